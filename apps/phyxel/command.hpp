@@ -1,0 +1,17 @@
+/// The subcommands of the program; one file each, `<name>.cpp`. Each adds itself to the parser
+/// and throws `phyxel::Error` for what main() turns into a message and an exit code.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace phyxel::app {
+
+void add_run(CLI::App& program);
+void add_check(CLI::App& program);
+void add_sample(CLI::App& program);
+void add_info(CLI::App& program);
+void add_export(CLI::App& program);
+void add_render(CLI::App& program);
+void add_bench(CLI::App& program);
+
+}  // namespace phyxel::app

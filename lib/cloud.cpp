@@ -1,0 +1,84 @@
+#include "phyxel/cloud.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace phyxel {
+namespace {
+
+/// Spreads the low 21 bits of `v` so that two zero bits follow each.
+std::uint64_t spread_bits(std::uint64_t v) {
+  v &= 0x1fffff;
+  v = (v | v << 32) & 0x1f00000000ffff;
+  v = (v | v << 16) & 0x1f0000ff0000ff;
+  v = (v | v << 8) & 0x100f00f00f00f00f;
+  v = (v | v << 4) & 0x10c30c30c30c30c3;
+  v = (v | v << 2) & 0x1249249249249249;
+  return v;
+}
+
+template <class T>
+void permute(std::vector<T>& values, const std::vector<Index>& order) {
+  if (values.empty()) return;
+  std::vector<T> moved(values.size());
+  for (std::size_t k = 0; k < order.size(); ++k) moved[k] = values[order[k]];
+  values.swap(moved);
+}
+
+}  // namespace
+
+std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
+                                  const std::vector<Triangle>& triangle) {
+  std::vector<Vec3d> normal(position.size());
+  for (const Triangle& t : triangle) {
+    const Vec3d area = cross(position[t[1]] - position[t[0]], position[t[2]] - position[t[0]]);
+    for (const Index corner : t) normal[corner] += area;
+  }
+  for (Vec3d& n : normal) n = normalised(n);
+  return normal;
+}
+
+double enclosed_volume(const Surface& surface) {
+  // Taken about the first vertex, so that a body far from the origin loses no digits.
+  const Vec3d origin = surface.position.empty() ? Vec3d{} : surface.position.front();
+  double six_volumes = 0;
+  for (const Triangle& t : surface.triangle) {
+    six_volumes += dot(surface.position[t[0]] - origin, cross(surface.position[t[1]] - origin,
+                                                              surface.position[t[2]] - origin));
+  }
+  return six_volumes / 6;
+}
+
+void order_along_curve(Cloud& cloud) {
+  const std::size_t n = cloud.position.size();
+  if (n < 2) return;
+  Vec3d low = cloud.position[0], high = cloud.position[0];
+  for (const Vec3d& p : cloud.position) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const double scale = extent > 0 ? 2097151.0 / extent : 0;
+  std::vector<std::pair<std::uint64_t, Index>> key(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3d cell = scale * (cloud.position[i] - low);
+    key[i] = {spread_bits(static_cast<std::uint64_t>(cell.x)) |
+                  spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
+                  spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,
+              static_cast<Index>(i)};
+  }
+  std::sort(key.begin(), key.end());
+  std::vector<Index> order(n), place(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    order[k] = key[k].second;
+    place[order[k]] = static_cast<Index>(k);
+  }
+  permute(cloud.position, order);
+  permute(cloud.volume, order);
+  for (auto& [name, members] : cloud.regions) {
+    for (Index& i : members) i = place[i];
+    std::sort(members.begin(), members.end());
+  }
+}
+
+}  // namespace phyxel

@@ -1,0 +1,58 @@
+/// The work of one device, at the granularity of one kernel.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "phyxel/model.hpp"
+#include "phyxel/state.hpp"
+
+namespace phyxel {
+
+/// Phyxels [begin, end).
+struct Range {
+  Index begin = 0, end = 0;
+};
+
+/// Bytes a backend holds, by array.
+struct ArrayBytes {
+  std::string name;
+  std::size_t bytes = 0;
+};
+
+/// Owns the live arrays of one device and the kernels over them. `upload` and `download` are the
+/// only ways in and out.
+class Backend {
+ public:
+  virtual ~Backend() = default;
+
+  /// e.g. "cpu, float, 2 threads, 16 lanes".
+  virtual std::string name() const = 0;
+  virtual Index size() const = 0;
+  virtual void upload(const State& state) = 0;
+  virtual void download(State& state) const = 0;
+
+  /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q of each phyxel.
+  virtual void stress(Range range) = 0;
+  /// Pass 2: gathers Q over the inverse neighbourhood into forces, adds gravity and loads, and
+  /// takes one Verlet step of `dt` from `time`; motions are applied to the result.
+  virtual void advance(Range range, double time, double dt) = 0;
+
+  /// Internal forces [N] at the present displacements, shape [n, 3] (runs both passes).
+  virtual void internal_forces(std::vector<Vec3d>& force) = 0;
+  /// Displacement gradients at the present displacements, shape [n].
+  virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
+  /// Energies, momenta and a finiteness check at `state`'s time.
+  virtual Diagnostics diagnose(double time, double dt) = 0;
+  /// Passive surfel advection, equation (6).
+  virtual void advect_surfels(SurfelState& surfels) = 0;
+
+  virtual std::vector<ArrayBytes> memory() const = 0;
+};
+
+/// The CPU backend: OpenMP over SIMD packs of phyxels. The model must outlive it.
+/// @param threads 0: OpenMP's choice.
+std::unique_ptr<Backend> make_cpu_backend(const Model& model, Precision precision, int threads = 0);
+
+}  // namespace phyxel

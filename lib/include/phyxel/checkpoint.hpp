@@ -1,0 +1,45 @@
+/// Checkpoints: a `State` on disk that lets a run go on as if it had never stopped.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "phyxel/scene.hpp"
+#include "phyxel/state.hpp"
+
+namespace phyxel {
+
+/// What a checkpoint holds beside the state.
+struct CheckpointInfo {
+  int version = 0;              ///< Of the format.
+  std::string program;          ///< "phyxel 0.1.0 (commit)".
+  Precision precision = Precision::single;
+  std::string scene_text;
+  std::uint64_t model_digest = 0;  ///< Of rest positions, masses and neighbour lists.
+  double total_energy = 0;         ///< [J], for the drift of the continued run.
+  double initial_energy = 0;       ///< [J], at t = 0.
+  std::int64_t frames_written = 0; ///< Frames on disk at that time.
+};
+
+/// Writes `directory/checkpoint_<step>.h5`, then its digest beside it (`.xxh`); each to a
+/// temporary name, synced and renamed. Keeps the last two checkpoints, removes older ones.
+/// State arrays are stored in the precision of the run (float for `single`).
+/// @throws OutputError; earlier checkpoints stay intact.
+std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
+                                       const CheckpointInfo& info);
+
+struct Checkpoint {
+  State state;
+  CheckpointInfo info;
+};
+
+/// Reads one checkpoint. The digest is compared before HDF5 parses a single byte.
+/// @throws InputError for a missing, truncated, altered or foreign file.
+Checkpoint read_checkpoint(const std::filesystem::path& file);
+
+/// The newest readable checkpoint in `directory`; a damaged one is skipped, and `warning` says so.
+std::optional<std::filesystem::path> latest_checkpoint(const std::filesystem::path& directory,
+                                                       std::string* warning = nullptr);
+
+}  // namespace phyxel

@@ -1,0 +1,42 @@
+/// One deformable body at rest, before it has neighbours, masses or a material.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+using Triangle = std::array<Index, 3>;
+
+/// A triangulated surface. As part of a `Cloud` its vertices are the surfels.
+struct Surface {
+  std::vector<Vec3d> position;      ///< Vertex positions [m], shape [n_surfels, 3].
+  std::vector<Vec3d> normal;        ///< Outward unit normals, shape [n_surfels, 3].
+  std::vector<Triangle> triangle;   ///< Vertex indices, counter-clockwise seen from outside.
+};
+
+/// Rest points of one body, in the caller's order.
+struct Cloud {
+  std::vector<Vec3d> position;  ///< Phyxel positions [m], shape [n_phyxels, 3].
+  std::vector<double> volume;   ///< Phyxel volumes [m^3], shape [n_phyxels]; empty: unknown.
+  Surface surface;              ///< Surfels; may be empty.
+  /// Named groups of phyxels (sorted indices) that scenes can select, e.g. "mouth".
+  std::map<std::string, std::vector<Index>> regions;
+};
+
+/// Area-weighted vertex normals of a triangulated surface, outward for outward triangles.
+std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
+                                  const std::vector<Triangle>& triangle);
+
+/// Volume enclosed by a closed surface [m^3] (divergence theorem); negative if inside out.
+double enclosed_volume(const Surface& surface);
+
+/// Reorders the phyxels along a Morton (Z-order) curve, so that neighbours in space are
+/// neighbours in memory; regions follow. Every generator and sampler ends with this.
+void order_along_curve(Cloud& cloud);
+
+}  // namespace phyxel

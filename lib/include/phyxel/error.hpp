@@ -1,0 +1,57 @@
+/// The errors phyxel throws, and the exit code each one ends the program with.
+#pragma once
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace phyxel {
+
+/// Exit codes of the program; documented in `phyxel --help`.
+enum class ExitCode : int {
+  success = 0,
+  bad_input = 2,     ///< a file, key or option is wrong; nothing was computed or overwritten
+  diverged = 3,      ///< NaN or runaway energy; the last good state is on disk
+  output_failed = 74,///< writing failed during the run (disk full); earlier files are intact
+  stopped = 75,      ///< a signal ended the run; the checkpoint lets it go on
+};
+
+/// Base of every error phyxel throws on purpose. `what()` is the whole message for the user.
+class Error : public std::runtime_error {
+ public:
+  Error(ExitCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  ExitCode code() const { return code_; }
+
+ private:
+  ExitCode code_;
+};
+
+/// Wrong input. The message names the file (with line and column where known), the key or
+/// element, the value found, and what is allowed.
+class InputError : public Error {
+ public:
+  explicit InputError(const std::string& message) : Error(ExitCode::bad_input, message) {}
+};
+
+/// Writing a file failed while the simulation was under way.
+class OutputError : public Error {
+ public:
+  explicit OutputError(const std::string& message) : Error(ExitCode::output_failed, message) {}
+};
+
+/// The simulation became unstable.
+class DivergedError : public Error {
+ public:
+  explicit DivergedError(const std::string& message) : Error(ExitCode::diverged, message) {}
+};
+
+/// The entry of `allowed` with the smallest edit distance to `word`, or "" if none is close
+/// (more than half of the longer word would have to change).
+std::string nearest_name(std::string_view word, const std::vector<std::string>& allowed);
+
+/// " (did you mean \"young\"?)", or "" if no name is close.
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& allowed);
+
+}  // namespace phyxel

@@ -1,0 +1,31 @@
+/// Material of a body and how its volume shares are found.
+#pragma once
+
+#include <string>
+
+namespace phyxel {
+
+/// Strain measure. `green` (equation 2 of Farias et al. 2008) is exact under rotation; `cauchy`
+/// (equation 3) is its linearisation, cheaper and only right for small rotations.
+enum class Strain { green, cauchy };
+
+/// Isotropic Hookean material, one per body.
+struct Material {
+  double young = 0;             ///< Young's modulus E [Pa], > 0.
+  double poisson = 0;           ///< Poisson's ratio, -1 < nu < 0.5.
+  double density = 0;           ///< [kg/m^3], > 0.
+  Strain strain = Strain::green;
+  double volume_stiffness = 0;  ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
+  double damping = 0;           ///< Mass-proportional damping [1/s]; 0: none.
+
+  /// Lamé's first parameter [Pa].
+  double lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
+  /// Shear modulus [Pa], Lamé's second parameter.
+  double lame_mu() const { return young / (2 * (1 + poisson)); }
+};
+
+/// Where phyxel volumes come from. `kernel`: the rule of Mueller et al. 2004, mass over kernel
+/// density. `geometry`: the volumes the cloud carries. `automatic`: geometry if there is one.
+enum class VolumeRule { automatic, geometry, kernel };
+
+}  // namespace phyxel

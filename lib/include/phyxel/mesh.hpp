@@ -1,0 +1,58 @@
+/// Reading closed surfaces from files, and filling them with phyxels.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+
+namespace phyxel {
+
+/// Reads a triangulated surface from an OBJ, PLY or STL file (chosen by its extension).
+/// Polygons are triangulated, identical STL corners are merged, and normals are recomputed.
+/// @throws InputError naming the file and the line, byte or element for a missing, unreadable,
+///   empty, malformed or non-finite file, or indices out of range.
+Surface read_mesh(const std::filesystem::path& file);
+
+/// What is wrong with a surface, by count and place.
+struct SurfaceDefects {
+  Index open_edges = 0;           ///< Edges with one triangle: holes.
+  Index crowded_edges = 0;        ///< Edges with more than two triangles.
+  Index flipped_edges = 0;        ///< Edges whose two triangles disagree on the outside.
+  Index degenerate_triangles = 0; ///< Triangles without area.
+  Index unused_vertices = 0;
+  Index parts = 0;                ///< Connected parts.
+  bool inside_out = false;        ///< The enclosed volume is negative.
+  Vec3d example;                  ///< Midpoint of one defective edge or triangle [m].
+  bool clean() const;
+  std::string describe() const;   ///< One line for the user.
+};
+SurfaceDefects inspect_surface(const Surface& surface);
+
+/// How a surface is filled with phyxels.
+struct SampleRequest {
+  Index phyxels = 0;        ///< Exact number of phyxels.
+  std::uint64_t seed = 1;   ///< The same seed gives the same cloud on any number of threads.
+  int relaxations = 30;     ///< Sweeps of the relaxation (Lloyd); 0: none.
+};
+
+/// What sampling found out.
+struct SampleReport {
+  SurfaceDefects defects;
+  double volume = 0;             ///< Volume inside the surface [m^3].
+  double doubtful_fraction = 0;  ///< Share of inside tests with a winding number far from 0 and 1.
+  double spacing = 0;            ///< Mean distance to the nearest phyxel [m].
+  double smallest_gap = 0;       ///< Smallest distance between two phyxels [m].
+  std::vector<std::string> warnings;
+};
+
+/// Fills `surface` with exactly `request.phyxels` well-spread phyxels, all inside; each gets its
+/// share of the enclosed volume. The surface's vertices become the surfels.
+/// Source of the inside test: Jacobson et al. 2013 (generalised winding number), with the fast
+/// summation of Barill et al. 2018.
+/// @throws InputError for a surface without volume, or so open that inside has no meaning.
+Cloud sample_surface(const Surface& surface, const SampleRequest& request,
+                     SampleReport* report = nullptr);
+
+}  // namespace phyxel

@@ -1,0 +1,87 @@
+/// Everything about a scene that does not change while it runs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+#include "phyxel/neighbourhood.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel {
+
+/// One body's share of the model: phyxels [begin, end), surfels [surfel_begin, surfel_end).
+struct Part {
+  std::string name;
+  Index begin = 0, end = 0;
+  Index surfel_begin = 0, surfel_end = 0;
+  Material material;
+  std::string neighbourhood;    ///< The rule in words, for summaries.
+  bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
+};
+
+/// Phyxels whose neighbours do not span space.
+struct Degenerate {
+  std::vector<Index> isolated;    ///< No neighbour: moment matrix of rank 0.
+  std::vector<Index> collinear;   ///< Rank 1.
+  std::vector<Index> coplanar;    ///< Rank 2.
+  std::vector<Index> coincident;  ///< At the same place as another phyxel.
+  bool none() const;
+  std::string describe() const;   ///< Counts and the first few indices of each kind.
+};
+
+/// Phyxels that follow a path. Fixed phyxels are a motion with every term zero.
+struct Motion {
+  std::vector<Index> phyxels;
+  Vec3d displacement; double duration = 0;
+  Vec3d velocity;
+  Vec3d amplitude; double frequency = 0;
+  Vec3d displacement_at(double time) const;  ///< [m]
+};
+
+/// Constant forces on some phyxels, grown over `ramp` seconds.
+struct Load {
+  std::vector<Index> phyxels;
+  std::vector<Vec3d> force;   ///< [N], shape [phyxels]
+  double ramp = 0;            ///< [s]
+  double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
+};
+
+/// Surfels and the phyxels that carry each.
+struct Surfels {
+  std::vector<Vec3d> position;      ///< At rest [m], shape [n_surfels, 3].
+  std::vector<Vec3d> normal;        ///< At rest, unit.
+  std::vector<Triangle> triangle;
+  Csr carriers;                     ///< Row s: phyxels near surfel s.
+  Index unreached = 0;              ///< Surfels outside every support, carried by the nearest phyxel.
+};
+
+/// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never
+/// neighbour each other. Immutable after `build_model`; host memory, double precision.
+struct Model {
+  std::vector<Part> parts;
+  std::vector<Vec3d> position;        ///< Rest positions X [m], shape [n, 3].
+  std::vector<double> volume;         ///< v [m^3], shape [n].
+  std::vector<double> mass;           ///< m [kg], shape [n].
+  std::vector<Sym3d> inverse_moment;  ///< Pseudo-inverse of A_i = sum_j w_ij x_ij x_ij^T, shape [n].
+  std::vector<Vec3d> moment_offset;   ///< b_i = sum_j w_ij x_ij, shape [n, 3].
+  Neighbourhood neighbourhood;
+  Surfels surfels;
+  std::vector<Motion> motions;        ///< Fixed and prescribed phyxels.
+  std::vector<Load> loads;
+  Vec3d gravity;                      ///< [m/s^2]
+  Degenerate degenerate;
+  std::vector<std::string> warnings;  ///< For the summary.
+
+  Index size() const { return static_cast<Index>(position.size()); }
+};
+
+/// The rest cloud of one body of a scene: shape, mesh or file; scaled, rotated, moved into place.
+Cloud make_cloud(const BodyRequest& request);
+
+/// Builds the model: clouds, neighbours, masses, volumes, moments, selections.
+/// @throws InputError naming the scene's line for selections that match nothing, and for clouds
+///   that cannot carry the physics.
+Model build_model(const Scene& scene);
+
+}  // namespace phyxel

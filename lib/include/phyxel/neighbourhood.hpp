@@ -1,0 +1,66 @@
+/// Who interacts with whom: compressed rows of neighbours and of inverse neighbours.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Compressed rows: row i is indices[offsets[i] .. offsets[i+1]), ascending.
+struct Csr {
+  std::vector<Offset> offsets{0};  ///< shape [rows + 1]
+  std::vector<Index> indices;      ///< shape [entries]
+
+  Index rows() const { return static_cast<Index>(offsets.size() - 1); }
+  Offset entries() const { return offsets.back(); }
+  Index length(Index row) const { return static_cast<Index>(offsets[row + 1] - offsets[row]); }
+  std::span<const Index> row(Index i) const {
+    return {indices.data() + offsets[i], indices.data() + offsets[i + 1]};
+  }
+};
+
+/// Rows become columns: j is in row i of the result if i is in row j of `csr`. Linear time.
+Csr transpose(const Csr& csr, Index columns);
+
+/// How the support radius h of each phyxel is chosen. Source: Mueller et al. 2004, section 4.2:
+/// h_i = factor * (mean distance to the `nearest` nearest phyxels).
+struct NeighbourhoodRule {
+  enum class Support {
+    uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for both passes.
+    adaptive,  ///< Each phyxel its own h, as in the 2004 paper (factor 3 there).
+  };
+  Support support = Support::uniform;
+  int nearest = 10;
+  double factor = 1.8;                 ///< 1.8 gives about 32 neighbours in a uniform cloud.
+  std::optional<double> radius;        ///< [m]: h itself, instead of the rule.
+  std::optional<int> max_neighbours;   ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
+};
+
+/// Neighbours of every phyxel (itself excluded): j in N(i) if |x_j - x_i| < h_i.
+struct Neighbourhood {
+  Csr neighbours;                ///< N(i)
+  Csr inverse_lists;             ///< {j : i in N(j)}; empty if `symmetric`.
+  bool symmetric = true;         ///< N is its own inverse; `inverse()` then returns `neighbours`.
+  std::vector<double> support;   ///< h_i [m], shape [n_phyxels].
+  const Csr& inverse() const { return symmetric ? neighbours : inverse_lists; }
+};
+
+/// Mean distance from each phyxel to its `nearest` nearest others [m], shape [n_phyxels].
+/// Fewer phyxels than that: the mean over all others (0 for a lone phyxel).
+std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
+
+/// Neighbour search through the spatial hash of Teschner et al. 2003, in time linear in the number
+/// of phyxels. `spacing` is what `mean_spacing` returned.
+Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
+                              const NeighbourhoodRule& rule);
+
+/// For each of `point`, the phyxels i with |x_i - point| < support[i]; a point that no phyxel
+/// reaches gets the nearest one. `unreached` counts those.
+Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
+                 std::span<const double> support, Index* unreached = nullptr);
+
+}  // namespace phyxel

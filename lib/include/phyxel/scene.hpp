@@ -1,0 +1,137 @@
+/// A validated request for one simulation: what a scene file says, with units and defaults.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "phyxel/material.hpp"
+#include "phyxel/neighbourhood.hpp"
+#include "phyxel/shapes.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Arithmetic of a run. `mixed`: state in double, forces in float.
+enum class Precision { single, double_, mixed };
+
+/// A choice of phyxels, in rest coordinates after placement. Exactly one member is set.
+struct Selection {
+  struct Box { Vec3d low, high; };                  ///< [m]
+  struct Ball { Vec3d centre; double radius = 0; }; ///< [m]
+  std::optional<std::string> region;                ///< A named region of the cloud.
+  std::optional<std::vector<Index>> indices;        ///< Phyxel indices within the body.
+  std::optional<Box> box;
+  std::optional<Ball> ball;
+  bool all = false;                                 ///< The whole body.
+  std::string where;                                ///< "scene.toml:12:3", for errors.
+};
+
+/// Phyxels held where they are.
+struct FixRequest { Selection select; };
+
+/// Phyxels moved along a given path:
+/// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency t).
+struct MotionRequest {
+  Selection select;
+  Vec3d displacement;    ///< [m]
+  double duration = 0;   ///< [s], 0: at once is refused when displacement is not zero
+  Vec3d velocity;        ///< [m/s]
+  Vec3d amplitude;       ///< [m]
+  double frequency = 0;  ///< [Hz]
+};
+
+/// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density` [N/m^3].
+/// Grows linearly from zero during `ramp` seconds.
+struct LoadRequest {
+  Selection select;
+  Vec3d force;           ///< [N]
+  Vec3d force_density;   ///< [N/m^3]
+  double ramp = 0;       ///< [s]
+};
+
+/// Where a body's rest shape comes from. Exactly one of `shape.name`, `mesh`, `file` is set.
+struct BodySource {
+  ShapeRequest shape;
+  std::filesystem::path mesh;   ///< Surface to fill with `phyxels` phyxels.
+  std::filesystem::path file;   ///< body.h5 written by `phyxel sample`.
+  Index phyxels = 0;            ///< Mesh: exact count. Lattice shapes: about this many.
+  std::uint64_t seed = 1;
+  int relaxations = 30;
+};
+
+/// One body of a scene.
+struct BodyRequest {
+  std::string name;
+  BodySource source;
+  double scale = 1;             ///< Applied first, about the origin.
+  Vec3d rotation;               ///< Axis times angle [degrees], applied second.
+  Vec3d translation;            ///< [m], applied last.
+  Vec3d velocity;               ///< Initial velocity [m/s].
+  Vec3d spin;                   ///< Initial angular velocity about the centre of mass [rad/s].
+  Material material;
+  NeighbourhoodRule neighbourhood;
+  VolumeRule volume_rule = VolumeRule::automatic;
+  std::vector<FixRequest> fixed;
+  std::vector<MotionRequest> motions;
+  std::vector<LoadRequest> loads;
+  std::string where;            ///< "scene.toml:7:1", for errors.
+};
+
+struct TimeRequest {
+  double end = 0;               ///< Simulated time [s].
+  std::optional<double> step;   ///< [s]; unset: from the spectral radius of the stiffness.
+  double safety = 0.8;          ///< Fraction of the largest stable step, 0 to 1.
+};
+
+struct SolverRequest {
+  std::string device = "auto";  ///< "auto", "cpu" or "cuda".
+  Precision precision = Precision::single;
+  int threads = 0;              ///< 0: OpenMP's choice.
+};
+
+struct OutputRequest {
+  std::filesystem::path directory;             ///< Default: out/<scene file's name>.
+  double frames_per_second = 25;               ///< Frames per simulated second; 0: last frame only.
+  bool phyxels = true;                         ///< Write the phyxel family.
+  bool surface = true;                         ///< Write the deformed surface family.
+  /// Phyxel fields beside the positions: "displacement", "velocity", "von_mises" [Pa],
+  /// "volume_ratio", "mass", "volume", "body".
+  std::vector<std::string> fields = {"displacement", "velocity"};
+  double checkpoint_every = 300;               ///< Wall-clock seconds between checkpoints; 0: only at the end.
+};
+
+struct RenderRequest {
+  bool pictures = false;        ///< Write PNG pictures at the end of a run.
+  int count = 6;                ///< How many frames, evenly spread, first and last included.
+  int width = 960, height = 720;
+  Vec3d view{-1, 2, -0.6};      ///< Direction the camera looks along.
+  Vec3d up{0, 0, 1};
+};
+
+struct Scene {
+  std::string title;
+  std::filesystem::path file;   ///< Where it was read from; may be empty.
+  std::string text;             ///< The file's text, kept in checkpoints and outputs.
+  Vec3d gravity;                ///< [m/s^2], zero if the scene names none.
+  TimeRequest time;
+  SolverRequest solver;
+  OutputRequest output;
+  RenderRequest render;
+  std::vector<BodyRequest> bodies;
+};
+
+/// Reads and validates a scene file (TOML). Relative paths are resolved from its folder.
+/// @throws InputError with file, line and column for anything missing, unknown or out of range.
+Scene read_scene(const std::filesystem::path& file);
+
+/// The same from text; `file` is used in messages and to resolve paths.
+Scene parse_scene(const std::string& text, const std::filesystem::path& file);
+
+/// One line per key: name, type, unit, default, allowed range and meaning, as Markdown; made from
+/// the same table that parses, so that the documentation cannot drift.
+std::string scene_reference();
+
+}  // namespace phyxel

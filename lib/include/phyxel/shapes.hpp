@@ -1,0 +1,44 @@
+/// Built-in bodies that need no file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+
+namespace phyxel {
+
+/// Request for a built-in shape. Which members matter depends on the shape:
+/// "beam", "block": `size` (beam lies along x, its end x = 0 at the origin and its axis on the
+/// x axis; the block is centred on the origin); "cylinder": `radius`, `length` (along z, centred);
+/// "sphere": `radius` (centred). These are filled by a lattice of `spacing`, cell-centred, each
+/// phyxel moved by up to `jitter` spacings in each direction.
+/// "alien_head" (238 phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504):
+/// the bodies of Farias et al. 2008, section 6; their counts are fixed, about 1 m tall.
+struct ShapeRequest {
+  std::string name;
+  Vec3d size;                 ///< Extents [m].
+  double radius = 0;          ///< [m]
+  double length = 0;          ///< [m]
+  double spacing = 0;         ///< Lattice spacing [m].
+  double jitter = 0;          ///< Fraction of the spacing, 0 to 0.5.
+  std::uint64_t seed = 1;     ///< Of the jitter; the same on any number of threads.
+  bool surface = true;        ///< Whether to make surfels.
+};
+
+/// Names `make_shape` knows.
+const std::vector<std::string>& shape_names();
+
+/// Whether the shape is one of the paper's three bodies, whose size and counts are fixed.
+bool is_paper_shape(const std::string& name);
+
+/// Lattice spacing [m] that fills the shape with about `phyxels` phyxels.
+double spacing_for(const ShapeRequest& request, Index phyxels);
+
+/// Makes a built-in body: phyxels with volumes, surfels, and named regions ("x-", "x+", "y-", ...
+/// for the outermost layer of phyxels on that side of a box; "z-", "z+" for a cylinder; "mouth"
+/// for the dino, "neck" for the alien head, "leg" for the horn bug).
+/// @throws InputError for an unknown name, or sizes, spacing or jitter out of range.
+Cloud make_shape(const ShapeRequest& request);
+
+}  // namespace phyxel

@@ -1,0 +1,200 @@
+/// Small vectors and matrices shared by host and device code.
+///
+/// Everything here is a plain value templated on the scalar type `Real`, which may be `float`,
+/// `double`, or a SIMD pack of either (see lib/pack.hpp): the physics in `phyxel/physics/` is
+/// written once against these types. Public headers hold no Eigen types on purpose: their
+/// alignment depends on the compiler flags of whoever includes them.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#if defined(__CUDACC__)
+#define PHYXEL_HD __host__ __device__ __forceinline__
+#else
+#define PHYXEL_HD inline __attribute__((always_inline))
+#endif
+
+namespace phyxel {
+
+template <class Real>
+struct Vec3 {
+  Real x{}, y{}, z{};
+};
+
+/// 3x3 matrix, row-major: `a[row][column]`.
+template <class Real>
+struct Mat3 {
+  Real a[3][3]{};
+  PHYXEL_HD Real& operator()(int row, int column) { return a[row][column]; }
+  PHYXEL_HD const Real& operator()(int row, int column) const { return a[row][column]; }
+};
+
+/// Symmetric 3x3 matrix, upper triangle.
+template <class Real>
+struct Sym3 {
+  Real xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
+};
+
+using Vec3d = Vec3<double>;
+using Mat3d = Mat3<double>;
+using Sym3d = Sym3<double>;
+using Index = std::int32_t;   ///< index of a phyxel, surfel or triangle on one rank
+using Offset = std::int64_t;  ///< offset into a list of pairs; never 32-bit
+
+// --- Vec3 ---------------------------------------------------------------------------------------
+template <class R>
+PHYXEL_HD Vec3<R> operator+(Vec3<R> a, Vec3<R> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+template <class R>
+PHYXEL_HD Vec3<R> operator-(Vec3<R> a, Vec3<R> b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+template <class R>
+PHYXEL_HD Vec3<R> operator-(Vec3<R> a) { return {-a.x, -a.y, -a.z}; }
+template <class R>
+PHYXEL_HD Vec3<R> operator*(R s, Vec3<R> a) { return {s * a.x, s * a.y, s * a.z}; }
+template <class R>
+PHYXEL_HD Vec3<R> operator*(Vec3<R> a, R s) { return {a.x * s, a.y * s, a.z * s}; }
+template <class R>
+PHYXEL_HD Vec3<R> operator/(Vec3<R> a, R s) { return {a.x / s, a.y / s, a.z / s}; }
+template <class R>
+PHYXEL_HD Vec3<R>& operator+=(Vec3<R>& a, Vec3<R> b) { return a = a + b; }
+template <class R>
+PHYXEL_HD Vec3<R>& operator-=(Vec3<R>& a, Vec3<R> b) { return a = a - b; }
+template <class R>
+PHYXEL_HD bool operator==(const Vec3<R>& a, const Vec3<R>& b) {
+  return a.x == b.x && a.y == b.y && a.z == b.z;
+}
+template <class R>
+PHYXEL_HD R dot(Vec3<R> a, Vec3<R> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class R>
+PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
+/// Unit vector along `a`; the zero vector stays zero.
+inline Vec3d normalised(Vec3d a) {
+  const double length = norm(a);
+  return length > 0 ? a / length : Vec3d{};
+}
+inline bool is_finite(Vec3d a) {
+  return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
+}
+
+// --- Mat3 ---------------------------------------------------------------------------------------
+template <class R>
+PHYXEL_HD Mat3<R> identity() {
+  Mat3<R> m;
+  m(0, 0) = m(1, 1) = m(2, 2) = R(1);
+  return m;
+}
+template <class R>
+PHYXEL_HD Mat3<R> operator+(const Mat3<R>& p, const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) m(r, c) = p(r, c) + q(r, c);
+  return m;
+}
+template <class R>
+PHYXEL_HD Mat3<R> operator-(const Mat3<R>& p, const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) m(r, c) = p(r, c) - q(r, c);
+  return m;
+}
+template <class R>
+PHYXEL_HD Mat3<R>& operator+=(Mat3<R>& p, const Mat3<R>& q) { return p = p + q; }
+template <class R>
+PHYXEL_HD Mat3<R> operator*(R s, const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) m(r, c) = s * q(r, c);
+  return m;
+}
+template <class R>
+PHYXEL_HD Mat3<R> operator*(const Mat3<R>& p, const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      m(r, c) = p(r, 0) * q(0, c) + p(r, 1) * q(1, c) + p(r, 2) * q(2, c);
+  return m;
+}
+template <class R>
+PHYXEL_HD Vec3<R> operator*(const Mat3<R>& m, Vec3<R> v) {
+  return {m(0, 0) * v.x + m(0, 1) * v.y + m(0, 2) * v.z,
+          m(1, 0) * v.x + m(1, 1) * v.y + m(1, 2) * v.z,
+          m(2, 0) * v.x + m(2, 1) * v.y + m(2, 2) * v.z};
+}
+template <class R>
+PHYXEL_HD Mat3<R> transpose(const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) m(r, c) = q(c, r);
+  return m;
+}
+/// Tensor product a bᵀ.
+template <class R>
+PHYXEL_HD Mat3<R> outer(Vec3<R> a, Vec3<R> b) {
+  Mat3<R> m;
+  m(0, 0) = a.x * b.x; m(0, 1) = a.x * b.y; m(0, 2) = a.x * b.z;
+  m(1, 0) = a.y * b.x; m(1, 1) = a.y * b.y; m(1, 2) = a.y * b.z;
+  m(2, 0) = a.z * b.x; m(2, 1) = a.z * b.y; m(2, 2) = a.z * b.z;
+  return m;
+}
+template <class R>
+PHYXEL_HD R determinant(const Mat3<R>& m) {
+  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
+         m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
+         m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
+}
+/// Cofactor matrix, det(m) m⁻ᵀ: the derivative of the determinant.
+template <class R>
+PHYXEL_HD Mat3<R> cofactor(const Mat3<R>& m) {
+  Mat3<R> c;
+  c(0, 0) = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
+  c(0, 1) = m(1, 2) * m(2, 0) - m(1, 0) * m(2, 2);
+  c(0, 2) = m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0);
+  c(1, 0) = m(2, 1) * m(0, 2) - m(2, 2) * m(0, 1);
+  c(1, 1) = m(2, 2) * m(0, 0) - m(2, 0) * m(0, 2);
+  c(1, 2) = m(2, 0) * m(0, 1) - m(2, 1) * m(0, 0);
+  c(2, 0) = m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1);
+  c(2, 1) = m(0, 2) * m(1, 0) - m(0, 0) * m(1, 2);
+  c(2, 2) = m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0);
+  return c;
+}
+
+// --- Sym3 ---------------------------------------------------------------------------------------
+template <class R>
+PHYXEL_HD Sym3<R> operator+(const Sym3<R>& p, const Sym3<R>& q) {
+  return {p.xx + q.xx, p.xy + q.xy, p.xz + q.xz, p.yy + q.yy, p.yz + q.yz, p.zz + q.zz};
+}
+template <class R>
+PHYXEL_HD Sym3<R>& operator+=(Sym3<R>& p, const Sym3<R>& q) { return p = p + q; }
+template <class R>
+PHYXEL_HD Sym3<R> operator*(R s, const Sym3<R>& q) {
+  return {s * q.xx, s * q.xy, s * q.xz, s * q.yy, s * q.yz, s * q.zz};
+}
+template <class R>
+PHYXEL_HD R trace(const Sym3<R>& s) { return s.xx + s.yy + s.zz; }
+/// Double contraction p : q.
+template <class R>
+PHYXEL_HD R contract(const Sym3<R>& p, const Sym3<R>& q) {
+  return p.xx * q.xx + p.yy * q.yy + p.zz * q.zz +
+         R(2) * (p.xy * q.xy + p.xz * q.xz + p.yz * q.yz);
+}
+template <class R>
+PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
+  Mat3<R> m;
+  m(0, 0) = s.xx; m(0, 1) = s.xy; m(0, 2) = s.xz;
+  m(1, 0) = s.xy; m(1, 1) = s.yy; m(1, 2) = s.yz;
+  m(2, 0) = s.xz; m(2, 1) = s.yz; m(2, 2) = s.zz;
+  return m;
+}
+template <class R>
+PHYXEL_HD Vec3<R> operator*(const Sym3<R>& s, Vec3<R> v) {
+  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
+          s.xz * v.x + s.yz * v.y + s.zz * v.z};
+}
+template <class R>
+PHYXEL_HD Mat3<R> operator*(const Mat3<R>& m, const Sym3<R>& s) { return m * full(s); }
+
+}  // namespace phyxel
