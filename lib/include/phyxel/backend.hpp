@@ -10,11 +10,6 @@
 
 namespace phyxel {
 
-/// Phyxels [begin, end).
-struct Range {
-  Index begin = 0, end = 0;
-};
-
 /// Bytes a backend holds, by array.
 struct ArrayBytes {
   std::string name;
@@ -34,17 +29,15 @@ class Backend {
   virtual void download(State& state) const = 0;
 
   /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q of each phyxel.
-  virtual void stress(Range range) = 0;
+  virtual void stress() = 0;
   /// Pass 2: gathers Q over the inverse neighbourhood into forces, adds gravity and loads, and
   /// takes one Verlet step of `dt` from `time`; motions are applied to the result.
-  virtual void advance(Range range, double time, double dt) = 0;
+  virtual void advance(double time, double dt) = 0;
 
   /// Internal forces [N] at the present displacements, shape [n, 3] (runs both passes).
   virtual void internal_forces(std::vector<Vec3d>& force) = 0;
   /// Displacement gradients at the present displacements, shape [n].
   virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
-  /// Energies, momenta and a finiteness check at `state`'s time.
-  virtual Diagnostics diagnose(double time, double dt) = 0;
   /// Passive surfel advection, equation (6).
   virtual void advect_surfels(SurfelState& surfels) = 0;
 

@@ -1,6 +1,7 @@
 /// Everything about a scene that does not change while it runs.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,11 @@ struct Degenerate {
 /// Phyxels that follow a path. Fixed phyxels are a motion with every term zero.
 struct Motion {
   std::vector<Index> phyxels;
-  Vec3d displacement; double duration = 0;
-  Vec3d velocity;
-  Vec3d amplitude; double frequency = 0;
+  Vec3d displacement{};
+  double duration = 0;
+  Vec3d velocity{};
+  Vec3d amplitude{};
+  double frequency = 0;
   Vec3d displacement_at(double time) const;  ///< [m]
 };
 
@@ -83,5 +86,9 @@ Cloud make_cloud(const BodyRequest& request);
 /// @throws InputError naming the scene's line for selections that match nothing, and for clouds
 ///   that cannot carry the physics.
 Model build_model(const Scene& scene);
+
+/// The same from clouds already in place, one for each body of the scene (whose source, scale,
+/// rotation and translation are then unused).
+Model build_model(const Scene& scene, std::span<const Cloud> clouds);
 
 }  // namespace phyxel

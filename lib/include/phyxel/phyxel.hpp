@@ -5,6 +5,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/cloud.hpp"
+#include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"

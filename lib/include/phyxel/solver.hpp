@@ -1,9 +1,5 @@
-/// The time loop, the step limit and the stability watch.
+/// The time loop and the step limit.
 #pragma once
-
-#include <functional>
-#include <memory>
-#include <string>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
@@ -14,36 +10,37 @@ namespace phyxel {
 /// How the largest stable step was found.
 struct StepLimit {
   double omega_max = 0;     ///< Largest eigenfrequency of the model at rest [rad/s].
-  double largest_step = 0;  ///< 2 / omega_max [s].
-  double sound_step = 0;    ///< Smallest h / c, for comparison [s].
+  double largest_step = 0;  ///< 2 / omega_max [s]: Verlet is stable below it.
+  double sound_step = 0;    ///< Smallest h / c over the phyxels [s], for comparison.
   int iterations = 0;       ///< Lanczos iterations taken.
 };
 
-/// Largest eigenvalue of M^-1 K at the reference state, by Lanczos iteration on the force
-/// function itself (differenced at rest, in double), so that every term in use counts.
-/// Damping included: the largest step is that of the damped central difference.
-StepLimit step_limit(const Model& model);
+/// Largest eigenvalue of M⁻¹K at the reference state, by Lanczos iteration on the force function
+/// itself (in double, differenced about rest), so that every term in use counts. Fixed phyxels are
+/// taken as free, which can only lower the limit; damping does not change it.
+/// @throws InputError if nothing in the model resists deformation.
+StepLimit step_limit(const Model& model, int threads = 0);
 
-/// The state at t = 0: displacements of motions, initial velocities of the bodies.
+/// The state at t = 0: initial velocities of the bodies, motions at their start.
 State initial_state(const Model& model, const Scene& scene, double dt);
 
-/// Advances a state through a backend.
+/// Advances a state through a backend by steps of fixed size. Time is always step × dt, so that a
+/// restarted run sees the same times to the bit.
 class Solver {
  public:
-  Solver(const Model& model, Backend& backend, const State& start);
+  /// Uploads `start`, whose `dt` is the step size.
+  Solver(Backend& backend, const State& start);
 
-  void step();                       ///< One time step.
-  double time() const { return static_cast<double>(steps_) * dt_; }
+  void step();
+  double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
   std::int64_t steps() const { return steps_; }
-  double dt() const { return dt_; }
-  State state() const;               ///< Downloaded copy.
-  Diagnostics diagnose();
+  double dt() const { return dt_; }                                  ///< [s]
+  State state() const;                                               ///< Downloaded copy.
 
  private:
-  const Model& model_;
   Backend& backend_;
-  std::int64_t steps_ = 0;
-  double dt_ = 0;
+  std::int64_t steps_;
+  double dt_;
 };
 
 }  // namespace phyxel

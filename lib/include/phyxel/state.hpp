@@ -42,6 +42,7 @@ struct Diagnostics {
   double torque_scale = 0;       ///< Sum of |x| |f| [N m].
   double largest_displacement = 0;  ///< [m]
   double largest_speed = 0;         ///< [m/s]
+  Index fastest_phyxel = -1;
   Index inverted = 0;            ///< Phyxels whose deformation gradient has det F <= 0.
   Index bad_phyxel = -1;         ///< First phyxel whose state is not finite, or -1.
 };

@@ -1,0 +1,111 @@
+/// How the CPU backend numbers phyxels: bodies start at a multiple of the SIMD width, so that a
+/// pack never mixes two bodies, and neighbour lists are stored pack by pack.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <new>
+#include <vector>
+
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// std::vector storage aligned for SIMD and for whole cache lines.
+template <class T>
+struct AlignedAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t alignment{128};
+  AlignedAllocator() = default;
+  template <class U>
+  explicit AlignedAllocator(const AlignedAllocator<U>&) {}
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
+  void deallocate(T* p, std::size_t) { ::operator delete(p, alignment); }
+  template <class U>
+  bool operator==(const AlignedAllocator<U>&) const { return true; }
+};
+template <class T>
+using AlignedVector = std::vector<T, AlignedAllocator<T>>;
+
+/// One body's packs [begin, end), each of `width` slots.
+struct PackRange {
+  Index begin = 0, end = 0;
+};
+
+/// Slots: phyxels renumbered so that each body fills whole packs. Slots past a body's end are
+/// padding: they have no neighbours but themselves, no volume and no mass.
+class Layout {
+ public:
+  Layout(const Model& model, int width) : width_(width) {
+    Index pack = 0;
+    for (const Part& part : model.parts) {
+      const Index count = part.end - part.begin;
+      first_slot_.push_back(pack * width);
+      const Index packs = (count + width - 1) / width;
+      parts_.push_back({pack, pack + packs});
+      pack += packs;
+    }
+    packs_ = pack;
+    for (std::size_t p = 0; p < model.parts.size(); ++p) {
+      for (Index i = model.parts[p].begin; i < model.parts[p].end; ++i) {
+        slot_.push_back(first_slot_[p] + (i - model.parts[p].begin));
+      }
+    }
+  }
+
+  int width() const { return width_; }
+  Index packs() const { return packs_; }
+  Index slots() const { return packs_ * width_; }
+  Index slot(Index phyxel) const { return slot_[phyxel]; }
+  const PackRange& part(std::size_t p) const { return parts_[p]; }
+  std::size_t parts() const { return parts_.size(); }
+
+ private:
+  int width_;
+  Index packs_ = 0;
+  std::vector<Index> first_slot_;
+  std::vector<PackRange> parts_;
+  std::vector<Index> slot_;
+};
+
+/// Neighbour lists in packs ("sliced ELLPACK"): entry k of the `width` phyxels of pack p stands at
+/// indices[start[p] + k * width ...]. Short rows are filled with the phyxel itself, whose share of
+/// every sum is exactly zero (x_ii = 0, u_ii = 0).
+struct PackedLists {
+  std::vector<Offset> start;      ///< shape [packs + 1]
+  AlignedVector<Index> indices;
+
+  PackedLists() = default;
+  PackedLists(const Csr& csr, const Layout& layout) {
+    const int width = layout.width();
+    std::vector<Index> phyxel(static_cast<std::size_t>(layout.slots()), -1);
+    for (Index i = 0; i < csr.rows(); ++i) phyxel[layout.slot(i)] = i;
+    start.assign(static_cast<std::size_t>(layout.packs()) + 1, 0);
+    for (Index p = 0; p < layout.packs(); ++p) {
+      Index longest = 0;
+      for (int l = 0; l < width; ++l) {
+        const Index i = phyxel[p * width + l];
+        if (i >= 0) longest = std::max(longest, csr.length(i));
+      }
+      start[p + 1] = start[p] + Offset{longest} * width;
+    }
+    indices.resize(static_cast<std::size_t>(start.back()));
+#pragma omp parallel for schedule(static)
+    for (Index p = 0; p < layout.packs(); ++p) {
+      const auto longest = static_cast<Index>((start[p + 1] - start[p]) / width);
+      for (int l = 0; l < width; ++l) {
+        const Index slot = p * width + l, i = phyxel[slot];
+        const Index length = i >= 0 ? csr.length(i) : 0;
+        for (Index k = 0; k < longest; ++k) {
+          indices[start[p] + Offset{k} * width + l] =
+              k < length ? layout.slot(csr.row(i)[k]) : slot;
+        }
+      }
+    }
+  }
+  std::size_t bytes() const {
+    return start.size() * sizeof(Offset) + indices.size() * sizeof(Index);
+  }
+};
+
+}  // namespace phyxel

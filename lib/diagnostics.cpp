@@ -1,0 +1,125 @@
+#include "phyxel/diagnostics.hpp"
+
+#include <cmath>
+
+#include "phyxel/physics/stress.hpp"
+
+namespace phyxel {
+namespace {
+
+bool all_finite(const Mat3d& m) {
+  double sum = 0;
+  for (int e = 0; e < 9; ++e) sum += m(e / 3, e % 3);
+  return std::isfinite(sum);
+}
+
+Mat3d first_piola_stress(const Material& material, const Mat3d& grad_u) {
+  const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
+  Mat3d p = material.strain == Strain::green
+                ? GreenHooke<double>{hooke}.first_piola_stress(grad_u)
+                : CauchyHooke<double>{hooke}.first_piola_stress(grad_u);
+  if (material.volume_stiffness > 0) {
+    p += VolumeConservation<double>{material.volume_stiffness}.first_piola_stress(grad_u);
+  }
+  return p;
+}
+
+/// sqrt(3/2 s:s) of the deviator of σ = P Fᵀ / det F.
+double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
+  const Mat3d f = identity<double>() + grad_u;
+  Mat3d sigma = (1 / determinant(f)) * (piola * transpose(f));
+  const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
+  for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
+  double squares = 0;
+  for (int e = 0; e < 9; ++e) squares += sigma(e / 3, e % 3) * sigma(e / 3, e % 3);
+  return std::sqrt(1.5 * squares);
+}
+
+}  // namespace
+
+double pressure_wave_speed(const Material& m) {
+  return std::sqrt((m.lame_lambda() + 2 * m.lame_mu() + m.volume_stiffness) / m.density);
+}
+
+Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
+  Diagnostics d;
+  d.step = step;
+  d.time = static_cast<double>(step) * dt;
+  State state;
+  backend.download(state);
+  std::vector<Vec3d> force;
+  backend.internal_forces(force);
+  std::vector<Mat3d> gradient;
+  backend.displacement_gradients(gradient);
+
+  // Total force with loads, for the velocity at t; the loads' potential on the way.
+  std::vector<Vec3d> applied(model.loads.empty() ? 0 : force.size());
+  for (const Load& load : model.loads) {
+    const double scale = load.scale_at(d.time);
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      applied[load.phyxels[k]] += scale * load.force[k];
+      d.load_energy -= scale * dot(load.force[k], state.displacement[load.phyxels[k]]);
+    }
+  }
+  std::vector<char> moved(force.size(), 0);
+  for (const Motion& motion : model.motions) {
+    for (const Index i : motion.phyxels) moved[i] = 1;
+  }
+
+  for (const Part& part : model.parts) {
+    const Material& m = part.material;
+    const Hooke<double> hooke{m.lame_lambda(), m.lame_mu()};
+    const VolumeConservation<double> volume_law{m.volume_stiffness};
+    for (Index i = part.begin; i < part.end; ++i) {
+      const Vec3d u = state.displacement[i], x = model.position[i] + u;
+      if (d.bad_phyxel < 0 && !(is_finite(u) && is_finite(state.velocity[i]) &&
+                                is_finite(force[i]) && all_finite(gradient[i]))) {
+        d.bad_phyxel = i;
+      }
+      Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
+      if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
+      acceleration -= m.damping * state.velocity[i];
+      const Vec3d v = moved[i] ? state.velocity[i] : state.velocity[i] + (dt / 2) * acceleration;
+      const Vec3d p = model.mass[i] * v;
+      d.kinetic_energy += 0.5 * dot(p, v);
+      d.momentum += p;
+      d.angular_momentum += cross(x, p);
+      d.gravity_energy -= model.mass[i] * dot(model.gravity, u);
+      const double strain_energy = m.strain == Strain::green
+                                       ? GreenHooke<double>{hooke}.energy(gradient[i])
+                                       : CauchyHooke<double>{hooke}.energy(gradient[i]);
+      d.strain_energy += model.volume[i] * strain_energy;
+      if (m.volume_stiffness > 0) {
+        d.volume_energy += model.volume[i] * volume_law.energy(gradient[i]);
+      }
+      d.inverted += VolumeConservation<double>::volume_change(gradient[i]) <= -1;
+      d.internal_force += force[i];
+      d.internal_torque += cross(x, force[i]);
+      d.force_scale += norm(force[i]);
+      d.torque_scale += norm(x) * norm(force[i]);
+      d.largest_displacement = std::max(d.largest_displacement, norm(u));
+      if (norm(v) > d.largest_speed) {
+        d.largest_speed = norm(v);
+        d.fastest_phyxel = i;
+      }
+    }
+  }
+  return d;
+}
+
+void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
+                   std::vector<double>* volume_ratio) {
+  std::vector<Mat3d> gradient;
+  backend.displacement_gradients(gradient);
+  if (von_mises) von_mises->resize(gradient.size());
+  if (volume_ratio) volume_ratio->resize(gradient.size());
+  for (const Part& part : model.parts) {
+    for (Index i = part.begin; i < part.end; ++i) {
+      const Mat3d& g = gradient[i];
+      if (von_mises) (*von_mises)[i] = von_mises_stress(first_piola_stress(part.material, g), g);
+      if (volume_ratio) (*volume_ratio)[i] = 1 + VolumeConservation<double>::volume_change(g);
+    }
+  }
+}
+
+}  // namespace phyxel

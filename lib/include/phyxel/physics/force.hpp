@@ -1,0 +1,32 @@
+/// From stress to forces. Everything a phyxel does to its neighbours is in one matrix, its pair
+/// stress Q_i = v_i P_i A_i⁻¹ [N/m per m]; it follows from differentiating the energy
+/// Σ_i v_i ψ(F_i), so momentum is conserved exactly:
+///   f_i = Q_i Σ_{j in N(i)} w_ij x_ij  +  Σ_{j : i in N(j)} w_ji Q_j x_ij.
+/// The first sum is a constant of the cloud (`Model::moment_offset`), the second runs over the
+/// inverse neighbourhood and replaces the n×n force matrix of Farias et al. 2008, section 5.2.
+#pragma once
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Q_i = v_i P_i A_i⁻¹.
+template <class Real>
+PHYXEL_HD Mat3<Real> pair_stress(Real volume, const Mat3<Real>& first_piola_stress,
+                                 const Sym3<Real>& inverse_moment) {
+  return volume * (first_piola_stress * inverse_moment);
+}
+
+/// Force on a phyxel from its own stress [N]; `moment_offset` is Σ_j w_ij x_ij.
+template <class Real>
+PHYXEL_HD Vec3<Real> own_force(const Mat3<Real>& q_i, Vec3<Real> moment_offset) {
+  return q_i * moment_offset;
+}
+
+/// Force on phyxel i from the stress of phyxel j, which has i as a neighbour [N].
+template <class Real>
+PHYXEL_HD Vec3<Real> neighbour_force(const Mat3<Real>& q_j, Vec3<Real> x_ij, Real w_ji) {
+  return q_j * (w_ji * x_ij);
+}
+
+}  // namespace phyxel

@@ -1,0 +1,43 @@
+/// From displacements to strain. Notation: x_ij = X_j - X_i at rest, u displacement, A moment
+/// matrix, F = I + ∇u deformation gradient (called J in the 2004 paper).
+#pragma once
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// One neighbour's share of Σ_j (u_j - u_i) (w_ij x_ij)ᵀ.
+template <class Real>
+PHYXEL_HD Mat3<Real> gradient_term(Vec3<Real> u_ij, Vec3<Real> x_ij, Real w_ij) {
+  return outer(u_ij, w_ij * x_ij);
+}
+
+/// ∇u_i = (Σ_j (u_j - u_i) (w_ij x_ij)ᵀ) A_i⁻¹; row a, column b is ∂u_a/∂X_b. Exact for linear
+/// displacement fields on any neighbourhood of rank 3. Source: Mueller et al. 2004, equation (11).
+template <class Real>
+PHYXEL_HD Mat3<Real> displacement_gradient(const Mat3<Real>& sum, const Sym3<Real>& inverse_moment) {
+  return sum * inverse_moment;
+}
+
+/// Green's strain ½(∇u + ∇uᵀ + ∇uᵀ∇u) = ½(FᵀF - I): equation (2) of Farias et al. 2008, with the
+/// transpose that its print lost. Written in ∇u, so that small strains keep their digits.
+template <class Real>
+PHYXEL_HD Sym3<Real> green_strain(const Mat3<Real>& g) {
+  const Real half = Real(0.5);
+  return {g(0, 0) + half * (g(0, 0) * g(0, 0) + g(1, 0) * g(1, 0) + g(2, 0) * g(2, 0)),
+          half * (g(0, 1) + g(1, 0) + g(0, 0) * g(0, 1) + g(1, 0) * g(1, 1) + g(2, 0) * g(2, 1)),
+          half * (g(0, 2) + g(2, 0) + g(0, 0) * g(0, 2) + g(1, 0) * g(1, 2) + g(2, 0) * g(2, 2)),
+          g(1, 1) + half * (g(0, 1) * g(0, 1) + g(1, 1) * g(1, 1) + g(2, 1) * g(2, 1)),
+          half * (g(1, 2) + g(2, 1) + g(0, 1) * g(0, 2) + g(1, 1) * g(1, 2) + g(2, 1) * g(2, 2)),
+          g(2, 2) + half * (g(0, 2) * g(0, 2) + g(1, 2) * g(1, 2) + g(2, 2) * g(2, 2))};
+}
+
+/// Cauchy's strain ½(∇u + ∇uᵀ): equation (3) of Farias et al. 2008.
+template <class Real>
+PHYXEL_HD Sym3<Real> cauchy_strain(const Mat3<Real>& g) {
+  const Real half = Real(0.5);
+  return {g(0, 0), half * (g(0, 1) + g(1, 0)), half * (g(0, 2) + g(2, 0)),
+          g(1, 1), half * (g(1, 2) + g(2, 1)), g(2, 2)};
+}
+
+}  // namespace phyxel

@@ -1,0 +1,25 @@
+/// The weight of a neighbour. Source: Mueller et al. 2004, section 4.2 (their equation for w).
+#pragma once
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Shape of the weight, (1 - r²/h²)³, without unit: the full weight is
+/// w(r, h) = 315 / (64 π h³) (1 - r²/h²)³. The constant cancels in every gradient (it stands in
+/// the moment matrix and in the sum), and h⁹ would leave the range of float for small bodies,
+/// so the step uses the shape alone. For r < h only: lists hold no other neighbours.
+template <class Real>
+PHYXEL_HD Real weight_shape(Real r_squared, Real inverse_h_squared) {
+  const Real t = Real(1) - r_squared * inverse_h_squared;
+  return t * t * t;
+}
+
+/// Full weight [1/m³], zero at r >= h. Used for densities.
+inline double weight(double r, double h) {
+  if (r >= h) return 0;
+  constexpr double factor = 315.0 / (64.0 * 3.14159265358979323846);
+  return factor / (h * h * h) * weight_shape(r * r, 1 / (h * h));
+}
+
+}  // namespace phyxel

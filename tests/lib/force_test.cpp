@@ -1,0 +1,202 @@
+/// The force on every phyxel, against the papers' equations and against the energy.
+#include <gtest/gtest.h>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "support/clouds.hpp"
+#include "support/oracle.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+
+struct Terms {
+  const char* name;
+  Strain strain;
+  double volume_stiffness;
+  NeighbourhoodRule::Support support;
+  std::optional<int> max_neighbours;
+};
+
+void PrintTo(const Terms& terms, std::ostream* out) { *out << terms.name; }
+
+const Terms all_terms[] = {
+    {"GreenUniform", Strain::green, 0, NeighbourhoodRule::Support::uniform, {}},
+    {"CauchyUniform", Strain::cauchy, 0, NeighbourhoodRule::Support::uniform, {}},
+    {"GreenVolumeUniform", Strain::green, 3e5, NeighbourhoodRule::Support::uniform, {}},
+    {"CauchyVolumeAdaptive", Strain::cauchy, 3e5, NeighbourhoodRule::Support::adaptive, {}},
+    {"GreenAdaptive", Strain::green, 0, NeighbourhoodRule::Support::adaptive, {}},
+    {"GreenVolumeCapped", Strain::green, 2e5, NeighbourhoodRule::Support::adaptive, 12},
+};
+
+/// An irregular cloud of 5 x 4 x 6 phyxels with the given terms.
+struct Case {
+  Model model;
+  oracle::Body body;
+  std::vector<Vec3d> u;
+};
+
+Case make_case(const Terms& terms) {
+  Material material = rubber();
+  material.strain = terms.strain;
+  material.volume_stiffness = terms.volume_stiffness;
+  NeighbourhoodRule rule;
+  rule.support = terms.support;
+  rule.max_neighbours = terms.max_neighbours;
+  Case c{model_of(one_body(material, rule), lattice(5, 4, 6, 0.1, 0.25)), {}, {}};
+  c.u = random_deformation(c.model, 0.01);
+  for (Index i = 0; i < c.model.size(); ++i) {
+    const Vec3d p = c.model.position[i];
+    c.body.x.push_back({p.x, p.y, p.z});
+    c.body.v.push_back(c.model.volume[i]);
+    c.body.h.push_back(c.model.neighbourhood.support[i]);
+    const auto row = c.model.neighbourhood.neighbours.row(i);
+    c.body.neighbours.emplace_back(row.begin(), row.end());
+  }
+  c.body.young = material.young;
+  c.body.poisson = material.poisson;
+  c.body.green = terms.strain == Strain::green;
+  c.body.volume_stiffness = terms.volume_stiffness;
+  return c;
+}
+
+std::vector<oracle::V3> to_eigen(const std::vector<Vec3d>& vectors) {
+  std::vector<oracle::V3> result;
+  for (const Vec3d& v : vectors) result.push_back({v.x, v.y, v.z});
+  return result;
+}
+
+double largest_norm(const std::vector<oracle::V3>& vectors) {
+  double largest = 0;
+  for (const auto& v : vectors) largest = std::max(largest, v.norm());
+  return largest;
+}
+
+class Force : public ::testing::TestWithParam<Terms> {};
+
+std::vector<Vec3d> backend_forces(const Model& model, const std::vector<Vec3d>& u,
+                                  Precision precision) {
+  const auto backend = make_cpu_backend(model, precision, 2);
+  backend->upload(state_of(u));
+  std::vector<Vec3d> force;
+  backend->internal_forces(force);
+  return force;
+}
+
+TEST_P(Force, EqualsTheOracle) {
+  const Case c = make_case(GetParam());
+  const auto expected = oracle::forces(c.body, to_eigen(c.u));
+  const double scale = largest_norm(expected);
+  // Double: some 40 neighbours' rounding through an inverse matrix. Float: the same at 6e-8, with
+  // strains of order one.
+  const std::pair<Precision, double> cases[] = {
+      {Precision::double_, 1e-12}, {Precision::single, 2e-5}, {Precision::mixed, 2e-5}};
+  for (const auto& [precision, tolerance] : cases) {
+    const auto force = backend_forces(c.model, c.u, precision);
+    double worst = 0;
+    for (std::size_t i = 0; i < force.size(); ++i) {
+      worst = std::max(worst, (to_eigen({force[i]})[0] - expected[i]).norm() / scale);
+    }
+    EXPECT_LT(worst, tolerance);
+  }
+}
+
+TEST_P(Force, IsMinusTheEnergyGradient) {
+  const Case c = make_case(GetParam());
+  const auto force = backend_forces(c.model, c.u, Precision::double_);
+  auto u = to_eigen(c.u);
+  const double scale = largest_norm(to_eigen(force));
+  // Central differences with step 1e-6 m: truncation 1e-12 x third derivatives / 0.1 m, rounding
+  // 1e-16 / 1e-6 of the energy; both near 1e-9 of the force.
+  const double step = 1e-6;
+  for (const std::size_t i : {0u, 7u, 33u, 61u, 87u, 119u}) {
+    for (int a = 0; a < 3; ++a) {
+      const double here = u[i][a];
+      u[i][a] = here + step;
+      const double above = oracle::energy(c.body, u);
+      u[i][a] = here - step;
+      const double below = oracle::energy(c.body, u);
+      u[i][a] = here;
+      const double derivative = (above - below) / (2 * step);
+      EXPECT_NEAR(to_eigen({force[i]})[0][a], -derivative, 1e-7 * scale);
+    }
+  }
+}
+
+TEST_P(Force, ReportedEnergyIsTheOracles) {
+  const Case c = make_case(GetParam());
+  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  backend->upload(state_of(c.u));
+  const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
+  const double expected = oracle::energy(c.body, to_eigen(c.u));
+  EXPECT_NEAR(d.strain_energy + d.volume_energy, expected, 1e-12 * expected);
+  EXPECT_EQ(d.volume_energy > 0, GetParam().volume_stiffness > 0);
+}
+
+TEST_P(Force, TotalForceAndTorqueVanish) {
+  const Case c = make_case(GetParam());
+  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  backend->upload(state_of(c.u));
+  const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
+  // Pairwise cancellation: only rounding of 120 sums is left.
+  EXPECT_LT(norm(d.internal_force), 1e-14 * d.force_scale);
+  if (GetParam().strain == Strain::green) {
+    EXPECT_LT(norm(d.internal_torque), 1e-13 * d.torque_scale);
+  } else {
+    // The linear strain does not know rotations: under this deformation torque is really lost.
+    EXPECT_GT(norm(d.internal_torque), 1e-4 * d.torque_scale);
+  }
+}
+
+TEST_P(Force, LinearFieldIsReproduced) {
+  const Case c = make_case(GetParam());
+  const auto u = random_deformation(c.model, 0);
+  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  backend->upload(state_of(u));
+  std::vector<Mat3d> gradient;
+  backend->displacement_gradients(gradient);
+  std::mt19937_64 engine(7);  // as random_deformation draws it
+  Mat3d expected;
+  for (int e = 0; e < 9; ++e) expected(e / 3, e % 3) = uniform(engine, -0.3, 0.3);
+  for (Index i = 0; i < c.model.size(); ++i) {
+    for (int e = 0; e < 9; ++e) {
+      // Rounding, times the condition of a 12-neighbour moment matrix.
+      EXPECT_NEAR(gradient[i](e / 3, e % 3), expected(e / 3, e % 3), 1e-12);
+    }
+  }
+}
+
+TEST_P(Force, TranslationAndRotationCostNothing) {
+  const Case c = make_case(GetParam());
+  const double angle = GetParam().strain == Strain::green ? 2.1 : 0;
+  Mat3d rotation = identity<double>();
+  rotation(0, 0) = rotation(1, 1) = std::cos(angle);
+  rotation(1, 0) = std::sin(angle);
+  rotation(0, 1) = -rotation(1, 0);
+  std::vector<Vec3d> u;
+  for (const Vec3d& x : c.model.position) u.push_back(rotation * x - x + Vec3d{3, -2, 1});
+  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  backend->upload(state_of(u));
+  const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
+  // Strain is rounding (1e-15, through the condition of the moments), against E of 1e5 and a face
+  // of 0.01 m² a phyxel.
+  EXPECT_LT(d.force_scale, 1e-13 * 1e5 * 0.01 * c.model.size());
+  EXPECT_LT(d.strain_energy, 1e-20);
+}
+
+INSTANTIATE_TEST_SUITE_P(Terms, Force, ::testing::ValuesIn(all_terms),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(Force, CauchyStrainSeesARotationAsStrain) {
+  Terms terms = all_terms[1];
+  const Case c = make_case(terms);
+  std::vector<Vec3d> u;
+  for (const Vec3d& x : c.model.position) u.push_back(Vec3d{-x.y, x.x, x.z} - x);
+  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  backend->upload(state_of(u));
+  EXPECT_GT(diagnose(c.model, *backend, 0, 1e-3).strain_energy, 1);
+}
+
+}  // namespace
+}  // namespace phyxel

@@ -1,0 +1,78 @@
+/// Small clouds and models for the tests.
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "phyxel/model.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel::testing {
+
+inline double uniform(std::mt19937_64& engine, double low, double high) {
+  return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53;
+}
+inline Vec3d uniform_vector(std::mt19937_64& engine, double amplitude) {
+  const double x = uniform(engine, -amplitude, amplitude);
+  const double y = uniform(engine, -amplitude, amplitude);
+  return {x, y, uniform(engine, -amplitude, amplitude)};
+}
+
+/// nx × ny × nz phyxels, cell-centred, each moved by up to `jitter` spacings; equal volumes.
+inline Cloud lattice(int nx, int ny, int nz, double spacing, double jitter = 0,
+                     std::uint64_t seed = 1) {
+  std::mt19937_64 engine(seed);
+  Cloud cloud;
+  for (int z = 0; z < nz; ++z) {
+    for (int y = 0; y < ny; ++y) {
+      for (int x = 0; x < nx; ++x) {
+        const Vec3d centre{x + 0.5, y + 0.5, z + 0.5};
+        cloud.position.push_back(spacing * (centre + uniform_vector(engine, jitter)));
+        cloud.volume.push_back(spacing * spacing * spacing);
+      }
+    }
+  }
+  return cloud;
+}
+
+inline Material rubber() {
+  return {.young = 1e5, .poisson = 0.3, .density = 1000, .strain = Strain::green};
+}
+
+/// A scene of one body named "body" without loads or gravity.
+inline Scene one_body(const Material& material = rubber(), const NeighbourhoodRule& rule = {}) {
+  Scene scene;
+  scene.time.end = 1;
+  BodyRequest body;
+  body.name = "body";
+  body.where = "test.toml:1:1";
+  body.material = material;
+  body.neighbourhood = rule;
+  scene.bodies.push_back(body);
+  return scene;
+}
+
+inline Model model_of(const Scene& scene, const Cloud& cloud) {
+  return build_model(scene, std::span(&cloud, 1));
+}
+
+inline State state_of(const std::vector<Vec3d>& displacement, double dt = 1e-3) {
+  State state;
+  state.displacement = displacement;
+  state.velocity.resize(displacement.size());
+  state.dt = dt;
+  return state;
+}
+
+/// A large smooth deformation with a random part on top.
+inline std::vector<Vec3d> random_deformation(const Model& model, double roughness,
+                                             std::uint64_t seed = 7) {
+  std::mt19937_64 engine(seed);
+  Mat3d g;
+  for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = uniform(engine, -0.3, 0.3);
+  std::vector<Vec3d> u;
+  for (const Vec3d& x : model.position) u.push_back(g * x + uniform_vector(engine, roughness));
+  return u;
+}
+
+}  // namespace phyxel::testing

@@ -1,0 +1,121 @@
+/// The oracle: a plain evaluation of the papers' equations by double loops over all pairs, written
+/// from the papers and not from the library, short enough to read in one sitting. Everything else
+/// is held against it. Notation as in Mueller et al. 2004 and Farias et al. 2008: x rest position,
+/// u displacement, v volume, w weight, A moment matrix, J = I + grad u.
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+namespace oracle {
+
+using V3 = Eigen::Vector3d;
+using M3 = Eigen::Matrix3d;
+
+struct Body {
+  std::vector<V3> x;
+  std::vector<double> v, h;
+  std::vector<std::vector<int>> neighbours;
+  double young = 0, poisson = 0, volume_stiffness = 0;
+  bool green = true;
+};
+
+inline double w(double r, double h) {
+  if (r >= h) return 0;
+  return 315 / (64 * M_PI * std::pow(h, 9)) * std::pow(h * h - r * r, 3);
+}
+
+/// Everyone closer than h_i.
+inline void find_neighbours(Body& b) {
+  const int n = static_cast<int>(b.x.size());
+  b.neighbours.assign(b.x.size(), {});
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      if (j != i && (b.x[j] - b.x[i]).norm() < b.h[i]) b.neighbours[i].push_back(j);
+    }
+  }
+}
+
+/// A_i^-1 with singular directions left out.
+inline M3 inverse_moment(const Body& b, int i) {
+  M3 a = M3::Zero();
+  for (const int j : b.neighbours[i]) {
+    const V3 xij = b.x[j] - b.x[i];
+    a += w(xij.norm(), b.h[i]) * xij * xij.transpose();
+  }
+  const Eigen::JacobiSVD<M3> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  M3 inverse = M3::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double s = svd.singularValues()[k];
+    if (s > 1e-6 * svd.singularValues()[0]) {
+      inverse += svd.matrixV().col(k) * svd.matrixU().col(k).transpose() / s;
+    }
+  }
+  return inverse;
+}
+
+inline M3 grad_u(const Body& b, const std::vector<V3>& u, int i) {
+  M3 g = M3::Zero();
+  for (const int j : b.neighbours[i]) {
+    const V3 xij = b.x[j] - b.x[i];
+    g += (u[j] - u[i]) * (inverse_moment(b, i) * xij * w(xij.norm(), b.h[i])).transpose();
+  }
+  return g;
+}
+
+inline M3 strain(const Body& b, const M3& g) {
+  const M3 linear = 0.5 * (g + g.transpose());
+  return b.green ? M3(linear + 0.5 * g.transpose() * g) : linear;
+}
+
+/// Equation (5) of Farias et al. 2008, in its 6x6 engineering layout.
+inline M3 stress(const Body& b, const M3& e) {
+  const double nu = b.poisson;
+  Eigen::Matrix<double, 6, 6> c = Eigen::Matrix<double, 6, 6>::Zero();
+  c.topLeftCorner<3, 3>().setConstant(nu);
+  c.diagonal() << 1 - nu, 1 - nu, 1 - nu, 1 - 2 * nu, 1 - 2 * nu, 1 - 2 * nu;
+  c *= b.young / ((1 + nu) * (1 - 2 * nu));
+  Eigen::Matrix<double, 6, 1> column;
+  column << e(0, 0), e(1, 1), e(2, 2), e(0, 1), e(1, 2), e(0, 2);
+  const Eigen::Matrix<double, 6, 1> s = c * column;
+  M3 sigma;
+  sigma << s[0], s[3], s[5], s[3], s[1], s[4], s[5], s[4], s[2];
+  return sigma;
+}
+
+inline double energy(const Body& b, const std::vector<V3>& u) {
+  double total = 0;
+  for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
+    const M3 g = grad_u(b, u, i), e = strain(b, g);
+    const double dj = (M3::Identity() + g).determinant() - 1;
+    total += b.v[i] * (0.5 * e.cwiseProduct(stress(b, e)).sum() +
+                       0.5 * b.volume_stiffness * dj * dj);
+  }
+  return total;
+}
+
+/// Forces by the papers' scatter: i pushes each of its neighbours, and itself the other way.
+inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
+  std::vector<V3> f(b.x.size(), V3::Zero());
+  for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
+    const M3 g = grad_u(b, u, i), j = M3::Identity() + g, a = inverse_moment(b, i);
+    M3 p = stress(b, strain(b, g));
+    if (b.green) p = j * p;
+    if (b.volume_stiffness > 0) {
+      M3 cof;
+      cof.col(0) = j.col(1).cross(j.col(2));
+      cof.col(1) = j.col(2).cross(j.col(0));
+      cof.col(2) = j.col(0).cross(j.col(1));
+      p += b.volume_stiffness * (j.determinant() - 1) * cof;
+    }
+    for (const int n : b.neighbours[i]) {
+      const V3 xij = b.x[n] - b.x[i];
+      const V3 push = -b.v[i] * p * (a * xij * w(xij.norm(), b.h[i]));
+      f[n] += push;
+      f[i] -= push;
+    }
+  }
+  return f;
+}
+
+}  // namespace oracle
