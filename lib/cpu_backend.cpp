@@ -83,7 +83,7 @@ class CpuBackend final : public Backend {
 
   void stress() override {
     for_each_law([&](const auto& law, PackRange range) {
-#pragma omp parallel for schedule(static) num_threads(threads_)
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
       for (Index p = range.begin; p < range.end; ++p) {
         const Mat3<P> grad_u = displacement_gradient_of(p);
         const Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
@@ -172,6 +172,16 @@ class CpuBackend final : public Backend {
     return list;
   }
 
+  std::size_t step_traffic() const override {
+    const auto slots = static_cast<std::size_t>(layout_.slots());
+    const std::size_t pass_1 = lists_.bytes() + slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real);
+    const std::size_t pass_2 =
+        (inverse_.start.empty() ? lists_ : inverse_).bytes() +
+        slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
+        load_.size() * sizeof(Real);
+    return pass_1 + pass_2;
+  }
+
  private:
   // --- the two neighbour loops ------------------------------------------------------------------
 
@@ -210,6 +220,11 @@ class CpuBackend final : public Backend {
     return force;
   }
 
+  /// Threads worth waking for a body: a pack takes about a microsecond, so does a barrier.
+  int threads_for(PackRange range) const {
+    return std::clamp((range.end - range.begin) / 8, 1, threads_);
+  }
+
   /// Force, loads, gravity and the Verlet step of one body.
   template <bool Damped, bool Loaded>
   void advance_part(std::size_t part, double dt) {
@@ -217,7 +232,7 @@ class CpuBackend final : public Backend {
     const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
     const Vec3<S> gravity{S(model_.gravity.x), S(model_.gravity.y), S(model_.gravity.z)};
     const PackRange range = layout_.part(part);
-#pragma omp parallel for schedule(static) num_threads(threads_)
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
       Vec3<P> force = force_of(p);
       if constexpr (Loaded) force += vec3_of<P>(load_, p);

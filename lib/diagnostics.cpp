@@ -1,6 +1,11 @@
 #include "phyxel/diagnostics.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
+
+#include "phyxel/error.hpp"
 
 #include "phyxel/physics/stress.hpp"
 
@@ -105,6 +110,62 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
     }
   }
   return d;
+}
+
+bool is_conservative(const Model& model) {
+  for (const Part& part : model.parts) {
+    if (part.material.damping > 0) return false;
+  }
+  for (const Load& load : model.loads) {
+    if (load.ramp > 0) return false;
+  }
+  for (const Motion& motion : model.motions) {
+    const Vec3d drive = motion.displacement + motion.velocity + motion.amplitude;
+    if (!(drive == Vec3d{})) return false;
+  }
+  return true;
+}
+
+StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start)
+    : model_(model), start_energy_(start.total_energy()), conservative_(is_conservative(model)) {
+  for (const Part& part : model.parts) {
+    speed_limit_ = std::max(speed_limit_, 3 * pressure_wave_speed(part.material));
+  }
+  speed_limit_ = std::max(speed_limit_, 10 * start.largest_speed);
+  check(start);
+}
+
+void StabilityWatch::check(const Diagnostics& now) {
+  const auto body_of = [&](Index i) {
+    for (const Part& part : model_.parts) {
+      if (i >= part.begin && i < part.end) return fmt::format("phyxel {} of body \"{}\"", i - part.begin, part.name);
+    }
+    return std::string("no phyxel");
+  };
+  const std::string when = fmt::format("at t = {:g} s (step {})", now.time, now.step);
+  const char* advice = "; a smaller time.safety, damping, or a stiffer material may help";
+  if (now.bad_phyxel >= 0) {
+    throw DivergedError(fmt::format("the simulation diverged: the state of {} is not finite {}{}",
+                                    body_of(now.bad_phyxel), when, advice));
+  }
+  if (now.largest_speed > speed_limit_) {
+    throw DivergedError(fmt::format(
+        "the simulation diverged: {} moves at {:g} m/s {}, more than three times the wave speed "
+        "of its material{}",
+        body_of(now.fastest_phyxel), now.largest_speed, when, advice));
+  }
+  const double elastic = now.strain_energy + now.volume_energy;
+  const double gained = now.total_energy() - start_energy_;
+  const double turnover = std::max({exchanged_, std::abs(now.gravity_energy + now.load_energy)});
+  // Verlet's energy error is bounded by a share of what moves; gaining as much as has ever moved
+  // is no such error.
+  if (conservative_ && now.step > 0 && gained > turnover + 1e-6 * std::abs(start_energy_)) {
+    throw DivergedError(fmt::format(
+        "the simulation diverged: energy has run away, {:g} J gained {} where at most {:g} J were "
+        "in motion; fastest is {}{}",
+        gained, when, turnover, body_of(now.fastest_phyxel), advice));
+  }
+  exchanged_ = std::max(exchanged_, now.kinetic_energy + elastic);
 }
 
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,

@@ -6,6 +6,7 @@
 
 #include "phyxel/model.hpp"
 #include "phyxel/scene.hpp"
+#include "phyxel/state.hpp"
 
 namespace phyxel::testing {
 

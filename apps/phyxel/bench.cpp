@@ -1,0 +1,265 @@
+/// phyxel bench: speeds beside the error they are reached at and the machine's own limits.
+#include <fmt/format.h>
+#include <omp.h>
+#include <sys/utsname.h>
+
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <functional>
+#include <random>
+
+#include "command.hpp"
+#include "phyxel/phyxel.hpp"
+#include "setup.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct BenchOptions {
+  std::vector<Index> sizes;
+  std::vector<int> threads;
+  std::vector<std::string> precisions = {"float", "double", "mixed"};
+  std::vector<std::string> terms;
+  std::string device = "cpu", csv;
+  int repeats = 5;
+  double seconds = 0.3;
+  bool force = false;
+};
+
+std::string processor_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  char text[16];
+  std::strftime(text, sizeof text, "%Y-%m-%d", std::gmtime(&now));
+  return text;
+}
+
+/// Bytes per second that `threads` threads copy between arrays far larger than any cache; read and
+/// write both counted. Best of five.
+double copy_bandwidth(int threads) {
+  const std::size_t count = std::size_t{1} << 25;  // 256 MiB of double
+  std::vector<double> from(count, 1.0), to(count, 0.0);
+  double best = 0;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    const auto start = Clock::now();
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (std::size_t i = 0; i < count; ++i) to[i] = from[i];
+    best = std::max(best, 2.0 * sizeof(double) * static_cast<double>(count) / seconds_since(start));
+  }
+  return to[count / 2] == 1.0 ? best : 0;
+}
+
+/// A cube of `n` phyxels, 0.1 m apart, jittered, without surfels.
+Cloud cube(Index n) {
+  const double side = std::round(std::cbrt(static_cast<double>(n))) * 0.1;
+  return make_shape({.name = "block", .size = {side, side, side}, .spacing = 0.1, .jitter = 0.1,
+                     .surface = false});
+}
+
+Scene cube_scene(const std::string& terms) {
+  Scene scene;
+  scene.gravity = {0, 0, -9.81};
+  BodyRequest body;
+  body.name = "cube";
+  body.material = {.young = 1e6, .poisson = 0.3, .density = 1000, .strain = Strain::green};
+  if (terms == "cauchy") body.material.strain = Strain::cauchy;
+  if (terms == "volume") body.material.volume_stiffness = 1e6;
+  if (terms == "damping") body.material.damping = 0.1;
+  if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
+  if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  scene.bodies.push_back(body);
+  return scene;
+}
+const std::vector<std::string> all_terms = {"green", "cauchy", "volume", "damping", "load", "adaptive"};
+
+Precision precision_of(const std::string& name) {
+  if (name == "float") return Precision::single;
+  if (name == "double") return Precision::double_;
+  if (name == "mixed") return Precision::mixed;
+  throw InputError(fmt::format("--precision {}: allowed: float, double, mixed", name));
+}
+
+/// Largest difference of internal forces from those in double, over the largest force, after a
+/// deformation of 10%.
+double force_error(const Model& model, Backend& backend) {
+  std::mt19937_64 engine(3);
+  State state;
+  for (const Vec3d& x : model.position) {
+    const auto noise = [&] { return 0.002 * (static_cast<double>(engine() >> 11) * 0x1p-53 - 0.5); };
+    state.displacement.push_back({0.1 * x.y + noise(), -0.05 * x.z + noise(), 0.02 * x.x + noise()});
+  }
+  state.velocity.resize(state.displacement.size());
+  std::vector<Vec3d> force, exact;
+  backend.upload(state);
+  backend.internal_forces(force);
+  const auto reference = make_cpu_backend(model, Precision::double_);
+  reference->upload(state);
+  reference->internal_forces(exact);
+  double worst = 0, largest = 0;
+  for (std::size_t i = 0; i < force.size(); ++i) {
+    worst = std::max(worst, norm(force[i] - exact[i]));
+    largest = std::max(largest, norm(exact[i]));
+  }
+  return worst / largest;
+}
+
+/// Writes the same row to the terminal and to the CSV file.
+class Table {
+ public:
+  Table(const BenchOptions& options, const std::string& columns) {
+    fmt::print("# {} | {} | {} | {}\n{}\n", program_version(), processor_name(), compiler_name(), today(), columns);
+    if (options.csv.empty()) return;
+    if (std::filesystem::exists(options.csv) && !options.force) {
+      throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
+    }
+    file_.open(options.csv);
+    if (!file_) throw InputError(fmt::format("{}: cannot be written", options.csv));
+    file_ << fmt::format("# program: {}\n# hardware: {}\n# compiler: {}\n# date: {}\n{}\n",
+                         program_version(), processor_name(), compiler_name(), today(), columns);
+  }
+  void row(const std::string& line) {
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+    if (file_.is_open()) file_ << line << '\n' << std::flush;
+  }
+
+ private:
+  std::ofstream file_;
+};
+
+void bench_step(const BenchOptions& options) {
+  if (options.device != "cpu") {
+    throw InputError(fmt::format("--device {}: this version simulates on the CPU only; allowed: cpu",
+                                 options.device));
+  }
+  for (const std::string& terms : options.terms) {
+    if (std::find(all_terms.begin(), all_terms.end(), terms) == all_terms.end()) {
+      throw InputError(fmt::format("--terms {}: unknown{}; allowed: {}", terms,
+                                   did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
+    }
+  }
+  Table table(options,
+              "terms,precision,threads,phyxels,neighbours,steps_per_s,phyxel_steps_per_s,spread,pairs_per_s,"
+              "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error");
+  std::vector<double> copy;
+  for (const int threads : options.threads) copy.push_back(copy_bandwidth(threads));
+  for (const std::string& terms : options.terms) {
+    for (const Index size : options.sizes) {
+      const Scene scene = cube_scene(terms);
+      const Cloud cloud = cube(size);
+      const Model model = build_model(scene, std::span(&cloud, 1));
+      const double pairs = static_cast<double>(model.neighbourhood.neighbours.entries());
+      for (const std::string& precision : options.precisions) {
+        for (std::size_t t = 0; t < options.threads.size(); ++t) {
+          const auto backend = make_cpu_backend(model, precision_of(precision), options.threads[t]);
+          const double error = force_error(model, *backend);
+          // A tenth of the sound step: any speed, no risk.
+          const double dt = 0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
+          Solver solver(*backend, initial_state(model, scene, dt));
+          const auto warm = Clock::now();
+          int steps = 0;
+          while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) solver.step(), ++steps;
+          steps = std::max(2, static_cast<int>(steps * options.seconds / seconds_since(warm)));
+          std::vector<double> rate;
+          for (int repeat = 0; repeat < options.repeats; ++repeat) {
+            const auto start = Clock::now();
+            for (int s = 0; s < steps; ++s) solver.step();
+            rate.push_back(steps / seconds_since(start));
+          }
+          std::sort(rate.begin(), rate.end());
+          const double median = rate[rate.size() / 2], n = model.size();
+          std::size_t memory = 0;
+          for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
+          const double traffic = static_cast<double>(backend->step_traffic());
+          table.row(fmt::format("{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e}",
+                                terms, precision, options.threads[t], model.size(), pairs / n, median,
+                                median * n, (rate.back() - rate.front()) / median, median * 2 * pairs,
+                                traffic / n, median * traffic, copy[t],
+                                static_cast<double>(memory) / n, error));
+        }
+      }
+    }
+  }
+}
+
+void bench_neighbours(const BenchOptions& options) {
+  Table table(options, "threads,phyxels,neighbours,spacing_us_per_phyxel,search_us_per_phyxel,transpose_us_per_phyxel");
+  for (const int threads : options.threads) {
+    omp_set_num_threads(threads);
+    for (const Index size : options.sizes) {
+      const Cloud cloud = cube(size);
+      const double n = static_cast<double>(cloud.position.size());
+      std::vector<double> spacing_time, search_time, transpose_time;
+      double pairs = 0;
+      for (int repeat = 0; repeat < std::max(1, size > 3'000'000 ? 1 : options.repeats / 2); ++repeat) {
+        auto start = Clock::now();
+        const std::vector<double> spacing = mean_spacing(cloud.position, 10);
+        spacing_time.push_back(seconds_since(start));
+        start = Clock::now();
+        const Neighbourhood hood = find_neighbours(cloud.position, spacing, {});
+        search_time.push_back(seconds_since(start));
+        start = Clock::now();
+        const Csr inverse = transpose(hood.neighbours, hood.neighbours.rows());
+        transpose_time.push_back(seconds_since(start));
+        pairs = static_cast<double>(inverse.entries());
+      }
+      const auto median = [&](std::vector<double>& times) {
+        std::sort(times.begin(), times.end());
+        return times[times.size() / 2] / n * 1e6;
+      };
+      table.row(fmt::format("{},{},{:.1f},{:.3f},{:.3f},{:.3f}", threads, cloud.position.size(), pairs / n,
+                            median(spacing_time), median(search_time), median(transpose_time)));
+    }
+  }
+}
+
+CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
+                       std::vector<Index> sizes, void (*body)(const BenchOptions&)) {
+  CLI::App* command = bench.add_subcommand(name, what);
+  auto options = std::make_shared<BenchOptions>();
+  options->sizes = std::move(sizes);
+  for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
+  options->terms = all_terms;
+  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
+      ->delimiter(',')->check(CLI::Range(8, 100'000'000));
+  command->add_option("--threads", options->threads, "Thread counts, comma separated")
+      ->delimiter(',')->check(CLI::Range(1, 4096));
+  command->add_option("--csv", options->csv, "Also write the table to this file");
+  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")->check(CLI::Range(1, 1000));
+  command->add_flag("--force", options->force, "Replace the CSV file");
+  if (std::string(name) == "step") {
+    command->add_option("--device", options->device, "cpu");
+    command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
+    command->add_option("--terms", options->terms, "Term sets: green, cauchy, volume, damping, load, adaptive")->delimiter(',');
+    command->add_option("--seconds", options->seconds, "Length of one repeat [s]")->check(CLI::Range(0.01, 60.0));
+  }
+  command->callback([options, body] { body(*options); });
+  return command;
+}
+
+}  // namespace
+
+void add_bench(CLI::App& program) {
+  CLI::App* bench = program.add_subcommand("bench", "Measure speed beside error and bandwidth");
+  bench->require_subcommand(1);
+  add_bench_of(*bench, "step", "Time steps per second of a jittered cube, per term and precision",
+               {1000, 10648, 103823, 1000000}, bench_step);
+  add_bench_of(*bench, "neighbours", "Neighbour search: time per phyxel against the number of phyxels",
+               {10648, 103823, 1000000, 9938375}, bench_neighbours);
+}
+
+}  // namespace phyxel::app

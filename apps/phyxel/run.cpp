@@ -1,0 +1,317 @@
+/// phyxel run: a scene, simulated, written and drawn.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "command.hpp"
+#include "phyxel/phyxel.hpp"
+#include "picture.hpp"
+#include "progress.hpp"
+#include "setup.hpp"
+#include "stop_signal.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+struct RunOptions {
+  Overrides overrides;
+  std::string resume;  // "", "auto" or a checkpoint file
+  bool force = false;
+  bool no_pictures = false;
+  bool quiet = false;
+  bool json = false;
+};
+
+/// One run from its plan to its summary.
+class Run {
+ public:
+  Run(const RunOptions& options)
+      : options_(options),
+        scene_(scene_with(options.overrides)),
+        begin_(find_checkpoint()),
+        model_(build_model(scene_)),
+        plan_(plan_steps(scene_, model_, options.overrides.unsafe_step)),
+        recorder_(model_, scene_, options.force, begin_ ? begin_->info.frames_written : 0) {
+    setup_seconds_ = seconds_since(start_);
+  }
+
+  void execute() {
+    const auto backend = make_cpu_backend(model_, scene_.solver.precision, scene_.solver.threads);
+    backend_ = backend.get();
+    Solver solver(*backend, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt));
+    solver_ = &solver;
+    first_step_ = solver.steps();
+    say_plan();
+
+    Diagnostics now = diagnose(model_, *backend, solver.steps(), solver.dt());
+    initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
+    peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
+    StabilityWatch watch(model_, now);
+    good_ = solver.state();
+    if (!begin_) write_frame(now);
+
+    StopSignal signals;
+    Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr);
+    loop_start_ = Clock::now();
+    auto last_checkpoint = Clock::now();
+    try {
+      while (solver.steps() < plan_.steps) {
+        solver.step();
+        const bool last = solver.steps() == plan_.steps;
+        const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
+        const bool stop = StopSignal::stop_requested() != 0;
+        if (frame || stop || solver.steps() % watch_interval == 0) {
+          now = diagnose(model_, *backend, solver.steps(), solver.dt());
+          watch.check(now);
+          peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
+          good_ = solver.state();
+          progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+        }
+        if (frame) write_frame(now);
+        const bool due = scene_.output.checkpoint_every > 0 &&
+                         seconds_since(last_checkpoint) > scene_.output.checkpoint_every;
+        if (last || stop || due || StopSignal::checkpoint_requested()) {
+          good_ = solver.state();
+          write_state(now);
+          last_checkpoint = Clock::now();
+        }
+        if (stop && !last) {
+          progress.finish();
+          throw Error(ExitCode::stopped,
+                      fmt::format("stopped by signal {} at t = {:g} s (step {}); the checkpoint is "
+                                  "written, --resume auto continues",
+                                  StopSignal::stop_requested(), solver.time(), solver.steps()));
+        }
+      }
+    } catch (const DivergedError& error) {
+      progress.finish();
+      write_state(now);
+      throw DivergedError(fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(),
+                                      good_.time, checkpoint_.string()));
+    }
+    progress.finish();
+    loop_seconds_ = seconds_since(loop_start_);
+    if (scene_.render.pictures && !options_.no_pictures) {
+      pictures_ = render_directory(recorder_.directory(), scene_.render, true);
+    }
+    say_summary(now);
+  }
+
+ private:
+  // Often enough to stop a blow-up early, seldom enough to cost under one percent.
+  static constexpr std::int64_t watch_interval = 250;
+
+  double speed() const {
+    return static_cast<double>(solver_->steps() - first_step_) / std::max(1e-9, seconds_since(loop_start_));
+  }
+
+  /// Before the model is built, so that a wrong --resume costs no time.
+  std::optional<Checkpoint> find_checkpoint() const {
+    if (options_.resume.empty()) return std::nullopt;
+    std::filesystem::path file = options_.resume;
+    if (options_.resume == "auto") {
+      std::string warning;
+      const auto latest = latest_checkpoint(scene_.output.directory, &warning);
+      if (!warning.empty()) fmt::print(stderr, "phyxel: warning: {}\n", warning);
+      if (!latest) return std::nullopt;
+      file = *latest;
+    }
+    Checkpoint checkpoint = read_checkpoint(file);
+    if (checkpoint.info.precision != scene_.solver.precision) {
+      throw InputError(fmt::format("{}: written by a run in {}, this one is in {}: allowed --precision {}",
+                                   file.string(), precision_name(checkpoint.info.precision),
+                                   precision_name(scene_.solver.precision),
+                                   precision_name(checkpoint.info.precision)));
+    }
+    return checkpoint;
+  }
+
+  State resumed_state() const {
+    if (begin_->info.model_digest != model_digest(model_)) {
+      throw InputError(fmt::format(
+          "{}: the checkpoint belongs to another model: bodies, materials, neighbourhoods, loads and "
+          "fixed phyxels must be those of the run that wrote it",
+          options_.resume));
+    }
+    if (begin_->state.dt != plan_.dt) {
+      throw InputError(fmt::format(
+          "{}: the checkpoint was written with a time step of {:.17g} s, this run would take {:.17g} s; "
+          "leave time.step, time.safety and output.frames_per_second as they were",
+          options_.resume, begin_->state.dt, plan_.dt));
+    }
+    return begin_->state;
+  }
+
+  void write_frame(const Diagnostics& now) {
+    SurfelState surfels;
+    Frame frame;
+    frame.state = &good_;
+    frame.diagnostics = now;
+    if (scene_.output.surface && !model_.surfels.position.empty()) {
+      backend_->advect_surfels(surfels);
+      frame.surfels = &surfels;
+    }
+    const auto wanted = [&](const char* field) {
+      const auto& fields = scene_.output.fields;
+      return std::find(fields.begin(), fields.end(), field) != fields.end();
+    };
+    if (wanted("von_mises") || wanted("volume_ratio")) {
+      stress_fields(model_, *backend_, wanted("von_mises") ? &frame.von_mises : nullptr,
+                    wanted("volume_ratio") ? &frame.volume_ratio : nullptr);
+    }
+    recorder_.write(frame);
+  }
+
+  void write_state(const Diagnostics& now) {
+    CheckpointInfo info;
+    info.program = program_version();
+    info.precision = scene_.solver.precision;
+    info.scene_text = scene_.text;
+    info.model_digest = model_digest(model_);
+    info.total_energy = now.total_energy();
+    info.initial_energy = initial_energy_;
+    info.frames_written = recorder_.frames_written();
+    checkpoint_ = write_checkpoint(recorder_.directory(), good_, info);
+  }
+
+  void say_plan() const {
+    if (options_.json || options_.quiet) return;
+    fmt::print("{}: {}\n", program_version(), scene_.title.empty() ? scene_.file.string() : scene_.title);
+    fmt::print("{}", describe_model(scene_, model_));
+    fmt::print("  device      {}\n", backend_->name());
+    fmt::print("  time step   {}\n", plan_.why);
+    fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
+               plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
+    if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_->time(), first_step_);
+    std::fflush(stdout);
+  }
+
+  void say_summary(const Diagnostics& now) const {
+    const double steps = static_cast<double>(solver_->steps() - first_step_);
+    const double energy_drift = (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
+    const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
+    const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
+    std::size_t bytes = 0;
+    for (const ArrayBytes& array : backend_->memory()) bytes += array.bytes;
+    if (options_.json) {
+      nlohmann::ordered_json j = {
+          {"program", program_version()}, {"scene", scene_.file.string()}, {"title", scene_.title},
+          {"device", backend_->name()}, {"phyxels", model_.size()},
+          {"surfels", model_.surfels.position.size()},
+          {"neighbours_per_phyxel", static_cast<double>(model_.neighbourhood.neighbours.entries()) / std::max(1, model_.size())},
+          {"time_s", now.time}, {"steps", solver_->steps()}, {"time_step_s", plan_.dt},
+          {"largest_stable_step_s", plan_.limit.largest_step}, {"omega_max_rad_s", plan_.limit.omega_max},
+          {"setup_seconds", setup_seconds_}, {"loop_seconds", loop_seconds_},
+          {"steps_per_second", steps / loop_seconds_},
+          {"phyxel_steps_per_second", steps * model_.size() / loop_seconds_},
+          {"bytes", bytes}, {"energy_j", now.total_energy()}, {"energy_drift", energy_drift},
+          {"conservative", is_conservative(model_)},
+          {"internal_force_balance", force_balance}, {"internal_torque_balance", torque_balance},
+          {"inverted_phyxels", now.inverted}, {"warnings", model_.warnings},
+          {"frames", recorder_.frames_written()}, {"directory", recorder_.directory().string()},
+          {"checkpoint", checkpoint_.string()}};
+      fmt::print("{}\n", j.dump(2));
+      return;
+    }
+    fmt::print("  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s ({:.2f} s with output), {:.0f} bytes per phyxel\n",
+               steps / loop_seconds_, steps * model_.size() / loop_seconds_, loop_seconds_,
+               static_cast<double>(bytes) / std::max(1, model_.size()));
+    if (is_conservative(model_)) {
+      fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n", energy_drift, peak_energy_);
+    } else {
+      fmt::print("  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n", now.total_energy());
+    }
+    fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n", force_balance, torque_balance);
+    if (now.inverted > 0) {
+      fmt::print("  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will not "
+                 "cure that: volume_stiffness or a stiffer material may\n", now.inverted);
+    }
+    fmt::print("  written     {} frames: ", recorder_.frames_written());
+    const auto files = recorder_.files();
+    for (std::size_t f = 0; f < files.size(); ++f) fmt::print("{}{}", f ? ", " : "", files[f].string());
+    fmt::print("\n              {} (checkpoint)\n", checkpoint_.string());
+    if (!pictures_.empty()) {
+      fmt::print("              {} pictures: {} ... {}\n", pictures_.size(), pictures_.front().string(),
+                 pictures_.back().string());
+    }
+  }
+
+  const RunOptions& options_;
+  Clock::time_point start_ = Clock::now();
+  Scene scene_;
+  std::optional<Checkpoint> begin_;
+  Model model_;
+  StepPlan plan_;
+  Recorder recorder_;
+  Backend* backend_ = nullptr;
+  Solver* solver_ = nullptr;
+  State good_;  // the last state that passed the watch
+  std::int64_t first_step_ = 0;
+  double initial_energy_ = 0, peak_energy_ = 0;
+  double setup_seconds_ = 0, loop_seconds_ = 0;
+  Clock::time_point loop_start_;
+  std::filesystem::path checkpoint_;
+  std::vector<std::filesystem::path> pictures_;
+};
+
+void run(const RunOptions& options) { Run(options).execute(); }
+
+void check(const Overrides& overrides) {
+  const Scene scene = scene_with(overrides);
+  const Model model = build_model(scene);
+  const StepPlan plan = plan_steps(scene, model, overrides.unsafe_step);
+  const auto backend = make_cpu_backend(model, scene.solver.precision, scene.solver.threads);
+  fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model));
+  fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
+  fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps, scene.time.end,
+             plan.steps_per_frame);
+  for (const ArrayBytes& array : backend->memory()) {
+    fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: {}\n", array.bytes,
+               static_cast<double>(array.bytes) / std::max(1, model.size()), array.name);
+  }
+  // A few steps tell how long the run will take.
+  Solver solver(*backend, initial_state(model, scene, plan.dt));
+  const auto start = Clock::now();
+  int steps = 0;
+  for (; steps < 2 || (seconds_since(start) < 0.2 && steps < 1000); ++steps) solver.step();
+  fmt::print("  forecast    {:.3g} s for the steps alone\n",
+             seconds_since(start) / steps * static_cast<double>(plan.steps));
+}
+
+}  // namespace
+
+void add_run(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("run", "Simulate a scene, write its trajectory and pictures");
+  auto options = std::make_shared<RunOptions>();
+  add_overrides(*command, options->overrides);
+  command->add_option("--resume", options->resume,
+                      "Continue from a checkpoint file, or from the newest in the output folder (auto)");
+  command->add_flag("--force", options->force, "Replace an earlier trajectory in the output folder");
+  command->add_flag("--no-pictures", options->no_pictures, "Leave out the pictures the scene asks for");
+  command->add_flag("--quiet", options->quiet, "No progress, no plan; only the summary");
+  command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
+  command->footer(
+      "Examples:\n"
+      "  phyxel run examples/dino/scene.toml --out out/dino\n"
+      "  phyxel run scene.toml --precision double --until 0.5 --force\n"
+      "  phyxel run scene.toml --resume auto");
+  command->callback([options] { run(*options); });
+}
+
+void add_check(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "check", "Read a scene, build its model and print the plan: time step, memory, forecast");
+  auto overrides = std::make_shared<Overrides>();
+  add_overrides(*command, *overrides);
+  command->callback([overrides] { check(*overrides); });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,158 @@
+#include "setup.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel::app {
+namespace {
+
+std::string terms_of(const Material& m) {
+  std::string terms = m.strain == Strain::green ? "Green strain" : "Cauchy strain";
+  if (m.volume_stiffness > 0) terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
+  if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
+  return terms;
+}
+
+std::string neighbours_of(const Model& model, const Part& part) {
+  Index fewest = model.size(), most = 0;
+  for (Index i = part.begin; i < part.end; ++i) {
+    fewest = std::min(fewest, model.neighbourhood.neighbours.length(i));
+    most = std::max(most, model.neighbourhood.neighbours.length(i));
+  }
+  const Offset pairs = model.neighbourhood.neighbours.offsets[part.end] -
+                       model.neighbourhood.neighbours.offsets[part.begin];
+  return fmt::format("{:.1f} neighbours ({} to {})",
+                     static_cast<double>(pairs) / std::max(part.end - part.begin, 1), fewest, most);
+}
+
+}  // namespace
+
+const char* precision_name(Precision precision) {
+  switch (precision) {
+    case Precision::single: return "float";
+    case Precision::double_: return "double";
+    case Precision::mixed: break;
+  }
+  return "mixed";
+}
+
+void add_overrides(CLI::App& command, Overrides& o) {
+  command.add_option("scene", o.scene, "Scene file (TOML)")->required();
+  command.add_option("--out", o.out, "Output folder, instead of the scene's");
+  command.add_option("--device", o.device, "auto, cpu or cuda");
+  command.add_option("--precision", o.precision, "float, double or mixed");
+  command.add_option("--threads", o.threads, "CPU threads (default: all)");
+  command.add_option("--until", o.until, "Simulated time to stop at [s]");
+  command.add_option("--step", o.step, "Time step [s], instead of the scene's");
+  command.add_flag("--unsafe-step", o.unsafe_step, "Allow a step above the largest stable one");
+}
+
+Scene scene_with(const Overrides& o) {
+  Scene scene = read_scene(o.scene);
+  if (!o.out.empty()) scene.output.directory = o.out;
+  if (!o.device.empty()) scene.solver.device = o.device;
+  if (o.device != "" && o.device != "auto" && o.device != "cpu" && o.device != "cuda") {
+    throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda", o.device,
+                                 did_you_mean(o.device, {"auto", "cpu", "cuda"})));
+  }
+  if (scene.solver.device == "cuda") {
+    throw InputError(
+        "device \"cuda\": this version simulates on the CPU only; allowed: auto, cpu");
+  }
+  if (o.precision == "float") {
+    scene.solver.precision = Precision::single;
+  } else if (o.precision == "double") {
+    scene.solver.precision = Precision::double_;
+  } else if (o.precision == "mixed") {
+    scene.solver.precision = Precision::mixed;
+  } else if (!o.precision.empty()) {
+    throw InputError(fmt::format("--precision {}: unknown{}; allowed: float, double, mixed",
+                                 o.precision,
+                                 did_you_mean(o.precision, {"float", "double", "mixed"})));
+  }
+  if (o.threads) {
+    if (*o.threads < 1 || *o.threads > 4096) {
+      throw InputError(fmt::format("--threads {}: out of range: allowed 1 to 4096", *o.threads));
+    }
+    scene.solver.threads = *o.threads;
+  }
+  if (o.until) {
+    if (!(*o.until > 0) || !std::isfinite(*o.until)) {
+      throw InputError(fmt::format("--until {}: out of range: allowed > 0 s", *o.until));
+    }
+    scene.time.end = *o.until;
+  }
+  if (o.step) {
+    if (!(*o.step > 0) || !std::isfinite(*o.step)) {
+      throw InputError(fmt::format("--step {}: out of range: allowed > 0 s", *o.step));
+    }
+    scene.time.step = *o.step;
+  }
+  return scene;
+}
+
+StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step) {
+  StepPlan plan;
+  plan.limit = step_limit(model, scene.solver.threads);
+  const double largest = plan.limit.largest_step;
+  if (scene.time.step && *scene.time.step >= largest && !unsafe_step) {
+    throw InputError(fmt::format(
+        "time.step = {:g} s is unstable: the largest stable step is {:g} s (2 / omega_max, "
+        "omega_max = {:g} rad/s); allowed below that, or \"auto\", or --unsafe-step to try it "
+        "all the same",
+        *scene.time.step, largest, plan.limit.omega_max));
+  }
+  const double wanted = scene.time.step ? *scene.time.step : scene.time.safety * largest;
+  const double interval =
+      scene.output.frames_per_second > 0
+          ? std::min(1 / scene.output.frames_per_second, scene.time.end)
+          : scene.time.end;
+  // The 1e-9 keeps a step that divides the interval from being split for a rounding error.
+  plan.steps_per_frame =
+      std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(interval / wanted - 1e-9)));
+  plan.dt = interval / static_cast<double>(plan.steps_per_frame);
+  plan.steps = static_cast<std::int64_t>(std::ceil(scene.time.end / plan.dt - 1e-9));
+  const std::string limit_words = fmt::format(
+      "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations",
+      largest, plan.limit.omega_max, plan.limit.iterations);
+  plan.why = scene.time.step
+                 ? fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words)
+                 : fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest, limit_words);
+  return plan;
+}
+
+std::string describe_model(const Scene& scene, const Model& model) {
+  std::string text;
+  const std::size_t shown = std::min<std::size_t>(model.parts.size(), 12);
+  for (std::size_t p = 0; p < shown; ++p) {
+    const Part& part = model.parts[p];
+    const Material& m = part.material;
+    double mass = 0, volume = 0;
+    for (Index i = part.begin; i < part.end; ++i) {
+      mass += model.mass[i];
+      volume += model.volume[i];
+    }
+    text += fmt::format("  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n",
+                        part.name, part.end - part.begin, part.surfel_end - part.surfel_begin, mass,
+                        volume, part.kernel_volumes ? "kernel" : "geometric");
+    text += fmt::format("              {}; {}\n", neighbours_of(model, part), part.neighbourhood);
+    text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
+                        m.poisson, m.density, terms_of(m));
+  }
+  if (shown < model.parts.size()) {
+    text += fmt::format("              and {} more bodies\n", model.parts.size() - shown);
+  }
+  Index moved = 0, loaded = 0;
+  for (const Motion& motion : model.motions) moved += static_cast<Index>(motion.phyxels.size());
+  for (const Load& load : model.loads) loaded += static_cast<Index>(load.phyxels.size());
+  text += fmt::format("  boundary    {} phyxels fixed or moved, {} loaded; gravity [{:g}, {:g}, {:g}] m/s^2\n",
+                      moved, loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
+  for (const std::string& warning : model.warnings) text += fmt::format("  warning     {}\n", warning);
+  return text;
+}
+
+}  // namespace phyxel::app

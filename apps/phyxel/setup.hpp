@@ -1,0 +1,46 @@
+/// What `run` and `check` share: a scene with the command line's overrides, and the plan it gives.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "phyxel/model.hpp"
+#include "phyxel/scene.hpp"
+#include "phyxel/solver.hpp"
+
+namespace phyxel::app {
+
+/// Options that replace what the scene says.
+struct Overrides {
+  std::string scene;
+  std::string out, device, precision;
+  std::optional<int> threads;
+  std::optional<double> until, step;
+  bool unsafe_step = false;
+};
+void add_overrides(CLI::App& command, Overrides& overrides);
+
+/// Reads the scene and applies the overrides. @throws InputError
+Scene scene_with(const Overrides& overrides);
+
+/// The step a run takes and why.
+struct StepPlan {
+  StepLimit limit;
+  double dt = 0;                     ///< [s]
+  std::int64_t steps = 0;            ///< To the end of the run.
+  std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it; 0: only the last.
+  std::string why;                   ///< One line for the summary.
+};
+
+/// Chooses the step: the scene's, or the safety factor times the largest stable one; slightly
+/// shortened so that frames and the end fall on whole steps.
+/// @throws InputError for a step above the largest stable one unless `unsafe_step`.
+StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step);
+
+/// Bodies, materials, terms, neighbours and warnings, one per line.
+std::string describe_model(const Scene& scene, const Model& model);
+
+const char* precision_name(Precision precision);
+
+}  // namespace phyxel::app
