@@ -59,16 +59,26 @@ PHYXEL_HD V zip(V a, V b, std::index_sequence<I...>) {
   return __builtin_shufflevector(a, b, (int(I) % 2 * w + int(I) / 2 + Half * w / 2)...);
 }
 
+/// Two half rows side by side.
+template <class Half, std::size_t... I>
+PHYXEL_HD auto join(Half low, Half high, std::index_sequence<I...>) {
+  return __builtin_shufflevector(low, high, int(I)...);
+}
+
 /// log2(W) rounds of zipping row r with row r + rows/2 turn rows of records into rows of lanes.
 template <int Rows, int W, class V>
 PHYXEL_HD void transpose_rows(V* rows) {
   using Lanes = std::make_index_sequence<W>;
+  // Unrolled by hand-set pragmas: left to itself the compiler keeps the rows in memory.
+#pragma GCC unroll 8
   for (int round = W; round > 1; round /= 2) {
     V mixed[Rows];
+#pragma GCC unroll 16
     for (int r = 0; r < Rows / 2; ++r) {
       mixed[2 * r] = zip<0>(rows[r], rows[r + Rows / 2], Lanes{});
       mixed[2 * r + 1] = zip<1>(rows[r], rows[r + Rows / 2], Lanes{});
     }
+#pragma GCC unroll 16
     for (int r = 0; r < Rows; ++r) rows[r] = mixed[r];
   }
 }
@@ -84,28 +94,27 @@ PHYXEL_HD void load_records(const T* records, const Index* index, Pack<T, W> (&o
   if constexpr (C >= W) {
     for (int chunk = 0; chunk < C / W; ++chunk) {
       V rows[W];
+#pragma GCC unroll 16
       for (int l = 0; l < W; ++l) {
         rows[l] = *reinterpret_cast<const V*>(records + std::ptrdiff_t{index[l]} * C + chunk * W);
       }
       detail::transpose_rows<W, W>(rows);
+#pragma GCC unroll 16
       for (int c = 0; c < W; ++c) out[chunk * W + c] = Pack<T, W>(rows[c]);
     }
   } else {
-    constexpr int records_per_row = W / C;
+    static_assert(W == 2 * C, "a row holds one record or two");
     using Record = typename Pack<T, C>::Lanes;
     V rows[C];
+#pragma GCC unroll 16
     for (int r = 0; r < C; ++r) {
-      union {
-        V row;
-        Record part[records_per_row];
-      } joined;
-      for (int h = 0; h < records_per_row; ++h) {
-        joined.part[h] = *reinterpret_cast<const Record*>(
-            records + std::ptrdiff_t{index[r * records_per_row + h]} * C);
-      }
-      rows[r] = joined.row;
+      rows[r] = detail::join(
+          *reinterpret_cast<const Record*>(records + std::ptrdiff_t{index[2 * r]} * C),
+          *reinterpret_cast<const Record*>(records + std::ptrdiff_t{index[2 * r + 1]} * C),
+          std::make_index_sequence<W>{});
     }
     detail::transpose_rows<C, W>(rows);
+#pragma GCC unroll 16
     for (int c = 0; c < C; ++c) out[c] = Pack<T, W>(rows[c]);
   }
 }

@@ -42,6 +42,8 @@ class Backend {
   virtual void advect_surfels(SurfelState& surfels) = 0;
 
   virtual std::vector<ArrayBytes> memory() const = 0;
+  /// Bytes one step must move at the least: each array once for every pass that reads or writes it.
+  virtual std::size_t step_traffic() const = 0;
 };
 
 /// The CPU backend: OpenMP over SIMD packs of phyxels. The model must outlive it.

@@ -20,4 +20,25 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
 /// Speed of pressure waves, sqrt((λ + 2μ + k_v) / ρ) [m/s].
 double pressure_wave_speed(const Material& material);
 
+/// Stops a run that has become unstable.
+class StabilityWatch {
+ public:
+  StabilityWatch(const Model& model, const Diagnostics& start);
+
+  /// @throws DivergedError, saying which phyxel and when, if the state is not finite, if a phyxel
+  ///   moves faster than any wave in its material by far, or if a conservative scene has gained
+  ///   more energy than it has exchanged so far.
+  void check(const Diagnostics& now);
+
+ private:
+  const Model& model_;
+  double start_energy_;
+  double exchanged_ = 0;   // largest kinetic + elastic energy of a state found good [J]
+  double speed_limit_ = 0; // [m/s]
+  bool conservative_;
+};
+
+/// Whether total energy is a constant of this model: no damping, no motion and no growing load.
+bool is_conservative(const Model& model);
+
 }  // namespace phyxel

@@ -79,6 +79,10 @@ struct Model {
   Index size() const { return static_cast<Index>(position.size()); }
 };
 
+/// A number that tells two models apart: rest positions, masses, materials and neighbour lists. A
+/// checkpoint carries it, so that a state never continues on another body.
+std::uint64_t model_digest(const Model& model);
+
 /// The rest cloud of one body of a scene: shape, mesh or file; scaled, rotated, moved into place.
 Cloud make_cloud(const BodyRequest& request);
 
