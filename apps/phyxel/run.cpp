@@ -39,7 +39,8 @@ class Run {
         begin_(find_checkpoint()),
         model_(build_model(scene_)),
         plan_(plan_steps(scene_, model_, options.overrides.unsafe_step)),
-        recorder_(model_, scene_, options.force, begin_ ? begin_->info.frames_written : 0) {
+        recorder_(model_, scene_, options.force,
+                  begin_ ? std::optional(begin_->info.frames_written) : std::nullopt) {
     setup_seconds_ = seconds_since(start_);
   }
 
@@ -71,7 +72,8 @@ class Run {
         if (frame || stop || solver.steps() % watch_interval == 0) {
           now = diagnose(model_, *backend, solver.steps(), solver.dt());
           watch.check(now);
-          peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
+          peak_energy_ =
+              std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
           good_ = solver.state();
           progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
         }
@@ -110,11 +112,13 @@ class Run {
   static constexpr std::int64_t watch_interval = 250;
 
   double speed() const {
-    return static_cast<double>(solver_->steps() - first_step_) / std::max(1e-9, seconds_since(loop_start_));
+    return static_cast<double>(solver_->steps() - first_step_) /
+           std::max(1e-9, seconds_since(loop_start_));
   }
 
-  /// Before the model is built, so that a wrong --resume costs no time.
+  /// Before the model is built, so that a wrong --resume or output folder costs no time.
   std::optional<Checkpoint> find_checkpoint() const {
+    check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
     if (options_.resume.empty()) return std::nullopt;
     std::filesystem::path file = options_.resume;
     if (options_.resume == "auto") {
@@ -126,26 +130,28 @@ class Run {
     }
     Checkpoint checkpoint = read_checkpoint(file);
     if (checkpoint.info.precision != scene_.solver.precision) {
-      throw InputError(fmt::format("{}: written by a run in {}, this one is in {}: allowed --precision {}",
-                                   file.string(), precision_name(checkpoint.info.precision),
-                                   precision_name(scene_.solver.precision),
-                                   precision_name(checkpoint.info.precision)));
+      throw InputError(fmt::format(
+          "{}: written by a run in {}, this one is in {}: allowed --precision {}", file.string(),
+          precision_name(checkpoint.info.precision), precision_name(scene_.solver.precision),
+          precision_name(checkpoint.info.precision)));
     }
     return checkpoint;
   }
 
   State resumed_state() const {
     if (begin_->info.model_digest != model_digest(model_)) {
-      throw InputError(fmt::format(
-          "{}: the checkpoint belongs to another model: bodies, materials, neighbourhoods, loads and "
-          "fixed phyxels must be those of the run that wrote it",
-          options_.resume));
+      throw InputError(
+          fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
+                      "neighbourhoods, loads and "
+                      "fixed phyxels must be those of the run that wrote it",
+                      options_.resume));
     }
     if (begin_->state.dt != plan_.dt) {
-      throw InputError(fmt::format(
-          "{}: the checkpoint was written with a time step of {:.17g} s, this run would take {:.17g} s; "
-          "leave time.step, time.safety and output.frames_per_second as they were",
-          options_.resume, begin_->state.dt, plan_.dt));
+      throw InputError(
+          fmt::format("{}: the checkpoint was written with a time step of {:.17g} s, this run "
+                      "would take {:.17g} s; "
+                      "leave time.step, time.safety and output.frames_per_second as they were",
+                      options_.resume, begin_->state.dt, plan_.dt));
     }
     return begin_->state;
   }
@@ -184,63 +190,89 @@ class Run {
 
   void say_plan() const {
     if (options_.json || options_.quiet) return;
-    fmt::print("{}: {}\n", program_version(), scene_.title.empty() ? scene_.file.string() : scene_.title);
+    fmt::print("{}: {}\n", program_version(),
+               scene_.title.empty() ? scene_.file.string() : scene_.title);
     fmt::print("{}", describe_model(scene_, model_));
     fmt::print("  device      {}\n", backend_->name());
     fmt::print("  time step   {}\n", plan_.why);
-    fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
-               plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
+    fmt::print(
+        "  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
+        plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
     if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_->time(), first_step_);
     std::fflush(stdout);
   }
 
   void say_summary(const Diagnostics& now) const {
     const double steps = static_cast<double>(solver_->steps() - first_step_);
-    const double energy_drift = (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
+    const double energy_drift =
+        (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
     const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
     const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
     std::size_t bytes = 0;
     for (const ArrayBytes& array : backend_->memory()) bytes += array.bytes;
     if (options_.json) {
       nlohmann::ordered_json j = {
-          {"program", program_version()}, {"scene", scene_.file.string()}, {"title", scene_.title},
-          {"device", backend_->name()}, {"phyxels", model_.size()},
+          {"program", program_version()},
+          {"scene", scene_.file.string()},
+          {"title", scene_.title},
+          {"device", backend_->name()},
+          {"phyxels", model_.size()},
           {"surfels", model_.surfels.position.size()},
-          {"neighbours_per_phyxel", static_cast<double>(model_.neighbourhood.neighbours.entries()) / std::max(1, model_.size())},
-          {"time_s", now.time}, {"steps", solver_->steps()}, {"time_step_s", plan_.dt},
-          {"largest_stable_step_s", plan_.limit.largest_step}, {"omega_max_rad_s", plan_.limit.omega_max},
-          {"setup_seconds", setup_seconds_}, {"loop_seconds", loop_seconds_},
+          {"neighbours_per_phyxel", static_cast<double>(model_.neighbourhood.neighbours.entries()) /
+                                        std::max(1, model_.size())},
+          {"time_s", now.time},
+          {"steps", solver_->steps()},
+          {"time_step_s", plan_.dt},
+          {"largest_stable_step_s", plan_.limit.largest_step},
+          {"omega_max_rad_s", plan_.limit.omega_max},
+          {"setup_seconds", setup_seconds_},
+          {"loop_seconds", loop_seconds_},
           {"steps_per_second", steps / loop_seconds_},
           {"phyxel_steps_per_second", steps * model_.size() / loop_seconds_},
-          {"bytes", bytes}, {"energy_j", now.total_energy()}, {"energy_drift", energy_drift},
+          {"bytes", bytes},
+          {"energy_j", now.total_energy()},
+          {"energy_drift", energy_drift},
           {"conservative", is_conservative(model_)},
-          {"internal_force_balance", force_balance}, {"internal_torque_balance", torque_balance},
-          {"inverted_phyxels", now.inverted}, {"warnings", model_.warnings},
-          {"frames", recorder_.frames_written()}, {"directory", recorder_.directory().string()},
+          {"internal_force_balance", force_balance},
+          {"internal_torque_balance", torque_balance},
+          {"inverted_phyxels", now.inverted},
+          {"warnings", model_.warnings},
+          {"frames", recorder_.frames_written()},
+          {"directory", recorder_.directory().string()},
           {"checkpoint", checkpoint_.string()}};
       fmt::print("{}\n", j.dump(2));
       return;
     }
-    fmt::print("  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s ({:.2f} s with output), {:.0f} bytes per phyxel\n",
-               steps / loop_seconds_, steps * model_.size() / loop_seconds_, loop_seconds_,
-               static_cast<double>(bytes) / std::max(1, model_.size()));
+    fmt::print(
+        "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s ({:.2f} s with output), {:.0f} bytes "
+        "per phyxel\n",
+        steps / loop_seconds_, steps * model_.size() / loop_seconds_, loop_seconds_,
+        static_cast<double>(bytes) / std::max(1, model_.size()));
     if (is_conservative(model_)) {
-      fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n", energy_drift, peak_energy_);
+      fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
+                 energy_drift, peak_energy_);
     } else {
-      fmt::print("  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n", now.total_energy());
+      fmt::print(
+          "  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n",
+          now.total_energy());
     }
-    fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n", force_balance, torque_balance);
+    fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
+               force_balance, torque_balance);
     if (now.inverted > 0) {
-      fmt::print("  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will not "
-                 "cure that: volume_stiffness or a stiffer material may\n", now.inverted);
+      fmt::print(
+          "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "
+          "not "
+          "cure that: volume_stiffness or a stiffer material may\n",
+          now.inverted);
     }
     fmt::print("  written     {} frames: ", recorder_.frames_written());
     const auto files = recorder_.files();
-    for (std::size_t f = 0; f < files.size(); ++f) fmt::print("{}{}", f ? ", " : "", files[f].string());
+    for (std::size_t f = 0; f < files.size(); ++f)
+      fmt::print("{}{}", f ? ", " : "", files[f].string());
     fmt::print("\n              {} (checkpoint)\n", checkpoint_.string());
     if (!pictures_.empty()) {
-      fmt::print("              {} pictures: {} ... {}\n", pictures_.size(), pictures_.front().string(),
-                 pictures_.back().string());
+      fmt::print("              {} pictures: {} ... {}\n", pictures_.size(),
+                 pictures_.front().string(), pictures_.back().string());
     }
   }
 
@@ -271,8 +303,8 @@ void check(const Overrides& overrides) {
   const auto backend = make_cpu_backend(model, scene.solver.precision, scene.solver.threads);
   fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model));
   fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
-  fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps, scene.time.end,
-             plan.steps_per_frame);
+  fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps,
+             scene.time.end, plan.steps_per_frame);
   for (const ArrayBytes& array : backend->memory()) {
     fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: {}\n", array.bytes,
                static_cast<double>(array.bytes) / std::max(1, model.size()), array.name);
@@ -289,13 +321,17 @@ void check(const Overrides& overrides) {
 }  // namespace
 
 void add_run(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("run", "Simulate a scene, write its trajectory and pictures");
+  CLI::App* command =
+      program.add_subcommand("run", "Simulate a scene, write its trajectory and pictures");
   auto options = std::make_shared<RunOptions>();
   add_overrides(*command, options->overrides);
-  command->add_option("--resume", options->resume,
-                      "Continue from a checkpoint file, or from the newest in the output folder (auto)");
-  command->add_flag("--force", options->force, "Replace an earlier trajectory in the output folder");
-  command->add_flag("--no-pictures", options->no_pictures, "Leave out the pictures the scene asks for");
+  command->add_option(
+      "--resume", options->resume,
+      "Continue from a checkpoint file, or from the newest in the output folder (auto)");
+  command->add_flag("--force", options->force,
+                    "Replace an earlier trajectory in the output folder");
+  command->add_flag("--no-pictures", options->no_pictures,
+                    "Leave out the pictures the scene asks for");
   command->add_flag("--quiet", options->quiet, "No progress, no plan; only the summary");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
   command->footer(

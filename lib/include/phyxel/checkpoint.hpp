@@ -12,19 +12,19 @@ namespace phyxel {
 
 /// What a checkpoint holds beside the state.
 struct CheckpointInfo {
-  int version = 0;              ///< Of the format.
-  std::string program;          ///< "phyxel 0.1.0 (commit)".
+  int version = 0;      ///< Of the format.
+  std::string program;  ///< "phyxel 0.1.0 (commit)".
   Precision precision = Precision::single;
   std::string scene_text;
-  std::uint64_t model_digest = 0;  ///< Of rest positions, masses and neighbour lists.
-  double total_energy = 0;         ///< [J], for the drift of the continued run.
-  double initial_energy = 0;       ///< [J], at t = 0.
-  std::int64_t frames_written = 0; ///< Frames on disk at that time.
+  std::uint64_t model_digest = 0;   ///< Of rest positions, masses and neighbour lists.
+  double total_energy = 0;          ///< [J], for the drift of the continued run.
+  double initial_energy = 0;        ///< [J], at t = 0.
+  std::int64_t frames_written = 0;  ///< Frames on disk at that time.
 };
 
-/// Writes `directory/checkpoint_<step>.h5`, then its digest beside it (`.xxh`); each to a
-/// temporary name, synced and renamed. Keeps the last two checkpoints, removes older ones.
-/// State arrays are stored in the precision of the run (float for `single`).
+/// Writes `directory/checkpoint_<step>.h5`: to a temporary name, synced, renamed. Keeps the last
+/// two checkpoints and removes older ones, and those of later steps, which a run resumed from an
+/// earlier one has left behind. State arrays are stored in the precision of the run's state.
 /// @throws OutputError; earlier checkpoints stay intact.
 std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
                                        const CheckpointInfo& info);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,55 +16,94 @@ namespace phyxel {
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
 struct Frame {
   const State* state = nullptr;
-  const SurfelState* surfels = nullptr;   ///< Null: no surface family.
+  const SurfelState* surfels = nullptr;  ///< Null: no surface family.
   Diagnostics diagnostics;
-  std::vector<double> von_mises;          ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
-  std::vector<double> volume_ratio;       ///< det F, shape [n] or empty.
+  std::vector<double> von_mises;     ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
+  std::vector<double> volume_ratio;  ///< det F, shape [n] or empty.
+};
+
+/// One frame of a series: its file and its time [s].
+struct SeriesEntry {
+  std::filesystem::path file;
+  double time = 0;
+};
+
+/// Makes sure that a run can write into `directory` before any time is spent: the folder is made if
+/// need be, it can be written, and no earlier trajectory in it would be lost.
+/// @param may_exist whether a trajectory may be there: the run replaces or continues it.
+/// @throws InputError.
+void check_output_folder(const std::filesystem::path& directory, bool may_exist);
+
+/// A series file in the making: each frame is appended in one write, so that it is valid at any
+/// time.
+class SeriesFile {
+ public:
+  /// Writes a new file with these entries.
+  void create(const std::filesystem::path& file, const std::vector<SeriesEntry>& entries);
+  void append(const SeriesEntry& entry);
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+  std::size_t end_ = 0;  // where the closing brackets begin
+  bool empty_ = true;
 };
 
 /// Writes frames into a folder:
-///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell; phyxels.hdf.series
-///   surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;            surface.hdf.series
-///   energy.csv              one line a frame: time, energies, momenta
+///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
+///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
+///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
 /// Each frame is written to a temporary name and renamed. Metadata sit in the group `/phyxel`.
 class Recorder {
  public:
-  /// Makes the folder and proves that it can be written.
-  /// @param frames_before frames of an earlier part of this run to keep (restart); files of later
-  ///   frames are removed.
-  /// @throws InputError if the folder holds an earlier trajectory and `overwrite` is false, or it
-  ///   cannot be written.
-  Recorder(const Model& model, const Scene& scene, bool overwrite, std::int64_t frames_before = 0);
+  /// Checks the folder and the free space, then removes what the run replaces.
+  /// @param resume_after frames of an earlier part of this run, which are kept; later ones are
+  ///   removed. Unset: a new run.
+  /// @throws InputError if the folder holds an earlier trajectory and `overwrite` is false, if it
+  ///   cannot be written, or if the disk has no room for the frames to come.
+  Recorder(const Model& model, const Scene& scene, bool overwrite,
+           std::optional<std::int64_t> resume_after = std::nullopt);
 
   /// @throws OutputError; frames already written stay intact.
   void write(const Frame& frame);
 
-  std::int64_t frames_written() const { return static_cast<std::int64_t>(times_.size()); }
+  /// Including those of the earlier part of a resumed run.
+  std::int64_t frames_written() const { return frames_; }
   const std::filesystem::path& directory() const { return directory_; }
   std::vector<std::filesystem::path> files() const;  ///< Series files and the log, for summaries.
 
  private:
+  void check_space(std::int64_t frames_before) const;
+  void begin_anew();
+  void continue_after(std::int64_t frames);
+
   const Model& model_;
   const Scene& scene_;
   std::filesystem::path directory_;
-  std::vector<double> times_;
+  bool writes_phyxels_, writes_surface_;
+  std::int64_t frames_ = 0;
+  SeriesFile phyxels_, surface_;
+  std::size_t log_size_ = 0;  // bytes of energy.csv
 };
 
-/// What a trajectory folder or single frame holds, read back.
+/// What a single frame holds, read back.
 struct FrameData {
   double time = 0;
-  std::vector<Vec3d> point;         ///< Deformed positions [m].
-  std::vector<Triangle> triangle;   ///< Empty for phyxel frames.
-  std::vector<Vec3d> normal;        ///< Empty unless the frame has them.
-  std::vector<Index> body;          ///< Body of each point, or empty.
+  std::vector<Vec3d> point;        ///< Deformed positions [m].
+  std::vector<Triangle> triangle;  ///< Empty for phyxel frames.
+  std::vector<Vec3d> normal;       ///< Empty unless the frame has them.
+  std::vector<Index> body;         ///< Body of each point, or empty.
 };
+/// @throws InputError.
 FrameData read_frame(const std::filesystem::path& file);
 
-/// A series file: name and time of each frame, paths resolved.
-struct SeriesEntry { std::filesystem::path file; double time = 0; };
+/// The entries of a series file, paths resolved from its folder.
+/// @throws InputError.
 std::vector<SeriesEntry> read_series(const std::filesystem::path& file);
 
 /// Writes all frames of a series into one temporal VTKHDF 2.0 file (ParaView 5.12 and later).
-void export_single(const std::filesystem::path& series, const std::filesystem::path& out, bool overwrite);
+/// Topology is stored once. @throws InputError, OutputError.
+void export_single(const std::filesystem::path& series, const std::filesystem::path& out,
+                   bool overwrite);
 
 }  // namespace phyxel

@@ -1,0 +1,40 @@
+/// phyxel export: a trajectory in other forms.
+#include <fmt/format.h>
+
+#include "command.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/recorder.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct ExportOptions {
+  std::filesystem::path series, single;
+  bool force = false;
+};
+
+void export_command(const ExportOptions& options) {
+  const std::size_t frames = read_series(options.series).size();
+  export_single(options.series, options.single, options.force);
+  fmt::print("{}: {} frames, {:.1f} MB\n", options.single.string(), frames,
+             static_cast<double>(std::filesystem::file_size(options.single)) / 1e6);
+}
+
+}  // namespace
+
+void add_export(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "export",
+      "Gather a series of frames into one temporal VTKHDF file (ParaView 5.12 and later)");
+  auto options = std::make_shared<ExportOptions>();
+  command->add_option("series", options->series, "A .hdf.series file of a run")->required();
+  command->add_option("--single", options->single, "The file to write, .vtkhdf or .hdf")
+      ->required();
+  command->add_flag("--force", options->force, "Replace the file if it exists");
+  command->footer(
+      "Example:\n"
+      "  phyxel export out/dino/surface.hdf.series --single dino.vtkhdf");
+  command->callback([options] { export_command(*options); });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,246 @@
+/// phyxel info: what any file of ours holds.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "command.hpp"
+#include "hdf5_file.hpp"
+#include "phyxel/phyxel.hpp"
+#include "sealed_file.hpp"
+#include "setup.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Facts = nlohmann::ordered_json;
+
+Facts box_of(const std::vector<Vec3d>& points) {
+  if (points.empty()) return "empty";
+  Vec3d low = points.front(), high = low;
+  for (const Vec3d& p : points) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  return {{"low", {low.x, low.y, low.z}}, {"high", {high.x, high.y, high.z}}};
+}
+
+Facts body_facts(const fs::path& file) {
+  const Cloud cloud = read_body(file);
+  double volume = 0;
+  for (const double v : cloud.volume) volume += v;
+  Facts regions = Facts::object();
+  for (const auto& [name, phyxels] : cloud.regions) regions[name] = phyxels.size();
+  Facts facts = {{"phyxels", cloud.position.size()},
+                 {"surfels", cloud.surface.position.size()},
+                 {"triangles", cloud.surface.triangle.size()},
+                 {"bounds [m]", box_of(cloud.position)}};
+  if (cloud.volume.empty()) {
+    facts["volume"] = "not given: the kernel rule applies";
+  } else {
+    facts["volume [m^3]"] = volume;
+  }
+  if (!regions.empty()) facts["regions"] = regions;
+  return facts;
+}
+
+Facts checkpoint_facts(const fs::path& file) {
+  const Checkpoint checkpoint = read_checkpoint(file);
+  const State& state = checkpoint.state;
+  double displacement = 0, speed = 0;
+  for (std::size_t i = 0; i < state.displacement.size(); ++i) {
+    displacement = std::max(displacement, norm(state.displacement[i]));
+    speed = std::max(speed, norm(state.velocity[i]));
+  }
+  return {{"program", checkpoint.info.program},
+          {"precision", precision_name(checkpoint.info.precision)},
+          {"phyxels", state.displacement.size()},
+          {"time [s]", state.time},
+          {"step", state.step},
+          {"time step [s]", state.dt},
+          {"largest displacement [m]", displacement},
+          {"largest speed [m/s]", speed},
+          {"total energy [J]", checkpoint.info.total_energy},
+          {"frames written before", checkpoint.info.frames_written},
+          {"model digest", fmt::format("{:016x}", checkpoint.info.model_digest)},
+          {"continue with", fmt::format("phyxel run SCENE --resume {}", file.string())},
+          {"scene", checkpoint.info.scene_text}};
+}
+
+Facts frame_facts(const fs::path& file) {
+  const FrameData frame = read_frame(file);
+  const Hdf5Reader in(file);
+  return {{"title", in.text_attribute("/phyxel", "title")},
+          {"program", in.text_attribute("/phyxel", "program")},
+          {"time [s]", frame.time},
+          {"step", in.integer_attribute("/phyxel", "step")},
+          {"points", frame.point.size()},
+          {"triangles", frame.triangle.size()},
+          {"bounds [m]", box_of(frame.point)},
+          {"fields", in.names("/VTKHDF/PointData")},
+          {"kinetic energy [J]", in.number_attribute("/phyxel", "kinetic_energy")},
+          {"total energy [J]", in.number_attribute("/phyxel", "total_energy")}};
+}
+
+Facts trajectory_facts(const fs::path& file) {
+  const Hdf5Reader in(file);
+  const auto times = in.array<double>("/VTKHDF/Steps/Values");
+  return {{"title", in.text_attribute("/phyxel", "title")},
+          {"frames", times.size()},
+          {"first time [s]", times.empty() ? 0 : times.front()},
+          {"last time [s]", times.empty() ? 0 : times.back()},
+          {"points in all", in.shape("/VTKHDF/Points").rows},
+          {"fields", in.names("/VTKHDF/PointData")}};
+}
+
+Facts sealed_facts(const fs::path& file) {
+  const std::string kind = check_seal(file);
+  Facts facts = {{"file", file.string()},
+                 {"kind", "phyxel " + kind},
+                 {"bytes", fs::file_size(file)},
+                 {"digest", "fits"}};
+  if (kind == "body") facts.update(body_facts(file));
+  if (kind == "checkpoint") facts.update(checkpoint_facts(file));
+  if (kind == "phyxel frame" || kind == "surface frame") facts.update(frame_facts(file));
+  if (kind == "trajectory") facts.update(trajectory_facts(file));
+  return facts;
+}
+
+Facts series_facts(const fs::path& file) {
+  const auto entries = read_series(file);
+  Facts missing = Facts::array();
+  for (const SeriesEntry& entry : entries) {
+    if (!fs::exists(entry.file)) missing.push_back(entry.file.filename().string());
+  }
+  Facts facts = {{"file", file.string()}, {"kind", "series of frames"}, {"frames", entries.size()}};
+  if (!entries.empty()) {
+    facts["first time [s]"] = entries.front().time;
+    facts["last time [s]"] = entries.back().time;
+  }
+  if (!missing.empty()) facts["missing frames"] = missing;
+  return facts;
+}
+
+Facts scene_facts(const fs::path& file) {
+  const Scene scene = read_scene(file);
+  Facts bodies = Facts::array();
+  for (const BodyRequest& body : scene.bodies) {
+    const BodySource& source = body.source;
+    bodies.push_back({{"name", body.name},
+                      {"from", !source.shape.name.empty() ? source.shape.name
+                               : !source.mesh.empty()     ? source.mesh.string()
+                                                          : source.file.string()},
+                      {"E [Pa]", body.material.young},
+                      {"nu", body.material.poisson},
+                      {"rho [kg/m^3]", body.material.density}});
+  }
+  return {{"file", file.string()},
+          {"kind", "scene"},
+          {"title", scene.title},
+          {"end [s]", scene.time.end},
+          {"precision", precision_name(scene.solver.precision)},
+          {"output", scene.output.directory.string()},
+          {"bodies", bodies},
+          {"more", fmt::format("phyxel check {}", file.string())}};
+}
+
+Facts mesh_facts(const fs::path& file) {
+  const Surface surface = read_mesh(file);
+  return {{"file", file.string()},
+          {"kind", "triangle mesh"},
+          {"vertices", surface.position.size()},
+          {"triangles", surface.triangle.size()},
+          {"enclosed volume [m^3]", enclosed_volume(surface)},
+          {"bounds [m]", box_of(surface.position)},
+          {"state", inspect_surface(surface).describe()}};
+}
+
+Facts folder_facts(const fs::path& folder) {
+  Facts facts = {{"folder", folder.string()}, {"kind", "output of a run"}};
+  for (const char* family : {"phyxels", "surface"}) {
+    const fs::path series = folder / fmt::format("{}.hdf.series", family);
+    if (fs::exists(series)) facts[family] = series_facts(series);
+  }
+  std::string warning;
+  if (const auto checkpoint = latest_checkpoint(folder, &warning)) {
+    const Checkpoint read = read_checkpoint(*checkpoint);
+    facts["newest checkpoint"] = {
+        {"file", checkpoint->string()}, {"time [s]", read.state.time}, {"step", read.state.step}};
+  }
+  if (!warning.empty()) facts["warning"] = warning;
+  if (facts.size() == 2)
+    throw InputError(fmt::format("{}: holds no run of phyxel", folder.string()));
+  return facts;
+}
+
+Facts facts_of(const fs::path& file) {
+  if (fs::is_directory(file)) return folder_facts(file);
+  if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (extension == ".toml") return scene_facts(file);
+  if (extension == ".series") return series_facts(file);
+  if (extension == ".obj" || extension == ".ply" || extension == ".stl") return mesh_facts(file);
+  return sealed_facts(file);
+}
+
+/// Texts as they are, numbers to nine digits, short lists on one line.
+std::string shown(const Facts& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) return fmt::format("{:.9g}", value.get<double>());
+  if (!value.is_array()) return value.dump();
+  std::string list;
+  for (const Facts& item : value) list += (list.empty() ? "" : ", ") + shown(item);
+  return list;
+}
+
+void print_facts(const Facts& facts, int indent) {
+  for (const auto& [key, value] : facts.items()) {
+    const bool nested =
+        value.is_object() || (value.is_array() && !value.empty() && value.front().is_object());
+    if (!nested) {
+      const std::string text = shown(value);
+      const bool block = text.find('\n') != std::string::npos;
+      fmt::print("{:{}}{:<{}}{}{}\n", "", indent, key, std::max(4, 28 - indent), block ? "\n" : "",
+                 text);
+      continue;
+    }
+    fmt::print("{:{}}{}\n", "", indent, key);
+    if (value.is_object()) {
+      print_facts(value, indent + 2);
+    } else {
+      for (const Facts& item : value) print_facts(item, indent + 2);
+    }
+  }
+}
+
+}  // namespace
+
+void add_info(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("info",
+                                             "Explain a file: body, checkpoint, frame, series, "
+                                             "trajectory, scene, mesh, or a run's folder");
+  struct Options {
+    fs::path file;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  command->add_option("file", options->file, "File or folder")->required();
+  command->add_flag("--json", options->json, "As JSON");
+  command->footer(
+      "Examples:\n"
+      "  phyxel info out/dino\n"
+      "  phyxel info out/dino/phyxels_000010.hdf --json");
+  command->callback([options] {
+    const Facts facts = facts_of(options->file);
+    if (options->json) {
+      fmt::print("{}\n", facts.dump(2));
+    } else {
+      print_facts(facts, 0);
+    }
+  });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,34 @@
+/// One instant of a run as a VTKHDF file.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "phyxel/model.hpp"
+#include "phyxel/recorder.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel {
+
+inline constexpr const char* phyxel_frame_kind = "phyxel frame";
+inline constexpr const char* surface_frame_kind = "surface frame";
+
+/// A number of `Diagnostics`, as a column of the energy log and an attribute of every frame.
+struct DiagnosticColumn {
+  const char* name;
+  const char* unit;
+  double (*value)(const Diagnostics&);
+};
+std::span<const DiagnosticColumn> diagnostic_columns();
+
+/// VTKHDF UnstructuredGrid 1.0, what every ParaView since 5.10 opens: one poly-vertex cell a body.
+/// Positions in the precision of the run's state.
+void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
+                        const Frame& frame);
+
+/// The same for the deformed surface: triangles, with normals.
+void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
+                         const Frame& frame);
+
+}  // namespace phyxel

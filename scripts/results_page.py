@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""Writes docs/results/README.md from the CSV files beside it. No number there is typed by hand.
+
+    build/cpu/bin/phyxel bench step --csv docs/results/cpu_step.csv --force
+    build/cpu/bin/phyxel bench neighbours --csv docs/results/cpu_neighbours.csv --force
+    scripts/results_page.py
+"""
+import csv
+import pathlib
+
+FOLDER = pathlib.Path(__file__).resolve().parent.parent / "docs" / "results"
+
+
+def read(name):
+    """(header comments as a dict, rows) of a CSV, or (None, []) if it is not there."""
+    path = FOLDER / name
+    if not path.exists():
+        return None, []
+    lines = path.read_text().splitlines()
+    facts = dict(line[2:].split(": ", 1) for line in lines if line.startswith("# ") and ": " in line)
+    return facts, list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+def measured(facts):
+    return ", ".join(facts[key] for key in ("hardware", "compiler", "program", "date") if key in facts)
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def million(text):
+    return f"{float(text) / 1e6:.2f}"
+
+
+def step_section():
+    facts, rows = read("cpu_step.csv")
+    if not rows:
+        return ""
+    text = "## One time step on the CPU\n\n"
+    text += f"`phyxel bench step --device cpu`, {measured(facts)}. A jittered cube; medians; `spread` is "
+    text += "(fastest − slowest)/median over the repeats. The force error is the largest difference from "
+    text += "double over the largest force. Bytes are the least a step must move; the last column sets them "
+    text += "against a plain copy on the same threads (above 100%: the body fits in cache).\n\n"
+    head = ["terms", "precision", "threads", "phyxels", "neighbours", "M phyxel-steps/s", "spread",
+            "G pairs/s", "bytes/phyxel-step", "of copy bandwidth", "force error"]
+    body = [[r["terms"], r["precision"], r["threads"], r["phyxels"], r["neighbours"],
+             million(r["phyxel_steps_per_s"]), f"{float(r['spread']):.0%}",
+             f"{float(r['pairs_per_s']) / 1e9:.2f}", r["bytes_per_phyxel_step"],
+             f"{float(r['bytes_per_s']) / float(r['copy_bytes_per_s']):.0%}", r["force_error"]]
+            for r in rows]
+    text += table(head, body)
+    scaling = {}
+    for r in rows:
+        scaling.setdefault((r["terms"], r["precision"], r["phyxels"]), {})[r["threads"]] = float(
+            r["phyxel_steps_per_s"])
+    ratios = [[*key, f"{by['2'] / by['1']:.2f}"] for key, by in scaling.items() if "1" in by and "2" in by]
+    if ratios:
+        text += "\n### From one thread to two\n\n" + table(["terms", "precision", "phyxels", "ratio"], ratios)
+    return text
+
+
+def neighbours_section():
+    facts, rows = read("cpu_neighbours.csv")
+    if not rows:
+        return ""
+    text = "\n## Neighbour search\n\n"
+    text += f"`phyxel bench neighbours`, {measured(facts)}. Microseconds per phyxel: mean spacing to the ten "
+    text += "nearest, search within the support, transposition into the inverse neighbourhood.\n\n"
+    head = ["threads", "phyxels", "neighbours", "spacing", "search", "transpose", "together"]
+    body = [[r["threads"], r["phyxels"], r["neighbours"], r["spacing_us_per_phyxel"],
+             r["search_us_per_phyxel"], r["transpose_us_per_phyxel"],
+             f"{sum(float(r[k + '_us_per_phyxel']) for k in ('spacing', 'search', 'transpose')):.2f}"]
+            for r in rows]
+    return text + table(head, body)
+
+
+def peer_section():
+    facts, peer = read("lammps_tlsph.csv")
+    _, own = read("cpu_step.csv")
+    if not peer or not own:
+        return ""
+    text = "\n## Beside LAMMPS `smd/tlsph`\n\n"
+    text += f"{facts.get('what', '')} {measured(facts)}. LAMMPS input: `bench/compare/lammps_tlsph.in`. "
+    text += "Phyxel rows are those above (terms green) of the nearest size, on as many threads as LAMMPS has "
+    text += "ranks. LAMMPS computes in double.\n\n"
+    head = ["particles", "cores", "LAMMPS neighbours", "LAMMPS M particle-steps/s",
+            "phyxel double", "ratio", "phyxel float", "ratio"]
+    body = []
+    for p in peer:
+        line = [p["particles"], p["ranks"], p["neighbours"], million(p["particle_steps_per_s"])]
+        for precision in ("double", "float"):
+            near = [r for r in own if r["terms"] == "green" and r["precision"] == precision
+                    and r["threads"] == p["ranks"]
+                    and 0.5 < float(r["phyxels"]) / float(p["particles"]) < 2]
+            if not near:
+                line += ["–", "–"]
+                continue
+            rate = float(near[0]["phyxel_steps_per_s"])
+            line += [million(rate), f"{rate / float(p['particle_steps_per_s']):.1f}×"]
+        body.append(line)
+    return text + table(head, body)
+
+
+def main():
+    page = "# Measurements\n\nMade by `scripts/results_page.py` from the CSV files in this folder, which the "
+    page += "`bench` commands write.\n\n"
+    page += step_section() + neighbours_section() + peer_section()
+    (FOLDER / "README.md").write_text(page)
+
+
+if __name__ == "__main__":
+    main()

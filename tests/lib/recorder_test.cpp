@@ -1,0 +1,227 @@
+/// Trajectories: frames read back by our own reader and by VTK and h5py, restarts, nothing lost.
+#include "phyxel/recorder.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <cstdlib>
+
+#include "phyxel/error.hpp"
+#include "support/folder.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+using test::text_of;
+using ::testing::HasSubstr;
+
+/// Two bodies of two and three phyxels; the surface is one tetrahedron, of the second body.
+Model small_model() {
+  Model model;
+  model.position = {{0, 0, 0}, {1, 0, 0}, {5, 0, 0}, {5, 1, 0}, {5, 0, 1}};
+  model.mass = {1, 2, 3, 4, 5};
+  model.volume = {0.1, 0.2, 0.3, 0.4, 0.5};
+  model.parts.resize(2);
+  model.parts[0].end = 2;
+  model.parts[1] = {.name = "second", .begin = 2, .end = 5, .surfel_begin = 0, .surfel_end = 4};
+  model.surfels.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  model.surfels.normal = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  model.surfels.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+  return model;
+}
+
+class Recording : public test::Folder {
+ protected:
+  Recording() {
+    scene_.title = "two bodies";
+    scene_.text = "title = \"two bodies\"\n";
+    scene_.time.end = 1;
+    scene_.output.directory = folder_ / "out";
+    scene_.output.fields = {"displacement", "velocity", "von_mises",
+                            "volume_ratio", "mass",     "volume"};
+  }
+  /// Frame number `k`: everything moved by k in x.
+  void record(Recorder& recorder, int k) const {
+    State state;
+    state.displacement.assign(5, Vec3d{0.5 * k, 0, 0});
+    state.velocity.assign(5, Vec3d{0, 0.25 * k, 0});
+    SurfelState surfels{model_.surfels.position, model_.surfels.normal};
+    for (Vec3d& p : surfels.position) p.x += 0.5 * k;
+    Frame frame;
+    frame.state = &state;
+    frame.surfels = &surfels;
+    frame.von_mises.assign(5, 100.0 * k);
+    frame.volume_ratio.assign(5, 1.0);
+    frame.diagnostics.step = 10 * k;
+    frame.diagnostics.time = 0.1 * k;
+    frame.diagnostics.kinetic_energy = k;
+    recorder.write(frame);
+  }
+
+  Model model_ = small_model();
+  Scene scene_;
+};
+
+TEST_F(Recording, FramesComeBack) {
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    scene_.solver.precision = precision;
+    Recorder recorder(model_, scene_, true);
+    for (int k = 0; k < 3; ++k) record(recorder, k);
+    EXPECT_EQ(recorder.frames_written(), 3);
+    const auto series = read_series(folder_ / "out" / "phyxels.hdf.series");
+    ASSERT_EQ(series.size(), 3u);
+    EXPECT_EQ(series[2].time, 0.1 * 2);
+    const FrameData frame = read_frame(series[2].file);
+    EXPECT_EQ(frame.time, 0.1 * 2);
+    ASSERT_EQ(frame.point.size(), 5u);
+    for (int i = 0; i < 5; ++i) {  // halves are exact in float
+      EXPECT_EQ(frame.point[i].x, model_.position[i].x + 1.0);
+      EXPECT_EQ(frame.point[i].z, model_.position[i].z);
+    }
+    EXPECT_EQ(frame.body, (std::vector<Index>{0, 0, 1, 1, 1}));
+    const FrameData surface =
+        read_frame(read_series(folder_ / "out" / "surface.hdf.series")[1].file);
+    EXPECT_EQ(surface.triangle, model_.surfels.triangle);
+    EXPECT_EQ(surface.point[1].x, 1.5);
+    EXPECT_TRUE(surface.normal == model_.surfels.normal);
+    EXPECT_EQ(surface.body, (std::vector<Index>{1, 1, 1, 1}));
+  }
+}
+
+TEST_F(Recording, TheLogHasOneLineAFrameAndUnitsInItsHeader) {
+  Recorder recorder(model_, scene_, false);
+  for (int k = 0; k < 3; ++k) record(recorder, k);
+  std::istringstream log(text_of(folder_ / "out" / "energy.csv"));
+  std::string line;
+  std::getline(log, line);
+  EXPECT_EQ(line.rfind("step,time [s],kinetic_energy [J],", 0), 0u) << line;
+  const auto columns = std::count(line.begin(), line.end(), ',');
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(std::getline(log, line));
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns);
+    EXPECT_EQ(std::stod(line.substr(line.find(',') + 1)), 0.1 * k);
+  }
+  EXPECT_FALSE(std::getline(log, line));
+}
+
+TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
+  {
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 5; ++k) record(recorder, k);
+  }
+  const std::string series = text_of(folder_ / "out" / "phyxels.hdf.series");
+  const std::string log = text_of(folder_ / "out" / "energy.csv");
+  const std::string last = text_of(folder_ / "out" / "surface_000004.hdf");
+  Recorder resumed(model_, scene_, false, 2);
+  EXPECT_EQ(resumed.frames_written(), 2);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "phyxels_000001.hdf"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "phyxels_000002.hdf"));
+  EXPECT_EQ(read_series(folder_ / "out" / "surface.hdf.series").size(), 2u);
+  for (int k = 2; k < 5; ++k) record(resumed, k);
+  EXPECT_EQ(text_of(folder_ / "out" / "phyxels.hdf.series"), series);
+  EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), log);
+  EXPECT_EQ(text_of(folder_ / "out" / "surface_000004.hdf"), last);
+}
+
+TEST_F(Recording, ResumingIntoAnotherFolderNumbersOn) {
+  Recorder resumed(model_, scene_, false, 7);
+  record(resumed, 7);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "phyxels_000007.hdf"));
+  EXPECT_EQ(read_series(folder_ / "out" / "phyxels.hdf.series").size(), 1u);
+}
+
+TEST_F(Recording, ATrajectoryThatIsThereIsKept) {
+  {
+    Recorder recorder(model_, scene_, false);
+    record(recorder, 0);
+  }
+  const std::string before = text_of(folder_ / "out" / "phyxels_000000.hdf");
+  EXPECT_THROW(Recorder(model_, scene_, false), InputError);
+  EXPECT_THROW(Recorder(model_, scene_, false, 3), InputError);  // the checkpoint has seen more
+  EXPECT_EQ(text_of(folder_ / "out" / "phyxels_000000.hdf"), before);
+  const std::string other = "notes";
+  std::ofstream(folder_ / "out" / "notes.txt") << other;
+  Recorder replaced(model_, scene_, true);
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "phyxels_000000.hdf"));
+  EXPECT_EQ(text_of(folder_ / "out" / "notes.txt"), other);  // not ours
+}
+
+TEST_F(Recording, ADiskWithoutRoomIsRefusedBeforehand) {
+  scene_.time.end = 1e9;
+  scene_.output.frames_per_second = 1e6;
+  try {
+    Recorder recorder(model_, scene_, false);
+    FAIL() << "10^15 frames fit on the disk?";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("frames_per_second"));
+    EXPECT_THAT(error.what(), HasSubstr("free"));
+  }
+}
+
+TEST_F(Recording, OnlyWhatTheSceneAsksForIsWritten) {
+  scene_.output.surface = false;
+  scene_.output.fields = {};
+  Recorder recorder(model_, scene_, false);
+  record(recorder, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "surface_000000.hdf"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "surface.hdf.series"));
+  EXPECT_EQ(recorder.files().size(), 2u);
+}
+
+TEST_F(Recording, SeriesThatAreNoneAreRefused) {
+  for (const char* text :
+       {"", "{", "[]", "{}", "{\"files\":1}", "{\"files\":[1]}",
+        "{\"files\":[{\"name\":1,\"time\":0}]}", "{\"files\":[{\"name\":\"a\"}]}",
+        "{\"files\":[{\"name\":\"a\",\"time\":\"0\"}]}",
+        "{\"files\":[{\"name\":\"a\",\"time\":1e999}]}"}) {
+    EXPECT_THROW(read_series(write("x.hdf.series", text)), InputError) << text;
+  }
+  EXPECT_THROW(read_series(write("deep.hdf.series", std::string(1000000, '['))), InputError);
+  EXPECT_THROW(read_series(folder_ / "missing"), InputError);
+  EXPECT_THROW(read_frame(write("x.hdf", "no frame")), InputError);
+}
+
+/// The independent readers: VTK's own reader and h5py, through Debian's Python, or another one that
+/// the environment names.
+int read_back(const fs::path& folder, const std::string& what) {
+  const char* named = std::getenv("PHYXEL_PYTHON");
+  const std::string python = named ? named : "/usr/bin/python3";
+  const std::string command =
+      python + " '" PHYXEL_SOURCE_DIR "/tests/read_back.py' " + what + " '" + folder.string() + "'";
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+constexpr int no_reader = 77;
+
+TEST_F(Recording, VtkAndH5pyReadTheSameNumbers) {
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    scene_.solver.precision = precision;
+    Recorder recorder(model_, scene_, true);
+    for (int k = 0; k < 3; ++k) record(recorder, k);
+    const int code = read_back(folder_ / "out", "frames");
+    if (code == no_reader) GTEST_SKIP() << "python3-vtk9 or python3-h5py is missing";
+    EXPECT_EQ(code, 0);
+  }
+}
+
+TEST_F(Recording, TheSingleFileHoldsEveryStep) {
+  {
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 3; ++k) record(recorder, k);
+  }
+  for (const char* family : {"phyxels", "surface"}) {
+    const fs::path out = folder_ / "out" / (std::string(family) + ".vtkhdf");
+    export_single(folder_ / "out" / (std::string(family) + ".hdf.series"), out, false);
+    EXPECT_THROW(export_single(folder_ / "out" / (std::string(family) + ".hdf.series"), out, false),
+                 InputError);
+    EXPECT_FALSE(fs::exists(out.string() + ".tmp"));
+  }
+  const int code = read_back(folder_ / "out", "single");
+  if (code == no_reader) GTEST_SKIP() << "python3-vtk9 or python3-h5py is missing";
+  EXPECT_EQ(code, 0);
+}
+
+}  // namespace
+}  // namespace phyxel
