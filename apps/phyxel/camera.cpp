@@ -1,0 +1,89 @@
+#include "camera.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel::app {
+namespace {
+
+constexpr double field_of_view = 30 * std::numbers::pi / 180;  // of the shorter side
+constexpr double filled = 0.86;  // share of the image that the points may take, each way
+
+}  // namespace
+
+Camera::Place Camera::project(Vec3d point) const {
+  const Vec3d d = point - eye;
+  const double depth = dot(d, forward);
+  return {0.5 * width + focal * dot(d, right) / depth, 0.5 * height - focal * dot(d, up) / depth,
+          depth};
+}
+
+CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up) {
+  if (std::min(width, height) < 16 || std::max(width, height) > 16384) {
+    throw InputError(fmt::format("picture of {} x {} pixels: allowed from 16 x 16 to 16384 x 16384",
+                                 width, height));
+  }
+  if (!is_finite(view) || !(norm(view) > 0) || !is_finite(up)) {
+    throw InputError(fmt::format(
+        "view [{}, {}, {}] with up [{}, {}, {}]: allowed are finite vectors, view not zero", view.x,
+        view.y, view.z, up.x, up.y, up.z));
+  }
+  camera_.width = width;
+  camera_.height = height;
+  camera_.forward = normalised(view);
+  for (const Vec3d candidate : {normalised(up), Vec3d{0, 1, 0}, Vec3d{0, 0, 1}}) {
+    const Vec3d right = cross(camera_.forward, candidate);
+    if (norm(right) < 1e-6) continue;
+    camera_.right = normalised(right);
+    break;
+  }
+  camera_.up = cross(camera_.right, camera_.forward);
+  camera_.focal = 0.5 * std::min(width, height) / std::tan(0.5 * field_of_view);
+  slope_x_ = filled * 0.5 * width / camera_.focal;
+  slope_y_ = filled * 0.5 * height / camera_.focal;
+}
+
+// A point (x, y, z) in the camera's axes is seen from an eye at e if |x - e_x| <= s_x (z - e_z) and
+// the same for y: four half-spaces for the eye, of which only the tightest of all points count.
+void CameraFit::include(std::span<const Vec3d> points) {
+  for (const Vec3d& p : points) {
+    if (!is_finite(p)) continue;
+    const double x = dot(p, camera_.right), y = dot(p, camera_.up), z = dot(p, camera_.forward);
+    left_ = std::max(left_, x - slope_x_ * z);
+    right_ = std::min(right_, x + slope_x_ * z);
+    below_ = std::max(below_, y - slope_y_ * z);
+    above_ = std::min(above_, y + slope_y_ * z);
+    nearest_ = std::min(nearest_, z);
+    farthest_ = std::max(farthest_, z);
+    low_x_ = std::min(low_x_, x);
+    high_x_ = std::max(high_x_, x);
+    low_y_ = std::min(low_y_, y);
+    high_y_ = std::max(high_y_, y);
+  }
+}
+
+double CameraFit::extent() const {
+  return empty() ? 0 : std::max({high_x_ - low_x_, high_y_ - low_y_, farthest_ - nearest_});
+}
+
+Camera CameraFit::camera() const {
+  Camera fitted = camera_;
+  if (empty()) return fitted;
+  // Never nearer than half the extent: a body seen along its axis would else touch the lens. The
+  // 1e-3 keeps a single point far from the origin at a depth that its coordinates resolve.
+  const double magnitude =
+      std::max({std::abs(low_x_), std::abs(high_x_), std::abs(low_y_), std::abs(high_y_),
+                std::abs(nearest_), std::abs(farthest_), 1e-9});
+  const double clearance = std::max(0.5 * extent(), 1e-3 * magnitude);
+  const double z = std::min({(right_ - left_) / (2 * slope_x_), (above_ - below_) / (2 * slope_y_),
+                             nearest_ - clearance});
+  fitted.eye = 0.5 * (left_ + right_) * camera_.right + 0.5 * (below_ + above_) * camera_.up +
+               z * camera_.forward;
+  return fitted;
+}
+
+}  // namespace phyxel::app

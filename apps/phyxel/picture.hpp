@@ -1,0 +1,47 @@
+/// Pictures of a trajectory: which frames, seen from where, written to which files.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "compose.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel::app {
+
+/// Which frames of a series; at most one member is set, none means all of them.
+struct FrameChoice {
+  std::vector<std::int64_t> frames;  ///< Numbers from 0; negative ones count from the end.
+  std::int64_t count = 0;            ///< This many, evenly spread, first and last included.
+  std::int64_t every = 0;            ///< Every so many, from the first.
+};
+
+/// Frame numbers in rising order, each once.
+/// @throws InputError for a number outside [-available, available), or a negative count or step.
+std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t available);
+
+struct PictureRequest {
+  int width = 960, height = 720;  ///< [px]
+  Vec3d view{-1, 2, -0.6};        ///< Direction the camera looks along.
+  Vec3d up{0, 0, 1};
+  bool phyxels = true, surface = true;  ///< What is drawn, as far as there is any.
+  FrameChoice choice;
+};
+
+/// Draws the frames of a run's folder (phyxels and surface), of one series file, or of one frame
+/// file, with one camera that sees the whole motion. Pictures of a series are
+/// `folder`/frame_<number>.png, that of a single frame bears its name.
+/// @returns the files written, in order of time.
+/// @throws InputError if there is nothing to draw, or, unless `overwrite`, if one of the pictures
+///   exists (none is written then); OutputError if writing fails.
+std::vector<std::filesystem::path> render(const std::filesystem::path& input,
+                                          const std::filesystem::path& folder,
+                                          const PictureRequest& request, bool overwrite);
+
+/// What a run does at its end: draws `request.count` frames of the run's folder into
+/// `out`/pictures. With `overwrite`, pictures of an earlier run of that folder are removed.
+std::vector<std::filesystem::path> render_directory(const std::filesystem::path& out,
+                                                    const RenderRequest& request, bool overwrite);
+
+}  // namespace phyxel::app

@@ -1,0 +1,120 @@
+#include "progress.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <string_view>
+
+namespace phyxel::app {
+namespace {
+
+constexpr double redraw_interval = 0.1, line_interval = 5;  // [s]
+constexpr std::size_t bar_length = 16;  // leaves an 80-column terminal room for the speed
+
+bool can_redraw(std::FILE* stream) {
+  const char* kind = std::getenv("TERM");
+  return ::isatty(::fileno(stream)) == 1 && !(kind != nullptr && std::string_view(kind) == "dumb");
+}
+
+int terminal_columns(std::FILE* stream) {
+  winsize size = {};
+  if (::ioctl(::fileno(stream), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+  return size.ws_col;
+}
+
+double steady_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// "0:07", "12:34", "5:06:07", or "-:--" if unknown.
+std::string clock_text(double seconds) {
+  if (!(seconds >= 0 && seconds < 1e9)) return "-:--";
+  const auto s = static_cast<std::int64_t>(std::ceil(seconds));
+  if (s < 3600) return fmt::format("{}:{:02d}", s / 60, s % 60);
+  return fmt::format("{}:{:02d}:{:02d}", s / 3600, s / 60 % 60, s % 60);
+}
+
+}  // namespace
+
+Progress::Progress(double end_time, std::FILE* stream, const ProgressStyle& style)
+    : end_time_(end_time),
+      stream_(stream),
+      phyxels_(style.phyxels),
+      clock_(style.clock ? style.clock : steady_seconds) {
+  if (stream_ == nullptr) return;
+  terminal_ = style.terminal.value_or(can_redraw(stream_));
+  if (terminal_) columns_ = style.columns.value_or(terminal_columns(stream_));
+  // On a terminal the first update shows at once; elsewhere short runs get only their last line.
+  last_shown_ = clock_() - (terminal_ ? redraw_interval : 0);
+}
+
+Progress::~Progress() { finish(); }
+
+void Progress::update(double time, std::int64_t step, double steps_per_second, double energy) {
+  if (stream_ == nullptr) return;
+  time_ = time;
+  step_ = step;
+  steps_per_second_ = steps_per_second;
+  energy_ = energy;
+  pending_ = true;
+  const double now = clock_();
+  if (now - last_shown_ < (terminal_ ? redraw_interval : line_interval)) return;
+  last_shown_ = now;
+  show();
+}
+
+void Progress::finish() {
+  if (stream_ == nullptr) return;
+  if (pending_) show();
+  if (drawn_) std::fputc('\n', stream_);
+  std::fflush(stream_);
+  stream_ = nullptr;
+}
+
+// The parts of a line, the most wanted first: a narrow terminal drops the last ones.
+std::vector<std::string> Progress::parts() const {
+  // The last step ends at end_time up to rounding.
+  const bool done = time_ >= end_time_ * (1 - 1e-9);
+  const double fraction = done ? 1 : std::clamp(time_ / end_time_, 0.0, 0.999);  // 100% is the end
+  // Time left from the steps still to go; the step size is time / step.
+  const double dt = step_ > 0 ? time_ / static_cast<double>(step_) : 0;
+  const double left = done ? 0 : (end_time_ - time_) / (dt * steps_per_second_);
+  std::vector<std::string> parts;
+  if (terminal_) {
+    const auto filled = static_cast<std::size_t>(fraction * bar_length);
+    parts.push_back('[' + std::string(filled, '#') + std::string(bar_length - filled, '.') + ']');
+  }
+  parts.push_back(fmt::format("{:5.1f}%", 100 * fraction));
+  parts.push_back(fmt::format("{} left", clock_text(left)));
+  parts.push_back(fmt::format("{:.3f}/{:g} s", time_, end_time_));
+  if (phyxels_ > 0) {
+    parts.push_back(
+        fmt::format("{:.3g} phyxel-steps/s", steps_per_second_ * static_cast<double>(phyxels_)));
+  }
+  parts.push_back(fmt::format("{:.4g} steps/s", steps_per_second_));
+  parts.push_back(fmt::format("step {}", step_));
+  parts.push_back(fmt::format("E = {:.4g} J", energy_));
+  return parts;
+}
+
+void Progress::show() {
+  pending_ = false;
+  std::string line;
+  for (const std::string& part : parts()) {
+    // One column stays free, so that no terminal wraps the line.
+    if (terminal_ && static_cast<int>(line.size() + 2 + part.size()) >= columns_) break;
+    if (!line.empty()) line += "  ";
+    line += part;
+  }
+  // Not fmt::print, which throws: a closed stderr must not end a run.
+  std::fputs((terminal_ ? '\r' + line + "\x1b[K" : line + '\n').c_str(), stream_);
+  std::fflush(stream_);
+  drawn_ = terminal_;
+}
+
+}  // namespace phyxel::app

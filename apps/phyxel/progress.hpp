@@ -1,0 +1,56 @@
+/// How far a run has come: one line redrawn in place on a terminal, a plain line every few seconds
+/// elsewhere.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace phyxel::app {
+
+/// What a progress line shows and how. What is not set is found out from the stream and the
+/// environment.
+struct ProgressStyle {
+  std::int64_t phyxels = 0;       ///< If positive, phyxel-steps/s are shown beside steps/s.
+  std::optional<bool> terminal;   ///< A terminal that can redraw; else plain lines.
+  std::optional<int> columns;     ///< Width of the terminal.
+  std::function<double()> clock;  ///< Wall-clock seconds from any origin.
+};
+
+class Progress {
+ public:
+  /// @param end_time simulated time at which the run ends [s].
+  /// @param stream null: silent.
+  Progress(double end_time, std::FILE* stream, const ProgressStyle& style = {});
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  /// Cheap enough for every step: shows at most 10 lines a second on a terminal, one every 5
+  /// seconds elsewhere. @param time simulated [s]. @param energy total [J].
+  void update(double time, std::int64_t step, double steps_per_second, double energy);
+
+  /// Shows the last update and ends the line; later calls do nothing.
+  void finish();
+
+ private:
+  std::vector<std::string> parts() const;
+  void show();
+
+  double end_time_;
+  std::FILE* stream_;
+  std::int64_t phyxels_;
+  bool terminal_ = false;
+  int columns_ = 80;
+  std::function<double()> clock_;
+  double last_shown_ = 0;
+  bool pending_ = false;  // the last update has not been shown
+  bool drawn_ = false;    // a line on the terminal is not yet ended
+  double time_ = 0, steps_per_second_ = 0, energy_ = 0;
+  std::int64_t step_ = 0;
+};
+
+}  // namespace phyxel::app

@@ -1,0 +1,99 @@
+/// phyxel render: pictures of a trajectory, without display or GPU.
+#include <fmt/format.h>
+
+#include "command.hpp"
+#include "phyxel/error.hpp"
+#include "picture.hpp"
+
+namespace phyxel::app {
+namespace {
+
+constexpr std::int64_t most_frames = 1'000'000'000;
+
+struct RenderOptions {
+  std::filesystem::path input, out;
+  PictureRequest request;
+  std::vector<double> view, up;
+  bool no_phyxels = false, no_surface = false, force = false;
+};
+
+Vec3d vector_of(const std::vector<double>& values, const char* option, Vec3d otherwise) {
+  if (values.empty()) return otherwise;
+  if (values.size() != 3) {
+    throw InputError(fmt::format("{}: {} numbers; allowed: three, as in {} -1,2,-0.6", option,
+                                 values.size(), option));
+  }
+  return {values[0], values[1], values[2]};
+}
+
+void render_command(const RenderOptions& options) {
+  PictureRequest request = options.request;
+  request.view = vector_of(options.view, "--view", request.view);
+  request.up = vector_of(options.up, "--up", request.up);
+  request.phyxels = !options.no_phyxels;
+  request.surface = !options.no_surface;
+  if (!request.phyxels && !request.surface) {
+    throw InputError("--no-phyxels --no-surface: nothing is left to draw; allowed: one of the two");
+  }
+  std::filesystem::path folder = options.out;
+  if (folder.empty()) {
+    const bool directory = std::filesystem::is_directory(options.input);
+    folder = (directory ? options.input : options.input.parent_path()) / "pictures";
+  }
+  const auto files = render(options.input, folder, request, options.force);
+  fmt::print("{} picture{}: {}", files.size(), files.size() == 1 ? "" : "s",
+             files.front().string());
+  fmt::print("{}{}\n", files.size() > 1 ? " ... " : "",
+             files.size() > 1 ? files.back().string() : std::string());
+}
+
+}  // namespace
+
+void add_render(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "render", "Draw PNG pictures of a trajectory: the shaded surface, phyxels as dots");
+  auto options = std::make_shared<RenderOptions>();
+  PictureRequest& request = options->request;
+  command
+      ->add_option("input", options->input, "Folder of a run, a .series file, or one frame (.hdf)")
+      ->required();
+  command->add_option("--out", options->out,
+                      "Folder for the pictures (default: pictures/ beside the frames)");
+  auto* frames = command
+                     ->add_option("--frames", request.choice.frames,
+                                  "Frames, comma separated, from 0; -1 is the last (default: all)")
+                     ->delimiter(',')
+                     ->allow_extra_args(false);
+  auto* count = command
+                    ->add_option("--count", request.choice.count,
+                                 "So many frames, evenly spread, first and last included")
+                    ->check(CLI::Range(std::int64_t{1}, most_frames))
+                    ->excludes(frames);
+  command->add_option("--every", request.choice.every, "Every so many frames")
+      ->check(CLI::Range(std::int64_t{1}, most_frames))
+      ->excludes(frames)
+      ->excludes(count);
+  command->add_option("--width", request.width, "Pixels across")->capture_default_str();
+  command->add_option("--height", request.height, "Pixels down")->capture_default_str();
+  command
+      ->add_option("--view", options->view,
+                   "Direction the camera looks along: x,y,z (default: -1,2,-0.6)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command
+      ->add_option("--up", options->up,
+                   "Direction that is up on the picture: x,y,z (default: 0,0,1)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_flag("--no-phyxels", options->no_phyxels, "The surface only");
+  command->add_flag("--no-surface", options->no_surface, "The phyxels only, as balls");
+  command->add_flag("--force", options->force, "Replace pictures that exist");
+  command->footer(
+      "Examples:\n"
+      "  phyxel render out/dino --count 6\n"
+      "  phyxel render out/dino --frames 0,10,-1 --view 0,1,0 --out pictures\n"
+      "  phyxel render out/dino/surface_000010.hdf");
+  command->callback([options] { render_command(*options); });
+}
+
+}  // namespace phyxel::app

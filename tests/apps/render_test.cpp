@@ -1,0 +1,320 @@
+/// Pictures of a trajectory: what is on them, which frames are drawn, which files are written.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <random>
+
+#include "ball.hpp"
+#include "picture.hpp"
+#include "png_file.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// --- whole pictures ----------------------------------------------------------------------------
+
+Setting setting_for(const FrameData& surface, double spacing) {
+  CameraFit fit(160, 120, {-1, 2, -0.6}, {0, 0, 1});
+  fit.include(surface.point);
+  Setting setting;
+  setting.camera = fit.camera();
+  setting.extent = fit.extent();
+  setting.spacing = spacing;
+  return setting;
+}
+
+int pixels_that_differ(const Image& a, const Image& b) {
+  int count = 0;
+  for (std::size_t k = 0; k < a.rgb.size(); k += 3) {
+    count += !std::equal(&a.rgb[k], &a.rgb[k] + 3, &b.rgb[k]);
+  }
+  return count;
+}
+
+TEST(Picture, ShowsPhyxelsAsDotsOnTheSurfaceAndTheTimeBelow) {
+  const FrameData surface = sphere({1, 2, 3}, 1, 30);
+  FrameData phyxels;
+  phyxels.point = {{1, 2, 3}, {1.5, 1.5, 3}, {0.5, 1.5, 3.5}};
+  Setting setting = setting_for(surface, 0.5);
+  const Image with = draw_picture(&surface, &phyxels, setting);
+  const Image without = draw_picture(&surface, nullptr, setting);
+  // Radius 0.2 spacings = 0.1 m; the sphere's 1 m is about 50 px: three dots of 80 px, one of them
+  // maybe half hidden by another.
+  EXPECT_GT(pixels_that_differ(with, without), 100);
+  EXPECT_LT(pixels_that_differ(with, without), 400);
+  EXPECT_EQ(with.rgb, draw_picture(&surface, &phyxels, setting).rgb);
+
+  setting.time_decimals = -1;
+  const Image unlabelled = draw_picture(&surface, &phyxels, setting);
+  EXPECT_GT(pixels_that_differ(with, unlabelled), 30);
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      if (x < 80 && y > 90) continue;  // the corner of the label
+      ASSERT_TRUE(std::equal(with.pixel(x, y), with.pixel(x, y) + 3, unlabelled.pixel(x, y)));
+    }
+  }
+}
+
+TEST(Picture, NormalsThatTheFrameLacksAreMade) {
+  FrameData given = sphere({0, 0, 0}, 1, 60), lacking = given;
+  lacking.normal.clear();
+  const Setting setting = setting_for(given, 0.1);
+  const Image a = draw_picture(&given, nullptr, setting);
+  const Image b = draw_picture(&lacking, nullptr, setting);
+  // Area-weighted normals of a fine sphere are within a degree or so of the true ones.
+  for (std::size_t k = 0; k < a.rgb.size(); ++k) ASSERT_NEAR(a.rgb[k], b.rgb[k], 6) << k;
+}
+
+TEST(Picture, BodiesHaveTheirOwnColours) {
+  FrameData both = sphere({-1.5, 0, 0}, 1, 20);
+  const FrameData second = sphere({1.5, 0, 0}, 1, 20);
+  const auto n = static_cast<Index>(both.point.size());
+  both.body.assign(both.point.size(), 0);
+  both.body.insert(both.body.end(), second.point.size(), 1);
+  both.point.insert(both.point.end(), second.point.begin(), second.point.end());
+  both.normal.insert(both.normal.end(), second.normal.begin(), second.normal.end());
+  for (const auto& [a, b, c] : second.triangle) both.triangle.push_back({a + n, b + n, c + n});
+  Setting setting = setting_for(both, 0.1);
+  const Image image = draw_picture(&both, nullptr, setting);
+  const auto pixel_at = [&](Vec3d point) {
+    const Camera::Place place = setting.camera.project(point);
+    return image.pixel(static_cast<int>(place.x), static_cast<int>(place.y));
+  };
+  const std::uint8_t *green = pixel_at({-1.5, 0, 0}), *violet = pixel_at({1.5, 0, 0});
+  EXPECT_GT(green[1], 20 + std::max(green[0], green[2]));
+  EXPECT_LT(violet[1], std::min(violet[0], violet[2]) - 20);
+}
+
+// --- files -------------------------------------------------------------------------------------
+
+class Files : public ::testing::Test {
+ protected:
+  Files() {
+    folder_ = fs::temp_directory_path() /
+              ("phyxel_render_" + std::to_string(getpid()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~Files() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  static Image read_png(const fs::path& file) {
+    png_image png = {};
+    png.version = PNG_IMAGE_VERSION;
+    EXPECT_NE(png_image_begin_read_from_file(&png, file.c_str()), 0) << file << png.message;
+    EXPECT_EQ(png.format, static_cast<png_uint_32>(PNG_FORMAT_RGB));
+    Image image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
+    image.rgb.resize(PNG_IMAGE_SIZE(png));
+    EXPECT_NE(png_image_finish_read(&png, nullptr, image.rgb.data(), 0, nullptr), 0) << png.message;
+    return image;
+  }
+  std::vector<std::string> names_in(const fs::path& folder) const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      names.push_back(entry.path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  fs::path folder_;
+};
+
+TEST_F(Files, APngHoldsExactlyThePixels) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {17, 5}, {300, 200}}) {
+    Image image{width, height, {}};
+    std::mt19937 random(1);
+    for (int k = 0; k < 3 * width * height; ++k) {
+      image.rgb.push_back(static_cast<std::uint8_t>(random() >> 24));
+    }
+    write_png(folder_ / "a.png", image);  // the second and third replace the one before
+    const Image back = read_png(folder_ / "a.png");
+    EXPECT_EQ(back.width, width);
+    EXPECT_EQ(back.height, height);
+    EXPECT_EQ(back.rgb, image.rgb);
+    EXPECT_THAT(names_in(folder_), ElementsAre("a.png"));
+  }
+}
+
+TEST_F(Files, AFolderThatCannotTakeAPngIsNamed) {
+  const Image image{1, 1, {0, 0, 0}};
+  EXPECT_THROW(write_png(folder_ / "absent" / "a.png", image), OutputError);
+  EXPECT_THAT(message_of([&] { write_png(folder_ / "absent" / "a.png", image); }),
+              HasSubstr("absent/a.png"));
+  EXPECT_THAT(names_in(folder_), IsEmpty());
+}
+
+TEST(ChooseFrames, FollowsTheTable) {
+  const struct {
+    FrameChoice choice;
+    std::size_t available;
+    std::vector<std::size_t> expected;
+  } table[] = {
+      {{}, 4, {0, 1, 2, 3}},
+      {{}, 0, {}},
+      {{.frames = {2, 0, 2}}, 4, {0, 2}},
+      {{.frames = {-1, 0}}, 4, {0, 3}},
+      {{.frames = {-4}}, 4, {0}},
+      {{.count = 1}, 4, {3}},
+      {{.count = 2}, 51, {0, 50}},
+      {{.count = 6}, 51, {0, 10, 20, 30, 40, 50}},
+      {{.count = 3}, 4, {0, 2, 3}},  // 1.5 rounds up
+      {{.count = 9}, 4, {0, 1, 2, 3}},
+      {{.count = 3}, 1, {0}},
+      {{.every = 2}, 4, {0, 2}},
+      {{.every = 3}, 4, {0, 3}},
+      {{.every = 100}, 4, {0}},
+  };
+  for (const auto& row : table) EXPECT_EQ(choose_frames(row.choice, row.available), row.expected);
+}
+
+TEST(ChooseFrames, FramesThatAreNotThereAreNamed) {
+  EXPECT_EQ(message_of([] {
+              choose_frames({.frames = {1, 4}}, 4);
+            }),
+            "frame 4: there are 4; allowed: -4 to 3");
+  EXPECT_THROW(choose_frames({.frames = {-5}}, 4), InputError);
+  EXPECT_THROW(choose_frames({.count = -1}, 4), InputError);
+  EXPECT_THROW(choose_frames({.every = -2}, 4), InputError);
+}
+
+/// A trajectory of three frames: a ball that falls, with two phyxels inside.
+class Trajectory : public Files {
+ protected:
+  Trajectory() {
+    const FrameData ball = sphere({0, 0, 0}, 1, 16);
+    model_.position = {{0.3, 0, 0}, {-0.3, 0, 0}};
+    model_.mass = model_.volume = {1, 1};
+    model_.surfels.position = ball.point;
+    model_.surfels.normal = ball.normal;
+    model_.surfels.triangle = ball.triangle;
+    Part part;
+    part.end = 2;
+    part.surfel_end = static_cast<Index>(ball.point.size());
+    model_.parts = {part};
+    scene_.output.directory = run_ = folder_ / "run";
+    scene_.time.end = 0.5;
+    scene_.output.frames_per_second = 4;
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d fall{0, 0, -2.0 * k};
+      State state;
+      state.displacement = {fall, fall};
+      state.velocity.resize(2);
+      state.time = 0.25 * k;
+      state.step = k;
+      SurfelState surfels{ball.point, ball.normal};
+      for (Vec3d& p : surfels.position) p += fall;
+      Frame frame;
+      frame.state = &state;
+      frame.surfels = &surfels;
+      frame.diagnostics.time = state.time;
+      frame.diagnostics.step = k;
+      recorder.write(frame);
+    }
+    request_.width = 160;
+    request_.height = 120;
+  }
+  Model model_;
+  Scene scene_;
+  fs::path run_;
+  PictureRequest request_;
+};
+
+/// Mean height of the green surface on the picture [px, downwards].
+double height_of_body(const Image& image) {
+  double sum = 0, count = 0;
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const std::uint8_t* p = image.pixel(x, y);
+      if (p[1] < p[0] + 20) continue;
+      sum += y;
+      ++count;
+    }
+  }
+  EXPECT_GT(count, 100);
+  return sum / count;
+}
+
+TEST_F(Trajectory, OneCameraSeesTheWholeMotion) {
+  const auto files = render(run_, folder_ / "pictures", request_, false);
+  EXPECT_THAT(names_in(folder_ / "pictures"),
+              ElementsAre("frame_000000.png", "frame_000001.png", "frame_000002.png"));
+  ASSERT_EQ(files.size(), 3u);
+  std::vector<double> height;
+  for (const fs::path& file : files) height.push_back(height_of_body(read_png(file)));
+  // The ball starts at the top, ends at the bottom, and is half way in between: perspective and
+  // the dots, which are not green, move the middle by a few pixels.
+  EXPECT_LT(height[0], 40);
+  EXPECT_GT(height[2], 80);
+  EXPECT_NEAR(height[1], 0.5 * (height[0] + height[2]), 4);
+}
+
+TEST_F(Trajectory, PicturesThatExistAreKeptUnlessForced) {
+  const fs::path pictures = folder_ / "pictures";
+  fs::create_directory(pictures);
+  std::ofstream(pictures / "frame_000002.png") << "mine";
+  EXPECT_THAT(message_of([&] { render(run_, pictures, request_, false); }),
+              HasSubstr("frame_000002.png: exists and is kept"));
+  EXPECT_THAT(names_in(pictures), ElementsAre("frame_000002.png"));
+  EXPECT_EQ(fs::file_size(pictures / "frame_000002.png"), 4u);
+  request_.choice.frames = {0, 1};
+  EXPECT_EQ(render(run_, pictures, request_, false).size(), 2u);  // not in the way
+  request_.choice = {};
+  EXPECT_EQ(render(run_, pictures, request_, true).size(), 3u);
+  EXPECT_EQ(read_png(pictures / "frame_000002.png").width, 160);
+}
+
+TEST_F(Trajectory, AFrameAndASeriesCanBeDrawnAlone) {
+  EXPECT_EQ(render(run_ / "surface_000001.hdf", folder_ / "one", request_, false),
+            std::vector{folder_ / "one" / "surface_000001.png"});
+  EXPECT_EQ(render(run_ / "phyxels.hdf.series", folder_ / "series", request_, false).size(), 3u);
+  height_of_body(read_png(folder_ / "series" / "frame_000000.png"));  // balls in the body's colour
+}
+
+TEST_F(Trajectory, ARunDrawsItsFolderAndRemovesStalePictures) {
+  fs::create_directories(run_ / "pictures");
+  for (const char* name : {"frame_000007.png", "notes.txt", "frame_a.png"}) {
+    std::ofstream(run_ / "pictures" / name) << "old";
+  }
+  RenderRequest request;
+  request.count = 2;
+  request.width = request.height = 64;
+  EXPECT_EQ(render_directory(run_, request, true).size(), 2u);
+  EXPECT_THAT(names_in(run_ / "pictures"),
+              ElementsAre("frame_000000.png", "frame_000002.png", "frame_a.png", "notes.txt"));
+}
+
+TEST_F(Trajectory, WrongInputIsNamedAndLeavesNothing) {
+  const fs::path out = folder_ / "pictures";
+  const auto refused = [&](const fs::path& input, const PictureRequest& request) {
+    return message_of([&] { render(input, out, request, false); });
+  };
+  EXPECT_THAT(refused(folder_ / "absent", request_), HasSubstr("absent: no such file or folder"));
+  EXPECT_THAT(refused(folder_, request_), HasSubstr("holds no trajectory"));
+  PictureRequest late = request_, flat = request_, balls = request_;
+  late.choice.frames = {3};
+  flat.width = 0;
+  balls.surface = false;
+  EXPECT_THAT(refused(run_, late), HasSubstr("frame 3: there are 3"));
+  EXPECT_THAT(refused(run_, flat), HasSubstr("0 x 120 pixels"));
+  EXPECT_THAT(refused(run_ / "surface.hdf.series", balls), HasSubstr("holds a surface only"));
+  std::ofstream(folder_ / "foreign.hdf") << "not a frame";
+  EXPECT_THAT(refused(folder_ / "foreign.hdf", request_), HasSubstr("foreign.hdf"));
+  fs::remove(run_ / "surface_000001.hdf");
+  EXPECT_THAT(refused(run_, request_), HasSubstr("surface_000001.hdf"));
+  EXPECT_FALSE(fs::exists(out));
+}
+
+}  // namespace
+}  // namespace phyxel::app
