@@ -1,0 +1,40 @@
+/// Boxes, cylinders and spheres filled by a lattice of cells with a phyxel in each.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "phyxel/shapes.hpp"
+
+namespace phyxel {
+
+/// A solid and the cells that tile the box around it. The z axis of a cylinder is the body's.
+struct Lattice {
+  enum class Solid { box, cylinder, sphere };
+  Solid solid = Solid::box;
+  Vec3d low;                    ///< Lower corner of the box [m].
+  Vec3d extent;                 ///< [m]
+  std::array<double, 3> cells;  ///< Whole numbers, 1 or more; doubles because they may be absurd.
+
+  Vec3d cell() const { return {extent.x / cells[0], extent.y / cells[1], extent.z / cells[2]}; }
+  double volume() const;         ///< Of the solid [m^3].
+  bool contains(Vec3d p) const;  ///< Strictly inside the solid.
+  /// Whether the centre of a cell is inside the solid, free of rounding.
+  bool holds(const std::array<std::int64_t, 3>& cell) const;
+  /// Cells whose centres are inside, one phyxel each; estimated where that is beyond 1e11.
+  double phyxels() const;
+};
+
+/// The solid of a checked request, in cells of about `spacing` [m].
+Lattice make_lattice(const ShapeRequest& request, double spacing);
+
+/// A phyxel in each cell whose centre is inside the solid, all with the same volume, in the order
+/// of a Morton curve over the cells; with regions. Phyxels are moved by up to `jitter` cells in
+/// each direction, but not out of the solid.
+Cloud fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed);
+
+/// The closed surface of the solid with vertices about `spacing` [m] apart, or more where that
+/// would be over a million.
+Surface lattice_surface(const Lattice& lattice, double spacing);
+
+}  // namespace phyxel
