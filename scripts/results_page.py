@@ -1,14 +1,18 @@
 #!/usr/bin/env python3
-"""Writes docs/results/README.md from the CSV files beside it. No number there is typed by hand.
+"""Writes docs/results/README.md, and the table of speeds in README.md, from the CSV files of
+docs/results. No number there is typed by hand.
 
     build/cpu/bin/phyxel bench step --csv docs/results/cpu_step.csv --force
     build/cpu/bin/phyxel bench neighbours --csv docs/results/cpu_neighbours.csv --force
+    bench/compare/lammps_tlsph.py path/to/lmp
     scripts/results_page.py
 """
 import csv
 import pathlib
 
-FOLDER = pathlib.Path(__file__).resolve().parent.parent / "docs" / "results"
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "docs" / "results"
+BEGIN, END = "<!-- speed: made by scripts/results_page.py -->\n", "<!-- end of speed -->"
 
 
 def read(name):
@@ -77,31 +81,56 @@ def neighbours_section():
     return text + table(head, body)
 
 
-def peer_section():
-    facts, peer = read("lammps_tlsph.csv")
+def peer_rows():
+    """Each measured run of LAMMPS beside ours in double and float, of the nearest size."""
+    _, peer = read("lammps_tlsph.csv")
     _, own = read("cpu_step.csv")
-    if not peer or not own:
-        return ""
-    text = "\n## Beside LAMMPS `smd/tlsph`\n\n"
-    text += f"{facts.get('what', '')} {measured(facts)}. LAMMPS input: `bench/compare/lammps_tlsph.in`. "
-    text += "Phyxel rows are those above (terms green) of the nearest size, on as many threads as LAMMPS has "
-    text += "ranks. LAMMPS computes in double.\n\n"
-    head = ["particles", "cores", "LAMMPS neighbours", "LAMMPS M particle-steps/s",
-            "phyxel double", "ratio", "phyxel float", "ratio"]
-    body = []
     for p in peer:
-        line = [p["particles"], p["ranks"], p["neighbours"], million(p["particle_steps_per_s"])]
+        rates = {}
         for precision in ("double", "float"):
             near = [r for r in own if r["terms"] == "green" and r["precision"] == precision
                     and r["threads"] == p["ranks"]
                     and 0.5 < float(r["phyxels"]) / float(p["particles"]) < 2]
-            if not near:
-                line += ["–", "–"]
-                continue
-            rate = float(near[0]["phyxel_steps_per_s"])
-            line += [million(rate), f"{rate / float(p['particle_steps_per_s']):.1f}×"]
+            if near:
+                rates[precision] = float(near[0]["phyxel_steps_per_s"])
+        if len(rates) == 2:
+            yield p, rates
+
+
+def peer_table(rows):
+    head = ["particles", "cores", "LAMMPS `smd/tlsph`, double", "phyxel, double", "ratio", "phyxel, float", "ratio"]
+    body = []
+    for p, rates in rows:
+        peer = float(p["particle_steps_per_s"])
+        line = [f"{int(p['particles']):,}", p["ranks"], million(peer)]
+        for precision in ("double", "float"):
+            line += [million(rates[precision]), f"{rates[precision] / peer:.1f}×"]
         body.append(line)
-    return text + table(head, body)
+    return table(head, body)
+
+
+def peer_section():
+    facts, _ = read("lammps_tlsph.csv")
+    rows = list(peer_rows())
+    if not rows:
+        return ""
+    text = "\n## Beside LAMMPS `smd/tlsph`\n\n"
+    text += f"Millions of particle steps per second. {facts.get('what', '')} {measured(facts)}. Input: "
+    text += "`bench/compare/lammps_tlsph.in`, run by `bench/compare/lammps_tlsph.py`. The phyxel rows are "
+    text += "those above (terms green) of the nearest size, on as many threads as LAMMPS has ranks. Both are "
+    text += "total-Lagrangian with 32 neighbours inside a cubic lattice; LAMMPS also computes an artificial "
+    text += "viscosity and hourglass control, which phyxel does not.\n\n"
+    return text + peer_table(rows)
+
+
+def readme_block():
+    facts, _ = read("cpu_step.csv")
+    rows = [row for row in peer_rows() if int(row[0]["particles"]) > 50_000]
+    if not rows:
+        return ""
+    text = "Millions of phyxel steps per second on a CPU (Green strain, gravity, about 32 neighbours), beside the "
+    text += f"nearest peer on the same cores: {measured(facts)}.\n\n"
+    return text + peer_table(rows)
 
 
 def main():
@@ -109,6 +138,9 @@ def main():
     page += "`bench` commands write.\n\n"
     page += step_section() + neighbours_section() + peer_section()
     (FOLDER / "README.md").write_text(page)
+    readme = (ROOT / "README.md").read_text()
+    before, rest = readme.split(BEGIN)
+    (ROOT / "README.md").write_text(before + BEGIN + readme_block() + END + rest.split(END, 1)[1])
 
 
 if __name__ == "__main__":

@@ -60,12 +60,15 @@ class Run {
     if (!begin_) write_frame(now);
 
     StopSignal signals;
-    Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr);
+    Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr,
+                      {.phyxels = model_.size()});
     loop_start_ = Clock::now();
     auto last_checkpoint = Clock::now();
     try {
       while (solver.steps() < plan_.steps) {
+        const auto step_start = Clock::now();
         solver.step();
+        step_seconds_ += seconds_since(step_start);
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
         const bool stop = StopSignal::stop_requested() != 0;
@@ -75,8 +78,8 @@ class Run {
           peak_energy_ =
               std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
           good_ = solver.state();
-          progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
         }
+        progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
         if (frame) write_frame(now);
         const bool due = scene_.output.checkpoint_every > 0 &&
                          seconds_since(last_checkpoint) > scene_.output.checkpoint_every;
@@ -227,8 +230,9 @@ class Run {
           {"omega_max_rad_s", plan_.limit.omega_max},
           {"setup_seconds", setup_seconds_},
           {"loop_seconds", loop_seconds_},
-          {"steps_per_second", steps / loop_seconds_},
-          {"phyxel_steps_per_second", steps * model_.size() / loop_seconds_},
+          {"step_seconds", step_seconds_},
+          {"steps_per_second", steps / step_seconds_},
+          {"phyxel_steps_per_second", steps * model_.size() / step_seconds_},
           {"bytes", bytes},
           {"energy_j", now.total_energy()},
           {"energy_drift", energy_drift},
@@ -244,9 +248,9 @@ class Run {
       return;
     }
     fmt::print(
-        "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s ({:.2f} s with output), {:.0f} bytes "
-        "per phyxel\n",
-        steps / loop_seconds_, steps * model_.size() / loop_seconds_, loop_seconds_,
+        "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s with "
+        "output; {:.0f} bytes per phyxel\n",
+        steps / step_seconds_, steps * model_.size() / step_seconds_, step_seconds_, loop_seconds_,
         static_cast<double>(bytes) / std::max(1, model_.size()));
     if (is_conservative(model_)) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
@@ -288,7 +292,7 @@ class Run {
   State good_;  // the last state that passed the watch
   std::int64_t first_step_ = 0;
   double initial_energy_ = 0, peak_energy_ = 0;
-  double setup_seconds_ = 0, loop_seconds_ = 0;
+  double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;
   std::vector<std::filesystem::path> pictures_;

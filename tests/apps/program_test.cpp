@@ -1,0 +1,323 @@
+/// The program as a user meets it: whole runs, exit codes, messages, signals and restart.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "phyxel/checkpoint.hpp"
+#include "phyxel/recorder.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+};
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+class Program : public ::testing::Test {
+ protected:
+  Program() {
+    folder_ = fs::temp_directory_path() /
+              ("phyxel_program_" + std::to_string(getpid()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~Program() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+
+  /// Starts the program in the test's folder; its output goes to files.
+  pid_t start(const std::vector<std::string>& arguments) const {
+    const pid_t child = fork();
+    if (child != 0) return child;
+    if (chdir(folder_.c_str()) != 0) _exit(99);
+    if (!freopen("stdout.txt", "w", stdout) || !freopen("stderr.txt", "w", stderr)) _exit(99);
+    std::vector<char*> argv{const_cast<char*>(PHYXEL_PROGRAM)};
+    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    argv.push_back(nullptr);
+    execv(PHYXEL_PROGRAM, argv.data());
+    _exit(99);
+  }
+  Outcome finish(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
+            text_of(folder_ / "stdout.txt"), text_of(folder_ / "stderr.txt")};
+  }
+  Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
+
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+  }
+  /// A small beam that swings; `end` seconds, `extra` goes on top of the file.
+  void write_beam(const std::string& end = "0.2", const std::string& extra = "") const {
+    write("beam.toml", extra + R"(
+gravity = [0.0, 0.0, -9.81]
+[time]
+end = )" + end + R"(
+[output]
+directory = "out"
+frames_per_second = 50
+[[body]]
+name = "beam"
+shape = "beam"
+size = [0.6, 0.2, 0.2]
+spacing = 0.05
+jitter = 0.1
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+[[body.fixed]]
+region = "x-"
+)");
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(Program, RunsASceneAndWritesWhatItSays) {
+  write_beam();
+  const Outcome outcome = run({"run", "beam.toml"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("phyxel-steps/s"));
+  EXPECT_THAT(outcome.out, HasSubstr("omega_max"));
+  EXPECT_THAT(outcome.out, HasSubstr("Green strain"));
+  const auto series = read_series(folder_ / "out" / "phyxels.hdf.series");
+  ASSERT_EQ(series.size(), 11u);  // 0.2 s at 50 a second, first and last included
+  EXPECT_NEAR(series.back().time, 0.2, 1e-12);
+  const FrameData first = read_frame(series.front().file), last = read_frame(series.back().file);
+  double start = 0, end = 0;
+  for (std::size_t i = 0; i < first.point.size(); ++i) {
+    start = std::min(start, first.point[i].z);
+    end = std::min(end, last.point[i].z);
+  }
+  EXPECT_LT(end, start - 0.005);  // the free end has dropped
+  EXPECT_EQ(read_series(folder_ / "out" / "surface.hdf.series").size(), 11u);
+  EXPECT_THAT(text_of(folder_ / "out" / "energy.csv"), HasSubstr("kinetic_energy"));
+}
+
+TEST_F(Program, KeepsAnEarlierTrajectoryUnlessForced) {
+  write_beam("0.02");
+  ASSERT_EQ(run({"run", "beam.toml"}).code, 0);
+  const std::string before = text_of(folder_ / "out" / "energy.csv");
+  const Outcome refused = run({"run", "beam.toml"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("out"));
+  EXPECT_THAT(refused.err, HasSubstr("--force"));
+  EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), before);
+  EXPECT_EQ(run({"run", "beam.toml", "--force"}).code, 0);
+}
+
+/// The state arrays of the checkpoint at the end of a run.
+State final_state(const fs::path& directory) {
+  const auto file = latest_checkpoint(directory);
+  EXPECT_TRUE(file.has_value());
+  return file ? read_checkpoint(*file).state : State{};
+}
+
+TEST_F(Program, StoppedBySigtermAndResumedIsBitwiseTheWholeRun) {
+  for (const std::string precision : {"float", "double", "mixed"}) {
+    write_beam("1.5");
+    const std::string whole = "whole_" + precision, parts = "parts_" + precision;
+    ASSERT_EQ(run({"run", "beam.toml", "--out", whole, "--precision", precision}).code, 0);
+    const pid_t child = start({"run", "beam.toml", "--out", parts, "--precision", precision});
+    for (int wait = 0; wait < 1000 && !fs::exists(folder_ / parts / "phyxels_000003.hdf"); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    kill(child, SIGTERM);
+    const Outcome stopped = finish(child);
+    ASSERT_EQ(stopped.code, 75) << stopped.out << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("--resume auto"));
+    const State middle = final_state(folder_ / parts);
+    const Outcome resumed =
+        run({"run", "beam.toml", "--out", parts, "--precision", precision, "--resume", "auto"});
+    ASSERT_EQ(resumed.code, 0) << resumed.err;
+    EXPECT_THAT(resumed.out, HasSubstr("resumed"));
+    const State one = final_state(folder_ / whole), two = final_state(folder_ / parts);
+    EXPECT_LT(middle.step, two.step);
+    EXPECT_EQ(one.step, two.step);
+    EXPECT_TRUE(one.displacement == two.displacement) << precision;
+    EXPECT_TRUE(one.velocity == two.velocity) << precision;
+    // The outputs are the same too, to the byte where no date or path is involved.
+    EXPECT_EQ(text_of(folder_ / whole / "energy.csv"), text_of(folder_ / parts / "energy.csv"));
+    EXPECT_EQ(text_of(folder_ / whole / "phyxels.hdf.series"),
+              text_of(folder_ / parts / "phyxels.hdf.series"));
+  }
+}
+
+TEST_F(Program, RefusesToResumeWhatDoesNotFit) {
+  write_beam("0.05");
+  ASSERT_EQ(run({"run", "beam.toml"}).code, 0);
+  Outcome outcome = run({"run", "beam.toml", "--resume", "auto", "--precision", "double"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("float"));
+  const auto checkpoint = latest_checkpoint(folder_ / "out");
+  ASSERT_TRUE(checkpoint.has_value());
+  std::string changed = text_of(folder_ / "beam.toml");
+  changed.replace(changed.find("young = 2e5"), 11, "young = 3e5");
+  write("stiffer.toml", changed);
+  outcome = run({"run", "stiffer.toml", "--resume", checkpoint->string(), "--out", "other"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("another model"));
+  // Cut short, and foreign.
+  fs::copy_file(*checkpoint, folder_ / "cut.h5");
+  fs::resize_file(folder_ / "cut.h5", fs::file_size(*checkpoint) / 2);
+  EXPECT_EQ(run({"run", "beam.toml", "--resume", "cut.h5"}).code, 2);
+  write("foreign.h5", "not a checkpoint");
+  EXPECT_EQ(run({"run", "beam.toml", "--resume", "foreign.h5"}).code, 2);
+  EXPECT_EQ(run({"run", "beam.toml", "--resume", "missing.h5"}).code, 2);
+  EXPECT_TRUE(fs::exists(*checkpoint));
+}
+
+TEST_F(Program, AnUnstableStepIsRefusedAndWhenForcedStopsWithTheLastGoodState) {
+  write_beam("2");
+  const Outcome refused = run({"run", "beam.toml", "--step", "0.02"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("largest stable step"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "phyxels_000000.hdf"));
+  const Outcome diverged = run({"run", "beam.toml", "--step", "0.02", "--unsafe-step"});
+  EXPECT_EQ(diverged.code, 3) << diverged.out << diverged.err;
+  EXPECT_THAT(diverged.err, HasSubstr("phyxel "));
+  EXPECT_THAT(diverged.err, HasSubstr("t = "));
+  EXPECT_THAT(diverged.err, HasSubstr("last good state"));
+  const State good = final_state(folder_ / "out");
+  for (const Vec3d& u : good.displacement) ASSERT_TRUE(is_finite(u));
+}
+
+TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
+  write_beam("0.02");
+  write("empty.obj", "");
+  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write("ok.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write("kept.h5", "precious");
+  write("bad.toml", "[time]\nend = 1\n[[body]]\nshape = \"dinno\"\n[body.material]\nyoung = 1\npoisson = 0.3\ndensity = 1\n");
+  write("broken.toml", "[time\nend = 1\n");
+  const struct {
+    std::vector<std::string> arguments;
+    std::string message;
+  } cases[] = {
+      {{}, ""},
+      {{"frobnicate"}, ""},
+      {{"run", "missing.toml"}, "missing.toml"},
+      {{"run", "."}, "."},
+      {{"run", "broken.toml"}, "broken.toml:"},
+      {{"run", "bad.toml"}, "dino"},
+      {{"run", "beam.toml", "--device", "gpu"}, "gpu"},
+      {{"run", "beam.toml", "--device", "cuda"}, "cuda"},
+      {{"run", "beam.toml", "--precision", "half"}, "half"},
+      {{"run", "beam.toml", "--until", "-1"}, "-1"},
+      {{"run", "beam.toml", "--threads", "0"}, "0"},
+      {{"run", "beam.toml", "--step", "nan"}, "nan"},
+      {{"run", "beam.toml", "--out", "/proc/phyxel"}, "/proc/phyxel"},
+      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5"},
+      {{"sample", "missing.obj", "--phyxels", "10", "--out", "a.h5"}, "missing.obj"},
+      {{"sample", "empty.obj", "--phyxels", "10", "--out", "a.h5"}, "empty.obj"},
+      {{"sample", "nan.obj", "--phyxels", "10", "--out", "a.h5"}, "nan.obj"},
+      {{"sample", "flat.obj", "--phyxels", "10", "--out", "a.h5"}, ""},
+      {{"sample", "ok.obj", "--phyxels", "0", "--out", "a.h5"}, "0"},
+      {{"sample", "ok.obj", "--phyxels", "-5", "--out", "a.h5"}, "-5"},
+      {{"sample", "ok.obj", "--phyxels", "2000000000", "--out", "a.h5"}, "2000000000"},
+      {{"sample", "ok.obj", "--phyxels", "10", "--out", "kept.h5"}, "kept.h5"},
+      {{"info", "kept.h5"}, "kept.h5"},
+      {{"render", "nowhere"}, "nowhere"},
+      {{"export", "nowhere.hdf.series", "--single", "x.vtkhdf"}, "nowhere"},
+  };
+  for (const auto& c : cases) {
+    std::string line;
+    for (const std::string& a : c.arguments) line += a + " ";
+    const Outcome outcome = run(c.arguments);
+    EXPECT_EQ(outcome.code, 2) << line << outcome.out << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(c.message)) << line;
+    EXPECT_FALSE(fs::exists(folder_ / "a.h5")) << line;
+  }
+  EXPECT_EQ(text_of(folder_ / "kept.h5"), "precious");
+}
+
+TEST_F(Program, MoreLatticePhyxelsThanMemoryIsAnError) {
+  std::string scene = R"(
+[time]
+end = 0.1
+[[body]]
+shape = "block"
+size = [1, 1, 1]
+phyxels = 2000000000
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)";
+  write("huge.toml", scene);
+  const Outcome outcome = run({"run", "huge.toml"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("memory"));
+}
+
+TEST_F(Program, ADiskThatFillsUpEndsTheRunCleanly) {
+  const fs::path disk = folder_ / "disk";
+  fs::create_directories(disk);
+  const std::string mount = "mount -t tmpfs -o size=600k tmpfs " + disk.string() + " 2>/dev/null";
+  if (std::system(mount.c_str()) != 0) GTEST_SKIP() << "mounting a small disk is not permitted here";
+  write_beam("4");
+  const Outcome outcome = run({"run", "beam.toml", "--out", "disk/out"});
+  EXPECT_TRUE(outcome.code == 74 || outcome.code == 2) << outcome.code << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("disk/out"));
+  // Whatever was finished before is still readable.
+  if (fs::exists(disk / "out" / "phyxels.hdf.series")) {
+    for (const SeriesEntry& entry : read_series(disk / "out" / "phyxels.hdf.series")) {
+      EXPECT_NO_THROW(read_frame(entry.file));
+    }
+  }
+  EXPECT_EQ(std::system(("umount " + disk.string()).c_str()), 0);
+}
+
+TEST_F(Program, SamplesAMeshAndRunsIt) {
+  // An octahedron, refined by nothing: eight triangles are enough of a mesh.
+  write("gem.obj",
+        "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
+        "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n");
+  const Outcome sampled = run({"sample", "gem.obj", "--phyxels", "300", "--out", "gem.h5"});
+  ASSERT_EQ(sampled.code, 0) << sampled.err;
+  write("gem.toml", R"(
+[time]
+end = 0.02
+[[body]]
+file = "gem.h5"
+spin = [0, 0, 2]
+[body.material]
+young = 1e5
+poisson = 0.34
+density = 1000
+)");
+  const Outcome outcome = run({"run", "gem.toml", "--out", "gem", "--precision", "double"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const FrameData frame = read_frame(folder_ / "gem" / "phyxels_000000.hdf");
+  EXPECT_EQ(frame.point.size(), 300u);
+  for (const Vec3d& p : frame.point) {
+    EXPECT_LE(std::abs(p.x) + std::abs(p.y) + std::abs(p.z), 1.0 + 1e-9);  // inside the octahedron
+  }
+}
+
+}  // namespace
+}  // namespace phyxel
