@@ -30,11 +30,15 @@ std::string read_bytes(const std::filesystem::path& file) {
   if (!stream || error) {
     throw InputError(fmt::format("{}: cannot be read: {}", file.string(), std::strerror(errno)));
   }
+  if (size > largest_file) {
+    throw InputError(
+        fmt::format("{}: {} bytes; at most {} are allowed", file.string(), size, largest_file));
+  }
   std::string content(size, '\0');
   stream.read(content.data(), static_cast<std::streamsize>(size));
   if (static_cast<std::uintmax_t>(stream.gcount()) != size) {
-    throw InputError(fmt::format("{}: only {} of {} bytes could be read", file.string(),
-                                 stream.gcount(), size));
+    throw InputError(
+        fmt::format("{}: only {} of {} bytes could be read", file.string(), stream.gcount(), size));
   }
   return content;
 }
@@ -56,9 +60,15 @@ Surface parse_mesh(std::string_view content, MeshFormat format, const std::strin
   if (content.empty()) throw InputError(fmt::format("{}: the file is empty", name));
   Surface surface;
   switch (format) {
-    case MeshFormat::obj: surface = parse_obj(content, name); break;
-    case MeshFormat::ply: surface = parse_ply(content, name); break;
-    case MeshFormat::stl: surface = parse_stl(content, name); break;
+    case MeshFormat::obj:
+      surface = parse_obj(content, name);
+      break;
+    case MeshFormat::ply:
+      surface = parse_ply(content, name);
+      break;
+    case MeshFormat::stl:
+      surface = parse_stl(content, name);
+      break;
   }
   if (surface.triangle.empty()) {
     throw InputError(fmt::format("{}: no faces ({} vertices)", name, surface.position.size()));

@@ -15,14 +15,16 @@ namespace {
 
 /// Keywords of the OBJ format. A line that starts otherwise is damage, not geometry of some kind.
 constexpr std::string_view keywords[] = {
-    "v",      "vt",     "vn",       "vp",       "vw",         "f",         "fo",    "l",    "p",
-    "o",      "g",      "s",        "t",        "mg",         "usemtl",    "mtllib", "usemap",
-    "maplib", "cstype", "deg",      "bmat",     "step",       "curv",      "curv2", "surf", "parm",
-    "trim",   "hole",   "scrv",     "sp",       "end",        "con",       "bevel", "lod",  "ctech",
+    "v",      "vt",     "vn",       "vp",       "vw",         "f",         "fo",
+    "l",      "p",      "o",        "g",        "s",          "t",         "mg",
+    "usemtl", "mtllib", "usemap",   "maplib",   "cstype",     "deg",       "bmat",
+    "step",   "curv",   "curv2",    "surf",     "parm",       "trim",      "hole",
+    "scrv",   "sp",     "end",      "con",      "bevel",      "lod",       "ctech",
     "stech",  "call",   "c_interp", "d_interp", "shadow_obj", "trace_obj", "csh"};
 
-/// What tinyobjloader is given, and where it came from. It reads what it is given without
-/// complaint, so every line is checked first, and only vertices and faces are passed on.
+/// What tinyobjloader is given. It takes damaged numbers and indices without complaint and knows no
+/// line numbers in what it returns, so every line is checked first, and only vertices and faces,
+/// with absolute indices, are passed on.
 struct CheckedText {
   std::string text;
   std::size_t vertices = 0;
@@ -50,10 +52,6 @@ class LineCheck {
     if (greatest_ > checked_.vertices) {
       line_ = greatest_line_;
       fail(fmt::format("a corner names vertex {}, but there are {}", greatest_, checked_.vertices));
-    }
-    if (checked_.vertices > 0x7fffffff) {
-      throw InputError(fmt::format("{}: {} vertices; at most 2147483647 are allowed", name_,
-                                   checked_.vertices));
     }
     return std::move(checked_);
   }

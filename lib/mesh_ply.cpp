@@ -31,24 +31,28 @@ struct Element {
 std::size_t bytes_of(Kind kind) {
   switch (kind) {
     case Kind::int8:
-    case Kind::uint8: return 1;
+    case Kind::uint8:
+      return 1;
     case Kind::int16:
-    case Kind::uint16: return 2;
+    case Kind::uint16:
+      return 2;
     case Kind::int32:
     case Kind::uint32:
-    case Kind::float32: return 4;
-    case Kind::float64: return 8;
+    case Kind::float32:
+      return 4;
+    case Kind::float64:
+      return 8;
   }
   return 0;
 }
 
 std::optional<Kind> kind_named(std::string_view name) {
   constexpr std::pair<std::string_view, Kind> kinds[] = {
-      {"char", Kind::int8},     {"int8", Kind::int8},       {"uchar", Kind::uint8},
-      {"uint8", Kind::uint8},   {"short", Kind::int16},     {"int16", Kind::int16},
-      {"ushort", Kind::uint16}, {"uint16", Kind::uint16},   {"int", Kind::int32},
-      {"int32", Kind::int32},   {"uint", Kind::uint32},     {"uint32", Kind::uint32},
-      {"float", Kind::float32}, {"float32", Kind::float32}, {"double", Kind::float64},
+      {"char", Kind::int8},      {"int8", Kind::int8},       {"uchar", Kind::uint8},
+      {"uint8", Kind::uint8},    {"short", Kind::int16},     {"int16", Kind::int16},
+      {"ushort", Kind::uint16},  {"uint16", Kind::uint16},   {"int", Kind::int32},
+      {"int32", Kind::int32},    {"uint", Kind::uint32},     {"uint32", Kind::uint32},
+      {"float", Kind::float32},  {"float32", Kind::float32}, {"double", Kind::float64},
       {"float64", Kind::float64}};
   for (const auto& [known, kind] : kinds) {
     if (known == name) return kind;
@@ -73,6 +77,7 @@ class PlyReader {
         skip(element);
       }
     }
+    check_end();
     // Faces may come before the vertices, so polygons are cut up at the end.
     for (std::size_t f = 0; f + 1 < face_start_.size(); ++f) {
       append_polygon({corner_.data() + face_start_[f], face_start_[f + 1] - face_start_[f]},
@@ -154,8 +159,10 @@ class PlyReader {
       type = cursor_.word();
     }
     const auto value = kind_named(type);
-    if (!value) fail("a property of unknown type (char, uchar, short, ushort, int, uint, float, "
-                     "double)");
+    if (!value)
+      fail(
+          "a property of unknown type (char, uchar, short, ushort, int, uint, float, "
+          "double)");
     property.value = *value;
     property.name = cursor_.word();
     elements_.back().properties.push_back(std::move(property));
@@ -169,11 +176,19 @@ class PlyReader {
       least += encoding_ == Encoding::ascii ? 2 : bytes_of(p.is_list ? p.count : p.value);
     }
     if (least == 0) return;
-    const std::size_t left = encoding_ == Encoding::ascii ? cursor_.left() + 1 : content_.size() - at_;
+    const std::size_t left =
+        encoding_ == Encoding::ascii ? cursor_.left() + 1 : content_.size() - at_;
     if (element.count > left / least) {
       fail(fmt::format("the header promises {} \"{}\" elements, but the file has room for {}",
                        element.count, printable(element.name), left / least));
     }
+  }
+
+  /// What is left over was promised by no element: then the counts in the header are wrong.
+  void check_end() {
+    if (encoding_ != Encoding::ascii) cursor_ = TextCursor(content_.substr(at_));
+    if (cursor_.word().empty()) return;
+    fail("the file goes on after all elements that the header promises");
   }
 
   template <class T>
@@ -196,14 +211,22 @@ class PlyReader {
       return *value;
     }
     switch (kind) {
-      case Kind::int8: return raw<std::int8_t>();
-      case Kind::uint8: return raw<std::uint8_t>();
-      case Kind::int16: return raw<std::int16_t>();
-      case Kind::uint16: return raw<std::uint16_t>();
-      case Kind::int32: return raw<std::int32_t>();
-      case Kind::uint32: return raw<std::uint32_t>();
-      case Kind::float32: return static_cast<double>(raw<float>());
-      case Kind::float64: return raw<double>();
+      case Kind::int8:
+        return raw<std::int8_t>();
+      case Kind::uint8:
+        return raw<std::uint8_t>();
+      case Kind::int16:
+        return raw<std::int16_t>();
+      case Kind::uint16:
+        return raw<std::uint16_t>();
+      case Kind::int32:
+        return raw<std::int32_t>();
+      case Kind::uint32:
+        return raw<std::uint32_t>();
+      case Kind::float32:
+        return static_cast<double>(raw<float>());
+      case Kind::float64:
+        return raw<double>();
     }
     return 0;
   }
@@ -211,9 +234,11 @@ class PlyReader {
   std::size_t list_length(const Property& property) {
     const double length = scalar(property.count);
     const std::size_t size = encoding_ == Encoding::ascii ? 2 : bytes_of(property.value);
-    const std::size_t left = encoding_ == Encoding::ascii ? cursor_.left() + 1 : content_.size() - at_;
-    if (!(length >= 0) || length != std::floor(length) || length > static_cast<double>(left / size)) {
-      fail(fmt::format("a list of length {}", length));
+    const std::size_t left =
+        encoding_ == Encoding::ascii ? cursor_.left() + 1 : content_.size() - at_;
+    if (!(length >= 0) || length != std::floor(length) ||
+        length > static_cast<double>(left / size)) {
+      fail(fmt::format("a list of length {}, but the file has room for {}", length, left / size));
     }
     return static_cast<std::size_t>(length);
   }
@@ -297,8 +322,8 @@ class PlyReader {
 
   std::string_view content_;
   const std::string& name_;
-  TextCursor cursor_;       ///< In the header and in text.
-  std::size_t at_ = 0;      ///< In binary data.
+  TextCursor cursor_;   ///< In the header and in text.
+  std::size_t at_ = 0;  ///< In binary data.
   bool in_header_ = true;
   Encoding encoding_ = Encoding::none;
   std::vector<Element> elements_;

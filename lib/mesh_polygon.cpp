@@ -30,8 +30,8 @@ void append_polygon(std::span<const Index> corners, const std::vector<Vec3d>& po
   Vec3d normal;
   for (std::size_t k = 0; k < corners.size(); ++k) {
     const Vec3d origin = position[corners[0]];
-    normal += cross(position[corners[k]] - origin,
-                    position[corners[(k + 1) % corners.size()]] - origin);
+    normal +=
+        cross(position[corners[k]] - origin, position[corners[(k + 1) % corners.size()]] - origin);
   }
   const double ax = std::abs(normal.x), ay = std::abs(normal.y), az = std::abs(normal.z);
   const auto flatten = [&](Index corner) -> Point2 {

@@ -20,10 +20,10 @@ class CornerMerger {
 
   Index vertex(Vec3d p) {
     p = p + Vec3d{};  // -0 becomes +0
-    const auto [found, is_new] = known_.try_emplace(
-        {std::bit_cast<std::uint64_t>(p.x), std::bit_cast<std::uint64_t>(p.y),
-         std::bit_cast<std::uint64_t>(p.z)},
-        static_cast<Index>(position_.size()));
+    const auto [found, is_new] =
+        known_.try_emplace({std::bit_cast<std::uint64_t>(p.x), std::bit_cast<std::uint64_t>(p.y),
+                            std::bit_cast<std::uint64_t>(p.z)},
+                           static_cast<Index>(position_.size()));
     if (is_new) position_.push_back(p);
     return found->second;
   }
@@ -118,7 +118,8 @@ class AsciiStl {
   static bool same(std::string_view word, std::string_view wanted) {
     if (word.size() != wanted.size()) return false;
     for (std::size_t k = 0; k < word.size(); ++k) {
-      const char lower = word[k] >= 'A' && word[k] <= 'Z' ? static_cast<char>(word[k] + 32) : word[k];
+      const char lower =
+          word[k] >= 'A' && word[k] <= 'Z' ? static_cast<char>(word[k] + 32) : word[k];
       if (lower != wanted[k]) return false;
     }
     return true;
@@ -171,11 +172,12 @@ Surface parse_stl(std::string_view content, const std::string& name) {
   if (content.size() < header_bytes) {
     throw InputError(fmt::format(
         "{}: neither text (which starts with \"solid\") nor binary STL ({} bytes; the header alone "
-        "takes {})", name, content.size(), header_bytes));
+        "takes {})",
+        name, content.size(), header_bytes));
   }
-  throw InputError(fmt::format(
-      "{}: the header promises {} facets, which take {} bytes, but the file has {}", name, promised,
-      header_bytes + promised * facet_bytes, content.size()));
+  throw InputError(
+      fmt::format("{}: the header promises {} facets, which take {} bytes, but the file has {}",
+                  name, promised, header_bytes + promised * facet_bytes, content.size()));
 }
 
 }  // namespace phyxel

@@ -21,7 +21,8 @@ SurfaceDefects inspect_surface(const Surface& surface) {
   for (std::size_t k = 0, next = 0; k < edges.size(); k = next) {
     int forward = 0;
     for (next = k; next < edges.size() && edges[next].low == edges[k].low &&
-                   edges[next].high == edges[k].high; ++next) {
+                   edges[next].high == edges[k].high;
+         ++next) {
       forward += edges[next].forward;
     }
     const std::size_t count = next - k;
@@ -51,8 +52,8 @@ SurfaceDefects inspect_surface(const Surface& surface) {
 }
 
 bool SurfaceDefects::clean() const {
-  return open_edges == 0 && crowded_edges == 0 && flipped_edges == 0 &&
-         degenerate_triangles == 0 && !inside_out;
+  return open_edges == 0 && crowded_edges == 0 && flipped_edges == 0 && degenerate_triangles == 0 &&
+         !inside_out;
 }
 
 std::string SurfaceDefects::describe() const {

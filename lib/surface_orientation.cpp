@@ -88,8 +88,8 @@ std::vector<std::string> orient(Surface& surface) {
   std::vector<std::string> done;
   const Index turned = agree_on_outside(surface);
   if (turned > 0) {
-    done.push_back(fmt::format("{} triangles were turned over to agree with their neighbours",
-                               turned));
+    done.push_back(
+        fmt::format("{} triangles were turned over to agree with their neighbours", turned));
   }
 
   const SurfaceTopology topology = connect(surface);
@@ -107,7 +107,8 @@ std::vector<std::string> orient(Surface& surface) {
     const Vec3d middle = 0.5 * (box[p].low + box[p].high);
     for (const Triangle& t : part[p]) {
       volume[p] += dot(surface.position[t[0]] - middle,
-                       cross(surface.position[t[1]] - middle, surface.position[t[2]] - middle)) / 6;
+                       cross(surface.position[t[1]] - middle, surface.position[t[2]] - middle)) /
+                   6;
     }
   }
   // Fewer than four triangles enclose nothing: loose ones are left as they are.
@@ -118,9 +119,8 @@ std::vector<std::string> orient(Surface& surface) {
   if (std::none_of(order.begin(), order.end(), [&](Index p) { return volume[p] < 0; })) return done;
 
   // From the largest part to the smallest, so that whatever holds a part comes before it.
-  std::stable_sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return std::abs(volume[a]) > std::abs(volume[b]);
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return std::abs(volume[a]) > std::abs(volume[b]); });
   std::vector<bool> turn_part(topology.parts, false);
   Index parts_turned = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {

@@ -10,12 +10,9 @@ namespace {
 std::vector<Index> coincident_corners(const std::vector<Vec3d>& position) {
   std::vector<Index> order(position.size()), corner(position.size());
   std::iota(order.begin(), order.end(), 0);
-  const auto key = [&](Index v) {
-    return std::tuple(position[v].x, position[v].y, position[v].z);
-  };
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-    return key(a) != key(b) ? key(a) < key(b) : a < b;
-  });
+  const auto key = [&](Index v) { return std::tuple(position[v].x, position[v].y, position[v].z); };
+  std::sort(order.begin(), order.end(),
+            [&](Index a, Index b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
   for (std::size_t k = 0; k < order.size(); ++k) {
     const bool same = k > 0 && position[order[k]] == position[order[k - 1]];
     corner[order[k]] = same ? corner[order[k - 1]] : order[k];
@@ -58,8 +55,10 @@ SurfaceTopology connect(const Surface& surface) {
   topology.closed = true;
   for (std::size_t k = 0, next = 0; k < topology.edges.size(); k = next) {
     int balance = 0;
-    for (next = k; next < topology.edges.size() && topology.edges[next].low == topology.edges[k].low &&
-                   topology.edges[next].high == topology.edges[k].high; ++next) {
+    for (next = k;
+         next < topology.edges.size() && topology.edges[next].low == topology.edges[k].low &&
+         topology.edges[next].high == topology.edges[k].high;
+         ++next) {
       balance += topology.edges[next].forward ? 1 : -1;
     }
     topology.closed &= balance == 0;

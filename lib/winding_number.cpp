@@ -71,15 +71,16 @@ void WindingNumber::build(Index index) {
 
   if (node.count > largest_leaf) {
     const Vec3d extent = high - low;
-    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : extent.y >= extent.z ? 1 : 2;
+    const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
+                     : extent.y >= extent.z                       ? 1
+                                                                  : 2;
     const auto along = [axis](const Corners& t) {
       const Vec3d c = t.a + t.b + t.c;
       return axis == 0 ? c.x : axis == 1 ? c.y : c.z;
     };
     const Index half = node.count / 2;
-    std::nth_element(first, first + half, last, [&](const Corners& s, const Corners& t) {
-      return along(s) < along(t);
-    });
+    std::nth_element(first, first + half, last,
+                     [&](const Corners& s, const Corners& t) { return along(s) < along(t); });
     node.child = static_cast<Index>(nodes_.size());
     Node left, right;
     left.first = node.first;
@@ -106,8 +107,8 @@ double WindingNumber::operator()(Vec3d point) const {
       // With G(r) = r / |r|^3: area . G + moment : grad G.
       const double inverse2 = 1 / r2, inverse3 = inverse2 / std::sqrt(r2);
       const Mat3d& m = node.moment;
-      far += inverse3 * (dot(node.area, r) + m(0, 0) + m(1, 1) + m(2, 2) -
-                         3 * inverse2 * dot(r, m * r));
+      far += inverse3 *
+             (dot(node.area, r) + m(0, 0) + m(1, 1) + m(2, 2) - 3 * inverse2 * dot(r, m * r));
     } else if (node.child >= 0) {
       stack[depth++] = node.child + 1;
       stack[depth++] = node.child;

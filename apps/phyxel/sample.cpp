@@ -1,0 +1,157 @@
+/// phyxel sample: a mesh filled with phyxels, written as body.h5.
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "command.hpp"
+#include "phyxel/body_file.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct SampleOptions {
+  std::filesystem::path mesh, out;
+  std::int64_t phyxels = 0, relaxations = SampleRequest{}.relaxations, seed = SampleRequest{}.seed;
+  bool force = false, json = false;
+};
+
+SampleRequest request_of(const SampleOptions& options) {
+  constexpr std::int64_t most = std::numeric_limits<Index>::max(), most_relaxations = 10000;
+  if (options.phyxels < 1 || options.phyxels > most) {
+    throw InputError(
+        fmt::format("--phyxels {}: out of range: allowed 1 to {}, as far as memory goes",
+                    options.phyxels, most));
+  }
+  if (options.relaxations < 0 || options.relaxations > most_relaxations) {
+    throw InputError(fmt::format("--relaxations {}: out of range: allowed 0 to {}",
+                                 options.relaxations, most_relaxations));
+  }
+  if (options.seed < 0) {
+    throw InputError(fmt::format("--seed {}: out of range: allowed 0 to {}", options.seed,
+                                 std::numeric_limits<std::int64_t>::max()));
+  }
+  return {.phyxels = static_cast<Index>(options.phyxels),
+          .seed = static_cast<std::uint64_t>(options.seed),
+          .relaxations = static_cast<int>(options.relaxations)};
+}
+
+/// Refuses an output that could not be written in the end, before any time is spent.
+void check_output(const SampleOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path& out = options.out;
+  std::error_code ignored;
+  if (fs::is_directory(out, ignored)) {
+    throw InputError(fmt::format("--out {}: is a folder; allowed: a file in it", out.string()));
+  }
+  if (fs::equivalent(out, options.mesh, ignored)) {
+    throw InputError(
+        fmt::format("--out {}: is the mesh itself; allowed: another file", out.string()));
+  }
+  if (fs::exists(out, ignored) && !options.force) {
+    throw InputError(fmt::format(
+        "--out {}: exists; allowed: another file, or --force to replace it", out.string()));
+  }
+  const fs::path folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, ignored)) {
+    throw InputError(
+        fmt::format("--out {}: the folder {} does not exist", out.string(), folder.string()));
+  }
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw InputError(
+        fmt::format("--out {}: the folder {} cannot be written to", out.string(), folder.string()));
+  }
+}
+
+void say_json(const SampleOptions& options, const Cloud& cloud, const SampleReport& report,
+              double seconds) {
+  const SurfaceDefects& defects = report.defects;
+  const nlohmann::ordered_json j = {{"program", program_version()},
+                                    {"mesh", options.mesh.string()},
+                                    {"file", options.out.string()},
+                                    {"phyxels", cloud.position.size()},
+                                    {"surfels", cloud.surface.position.size()},
+                                    {"triangles", cloud.surface.triangle.size()},
+                                    {"parts", defects.parts},
+                                    {"volume_m3", report.volume},
+                                    {"mean_spacing_m", report.spacing},
+                                    {"smallest_gap_m", report.smallest_gap},
+                                    {"watertight", defects.open_edges == 0},
+                                    {"open_edges", defects.open_edges},
+                                    {"doubtful_fraction", report.doubtful_fraction},
+                                    {"seed", options.seed},
+                                    {"relaxations", options.relaxations},
+                                    {"warnings", report.warnings},
+                                    {"seconds", seconds}};
+  fmt::print("{}\n", j.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleReport& report,
+                 double seconds) {
+  fmt::print("{}: {} -> {}\n", program_version(), options.mesh.string(), options.out.string());
+  fmt::print("  phyxels     {}, in {:.6g} m^3\n", cloud.position.size(), report.volume);
+  if (cloud.position.size() > 1) {
+    fmt::print(
+        "  spacing     {:.4g} m to the nearest on average, {:.4g} m at the least ({:.2f} of it)\n",
+        report.spacing, report.smallest_gap, report.smallest_gap / report.spacing);
+  }
+  fmt::print("  surfels     {}, in {} triangles\n", cloud.surface.position.size(),
+             cloud.surface.triangle.size());
+  fmt::print("  surface     {}\n", report.defects.describe());
+  for (const std::string& warning : report.warnings) fmt::print("  warning     {}\n", warning);
+  fmt::print("  took        {:.2f} s, {:.4g} phyxels/s\n", seconds,
+             static_cast<double>(cloud.position.size()) / seconds);
+}
+
+void sample(const SampleOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const SampleRequest request = request_of(options);
+  check_output(options);
+  const Surface surface = read_mesh(options.mesh);
+  SampleReport report;
+  Cloud cloud;
+  try {
+    cloud = sample_surface(surface, request, &report);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", options.mesh.string(), error.what()));
+  }
+  write_body(options.out, cloud, options.force);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  (options.json ? say_json : say_summary)(options, cloud, report, seconds);
+}
+
+}  // namespace
+
+void add_sample(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "sample", "Fill a closed surface with phyxels; its vertices become the surfels");
+  auto options = std::make_shared<SampleOptions>();
+  command->add_option("mesh", options->mesh, "Surface in metres: OBJ, PLY or STL")->required();
+  command->add_option("--phyxels", options->phyxels, "How many: exactly so many are made")
+      ->required();
+  command->add_option("--out", options->out, "File to write (body.h5)")->required();
+  command
+      ->add_option("--seed", options->seed,
+                   "The same seed gives the same phyxels, on any number of threads")
+      ->capture_default_str();
+  command
+      ->add_option("--relaxations", options->relaxations,
+                   "Sweeps that even out the distances; 0: none")
+      ->capture_default_str();
+  command->add_flag("--force", options->force, "Replace the file if it exists");
+  command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
+  command->footer(
+      "Examples:\n"
+      "  phyxel sample bunny.obj --phyxels 5000 --out bunny.h5\n"
+      "  phyxel sample scan.ply --phyxels 200000 --out scan.h5 --seed 7 --force\n"
+      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --relaxations 100 --json");
+  command->callback([options] { sample(*options); });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,21 @@
+/// Random numbers that depend on a place and a seed, not on what was drawn before.
+#pragma once
+
+#include <cstdint>
+
+namespace phyxel {
+
+/// A well-mixed function of `v`. Source: Steele, Lea, Flood 2014 (SplitMix64).
+inline std::uint64_t mix_bits(std::uint64_t v) {
+  v += 0x9e3779b97f4a7c15u;
+  v = (v ^ (v >> 30)) * 0xbf58476d1ce4e5b9u;
+  v = (v ^ (v >> 27)) * 0x94d049bb133111ebu;
+  return v ^ (v >> 31);
+}
+
+/// Uniform in (0, 1) from the low 21 bits.
+inline double unit_fraction(std::uint64_t bits) {
+  return (static_cast<double>(bits & 0x1fffff) + 0.5) / 2097152.0;
+}
+
+}  // namespace phyxel
