@@ -282,23 +282,33 @@ Vec3d Motion::displacement_at(double time) const {
   return smoothstep * displacement + time * velocity + wave * amplitude;
 }
 
-Cloud make_cloud(const BodyRequest& request) {
-  const BodySource& source = request.source;
-  Cloud cloud;
-  if (!source.file.empty()) {
-    cloud = read_body(source.file);
-  } else if (!source.mesh.empty()) {
-    cloud = sample_surface(read_mesh(source.mesh), {.phyxels = source.phyxels,
-                                                    .seed = source.seed,
-                                                    .relaxations = source.relaxations});
-  } else {
-    ShapeRequest shape = source.shape;
-    shape.seed = source.seed;
-    if (shape.spacing == 0 && !is_paper_shape(shape.name)) {
-      shape.spacing = spacing_for(shape, source.phyxels);
+namespace {
+
+/// The cloud of a source, before it is scaled and moved.
+Cloud rest_cloud(const BodySource& source) {
+  if (!source.file.empty()) return read_body(source.file);
+  if (!source.mesh.empty()) {
+    const Surface surface = read_mesh(source.mesh);
+    try {
+      return sample_surface(surface, {.phyxels = source.phyxels,
+                                      .seed = source.seed,
+                                      .relaxations = source.relaxations});
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
-    cloud = make_shape(shape);
   }
+  ShapeRequest shape = source.shape;
+  shape.seed = source.seed;
+  if (shape.spacing == 0 && !is_paper_shape(shape.name)) {
+    shape.spacing = spacing_for(shape, source.phyxels);
+  }
+  return make_shape(shape);
+}
+
+}  // namespace
+
+Cloud make_cloud(const BodyRequest& request) {
+  Cloud cloud = rest_cloud(request.source);
   place(cloud, request);
   return cloud;
 }
@@ -306,7 +316,16 @@ Cloud make_cloud(const BodyRequest& request) {
 Model build_model(const Scene& scene) {
   Model model;
   model.gravity = scene.gravity;
-  for (const BodyRequest& request : scene.bodies) add_body(model, request, make_cloud(request));
+  // Copies of a body follow one another; filling a mesh once serves them all.
+  const BodySource* made = nullptr;
+  Cloud rest;
+  for (const BodyRequest& request : scene.bodies) {
+    if (!made || !(*made == request.source)) rest = rest_cloud(request.source);
+    made = &request.source;
+    Cloud cloud = rest;
+    place(cloud, request);
+    add_body(model, request, cloud);
+  }
   finish(model);
   return model;
 }

@@ -60,6 +60,7 @@ struct BodySource {
   Index phyxels = 0;            ///< Mesh: exact count. Lattice shapes: about this many.
   std::uint64_t seed = 1;
   int relaxations = 30;
+  bool operator==(const BodySource&) const = default;
 };
 
 /// One body of a scene.

@@ -24,6 +24,7 @@ struct ShapeRequest {
   double jitter = 0;          ///< Fraction of the spacing, 0 to 0.5.
   std::uint64_t seed = 1;     ///< Of the jitter; the same on any number of threads.
   bool surface = true;        ///< Whether to make surfels.
+  bool operator==(const ShapeRequest&) const = default;
 };
 
 /// Names `make_shape` knows.

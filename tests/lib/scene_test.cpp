@@ -1,0 +1,269 @@
+/// What is read from scene files.
+#include "phyxel/scene.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "support/scene_text.hpp"
+
+namespace phyxel {
+namespace {
+
+void expect_vector(Vec3d found, Vec3d wanted) {
+  EXPECT_EQ(found.x, wanted.x);
+  EXPECT_EQ(found.y, wanted.y);
+  EXPECT_EQ(found.z, wanted.z);
+}
+
+// Every key that can stand beside the others; the rest is in the tests below.
+const std::string full_scene = R"(title = "All of it"
+gravity = [0.5, -1, -9.81]
+[time]
+end = 2.5
+safety = 0.6
+[solver]
+device = "cpu"
+precision = "mixed"
+threads = 3
+[output]
+directory = "results/all"
+frames_per_second = 12.5
+phyxels = false
+surface = false
+fields = ["von_mises", "body"]
+checkpoint_every = 60
+[render]
+pictures = true
+count = 4
+width = 640
+height = 480
+view = [0, 1, 0]
+up = [1, 0, 0]
+[[body]]
+name = "bar"
+shape = "block"
+size = [1, 2, 3]
+spacing = 0.25
+jitter = 0.1
+seed = 7
+surfels = false
+scale = 2
+rotation = [0, 0, 90]
+translation = [1, 2, 3]
+velocity = [4, 5, 6]
+spin = [7, 8, 9]
+volumes = "kernel"
+[body.material]
+young = 2e5
+poisson = -0.25
+density = 1234
+strain = "cauchy"
+volume_stiffness = 5e4
+damping = 0.125
+[body.neighbours]
+support = "adaptive"
+nearest = 12
+factor = 3
+max_neighbours = 20
+[[body.fixed]]
+region = "x-"
+[[body.fixed]]
+indices = [5, 3]
+[[body.motion]]
+box = [[0, 1, 2], [3, 4, 5]]
+displacement = [0.1, 0.2, 0.3]
+duration = 0.5
+velocity = [1, 2, 3]
+amplitude = [4, 5, 6]
+frequency = 7
+[[body.load]]
+ball = {centre = [1, 2, 3], radius = 0.5}
+force = [10, 20, 30]
+ramp = 0.75
+[[body.load]]
+all = true
+force_density = [1, 2, 3]
+)";
+
+TEST(Scene, RunKeysAreReadExactly) {
+  const Scene scene = parse_scene(full_scene, "folder/all.toml");
+  EXPECT_EQ(scene.title, "All of it");
+  EXPECT_EQ(scene.file, "folder/all.toml");
+  EXPECT_EQ(scene.text, full_scene);
+  expect_vector(scene.gravity, {0.5, -1, -9.81});
+  EXPECT_EQ(scene.time.end, 2.5);
+  EXPECT_FALSE(scene.time.step.has_value());
+  EXPECT_EQ(scene.time.safety, 0.6);
+  EXPECT_EQ(scene.solver.device, "cpu");
+  EXPECT_EQ(scene.solver.precision, Precision::mixed);
+  EXPECT_EQ(scene.solver.threads, 3);
+  EXPECT_EQ(scene.output.directory, "folder/results/all");
+  EXPECT_EQ(scene.output.frames_per_second, 12.5);
+  EXPECT_FALSE(scene.output.phyxels);
+  EXPECT_FALSE(scene.output.surface);
+  EXPECT_EQ(scene.output.fields, (std::vector<std::string>{"von_mises", "body"}));
+  EXPECT_EQ(scene.output.checkpoint_every, 60);
+  EXPECT_TRUE(scene.render.pictures);
+  EXPECT_EQ(scene.render.count, 4);
+  EXPECT_EQ(scene.render.width, 640);
+  EXPECT_EQ(scene.render.height, 480);
+  expect_vector(scene.render.view, {0, 1, 0});
+  expect_vector(scene.render.up, {1, 0, 0});
+}
+
+TEST(Scene, BodyKeysAreReadExactly) {
+  const Scene scene = parse_scene(full_scene, "folder/all.toml");
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  const BodyRequest& body = scene.bodies[0];
+  EXPECT_EQ(body.name, "bar");
+  EXPECT_EQ(body.where, "folder/all.toml:24:1");
+  EXPECT_EQ(body.source.shape.name, "block");
+  expect_vector(body.source.shape.size, {1, 2, 3});
+  EXPECT_EQ(body.source.shape.spacing, 0.25);
+  EXPECT_EQ(body.source.shape.jitter, 0.1);
+  EXPECT_EQ(body.source.seed, 7u);
+  EXPECT_EQ(body.source.shape.seed, 7u);
+  EXPECT_FALSE(body.source.shape.surface);
+  EXPECT_TRUE(body.source.mesh.empty());
+  EXPECT_TRUE(body.source.file.empty());
+  EXPECT_EQ(body.scale, 2);
+  expect_vector(body.rotation, {0, 0, 90});
+  expect_vector(body.translation, {1, 2, 3});
+  expect_vector(body.velocity, {4, 5, 6});
+  expect_vector(body.spin, {7, 8, 9});
+  EXPECT_EQ(body.volume_rule, VolumeRule::kernel);
+  EXPECT_EQ(body.material.young, 2e5);
+  EXPECT_EQ(body.material.poisson, -0.25);
+  EXPECT_EQ(body.material.density, 1234);
+  EXPECT_EQ(body.material.strain, Strain::cauchy);
+  EXPECT_EQ(body.material.volume_stiffness, 5e4);
+  EXPECT_EQ(body.material.damping, 0.125);
+  EXPECT_EQ(body.neighbourhood.support, NeighbourhoodRule::Support::adaptive);
+  EXPECT_EQ(body.neighbourhood.nearest, 12);
+  EXPECT_EQ(body.neighbourhood.factor, 3);
+  EXPECT_FALSE(body.neighbourhood.radius.has_value());
+  EXPECT_EQ(body.neighbourhood.max_neighbours, 20);
+}
+
+TEST(Scene, BoundaryKeysAreReadExactly) {
+  const BodyRequest body = parse_scene(full_scene, "all.toml").bodies.at(0);
+  ASSERT_EQ(body.fixed.size(), 2u);
+  EXPECT_EQ(body.fixed[0].select.region, "x-");
+  EXPECT_EQ(body.fixed[0].select.where, "all.toml:51:10");
+  EXPECT_EQ(body.fixed[1].select.indices, (std::vector<Index>{5, 3}));
+  ASSERT_EQ(body.motions.size(), 1u);
+  const MotionRequest& motion = body.motions[0];
+  ASSERT_TRUE(motion.select.box.has_value());
+  expect_vector(motion.select.box->low, {0, 1, 2});
+  expect_vector(motion.select.box->high, {3, 4, 5});
+  expect_vector(motion.displacement, {0.1, 0.2, 0.3});
+  EXPECT_EQ(motion.duration, 0.5);
+  expect_vector(motion.velocity, {1, 2, 3});
+  expect_vector(motion.amplitude, {4, 5, 6});
+  EXPECT_EQ(motion.frequency, 7);
+  ASSERT_EQ(body.loads.size(), 2u);
+  ASSERT_TRUE(body.loads[0].select.ball.has_value());
+  expect_vector(body.loads[0].select.ball->centre, {1, 2, 3});
+  EXPECT_EQ(body.loads[0].select.ball->radius, 0.5);
+  expect_vector(body.loads[0].force, {10, 20, 30});
+  EXPECT_EQ(body.loads[0].ramp, 0.75);
+  EXPECT_TRUE(body.loads[1].select.all);
+  expect_vector(body.loads[1].force_density, {1, 2, 3});
+}
+
+TEST(Scene, KeysThatExcludeTheOthersAreReadToo) {
+  const Scene scene = parse_scene(
+      "[time]\nend = 1\nstep = 1e-4\n[[body]]\nshape = 'cylinder'\nradius = 0.5\n"
+      "length = 2\nphyxels = 1000\n" +
+          material + "[body.neighbours]\nradius = 0.25\n",
+      "scene.toml");
+  EXPECT_EQ(scene.time.step, 1e-4);
+  EXPECT_EQ(scene.bodies[0].source.shape.radius, 0.5);
+  EXPECT_EQ(scene.bodies[0].source.shape.length, 2);
+  EXPECT_EQ(scene.bodies[0].source.phyxels, 1000);
+  EXPECT_EQ(scene.bodies[0].neighbourhood.radius, 0.25);
+}
+
+TEST(Scene, LeavesOutMeansTheDefaultsOfTheTypes) {
+  const Scene scene = parse_scene(time_section + dino, "scene.toml");
+  EXPECT_EQ(scene.title, "");
+  expect_vector(scene.gravity, {0, 0, 0});
+  EXPECT_FALSE(scene.time.step.has_value());
+  EXPECT_EQ(scene.time.safety, 0.8);
+  EXPECT_EQ(scene.solver.device, "auto");
+  EXPECT_EQ(scene.solver.precision, Precision::single);
+  EXPECT_EQ(scene.output.frames_per_second, 25);
+  EXPECT_FALSE(scene.render.pictures);
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  EXPECT_EQ(scene.bodies[0].name, "dino");
+  EXPECT_EQ(scene.bodies[0].scale, 1);
+  EXPECT_EQ(scene.bodies[0].volume_rule, VolumeRule::automatic);
+  EXPECT_EQ(scene.bodies[0].material.strain, Strain::green);
+  EXPECT_EQ(scene.bodies[0].neighbourhood.factor, 1.8);
+  EXPECT_TRUE(scene.bodies[0].fixed.empty());
+}
+
+TEST(Scene, ArrayMakesNamedAndMovedCopies) {
+  const Scene scene = parse_scene(
+      time_section + "[[body]]\nname = 'd'\nshape = 'dino'\ntranslation = [1, 0, 0]\n" + material +
+          "[body.array]\ncount = [2, 1, 2]\nspacing = [3, 0, -5]\n"
+          "[[body.fixed]]\nball = {centre = [0, 1, 0], radius = 2}\n"
+          "[[body.load]]\nbox = [[0, 0, 0], [1, 1, 1]]\nforce = [0, 0, 1]\n",
+      "scene.toml");
+  ASSERT_EQ(scene.bodies.size(), 4u);
+  const Vec3d moved[] = {{0, 0, 0}, {3, 0, 0}, {0, 0, -5}, {3, 0, -5}};
+  for (std::size_t b = 0; b < 4; ++b) {
+    const BodyRequest& body = scene.bodies[b];
+    EXPECT_EQ(body.name, "d " + std::to_string(b + 1));
+    expect_vector(body.translation, Vec3d{1, 0, 0} + moved[b]);
+    expect_vector(body.fixed.at(0).select.ball->centre, Vec3d{0, 1, 0} + moved[b]);
+    expect_vector(body.loads.at(0).select.box->low, moved[b]);
+    expect_vector(body.loads.at(0).select.box->high, Vec3d{1, 1, 1} + moved[b]);
+    EXPECT_EQ(body.material.young, 1e5);
+  }
+}
+
+TEST_F(SceneFiles, PathsStartAtTheSceneFile) {
+  const fs::path mesh = write("meshes/a.obj"), body = write("deep/b.h5");
+  const fs::path file = write(
+      "deep/s.toml", time_section + "[output]\ndirectory = '../results'\n" +
+                         "[[body]]\nmesh = '../meshes/a.obj'\nphyxels = 9\n" + material +
+                         "[[body]]\nfile = 'b.h5'\n" + material +
+                         "[[body]]\nname = 'third'\nfile = '" + body.string() + "'\n" + material);
+  const Scene scene = read_scene(file);
+  EXPECT_EQ(scene.bodies[0].source.mesh, mesh);
+  EXPECT_EQ(scene.bodies[0].name, "a");
+  EXPECT_EQ(scene.bodies[0].source.phyxels, 9);
+  EXPECT_EQ(scene.bodies[1].source.file, body);
+  EXPECT_EQ(scene.bodies[1].name, "b");
+  EXPECT_EQ(scene.bodies[2].source.file, body);
+  EXPECT_EQ(scene.output.directory, folder_ / "results");
+}
+
+TEST(Scene, OutputGoesToAFolderNamedAfterTheSceneHere) {
+  const auto directory = [](const fs::path& file) {
+    return parse_scene(time_section + dino, file).output.directory;
+  };
+  EXPECT_EQ(directory("some/where/swing.toml"), "out/swing");
+  EXPECT_EQ(directory("examples/dino/scene.toml"), "out/dino");
+  EXPECT_EQ(directory("scene.toml"), "out" / fs::current_path().filename());
+  EXPECT_EQ(directory(""), "out/scene");
+}
+
+TEST(Scene, EveryExampleIsRead) {
+  std::size_t count = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(PHYXEL_SOURCE_DIR "/examples")) {
+    const fs::path file = entry.path() / "scene.toml";
+    if (!fs::exists(file)) continue;
+    ++count;
+    const Scene scene = read_scene(file);
+    EXPECT_FALSE(scene.title.empty()) << file;
+    EXPECT_EQ(scene.output.directory, "out" / entry.path().filename()) << file;
+    EXPECT_EQ(scene.bodies.size(), entry.path().filename() == "ten_dinos" ? 10u : 1u) << file;
+  }
+  EXPECT_GE(count, 9u);
+}
+
+}  // namespace
+}  // namespace phyxel
