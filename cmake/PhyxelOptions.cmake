@@ -4,23 +4,44 @@ set(PHYXEL_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or threa
 
 add_library(phyxel_flags INTERFACE)
 target_compile_options(phyxel_flags INTERFACE
-  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion>)
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
+  # Designated initialisers name what matters; the rest has defaults.
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>"
+  # SIMD packs never cross a library border.
+  "$<$<COMPILE_LANGUAGE:CXX>:-Wno-psabi>"
+  # clang does not know GCC's unrolling pragma, and tells of loops that sanitizers keep scalar.
+  "$<$<COMPILE_LANG_AND_ID:CXX,Clang,AppleClang>:-Wno-unknown-pragmas;-Wno-pass-failed>")
+set(PHYXEL_SANITIZE_FLAGS "")
 if(PHYXEL_SANITIZE)
+  set(PHYXEL_SANITIZE_FLAGS -fsanitize=${PHYXEL_SANITIZE} -fno-omit-frame-pointer
+                            -fno-sanitize-recover=all)
   target_compile_options(phyxel_flags INTERFACE
-    $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${PHYXEL_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all>)
+    "$<$<COMPILE_LANGUAGE:CXX>:${PHYXEL_SANITIZE_FLAGS}>")
   target_link_options(phyxel_flags INTERFACE -fsanitize=${PHYXEL_SANITIZE})
 endif()
 
-# phyxel_add_test(NAME source... [LIBRARIES lib...]): a GoogleTest program, one ctest entry a case.
+# What a test may need of the tree: where the sources are, and the two folders of headers.
+function(phyxel_configure_test name)
+  target_link_libraries(${name} PRIVATE phyxel phyxel_flags)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_SOURCE_DIR}/lib)
+  target_compile_definitions(${name} PRIVATE PHYXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  set_target_properties(${name} PROPERTIES
+    RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
+endfunction()
+
+# phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds]):
+# a GoogleTest program, one ctest entry a case.
 function(phyxel_add_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "LIBRARIES" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "LIBRARIES;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
-  target_link_libraries(${name} PRIVATE phyxel phyxel_flags ${arg_LIBRARIES} GTest::gmock_main)
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_SOURCE_DIR}/lib)
-  set_target_properties(${name} PROPERTIES
-    RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${arg_TIMEOUT})
+  phyxel_configure_test(${name})
+  target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gmock_main)
+  set(properties TIMEOUT ${arg_TIMEOUT})
+  if(arg_LABELS)
+    list(APPEND properties LABELS "${arg_LABELS}")
+  endif()
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()

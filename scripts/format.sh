@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Formats every C++ file, or with --check says which are not formatted (exit code 1).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+mode=(-i)
+if [[ ${1-} == --check ]]; then
+  mode=(--dry-run --Werror)
+fi
+find lib apps tests fuzz examples -name '*.[ch]pp' -o -name '*.cu' -o -name '*.cuh' | sort |
+  xargs clang-format "${mode[@]}"

@@ -1,0 +1,52 @@
+#!/usr/bin/env bash
+# Makes sure that Debian's packages for phyxel are there: the one place that lists them.
+#
+#   scripts/setup-debian.sh            what building and running needs
+#   scripts/setup-debian.sh --tests    and what the tests need
+#
+# Installs what is missing as root or through sudo; otherwise prints the line to type, exit code 1.
+set -euo pipefail
+
+build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev libfmt-dev
+       libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev)
+# clang for the thread sanitizer and the fuzzers, Python to read our files independently.
+tests=(ccache pkg-config libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
+       python3-h5py python3-vtk9)
+
+wanted=("${build[@]}")
+if [[ ${1-} == --tests ]]; then
+  wanted+=("${tests[@]}")
+elif [[ $# -gt 0 ]]; then
+  echo "usage: scripts/setup-debian.sh [--tests]" >&2
+  exit 2
+fi
+
+if ! command -v apt-get >/dev/null || ! command -v dpkg-query >/dev/null; then
+  echo "Not a Debian system: nothing installed. phyxel needs the equivalents of:" >&2
+  echo "  ${wanted[*]}" >&2
+  exit 0
+fi
+
+missing=()
+for package in "${wanted[@]}"; do
+  if ! dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed; then
+    missing+=("$package")
+  fi
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  exit 0
+fi
+
+install=(apt-get install -y --no-install-recommends "${missing[@]}")
+if [[ $(id -u) -eq 0 ]]; then
+  as_root=(env DEBIAN_FRONTEND=noninteractive)
+elif command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [[ -t 0 ]]; }; then
+  as_root=(sudo env DEBIAN_FRONTEND=noninteractive)  # asks for a password on a terminal only
+else
+  echo "Packages are missing, and this user may not install them. As root, type:" >&2
+  echo "  apt-get update && ${install[*]}" >&2
+  exit 1
+fi
+echo "Installing: ${missing[*]}"
+"${as_root[@]}" apt-get update
+"${as_root[@]}" "${install[@]}"

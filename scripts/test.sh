@@ -1,0 +1,100 @@
+#!/usr/bin/env bash
+# Configures, builds and tests.
+#
+#   scripts/test.sh                   cpu, asan, tsan, cuda (where nvcc is) and fuzz
+#   scripts/test.sh cpu asan          only these
+#
+# Every stage runs even if an earlier one failed; a summary comes last, and exit code 1 if any failed.
+# FUZZ_SECONDS (30) is the time for each fuzzer.
+set -uo pipefail
+cd "$(dirname "$0")/.." || exit 1
+
+stages=("$@")
+if [[ ${#stages[@]} -eq 0 ]]; then
+  stages=(cpu asan tsan cuda fuzz)
+fi
+for stage in "${stages[@]}"; do
+  case $stage in cpu | asan | tsan | cuda | fuzz) ;; *)
+    echo "scripts/test.sh: unknown stage \"$stage\" (cpu, asan, tsan, cuda or fuzz)" >&2
+    exit 2 ;;
+  esac
+done
+
+scripts/setup-debian.sh --tests || exit 1
+
+jobs=$(nproc)
+generator=()
+command -v ninja >/dev/null || generator=(-G "Unix Makefiles")
+
+build() {
+  cmake --preset "$1" "${generator[@]}" "${@:2}" && cmake --build --preset "$1" --parallel "$jobs"
+}
+
+tested() { build "$1" -DPHYXEL_TESTS=ON && ctest --preset "$1" --parallel "$jobs"; }
+
+# GCC's libgomp does not tell the thread sanitizer about its barriers, so every parallel loop would
+# look like a race. LLVM's does, through its tool Archer, which says so on request (verbose=1).
+tested_with_tsan() {
+  local archer=
+  archer=$(find "$(dirname "$(readlink -f "$(command -v clang++)")")/.." -name libarcher.so | head -1)
+  if [[ -z $archer ]]; then
+    echo "libarcher.so was not found beside clang++ (Debian: libomp-dev)"
+    return 1
+  fi
+  export OMP_TOOL_LIBRARIES=$archer
+  export TSAN_OPTIONS="ignore_noninstrumented_modules=1 ${TSAN_OPTIONS-}"
+  tested tsan
+}
+
+fuzzed() {
+  build fuzz || return 1
+  local failed=0 fuzzer name corpus seeds
+  for fuzzer in build/fuzz/bin/fuzz_*; do
+    name=$(basename "$fuzzer")
+    corpus=build/fuzz/corpus/$name
+    seeds=fuzz/corpus/${name#fuzz_}
+    mkdir -p "$corpus" build/fuzz/found
+    [[ -d $seeds ]] || seeds=
+    echo "--- $name"
+    # Crashing inputs are kept under build/fuzz/found, the whole log beside it.
+    if ! "$fuzzer" -max_total_time="${FUZZ_SECONDS:-30}" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+      -artifact_prefix=build/fuzz/found/"$name"- "$corpus" ${seeds:+"$seeds"} >build/fuzz/"$name".log 2>&1; then
+      failed=1
+      grep -vE '^(#[0-9]+[[:space:]]|[[:space:]]*NEW_FUNC)' build/fuzz/"$name".log | tail -n 40
+    fi
+    grep -E 'number_of_executed_units|average_exec_per_sec' build/fuzz/"$name".log
+  done
+  return $failed
+}
+
+have_nvcc() {
+  command -v nvcc >/dev/null || [[ -n ${CUDACXX-} || -x /usr/local/cuda/bin/nvcc ]]
+}
+
+summary=()
+worst=0
+for stage in "${stages[@]}"; do
+  echo
+  echo "=== $stage"
+  start=$SECONDS
+  case $stage in
+    cpu | asan) (tested "$stage") ;;
+    tsan) if command -v clang++ >/dev/null; then (tested_with_tsan); else (exit 77); fi ;;
+    cuda) if have_nvcc; then (tested cuda); else (exit 77); fi ;;
+    fuzz) if command -v clang++ >/dev/null; then (fuzzed); else (exit 77); fi ;;
+  esac
+  code=$?
+  result=passed
+  if [[ $code -eq 77 ]]; then
+    result="skipped: its compiler is not installed"
+  elif [[ $code -ne 0 ]]; then
+    result=FAILED
+    worst=1
+  fi
+  summary+=("$(printf '  %-5s %5d s  %s' "$stage" $((SECONDS - start)) "$result")")
+done
+
+echo
+echo "Summary"
+printf '%s\n' "${summary[@]}"
+exit $worst
