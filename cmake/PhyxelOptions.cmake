@@ -7,6 +7,8 @@ target_compile_options(phyxel_flags INTERFACE
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
   # Designated initialisers name what matters; the rest has defaults.
   "$<$<COMPILE_LANGUAGE:CXX>:-Wno-missing-field-initializers>"
+  # GCC 12 sees copies that overlap and members that are not set inside std::string and std::vector.
+  "$<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-restrict;-Wno-maybe-uninitialized>"
   # SIMD packs never cross a library border.
   "$<$<COMPILE_LANGUAGE:CXX>:-Wno-psabi>"
   # clang does not know GCC's unrolling pragma, and tells of loops that sanitizers keep scalar.

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "mesh_formats.hpp"
+#include "mesh/mesh_formats.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 

@@ -1,7 +1,7 @@
-"""Reads what the tests of lib/recorder.cpp wrote, with readers that are not ours: VTK's and h5py.
+"""Reads what the tests of lib/files/recorder.cpp wrote, with readers that are not ours: VTK's and h5py.
 
 read_back.py frames|single FOLDER; exit code 77 if a reader is missing. The expected numbers are those of
-tests/lib/recorder_test.cpp: in frame k everything has moved by k/2 in x.
+tests/lib/files/recorder_test.cpp: in frame k everything has moved by k/2 in x.
 """
 
 import json

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
-#include "hdf5_file.hpp"
+#include "files/hdf5_file.hpp"
 #include "phyxel/phyxel.hpp"
-#include "sealed_file.hpp"
+#include "files/sealed_file.hpp"
 #include "setup.hpp"
 
 namespace phyxel::app {

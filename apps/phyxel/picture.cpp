@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <png.h>
 
-#include "atomic_file.hpp"
+#include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {

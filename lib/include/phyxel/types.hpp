@@ -1,7 +1,7 @@
 /// Small vectors and matrices shared by host and device code.
 ///
 /// Everything here is a plain value templated on the scalar type `Real`, which may be `float`,
-/// `double`, or a SIMD pack of either (see lib/pack.hpp): the physics in `phyxel/physics/` is
+/// `double`, or a SIMD pack of either (see lib/solver/pack.hpp): the physics in `phyxel/physics/` is
 /// written once against these types. Public headers hold no Eigen types on purpose: their
 /// alignment depends on the compiler flags of whoever includes them.
 #pragma once

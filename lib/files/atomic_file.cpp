@@ -1,0 +1,187 @@
+#include "files/atomic_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string reason(int error) { return std::error_code(error, std::generic_category()).message(); }
+
+[[noreturn]] void fail(const fs::path& file, const char* what, int error) {
+  throw OutputError(fmt::format("{}: {}: {}", file.string(), what, reason(error)));
+}
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  Descriptor(const fs::path& file, int flags)
+      : fd_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int get() const { return fd_; }
+  /// Closing can report what writing did not (NFS, quotas).
+  int close() {
+    const int result = ::close(fd_);
+    fd_ = -1;
+    return result;
+  }
+
+ private:
+  int fd_;
+};
+
+/// 0, or the error number of the write that failed.
+int write_all(int fd, std::span<const std::byte> bytes, off_t at) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::pwrite(fd, bytes.data(), bytes.size(), at);
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return errno;
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+    at += written;
+  }
+  return 0;
+}
+
+std::span<const std::byte> bytes_of(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+void sync_folder(const fs::path& file) {
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const Descriptor descriptor(folder, O_RDONLY | O_DIRECTORY);
+  // Some file systems cannot sync a folder; the rename is then as durable as it gets.
+  if (descriptor.get() >= 0) ::fsync(descriptor.get());
+}
+
+}  // namespace
+
+void write_whole_file(const fs::path& file, std::span<const std::span<const std::byte>> pieces,
+                      Durable durable) {
+  const fs::path temporary = file.string() + ".tmp";
+  Descriptor descriptor(temporary, O_WRONLY | O_CREAT | O_TRUNC);
+  if (descriptor.get() < 0) fail(file, "cannot be written", errno);
+  int error = 0;
+  off_t at = 0;
+  for (const auto piece : pieces) {
+    if (error == 0) error = write_all(descriptor.get(), piece, at);
+    at += static_cast<off_t>(piece.size());
+  }
+  if (error == 0 && durable == Durable::yes && ::fsync(descriptor.get()) != 0) error = errno;
+  if (descriptor.close() != 0 && error == 0) error = errno;
+  if (error != 0) {
+    ::unlink(temporary.c_str());
+    fail(file, fmt::format("{} bytes could not be written", at).c_str(), error);
+  }
+  move_into_place(temporary, file, Durable::no);
+  if (durable == Durable::yes) sync_folder(file);
+}
+
+void write_whole_file(const fs::path& file, std::string_view text, Durable durable) {
+  const std::span<const std::byte> pieces[] = {bytes_of(text)};
+  write_whole_file(file, pieces, durable);
+}
+
+void move_into_place(const fs::path& temporary, const fs::path& file, Durable durable) {
+  int error = 0;
+  if (durable == Durable::yes) {
+    const Descriptor descriptor(temporary, O_RDONLY);
+    if (descriptor.get() < 0 || ::fsync(descriptor.get()) != 0) error = errno;
+  }
+  if (error == 0 && ::rename(temporary.c_str(), file.c_str()) != 0) error = errno;
+  if (error != 0) {
+    ::unlink(temporary.c_str());
+    fail(file, "cannot be written", error);
+  }
+  if (durable == Durable::yes) sync_folder(file);
+}
+
+void replace_tail(const fs::path& file, std::size_t keep, std::string_view text) {
+  Descriptor descriptor(file, O_RDWR);
+  struct stat status {};
+  if (descriptor.get() < 0 || ::fstat(descriptor.get(), &status) != 0) {
+    fail(file, "cannot be written", errno);
+  }
+  const auto size = static_cast<std::size_t>(status.st_size);
+  if (size < keep) {
+    throw OutputError(
+        fmt::format("{}: has {} bytes where this run wrote at least {}: something else "
+                    "has changed it",
+                    file.string(), size, keep));
+  }
+  std::string tail(size - keep, '\0');
+  if (::pread(descriptor.get(), tail.data(), tail.size(), static_cast<off_t>(keep)) !=
+      static_cast<ssize_t>(tail.size())) {
+    fail(file, "cannot be read back", errno);
+  }
+  int error = write_all(descriptor.get(), bytes_of(text), static_cast<off_t>(keep));
+  if (error == 0 && ::ftruncate(descriptor.get(), static_cast<off_t>(keep + text.size())) != 0) {
+    error = errno;
+  }
+  if (error != 0) {
+    // The old tail lies in blocks the file already owns, so that this works on a full disk.
+    write_all(descriptor.get(), bytes_of(tail), static_cast<off_t>(keep));
+    [[maybe_unused]] const int cut = ::ftruncate(descriptor.get(), static_cast<off_t>(size));
+    fail(file, "cannot be written", error);
+  }
+  if (descriptor.close() != 0) fail(file, "cannot be written", errno);
+}
+
+std::string read_text_file(const fs::path& file, std::size_t limit) {
+  std::error_code error;
+  const auto status = fs::status(file, error);
+  if (!fs::exists(status)) throw InputError(fmt::format("{}: no such file", file.string()));
+  if (fs::is_directory(status))
+    throw InputError(fmt::format("{}: is a folder, not a file", file.string()));
+  const Descriptor descriptor(file, O_RDONLY);
+  if (descriptor.get() < 0) {
+    throw InputError(fmt::format("{}: cannot be read: {}", file.string(), reason(errno)));
+  }
+  std::string text;
+  char buffer[65536];
+  while (true) {
+    const ssize_t got = ::read(descriptor.get(), buffer, sizeof buffer);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0)
+      throw InputError(fmt::format("{}: cannot be read: {}", file.string(), reason(errno)));
+    if (got == 0) return text;
+    text.append(buffer, static_cast<std::size_t>(got));
+    if (text.size() > limit) {
+      throw InputError(
+          fmt::format("{}: more than {} bytes: too large for such a file", file.string(), limit));
+    }
+  }
+}
+
+void make_writable_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder)) {
+    throw InputError(fmt::format("{}: the output folder cannot be made: {}", folder.string(),
+                                 error ? error.message() : "a file of that name exists"));
+  }
+  const fs::path probe = folder / fmt::format(".phyxel_probe_{}", ::getpid());
+  const Descriptor descriptor(probe, O_WRONLY | O_CREAT | O_EXCL);
+  if (descriptor.get() < 0) {
+    throw InputError(fmt::format("{}: no file can be made in the output folder: {}",
+                                 folder.string(), reason(errno)));
+  }
+  ::unlink(probe.c_str());
+}
+
+}  // namespace phyxel

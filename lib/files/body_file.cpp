@@ -1,0 +1,119 @@
+#include "phyxel/body_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "files/hdf5_file.hpp"
+#include "phyxel/error.hpp"
+#include "files/sealed_file.hpp"
+#include "version.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr const char* kind = "body";
+constexpr std::int64_t version = 1;
+
+/// Points must be finite and fit an Index.
+void check_points(const Hdf5Reader& in, const std::string& path, const std::vector<Vec3d>& points) {
+  if (points.size() > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
+    in.refuse(fmt::format("{} has {} rows; allowed at most {}", path, points.size(),
+                          std::numeric_limits<Index>::max()));
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!is_finite(points[i])) in.refuse(fmt::format("{} is not finite in row {}", path, i));
+  }
+}
+
+void check_range(const Hdf5Reader& in, const std::string& path, std::span<const Index> indices,
+                 std::size_t count) {
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    if (indices[i] < 0 || static_cast<std::size_t>(indices[i]) >= count) {
+      in.refuse(fmt::format("{} holds the index {} at {}; allowed 0 to {}", path, indices[i], i,
+                            static_cast<std::int64_t>(count) - 1));
+    }
+  }
+}
+
+Surface read_surface(const Hdf5Reader& in) {
+  Surface surface;
+  surface.position = in.vectors("/surface/position");
+  surface.normal = in.vectors("/surface/normal");
+  check_points(in, "/surface/position", surface.position);
+  check_points(in, "/surface/normal", surface.normal);
+  if (surface.normal.size() != surface.position.size()) {
+    in.refuse(fmt::format("/surface/normal has {} rows, /surface/position {}",
+                          surface.normal.size(), surface.position.size()));
+  }
+  const std::vector<Index> corners = in.array<Index>("/surface/triangle", 3);
+  check_range(in, "/surface/triangle", corners, surface.position.size());
+  surface.triangle.resize(corners.size() / 3);
+  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+    surface.triangle[t] = {corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]};
+  }
+  return surface;
+}
+
+}  // namespace
+
+void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite) {
+  if (!overwrite && std::filesystem::exists(file)) {
+    throw InputError(
+        fmt::format("{}: exists already and is kept; --force replaces it", file.string()));
+  }
+  make_writable_folder(file.has_parent_path() ? file.parent_path() : ".");
+  Hdf5Writer out;
+  out.group("/phyxel");
+  out.attribute("/phyxel", "version", version);
+  out.attribute("/phyxel", "program", program_version());
+  out.attribute("/phyxel", "units", std::string("m, m^3"));
+  out.vectors("/position", cloud.position, false);
+  if (!cloud.volume.empty()) out.array<double>("/volume", cloud.volume);
+  const Surface& surface = cloud.surface;
+  if (!surface.position.empty()) {
+    out.vectors("/surface/position", surface.position, false);
+    out.vectors("/surface/normal", surface.normal, false);
+    const Index* corners = surface.triangle.empty() ? nullptr : surface.triangle.front().data();
+    out.array<Index>("/surface/triangle", std::span(corners, 3 * surface.triangle.size()), 3);
+  }
+  for (const auto& [name, phyxels] : cloud.regions) out.array<Index>("/regions/" + name, phyxels);
+  write_sealed(file, kind, out.image(), Durable::yes);
+}
+
+Cloud read_body(const std::filesystem::path& file) {
+  check_seal(file, kind);
+  const Hdf5Reader in(file);
+  if (const std::int64_t found = in.integer_attribute("/phyxel", "version"); found != version) {
+    in.refuse(fmt::format("format version {}; this program reads version {}", found, version));
+  }
+  Cloud cloud;
+  cloud.position = in.vectors("/position");
+  if (cloud.position.empty()) in.refuse("has no phyxels");
+  check_points(in, "/position", cloud.position);
+  if (in.has("/volume")) {
+    cloud.volume = in.array<double>("/volume");
+    if (cloud.volume.size() != cloud.position.size()) {
+      in.refuse(fmt::format("/volume has {} rows, /position {}", cloud.volume.size(),
+                            cloud.position.size()));
+    }
+    for (std::size_t i = 0; i < cloud.volume.size(); ++i) {
+      if (!(cloud.volume[i] > 0) || !std::isfinite(cloud.volume[i])) {
+        in.refuse(fmt::format("/volume is {} in row {}; allowed > 0 m^3", cloud.volume[i], i));
+      }
+    }
+  }
+  if (in.has("/surface")) cloud.surface = read_surface(in);
+  for (const std::string& name : in.names("/regions")) {
+    const std::string path = "/regions/" + name;
+    std::vector<Index> phyxels = in.array<Index>(path);
+    check_range(in, path, phyxels, cloud.position.size());
+    std::sort(phyxels.begin(), phyxels.end());
+    phyxels.erase(std::unique(phyxels.begin(), phyxels.end()), phyxels.end());
+    cloud.regions[name] = std::move(phyxels);
+  }
+  return cloud;
+}
+
+}  // namespace phyxel

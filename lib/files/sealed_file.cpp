@@ -1,0 +1,140 @@
+#include "files/sealed_file.hpp"
+
+#define XXH_INLINE_ALL
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <vector>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* first_line = "phyxel sealed file 1\n";
+
+/// Digest of a file from a byte onwards, in bounded memory.
+class Digest {
+ public:
+  Digest() : state_(XXH3_createState()) { XXH3_128bits_reset(state_.get()); }
+  void add(const void* bytes, std::size_t count) {
+    XXH3_128bits_update(state_.get(), bytes, count);
+  }
+  std::string hex() const {
+    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
+    return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  }
+
+ private:
+  struct Free {
+    void operator()(XXH3_state_t* state) const { XXH3_freeState(state); }
+  };
+  std::unique_ptr<XXH3_state_t, Free> state_;
+};
+
+std::array<char, seal_size> seal_of(const std::string& kind, std::uint64_t bytes,
+                                    const std::string& digest) {
+  std::array<char, seal_size> seal;
+  seal.fill('\n');
+  const std::string text = fmt::format("{}kind       {}\nbytes      {}\nxxh3-128   {}\n",
+                                       first_line, kind, bytes, digest);
+  std::memcpy(seal.data(), text.data(), text.size());
+  return seal;
+}
+
+/// Value of the line that begins with `key`, or "".
+std::string line_of(const std::string& seal, const std::string& key) {
+  const std::size_t at = seal.find('\n' + key + ' ');
+  if (at == std::string::npos) return "";
+  const std::size_t begin = seal.find_first_not_of(' ', at + 1 + key.size());
+  return seal.substr(begin, seal.find('\n', begin) - begin);
+}
+
+/// Digest and count of all bytes behind the seal.
+std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
+  std::vector<char> buffer(1 << 20);
+  Digest digest;
+  *bytes = 0;
+  while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), in.gcount() > 0) {
+    digest.add(buffer.data(), static_cast<std::size_t>(in.gcount()));
+    *bytes += static_cast<std::uint64_t>(in.gcount());
+  }
+  return digest.hex();
+}
+
+}  // namespace
+
+void write_sealed(const fs::path& file, const std::string& kind, std::span<const std::byte> content,
+                  Durable durable) {
+  Digest digest;
+  digest.add(content.data(), content.size());
+  const auto seal = seal_of(kind, content.size(), digest.hex());
+  const std::span<const std::byte> pieces[] = {std::as_bytes(std::span(seal)), content};
+  write_whole_file(file, pieces, durable);
+}
+
+void seal_in_place(const fs::path& file, const std::string& kind) {
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  stream.seekg(seal_size);
+  std::uint64_t bytes = 0;
+  const std::string digest = digest_rest(stream, &bytes);
+  const auto seal = seal_of(kind, bytes, digest);
+  stream.clear();
+  stream.seekp(0);
+  stream.write(seal.data(), seal.size());
+  stream.close();
+  if (!stream) throw OutputError(fmt::format("{}: cannot be written", file.string()));
+}
+
+std::string check_seal(const fs::path& file) {
+  std::error_code error;
+  const auto status = fs::status(file, error);
+  if (!fs::exists(status)) throw InputError(fmt::format("{}: no such file", file.string()));
+  if (fs::is_directory(status))
+    throw InputError(fmt::format("{}: is a folder, not a file", file.string()));
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw InputError(fmt::format("{}: cannot be read", file.string()));
+  std::string seal(seal_size, '\0');
+  in.read(seal.data(), seal_size);
+  if (in.gcount() != static_cast<std::streamsize>(seal_size) || seal.rfind(first_line, 0) != 0) {
+    const std::string start = seal.substr(0, 18);
+    if (start == std::string(first_line).substr(0, 18) &&
+        in.gcount() == static_cast<std::streamsize>(seal_size)) {
+      throw InputError(
+          fmt::format("{}: written by another version of phyxel: its first line is not \"{}\"",
+                      file.string(), std::string(first_line).substr(0, 20)));
+    }
+    throw InputError(
+        fmt::format("{}: not a file written by phyxel (or cut short within its first {} bytes)",
+                    file.string(), seal_size));
+  }
+  std::uint64_t bytes = 0;
+  const std::string digest = digest_rest(in, &bytes);
+  const std::string stated = line_of(seal, "bytes");
+  if (stated != std::to_string(bytes)) {
+    throw InputError(
+        fmt::format("{}: cut short or altered: {} bytes behind the seal, which says {}",
+                    file.string(), bytes, stated.empty() ? "nothing" : stated));
+  }
+  if (line_of(seal, "xxh3-128") != digest) {
+    throw InputError(fmt::format(
+        "{}: altered since it was written: its digest does not fit its content", file.string()));
+  }
+  return line_of(seal, "kind");
+}
+
+void check_seal(const fs::path& file, const std::string& kind) {
+  const std::string found = check_seal(file);
+  if (found != kind) {
+    throw InputError(fmt::format("{}: is a phyxel {}; expected a {}", file.string(), found, kind));
+  }
+}
+
+}  // namespace phyxel

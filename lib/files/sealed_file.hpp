@@ -1,0 +1,39 @@
+/// The seal in front of every HDF5 file of ours.
+///
+/// HDF5 1.10 crashes on some damaged files, so none is parsed before its digest has been compared.
+/// The digest sits in the file itself, as text in the first 512 bytes: HDF5 calls that a user block
+/// and skips it, so that ParaView, VTK and h5py read the file as any other.
+///
+///   phyxel sealed file 1
+///   kind       checkpoint
+///   bytes      123456            (behind the seal)
+///   xxh3-128   0123...           (of those bytes)
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "files/atomic_file.hpp"
+
+namespace phyxel {
+
+/// Bytes of the seal: the smallest user block of HDF5.
+inline constexpr std::size_t seal_size = 512;
+
+/// Writes seal and content, whole or not at all. @throws OutputError.
+void write_sealed(const std::filesystem::path& file, const std::string& kind,
+                  std::span<const std::byte> content, Durable durable);
+
+/// Seals a file that was written with `seal_size` bytes left free in front. @throws OutputError.
+void seal_in_place(const std::filesystem::path& file, const std::string& kind);
+
+/// Compares the digest. @returns the kind of file.
+/// @throws InputError for a file that is missing, unreadable, cut short, altered or not ours.
+std::string check_seal(const std::filesystem::path& file);
+
+/// The same, for one kind only. @throws InputError also for another kind.
+void check_seal(const std::filesystem::path& file, const std::string& kind);
+
+}  // namespace phyxel

@@ -1,0 +1,249 @@
+#include "mesh/inside_samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/random_bits.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr int block_level = 2;             ///< Blocks have 2^2 voxels a side.
+constexpr std::size_t enough_tasks = 400;  ///< For an even load on any number of threads.
+
+/// Up to here, walking from a known point beats the winding number.
+constexpr std::size_t few_triangles = 48;
+
+double component(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+bool is_doubtful(double winding) { return std::abs(winding - std::round(winding)) > 0.1; }
+
+}  // namespace
+
+void SampleTally::add(const SampleTally& other) {
+  samples += other.samples;
+  doubtful += other.doubtful;
+  repeated += other.repeated;
+}
+
+InsideSampler::InsideSampler(const Surface& surface, bool closed)
+    : surface_(surface), closed_(closed), winding_number_(surface) {
+  bool first = true;
+  Vec3d low, high;
+  for (const Triangle& t : surface.triangle) {
+    for (const Index corner : t) {
+      const Vec3d p = surface.position[corner];
+      if (first) low = high = p;
+      first = false;
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const Vec3d a = surface.position[t[0]], b = surface.position[t[1]], c = surface.position[t[2]];
+    area_ += 0.5 * norm(cross(b - a, c - a));
+    length_ += std::max({norm(b - a), norm(c - b), norm(a - c)});
+  }
+  middle_ = 0.5 * (low + high);
+  extent_ = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+}
+
+/// Whether a triangle's bounding box and plane both meet a cube: it may yet miss the cube, which
+/// costs time only.
+bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
+  const Triangle& t = surface_.triangle[triangle];
+  const Vec3d a = surface_.position[t[0]] - middle, b = surface_.position[t[1]] - middle,
+              c = surface_.position[t[2]] - middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double p = component(a, axis), q = component(b, axis), r = component(c, axis);
+    if (std::min({p, q, r}) > half || std::max({p, q, r}) < -half) return false;
+  }
+  const Vec3d normal = cross(b - a, c - a);
+  const double reach = half * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
+  return std::abs(dot(normal, a)) <= reach * (1 + 1e-9);
+}
+
+/// The winding number at a point in a cell of a closed surface, from that in the cell's middle: it
+/// changes by one at each triangle that the straight way there goes through.
+double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d point) const {
+  const Vec3d start = grid.middle(cell), way = point - start;
+  const double length = norm(way);
+  double winding = cell.winding;
+  for (const Index index : cell.triangles) {
+    const Triangle& t = surface_.triangle[index];
+    const Vec3d a = surface_.position[t[0]] - start, b = surface_.position[t[1]] - start,
+                c = surface_.position[t[2]] - start;
+    const Vec3d normal = cross(b - a, c - a);
+    const double size = std::max({norm(a), norm(b), norm(c)});
+    // Six times the volumes of start, point and triangle; what rounding might decide is left to
+    // the winding number itself.
+    const double rounding = 1e-12 * size * size * size,
+                 edge_rounding = 1e-12 * size * size * length;
+    const double before = dot(a, normal), after = before - dot(way, normal);
+    if ((before > rounding && after > rounding) || (before < -rounding && after < -rounding)) {
+      continue;
+    }
+    const double u = dot(way, cross(a, b)), v = dot(way, cross(b, c)), w = dot(way, cross(c, a));
+    if (std::min({u, v, w}) < -edge_rounding && std::max({u, v, w}) > edge_rounding) continue;
+    const bool clear = std::min({std::abs(u), std::abs(v), std::abs(w)}) > edge_rounding &&
+                       std::min(std::abs(before), std::abs(after)) > rounding;
+    if (!clear) return winding_number_(point);
+    winding += before > 0 ? -1 : 1;
+  }
+  return winding;
+}
+
+/// Whether an open surface, none of whose triangles touch the cell, has the same side everywhere in
+/// it. There its winding number is harmonic: it has no extremes inside the cell, so agreement in
+/// the middle and at the corners is good evidence.
+bool InsideSampler::agrees_throughout(const Grid& grid, const Cell& cell) const {
+  const auto clear = [&](double w) {
+    return (w > 0.5) == (cell.winding > 0.5) && std::abs(w - 0.5) > 0.1;
+  };
+  bool agrees = clear(cell.winding);
+  const std::int64_t side = std::int64_t{1} << cell.level;
+  for (int corner = 0; corner < 8 && agrees; ++corner) {
+    agrees =
+        clear(winding_number_(grid.place(static_cast<double>(cell.x + (corner & 1) * side),
+                                         static_cast<double>(cell.y + (corner >> 1 & 1) * side),
+                                         static_cast<double>(cell.z + (corner >> 2) * side))));
+  }
+  return agrees;
+}
+
+std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& cell) const {
+  std::vector<Cell> children(8);
+  const std::int64_t side = std::int64_t{1} << (cell.level - 1);
+  // A little larger than it is, for the rounding of sample points to float.
+  const double half = 0.5 * grid.voxel * (static_cast<double>(side) + 1e-3);
+  const bool few = closed_ && cell.triangles.size() <= few_triangles;
+  if (few && !cell.measured) {
+    const double winding = winding_number_(grid.middle(cell));
+    cell.measured = !is_doubtful(winding);
+    cell.winding = std::round(winding);
+  }
+  for (int k = 0; k < 8; ++k) {
+    Cell& child = children[k];
+    child.level = cell.level - 1;
+    child.x = cell.x + (k & 1) * side;
+    child.y = cell.y + (k >> 1 & 1) * side;
+    child.z = cell.z + (k >> 2) * side;
+    child.known = cell.known;
+    child.measured = cell.measured;
+    child.winding = cell.winding;
+    if (cell.known) continue;
+    const Vec3d middle = grid.middle(child);
+    for (const Index t : cell.triangles) {
+      if (may_touch(t, middle, half)) child.triangles.push_back(t);
+    }
+    child.measured = false;
+    if (child.level == 0) continue;
+    if (few && cell.measured) {
+      child.winding = winding_from(grid, cell, middle);
+      child.measured = !is_doubtful(child.winding);
+    }
+    if (!child.triangles.empty()) continue;
+    if (!child.measured) child.winding = winding_number_(middle);
+    child.known = closed_ || agrees_throughout(grid, child);
+  }
+  return children;
+}
+
+void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
+                         SampleTally& tally) const {
+  if (cell.known && !(cell.winding > 0.5)) return;
+  for (Cell& child : split(grid, cell)) {
+    if (child.level > 0) {
+      fill(grid, child, block, tally);
+    } else {
+      add_sample(grid, cell, child, block, tally);
+    }
+  }
+}
+
+void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell& cell,
+                               SampleBlock& block, SampleTally& tally) const {
+  std::uint64_t bits = mix_bits(grid.seed ^ mix_bits(static_cast<std::uint64_t>(cell.x)));
+  bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(cell.y)));
+  bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(cell.z)));
+  const Vec3d place = grid.place(static_cast<double>(cell.x) + unit_fraction(bits),
+                                 static_cast<double>(cell.y) + unit_fraction(bits >> 21),
+                                 static_cast<double>(cell.z) + unit_fraction(bits >> 42));
+  const Vec3d offset = place - block.centre;
+  block.offset.push_back(
+      {static_cast<float>(offset.x), static_cast<float>(offset.y), static_cast<float>(offset.z)});
+  const Vec3d rounded = block.position(block.offset.size() - 1);
+  const double winding = cell.known                   ? cell.winding
+                         : parent.measured && closed_ ? winding_from(grid, parent, rounded)
+                                                      : winding_number_(rounded);
+  if (!(winding > 0.5)) {
+    block.offset.pop_back();
+    return;
+  }
+  ++tally.samples;
+  tally.doubtful += is_doubtful(winding);
+  tally.repeated += winding > 1.5;
+}
+
+void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally,
+                            const std::function<void(const SampleBlock&)>& visit_block) const {
+  if (cell.known && !(cell.winding > 0.5)) return;
+  if (cell.level > block_level) {
+    for (Cell& child : split(grid, cell)) descend(grid, child, tally, visit_block);
+    return;
+  }
+  SampleBlock block;
+  block.centre = grid.middle(cell);
+  fill(grid, cell, block, tally);
+  if (!block.offset.empty()) visit_block(block);
+}
+
+SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& visit_block) const {
+  Cell root;
+  root.level = block_level;
+  while (voxel * static_cast<double>(std::int64_t{1} << root.level) < extent_ * 1.001 + voxel) {
+    ++root.level;
+  }
+  const double side = voxel * static_cast<double>(std::int64_t{1} << root.level);
+  const Grid grid{middle_ - 0.5 * Vec3d{side, side, side}, voxel, seed};
+  root.triangles.resize(surface_.triangle.size());
+  for (std::size_t t = 0; t < root.triangles.size(); ++t) root.triangles[t] = static_cast<Index>(t);
+
+  std::vector<Cell> tasks{root};
+  while (tasks.size() < enough_tasks && !tasks.empty() && tasks.front().level > block_level) {
+    std::vector<Cell> finer;
+    for (Cell& cell : tasks) {
+      for (Cell& child : split(grid, cell)) {
+        if (!child.known || child.winding > 0.5) finer.push_back(std::move(child));
+      }
+    }
+    tasks.swap(finer);
+  }
+
+  SampleTally total;
+  const auto n_tasks = static_cast<std::ptrdiff_t>(tasks.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::ptrdiff_t task = 0; task < n_tasks; ++task) {
+    SampleTally tally;
+    descend(grid, tasks[task], tally,
+            [&](const SampleBlock& block) { visit_block(static_cast<std::size_t>(task), block); });
+#pragma omp critical(phyxel_sample_tally)
+    total.add(tally);
+  }
+  return total;
+}
+
+SampleTally InsideSampler::collect(double voxel, std::uint64_t seed,
+                                   std::vector<SampleBlock>& blocks) const {
+  // Eight children at most of fewer than enough_tasks cells.
+  std::vector<std::vector<SampleBlock>> by_task(8 * enough_tasks);
+  const SampleTally tally = visit(voxel, seed, [&](std::size_t task, const SampleBlock& block) {
+    by_task[task].push_back(block);
+  });
+  blocks.clear();
+  for (std::vector<SampleBlock>& part : by_task) {
+    std::move(part.begin(), part.end(), std::back_inserter(blocks));
+    part = {};
+  }
+  return tally;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,95 @@
+/// Sample points that fill the inside of a surface evenly.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+#include "mesh/winding_number.hpp"
+
+namespace phyxel {
+
+/// Neighbouring sample points, at `centre` + offset.
+struct SampleBlock {
+  Vec3d centre;                     ///< [m]
+  std::vector<Vec3<float>> offset;  ///< [m], shape [n].
+
+  Vec3d position(std::size_t k) const {
+    return centre + Vec3d{offset[k].x, offset[k].y, offset[k].z};
+  }
+};
+
+/// What sampling found, beside the points.
+struct SampleTally {
+  Offset samples = 0;
+  Offset doubtful = 0;  ///< Those with a winding number more than 0.1 from a whole number.
+  Offset repeated = 0;  ///< Those the surface winds around more than once.
+  void add(const SampleTally& other);
+};
+
+/// The inside of a surface, cut into voxels with one sample point at a random place in each. Space
+/// is halved down to the voxels only near triangles, so that the empty part of a large box costs
+/// nothing. A point is inside where the winding number is above one half.
+class InsideSampler {
+ public:
+  /// The surface must outlive the sampler. `closed`: see SurfaceTopology.
+  InsideSampler(const Surface& surface, bool closed);
+
+  using Visit = std::function<void(std::size_t task, const SampleBlock&)>;
+
+  /// Calls visit(task, block) for blocks of up to 4 x 4 x 4 voxels with the side `voxel` [m]. The
+  /// tasks run on many threads in any order, the blocks of one task in order; the blocks depend
+  /// on `voxel` and `seed` only.
+  SampleTally visit(double voxel, std::uint64_t seed, const Visit& visit_block) const;
+
+  /// All blocks, by task.
+  SampleTally collect(double voxel, std::uint64_t seed, std::vector<SampleBlock>& blocks) const;
+
+  bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
+  /// About how many voxels the surface passes through, all of which are looked at.
+  double surface_voxels(double voxel) const { return (area_ / voxel + length_) / voxel; }
+  double extent() const { return extent_; }  ///< Longest side of its bounding box [m].
+  Vec3d middle() const { return middle_; }   ///< Of its bounding box [m].
+
+ private:
+  /// A cube of 2^level voxels a side.
+  struct Cell {
+    std::int64_t x = 0, y = 0, z = 0;  ///< Lower corner in units of voxels.
+    int level = 0;
+    std::vector<Index> triangles;  ///< Those that may touch it.
+    bool known = false;            ///< Whether all of it has the same `winding`.
+    bool measured = false;         ///< Whether `winding` is known in the middle at least.
+    double winding = 0;
+  };
+  struct Grid {
+    Vec3d origin;
+    double voxel;
+    std::uint64_t seed;
+    Vec3d place(double x, double y, double z) const { return origin + voxel * Vec3d{x, y, z}; }
+    Vec3d middle(const Cell& cell) const {
+      const double half = 0.5 * static_cast<double>(std::int64_t{1} << cell.level);
+      return place(static_cast<double>(cell.x) + half, static_cast<double>(cell.y) + half,
+                   static_cast<double>(cell.z) + half);
+    }
+  };
+
+  std::vector<Cell> split(const Grid& grid, Cell& cell) const;
+  bool may_touch(Index triangle, Vec3d middle, double half) const;
+  double winding_from(const Grid& grid, const Cell& cell, Vec3d point) const;
+  bool agrees_throughout(const Grid& grid, const Cell& cell) const;
+  void descend(const Grid& grid, Cell& cell, SampleTally& tally,
+               const std::function<void(const SampleBlock&)>& visit_block) const;
+  void fill(const Grid& grid, Cell& cell, SampleBlock& block, SampleTally& tally) const;
+  void add_sample(const Grid& grid, const Cell& parent, const Cell& cell, SampleBlock& block,
+                  SampleTally& tally) const;
+
+  const Surface& surface_;
+  bool closed_;
+  WindingNumber winding_number_;
+  Vec3d middle_;
+  double extent_ = 0;
+  double area_ = 0, length_ = 0;  ///< Of all triangles, and of their longest sides [m^2, m].
+};
+
+}  // namespace phyxel

@@ -1,0 +1,174 @@
+#define TINYOBJLOADER_USE_DOUBLE
+#include <fmt/format.h>
+#include <tiny_obj_loader.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "mesh/mesh_formats.hpp"
+#include "phyxel/error.hpp"
+#include "mesh/text_cursor.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Keywords of the OBJ format. A line that starts otherwise is damage, not geometry of some kind.
+constexpr std::string_view keywords[] = {
+    "v",      "vt",     "vn",       "vp",       "vw",         "f",         "fo",
+    "l",      "p",      "o",        "g",        "s",          "t",         "mg",
+    "usemtl", "mtllib", "usemap",   "maplib",   "cstype",     "deg",       "bmat",
+    "step",   "curv",   "curv2",    "surf",     "parm",       "trim",      "hole",
+    "scrv",   "sp",     "end",      "con",      "bevel",      "lod",       "ctech",
+    "stech",  "call",   "c_interp", "d_interp", "shadow_obj", "trace_obj", "csh"};
+
+/// What tinyobjloader is given. It takes damaged numbers and indices without complaint and knows no
+/// line numbers in what it returns, so every line is checked first, and only vertices and faces,
+/// with absolute indices, are passed on.
+struct CheckedText {
+  std::string text;
+  std::size_t vertices = 0;
+};
+
+class LineCheck {
+ public:
+  LineCheck(std::string_view content, const std::string& name) : content_(content), name_(name) {}
+
+  CheckedText run() {
+    std::size_t line = 0;
+    for (std::size_t at = 0; at < content_.size();) {
+      line_ = ++line;
+      std::string joined;
+      std::string_view text = next_line(at);
+      while (!text.empty() && text.back() == '\\' && at < content_.size()) {  // continued
+        joined.append(text.substr(0, text.size() - 1)).push_back(' ');
+        joined += next_line(at);
+        text = joined;
+        ++line;
+      }
+      check(text);
+    }
+    // Faces may name vertices that come later, so this can be told only now.
+    if (greatest_ > checked_.vertices) {
+      line_ = greatest_line_;
+      fail(fmt::format("a corner names vertex {}, but there are {}", greatest_, checked_.vertices));
+    }
+    return std::move(checked_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError(fmt::format("{}:{}: {}", name_, line_, what));
+  }
+
+  std::string_view next_line(std::size_t& at) const {
+    const std::size_t end = std::min(content_.find('\n', at), content_.size());
+    std::string_view text = content_.substr(at, end - at);
+    at = end + 1;
+    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+    return text;
+  }
+
+  void check(std::string_view text) {
+    TextCursor words(text);
+    const std::string_view keyword = words.word();
+    if (keyword.empty() || keyword.front() == '#') return;
+    if (keyword == "v") return check_vertex(words);
+    if (keyword == "f") return check_face(words);
+    if (std::ranges::find(keywords, keyword) == std::end(keywords)) {
+      fail(fmt::format("\"{}\" is not a keyword of the OBJ format", printable(keyword)));
+    }
+  }
+
+  void check_vertex(TextCursor& words) {
+    checked_.text += 'v';
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::string_view word = words.word();
+      if (word.empty()) fail(fmt::format("a vertex needs three coordinates, here are {}", axis));
+      const auto value = parse_number(word);
+      if (!value || !(std::abs(*value) <= largest_coordinate)) {
+        fail(fmt::format("the coordinate \"{}\" is not a number within +-{:g}", printable(word),
+                         largest_coordinate));
+      }
+      checked_.text.append(" ").append(word);
+    }
+    checked_.text += '\n';
+    ++checked_.vertices;
+  }
+
+  void check_face(TextCursor& words) {
+    checked_.text += 'f';
+    std::size_t corners = 0;
+    for (std::string_view word = words.word(); !word.empty(); word = words.word()) {
+      if (word.front() == '#') break;
+      const std::string_view vertex = word.substr(0, word.find('/'));
+      const auto index = parse_integer(vertex);
+      const auto before = static_cast<long long>(checked_.vertices);
+      if (!index || *index == 0) {
+        fail(fmt::format("the corner \"{}\" does not name a vertex (they count from 1)",
+                         printable(word)));
+      }
+      if (*index < -before) {
+        fail(fmt::format("the corner \"{}\" counts back beyond the {} vertices so far",
+                         printable(word), before));
+      }
+      const auto absolute = static_cast<std::size_t>(*index > 0 ? *index : before + *index + 1);
+      if (absolute > greatest_) {
+        greatest_ = absolute;
+        greatest_line_ = line_;
+      }
+      // The checked text has absolute indices only: 1 for the first vertex.
+      checked_.text += fmt::format(" {}", absolute);
+      ++corners;
+    }
+    if (corners < 3) fail(fmt::format("a face needs three corners, here are {}", corners));
+    if (corners > largest_polygon) {
+      fail(fmt::format("a face with {} corners; at most {} are allowed", corners, largest_polygon));
+    }
+    checked_.text += '\n';
+  }
+
+  std::string_view content_;
+  const std::string& name_;
+  std::size_t line_ = 1, greatest_ = 0, greatest_line_ = 0;
+  CheckedText checked_;
+};
+
+struct Polygons {
+  std::vector<Vec3d> position;
+  std::vector<Index> corner;
+  std::vector<std::size_t> face_start{0};
+};
+
+}  // namespace
+
+Surface parse_obj(std::string_view content, const std::string& name) {
+  CheckedText checked = LineCheck(content, name).run();
+  std::istringstream stream(std::move(checked.text));
+  Polygons polygons;
+  polygons.position.reserve(checked.vertices);
+  tinyobj::callback_t callback;
+  callback.vertex_cb = [](void* user, double x, double y, double z, double) {
+    static_cast<Polygons*>(user)->position.push_back({x, y, z});
+  };
+  callback.index_cb = [](void* user, tinyobj::index_t* indices, int count) {
+    auto& into = *static_cast<Polygons*>(user);
+    for (int k = 0; k < count; ++k) into.corner.push_back(indices[k].vertex_index - 1);
+    into.face_start.push_back(into.corner.size());
+  };
+  std::string warning, error;
+  if (!tinyobj::LoadObjWithCallback(stream, callback, &polygons, nullptr, &warning, &error)) {
+    throw InputError(fmt::format("{}: {}", name, error));
+  }
+
+  Surface surface;
+  surface.position = std::move(polygons.position);
+  for (std::size_t f = 0; f + 1 < polygons.face_start.size(); ++f) {
+    const std::size_t first = polygons.face_start[f];
+    append_polygon({polygons.corner.data() + first, polygons.face_start[f + 1] - first},
+                   surface.position, surface.triangle);
+  }
+  return surface;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,280 @@
+#include "mesh/relaxation.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "mesh/random_bits.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Points in the buckets of a hash table, added one by one.
+class GrowingHash {
+ public:
+  GrowingHash(double cell_size, std::size_t expected)
+      : inverse_(1 / cell_size), mask_(std::bit_ceil(4 * expected + 16) - 1), head_(mask_ + 1, -1) {
+    point_.reserve(expected);
+    next_.reserve(expected);
+  }
+
+  void add(Vec3d p) {
+    Index& head = head_[bucket(cell(p.x), cell(p.y), cell(p.z))];
+    next_.push_back(head);
+    head = static_cast<Index>(point_.size());
+    point_.push_back(p);
+  }
+
+  /// Square of the distance to the nearest point, or `limit` if none is nearer. Exact for limits
+  /// up to the square of the cell size.
+  double nearest2(Vec3d p, double limit) const {
+    const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
+    for (std::int64_t k = z - 1; k <= z + 1; ++k) {
+      for (std::int64_t j = y - 1; j <= y + 1; ++j) {
+        for (std::int64_t i = x - 1; i <= x + 1; ++i) {
+          for (Index q = head_[bucket(i, j, k)]; q >= 0; q = next_[q]) {
+            const Vec3d d = point_[q] - p;
+            limit = std::min(limit, dot(d, d));
+          }
+        }
+      }
+    }
+    return limit;
+  }
+
+  const std::vector<Vec3d>& points() const { return point_; }
+
+ private:
+  std::int64_t cell(double v) const { return static_cast<std::int64_t>(std::floor(v * inverse_)); }
+  std::size_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
+    const auto u = [](std::int64_t v) { return static_cast<std::uint64_t>(v); };
+    return mix_bits(u(x) * 73856093u ^ u(y) * 19349663u ^ u(z) * 83492791u) & mask_;
+  }
+
+  double inverse_;
+  std::size_t mask_;
+  std::vector<Index> head_, next_;
+  std::vector<Vec3d> point_;
+};
+
+}  // namespace
+
+std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
+                               std::uint64_t seed) {
+  struct Dart {
+    std::uint64_t rank;
+    Vec3d place;
+    double clearance2;  ///< Square of the distance to the nearest point taken, when last looked.
+  };
+  std::size_t samples = 0;
+  for (const SampleBlock& block : blocks) samples += block.offset.size();
+  // Twelve darts a point are enough to choose from; the hundred are for a few points, which must
+  // not by chance get fewer darts than points.
+  const double share = (12.0 * n + 100) / static_cast<double>(samples);
+  const Vec3d origin = blocks.front().centre;
+  std::vector<Dart> darts;
+  std::uint64_t sample = 0;
+  for (const SampleBlock& block : blocks) {
+    for (std::size_t k = 0; k < block.offset.size(); ++k, ++sample) {
+      const std::uint64_t bits = mix_bits(seed ^ mix_bits(sample));
+      if (share < 0.5 && unit_fraction(bits) > share) continue;
+      darts.push_back({mix_bits(bits), block.position(k) - origin, HUGE_VAL});
+    }
+  }
+  std::sort(darts.begin(), darts.end(),
+            [](const Dart& a, const Dart& b) { return a.rank < b.rank; });
+
+  // Random packings of spheres jam at a diameter of 0.90 spacings.
+  double radius = 0.9 * spacing;
+  GrowingHash taken(radius, static_cast<std::size_t>(n));
+  while (taken.points().size() < static_cast<std::size_t>(n)) {
+    for (Dart& dart : darts) {
+      if (dart.clearance2 < radius * radius) continue;
+      dart.clearance2 = taken.nearest2(dart.place, radius * radius);
+      if (dart.clearance2 < radius * radius) continue;
+      taken.add(dart.place);
+      dart.clearance2 = -1;
+      if (taken.points().size() == static_cast<std::size_t>(n)) break;
+    }
+    // Samples closer together than this are told apart by nothing.
+    radius = radius > 1e-6 * spacing ? 0.96 * radius : 0;
+  }
+  std::vector<Vec3d> site = taken.points();
+  for (Vec3d& p : site) p += origin;
+  return site;
+}
+
+NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
+    : site_(site), hash_(site, 1.2 * spacing) {}
+
+void NearestSite::find(const SampleBlock& block, Scratch& s) const {
+  const std::size_t n = block.offset.size();
+  s.x.resize(n);
+  s.y.resize(n);
+  s.z.resize(n);
+  double ball = 0;  // radius of the block about its centre
+  for (std::size_t k = 0; k < n; ++k) {
+    const Vec3<float> p = block.offset[k];
+    s.x[k] = p.x;
+    s.y[k] = p.y;
+    s.z[k] = p.z;
+    ball = std::max(ball, norm({p.x, p.y, p.z}));
+  }
+
+  double nearest2 = HUGE_VAL;
+  Vec3d nearest;
+  const double cell = hash_.cell_size();
+  const auto compare = [&](const SpatialHash::Entry& entry) {
+    const Vec3d d = entry.position - block.centre;
+    if (dot(d, d) >= nearest2) return;
+    nearest2 = dot(d, d);
+    nearest = d;
+  };
+  const int farthest = hash_.farthest_ring(block.centre);
+  for (int ring = 0; ring <= farthest; ++ring) {
+    if (ring > 4) {  // hardly ever: far from every site
+      hash_.visit_all(compare);
+      break;
+    }
+    hash_.visit_ring(block.centre, ring, compare);
+    if (nearest2 <= ring * cell * ring * cell) break;
+  }
+  // A site can be nearest to some point of the ball only if the plane half-way between it and the
+  // site nearest to the centre cuts the ball; hence also only if it is within the reach below.
+  const double slack = 1 + 1e-6;
+  const double reach = (std::sqrt(nearest2) + 2 * ball) * slack;
+  s.candidate.clear();
+  s.candidate_offset.clear();
+  hash_.visit_near(
+      block.centre, static_cast<int>(std::ceil(reach / cell)),
+      [&](const SpatialHash::Entry& entry) {
+        const Vec3d d = entry.position - block.centre;
+        const Vec3d apart = d - nearest;
+        const double beyond = dot(d, d) - nearest2;
+        if (beyond > 0 && beyond * beyond > 4 * ball * ball * slack * dot(apart, apart)) {
+          return;
+        }
+        s.candidate.push_back(entry.index);
+        s.candidate_offset.push_back(
+            {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)});
+      });
+
+  s.best.assign(n, std::numeric_limits<float>::max());
+  s.slot.assign(n, 0);
+  float* const best = s.best.data();
+  std::int32_t* const slot = s.slot.data();
+  const float *const x = s.x.data(), *const y = s.y.data(), *const z = s.z.data();
+  for (std::size_t c = 0; c < s.candidate.size(); ++c) {
+    const Vec3<float> q = s.candidate_offset[c];
+    const auto number = static_cast<std::int32_t>(c);
+#pragma omp simd
+    for (std::size_t k = 0; k < n; ++k) {
+      const float dx = x[k] - q.x, dy = y[k] - q.y, dz = z[k] - q.z;
+      const float d2 = dx * dx + dy * dy + dz * dz;
+      slot[k] = d2 < best[k] ? number : slot[k];
+      best[k] = d2 < best[k] ? d2 : best[k];
+    }
+  }
+  s.owner.resize(n);
+  for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
+}
+
+SampledVoronoi::SampledVoronoi(std::vector<SampleBlock> blocks) : blocks_(std::move(blocks)) {
+  first_.push_back(0);
+  for (const SampleBlock& block : blocks_) {
+    first_.push_back(first_.back() + static_cast<Offset>(block.offset.size()));
+  }
+  owner_.resize(static_cast<std::size_t>(first_.back()));
+}
+
+void SampledVoronoi::assign(const std::vector<Vec3d>& site, double spacing) {
+  const NearestSite nearest(site, spacing);
+  const auto n_blocks = static_cast<std::ptrdiff_t>(blocks_.size());
+#pragma omp parallel
+  {
+    NearestSite::Scratch scratch;
+#pragma omp for schedule(dynamic, 64)
+    for (std::ptrdiff_t b = 0; b < n_blocks; ++b) {
+      nearest.find(blocks_[b], scratch);
+      std::copy(scratch.owner.begin(), scratch.owner.end(), owner_.begin() + first_[b]);
+    }
+  }
+}
+
+void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps) {
+  const Vec3d origin = blocks_.front().centre;
+  std::vector<Vec3d> sum(site.size());
+  std::vector<Offset> count(site.size());
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    assign(site, spacing);
+    std::fill(sum.begin(), sum.end(), Vec3d{});
+    std::fill(count.begin(), count.end(), 0);
+    // In one order on one thread: the sums' last bits must not depend on the number of threads.
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      for (std::size_t k = 0; k < blocks_[b].offset.size(); ++k) {
+        const Index i = owner_[first_[b] + k];
+        sum[i] += blocks_[b].position(k) - origin;
+        ++count[i];
+      }
+    }
+    bool homeless = false;
+    for (std::size_t i = 0; i < site.size(); ++i) {
+      if (count[i] > 0) site[i] = origin + sum[i] / static_cast<double>(count[i]);
+      homeless |= count[i] == 0;
+    }
+    if (homeless) settle_homeless(site, count);
+  }
+}
+
+void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site,
+                                     const std::vector<Offset>& count) const {
+  std::vector<Index> order(site.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](Index a, Index b) { return count[a] > count[b]; });
+  const auto homeless = static_cast<std::size_t>(std::count(count.begin(), count.end(), 0));
+  // Each goes to the sample point farthest from the site of one of the largest cells.
+  std::vector<Index> guest(site.size(), -1);
+  std::vector<double> farthest(site.size(), -1);
+  std::vector<Vec3d> place(site.size());
+  for (std::size_t k = 0; k < std::min(homeless, site.size() - homeless); ++k) {
+    guest[order[k]] = order[order.size() - 1 - k];
+  }
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (std::size_t k = 0; k < blocks_[b].offset.size(); ++k) {
+      const Index host = owner_[first_[b] + k];
+      if (guest[host] < 0) continue;
+      const Vec3d d = blocks_[b].position(k) - site[host];
+      if (dot(d, d) <= farthest[host]) continue;
+      farthest[host] = dot(d, d);
+      place[host] = blocks_[b].position(k);
+    }
+  }
+  for (std::size_t host = 0; host < site.size(); ++host) {
+    if (guest[host] >= 0 && farthest[host] >= 0) site[guest[host]] = place[host];
+  }
+}
+
+void SampledVoronoi::snap(std::vector<Vec3d>& site, double spacing,
+                          const std::vector<std::uint8_t>& which) {
+  assign(site, spacing);
+  std::vector<double> nearest2(site.size(), HUGE_VAL);
+  std::vector<Vec3d> place = site;
+  std::vector<Offset> count(site.size(), 0);
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    for (std::size_t k = 0; k < blocks_[b].offset.size(); ++k) {
+      const Index i = owner_[first_[b] + k];
+      ++count[i];
+      if (!which[i]) continue;
+      const Vec3d d = blocks_[b].position(k) - site[i];
+      if (dot(d, d) >= nearest2[i]) continue;
+      nearest2[i] = dot(d, d);
+      place[i] = blocks_[b].position(k);
+    }
+  }
+  site.swap(place);
+  if (std::count(count.begin(), count.end(), 0) > 0) settle_homeless(site, count);
+}
+
+}  // namespace phyxel

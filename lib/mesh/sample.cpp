@@ -1,0 +1,278 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
+#include "mesh/relaxation.hpp"
+#include "mesh/surface_topology.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Sample points for each phyxel during relaxation. The more, the less a centroid is off by chance
+/// (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and the more memory is needed;
+/// for a few phyxels, more cost nothing.
+double samples_per_phyxel(Index phyxels) { return std::max(64.0, 20000.0 / phyxels); }
+
+void check_memory(Index phyxels) {
+  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 darts of 40, and 200 in sums,
+  // hashes and results.
+  const double bytes = phyxels * (24 * samples_per_phyxel(phyxels) + 12 * 40 + 200);
+  const double memory =
+      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
+  if (bytes > memory) {
+    throw InputError(fmt::format(
+        "{} phyxels need about {:.0f} GiB of memory to sample, but this machine has {:.0f} GiB; "
+        "allowed here: at most about {:.2g}",
+        phyxels, bytes / 0x1p30, memory / 0x1p30, phyxels * (memory / bytes)));
+  }
+}
+
+/// Refuses sizes whose squares and cubes would leave the range of the numbers in use, or whose
+/// coordinates hold no shape. @returns the surface's extent [m].
+double check_extent(const Surface& surface) {
+  constexpr double smallest = 1e-30, largest = 1e31;  // [m]
+  Vec3d low = surface.position[surface.triangle[0][0]], high = low;
+  for (const Triangle& t : surface.triangle) {
+    for (const Index corner : t) {
+      const Vec3d p = surface.position[corner];
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  }
+  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  if (!(extent >= smallest && extent <= largest)) {
+    throw InputError(fmt::format("the surface is {:g} m across; allowed: {:g} to {:g} m", extent,
+                                 smallest, largest));
+  }
+  const double distance = norm(0.5 * low + 0.5 * high);
+  if (extent < 1e-9 * distance) {
+    throw InputError(fmt::format(
+        "the surface is {:g} m across, but {:g} m from the origin: its coordinates hold too few "
+        "digits of its shape; move it nearer",
+        extent, distance));
+  }
+  return extent;
+}
+
+void check_request(const Surface& surface, const SampleRequest& request) {
+  if (request.phyxels < 1) {
+    throw InputError(fmt::format("{} phyxels asked for; at least 1 is needed", request.phyxels));
+  }
+  if (request.relaxations < 0) {
+    throw InputError(
+        fmt::format("{} relaxations asked for; 0 or more are allowed", request.relaxations));
+  }
+  check_memory(request.phyxels);
+  if (surface.triangle.empty()) throw InputError("the surface has no triangles");
+  for (std::size_t v = 0; v < surface.position.size(); ++v) {
+    const Vec3d p = surface.position[v];
+    if (!is_finite(p)) {
+      throw InputError(
+          fmt::format("vertex {} of the surface is at ({}, {}, {})", v, p.x, p.y, p.z));
+    }
+  }
+  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+    for (const Index corner : surface.triangle[t]) {
+      if (corner >= 0 && static_cast<std::size_t>(corner) < surface.position.size()) continue;
+      throw InputError(fmt::format("triangle {} of the surface names vertex {}, but there are {}",
+                                   t, corner, surface.position.size()));
+    }
+  }
+}
+
+/// Multiplies all lengths by 2^exponent, which rounds nothing.
+void scale(std::vector<Vec3d>& position, int exponent) {
+  for (Vec3d& p : position) {
+    p = {std::ldexp(p.x, exponent), std::ldexp(p.y, exponent), std::ldexp(p.z, exponent)};
+  }
+}
+
+void drop_unused_vertices(Surface& surface) {
+  std::vector<Index> number(surface.position.size(), -1);
+  for (const Triangle& t : surface.triangle) {
+    for (const Index corner : t) number[corner] = 0;
+  }
+  Index kept = 0;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    surface.position[kept] = surface.position[v];
+    number[v] = kept++;
+  }
+  surface.position.resize(kept);
+  for (Triangle& t : surface.triangle) {
+    for (Index& corner : t) corner = number[corner];
+  }
+}
+
+/// Blocks of samples that fill the inside, with voxels small enough that there are about `wanted`.
+/// @returns the voxel's side [m].
+double fill_inside(const InsideSampler& sampler, double wanted, std::uint64_t seed,
+                   const std::string& defects, std::vector<SampleBlock>& blocks,
+                   SampleTally& tally) {
+  // The volume is not known if the surface is open or covers parts of space twice: a coarse
+  // filling tells how fine the next must be.
+  double voxel = sampler.extent() / 24;
+  for (int attempt = 0;; ++attempt) {
+    // Among so many voxels, some would lie inside a plate of even 1e-7 of its width.
+    const double cost = sampler.surface_voxels(voxel);
+    const double most = attempt > 0 && tally.samples == 0 ? 3e5 : std::max(3e6, 8 * wanted);
+    if (cost > most || voxel < 1e-7 * sampler.extent()) {
+      throw InputError(
+          fmt::format("the surface encloses no volume, or too little for its area: {}", defects));
+    }
+    tally = sampler.collect(voxel, seed, blocks);
+    const double found = static_cast<double>(tally.samples);
+    if (found >= 0.9 * wanted && found <= 1.3 * wanted) return voxel;
+    if (attempt > 8 && found >= 0.5 * wanted) return voxel;
+    // Small numbers of samples are only a rough guess; go four times finer at most at a time.
+    voxel *= found > 0 ? std::clamp(std::cbrt(found / wanted), 0.25, 4.0) : 0.4;
+  }
+}
+
+void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects, bool closed) {
+  if (closed || tally.samples == 0) return;
+  const double doubtful = static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
+  if (doubtful <= 0.4) return;
+  throw InputError(fmt::format(
+      "the surface is too open to tell inside from outside: for {:.0f}% of the points inside, the "
+      "winding number is not near a whole number ({})",
+      100 * doubtful, defects.describe()));
+}
+
+/// Each phyxel's share of `volume`: of the sample points, on voxels half as large as those of the
+/// relaxation, it gets those nearest to it.
+std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
+                                   double voxel, double spacing, std::uint64_t seed,
+                                   double& sampled_volume) {
+  const NearestSite nearest(site, spacing);
+  std::vector<std::uint32_t> count(site.size(), 0);
+  const SampleTally tally =
+      sampler.visit(0.5 * voxel, seed, [&](std::size_t, const SampleBlock& b) {
+        thread_local NearestSite::Scratch scratch;
+        nearest.find(b, scratch);
+        for (const Index i : scratch.owner) {
+#pragma omp atomic
+          ++count[i];
+        }
+      });
+  sampled_volume = static_cast<double>(tally.samples) * std::pow(0.5 * voxel, 3);
+  std::vector<double> share(site.size());
+  // A phyxel too small to be seen still has a place of its own: half a sample's worth.
+  for (std::size_t i = 0; i < site.size(); ++i) share[i] = std::max(0.5, double(count[i]));
+  return share;
+}
+
+/// Mean and smallest distance to the nearest phyxel; zero for a single one.
+void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& report) {
+  const auto n = static_cast<std::ptrdiff_t>(site.size());
+  if (n < 2) return;
+  const SpatialHash hash(site, spacing);
+  std::vector<double> gap(site.size());
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    double nearest2 = HUGE_VAL;
+    const auto compare = [&](const SpatialHash::Entry& entry) {
+      if (entry.index == i) return;
+      const Vec3d d = entry.position - site[i];
+      nearest2 = std::min(nearest2, dot(d, d));
+    };
+    const double cell = hash.cell_size();
+    // With rings 0 to r looked at, nothing nearer than r cells has been missed.
+    int ring = 0;
+    for (; ring < 4; ++ring) {
+      hash.visit_ring(site[i], ring, compare);
+      if (nearest2 <= ring * cell * ring * cell) break;
+    }
+    if (ring == 4) hash.visit_all(compare);
+    gap[i] = std::sqrt(nearest2);
+  }
+  report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
+  report.smallest_gap = *std::min_element(gap.begin(), gap.end());
+}
+
+}  // namespace
+
+Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
+  check_request(surface, request);
+  SampleReport found;
+  found.defects = inspect_surface(surface);
+  const std::string defects = found.defects.describe();
+
+  // Worked on at a size of one to two, so that floats hold whatever is derived from it.
+  const int exponent = -std::ilogb(check_extent(surface));
+  Cloud cloud;
+  cloud.surface = surface;
+  scale(cloud.surface.position, exponent);
+  if (found.defects.unused_vertices > 0) {
+    drop_unused_vertices(cloud.surface);
+    found.warnings.push_back(fmt::format("{} vertices that no triangle uses were left out",
+                                         found.defects.unused_vertices));
+  }
+  for (std::string& done : orient(cloud.surface)) found.warnings.push_back(std::move(done));
+  cloud.surface.normal = vertex_normals(cloud.surface.position, cloud.surface.triangle);
+  const bool closed = connect(cloud.surface).closed;
+  const InsideSampler sampler(cloud.surface, closed);
+
+  const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
+  const std::uint64_t seed = request.seed;
+  std::vector<SampleBlock> blocks;
+  SampleTally tally;
+  const double voxel = fill_inside(sampler, wanted, seed, defects, blocks, tally);
+  refuse_if_too_open(tally, found.defects, closed);
+  found.doubtful_fraction =
+      static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
+  if (!closed) {
+    found.warnings.push_back(fmt::format(
+        "the surface is not closed ({}); for {:.2g}% of the points inside that is a matter of "
+        "opinion",
+        defects, 100 * found.doubtful_fraction));
+  }
+
+  const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
+  const double spacing = std::cbrt(rough_volume / request.phyxels);
+  cloud.position = throw_darts(blocks, request.phyxels, spacing, seed + 1);
+  SampledVoronoi voronoi(std::move(blocks));
+  voronoi.relax(cloud.position, spacing, request.relaxations);
+
+  // Where the body is thin or hollow, the centroid of a cell may lie outside.
+  std::vector<std::uint8_t> outside(cloud.position.size());
+  const auto n = static_cast<std::ptrdiff_t>(cloud.position.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::ptrdiff_t i = 0; i < n; ++i) outside[i] = !sampler.inside(cloud.position[i]);
+  if (std::count(outside.begin(), outside.end(), 1) > 0) {
+    voronoi.snap(cloud.position, spacing, outside);
+  }
+
+  double sampled_volume = 0;
+  cloud.volume = voronoi_shares(sampler, cloud.position, voxel, spacing, seed + 2, sampled_volume);
+  // The divergence theorem counts space that the surface covers twice, twice.
+  const bool exact = closed && tally.repeated == 0;
+  found.volume = exact ? enclosed_volume(cloud.surface) : sampled_volume;
+  if (tally.repeated > 0) {
+    found.warnings.push_back(fmt::format(
+        "the surface overlaps itself: {:.2g}% of the inside lies in it more than once, and counts "
+        "once",
+        100 * static_cast<double>(tally.repeated) / static_cast<double>(tally.samples)));
+  }
+  const double total = std::accumulate(cloud.volume.begin(), cloud.volume.end(), 0.0);
+  for (double& v : cloud.volume) v *= found.volume / total;
+
+  measure_gaps(cloud.position, spacing, found);
+  order_along_curve(cloud);
+
+  scale(cloud.surface.position, -exponent);
+  scale(cloud.position, -exponent);
+  for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);
+  found.volume = std::ldexp(found.volume, -3 * exponent);
+  found.spacing = std::ldexp(found.spacing, -exponent);
+  found.smallest_gap = std::ldexp(found.smallest_gap, -exponent);
+  if (report) *report = std::move(found);
+  return cloud;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,238 @@
+#include "phyxel/neighbourhood.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "model/spatial_hash.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr Index block_size = 4096;  // rows a thread fills at a time
+
+/// Builds rows in parallel: fill(i, row) appends row i's indices; rows come out ascending and in
+/// order whatever the number of threads.
+template <class Fill>
+Csr build_rows(Index rows, Fill&& fill) {
+  const Index blocks = (rows + block_size - 1) / block_size;
+  std::vector<std::vector<Index>> block_indices(static_cast<std::size_t>(blocks));
+  Csr csr;
+  csr.offsets.assign(static_cast<std::size_t>(rows) + 1, 0);
+#pragma omp parallel for schedule(dynamic)
+  for (Index b = 0; b < blocks; ++b) {
+    std::vector<Index> row;
+    std::vector<Index>& indices = block_indices[b];
+    const Index end = std::min(rows, (b + 1) * block_size);
+    for (Index i = b * block_size; i < end; ++i) {
+      row.clear();
+      fill(i, row);
+      std::sort(row.begin(), row.end());
+      csr.offsets[i + 1] = static_cast<Offset>(row.size());
+      indices.insert(indices.end(), row.begin(), row.end());
+    }
+  }
+  std::partial_sum(csr.offsets.begin(), csr.offsets.end(), csr.offsets.begin());
+  csr.indices.resize(static_cast<std::size_t>(csr.entries()));
+#pragma omp parallel for schedule(dynamic)
+  for (Index b = 0; b < blocks; ++b) {
+    std::copy(block_indices[b].begin(), block_indices[b].end(),
+              csr.indices.begin() + csr.offsets[b * block_size]);
+    std::vector<Index>().swap(block_indices[b]);
+  }
+  return csr;
+}
+
+/// A hash whose cells hold a handful of points each, without knowing the cloud's shape: starts
+/// from the bounding box and shrinks while cells are crowded.
+SpatialHash roomy_hash(std::span<const Vec3d> position) {
+  Vec3d low = position[0], high = position[0];
+  for (const Vec3d& p : position) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3d extent = high - low;
+  const double widest = std::max({extent.x, extent.y, extent.z});
+  const double floor_width = widest / 100;  // a sheet or thread has no volume
+  const double box = std::max(extent.x, floor_width) * std::max(extent.y, floor_width) *
+                     std::max(extent.z, floor_width);
+  double cell = std::cbrt(4 * box / static_cast<double>(position.size()));
+  for (int attempt = 0;; ++attempt) {
+    SpatialHash hash(position, cell);
+    if (hash.mean_occupancy() <= 8 || attempt == 4) return hash;
+    cell *= std::cbrt(3 / hash.mean_occupancy());
+  }
+}
+
+/// The `count` smallest squared distances from a place to other points, ascending.
+class NearestDistances {
+ public:
+  explicit NearestDistances(int count) : squared_(static_cast<std::size_t>(count)) {}
+  void clear() { found_ = 0; }
+  bool full() const { return found_ == squared_.size(); }
+  double largest() const { return squared_[found_ - 1]; }
+  void offer(double d2) {
+    if (full() && d2 >= largest()) return;
+    std::size_t k = full() ? found_ - 1 : found_++;
+    for (; k > 0 && squared_[k - 1] > d2; --k) squared_[k] = squared_[k - 1];
+    squared_[k] = d2;
+  }
+  double mean_distance() const {
+    double sum = 0;
+    for (std::size_t k = 0; k < found_; ++k) sum += std::sqrt(squared_[k]);
+    return found_ ? sum / static_cast<double>(found_) : 0;
+  }
+
+ private:
+  std::vector<double> squared_;
+  std::size_t found_ = 0;
+};
+
+/// Support radius of every phyxel by the rule [m].
+std::vector<double> support_radii(std::span<const double> spacing, const NeighbourhoodRule& rule) {
+  std::vector<double> support(spacing.size());
+  if (rule.radius) {
+    std::fill(support.begin(), support.end(), *rule.radius);
+  } else if (rule.support == NeighbourhoodRule::Support::adaptive) {
+    std::transform(spacing.begin(), spacing.end(), support.begin(),
+                   [&](double r) { return rule.factor * r; });
+  } else if (!spacing.empty()) {
+    std::vector<double> sorted(spacing.begin(), spacing.end());
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    std::fill(support.begin(), support.end(), rule.factor * *middle);
+  }
+  return support;
+}
+
+}  // namespace
+
+Csr transpose(const Csr& csr, Index columns) {
+  Csr result;
+  result.offsets.assign(static_cast<std::size_t>(columns) + 1, 0);
+  for (const Index j : csr.indices) ++result.offsets[j + 1];
+  std::partial_sum(result.offsets.begin(), result.offsets.end(), result.offsets.begin());
+  std::vector<Offset> next(result.offsets.begin(), result.offsets.end() - 1);
+  result.indices.resize(csr.indices.size());
+  for (Index i = 0; i < csr.rows(); ++i) {
+    for (const Index j : csr.row(i)) result.indices[next[j]++] = i;
+  }
+  return result;
+}
+
+std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
+  const Index n = static_cast<Index>(position.size());
+  std::vector<double> spacing(position.size(), 0);
+  if (n < 2) return spacing;
+  const SpatialHash hash = roomy_hash(position);
+#pragma omp parallel
+  {
+    NearestDistances found(std::min<int>(nearest, n - 1));
+#pragma omp for schedule(dynamic, block_size)
+    for (Index i = 0; i < n; ++i) {
+      found.clear();
+      const Vec3d here = position[i];
+      const auto offer = [&](const SpatialHash::Entry& e) {
+        if (e.index != i) found.offer(dot(e.position - here, e.position - here));
+      };
+      const int last = hash.farthest_ring(here);
+      for (int ring = 0; ring <= last; ++ring) {
+        if (ring == 12) {  // far from everything: looking at every point is cheaper
+          found.clear();
+          hash.visit_all(offer);
+          break;
+        }
+        // Rings 0 to ring - 1 hold every point nearer than (ring - 1) cells.
+        const double reached = (ring - 1) * hash.cell_size();
+        if (ring > 0 && found.full() && found.largest() <= reached * reached) break;
+        hash.visit_ring(here, ring, offer);
+      }
+      spacing[i] = found.mean_distance();
+    }
+  }
+  return spacing;
+}
+
+Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
+                              const NeighbourhoodRule& rule) {
+  const Index n = static_cast<Index>(position.size());
+  Neighbourhood result;
+  result.support = support_radii(spacing, rule);
+  if (n == 0) return result;
+
+  const bool uniform = rule.radius || rule.support == NeighbourhoodRule::Support::uniform;
+  std::vector<double> sorted = result.support;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const SpatialHash hash(position, *middle);
+
+  using Candidate = std::pair<double, Index>;
+  result.neighbours = build_rows(n, [&](Index i, std::vector<Index>& row) {
+    const Vec3d here = position[i];
+    const double h = result.support[i];
+    const int rings = static_cast<int>(std::ceil(h / hash.cell_size()));
+    const auto within = [&](const SpatialHash::Entry& e) {
+      return e.index != i && dot(e.position - here, e.position - here) < h * h;
+    };
+    if (!rule.max_neighbours) {
+      hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+        if (within(e)) row.push_back(e.index);
+      });
+      return;
+    }
+    // Nearest kept; ties go to the smaller index, so that the choice is one on every machine.
+    std::vector<Candidate> candidates;
+    hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+      if (within(e)) candidates.emplace_back(dot(e.position - here, e.position - here), e.index);
+    });
+    const std::size_t kept =
+        std::min(candidates.size(), static_cast<std::size_t>(*rule.max_neighbours));
+    std::partial_sort(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(kept),
+                      candidates.end());
+    for (std::size_t k = 0; k < kept; ++k) row.push_back(candidates[k].second);
+  });
+  result.symmetric = uniform && !rule.max_neighbours;
+  if (!result.symmetric) result.inverse_lists = transpose(result.neighbours, n);
+  return result;
+}
+
+Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
+                 std::span<const double> support, Index* unreached) {
+  Index lost = 0;
+  Csr csr;
+  if (!position.empty()) {
+    std::vector<double> sorted(support.begin(), support.end());
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::nth_element(sorted.begin(), middle, sorted.end());
+    const double largest = *std::max_element(middle, sorted.end());
+    const SpatialHash hash(position, *middle);
+    const int rings = static_cast<int>(std::ceil(largest / hash.cell_size()));
+    const auto rows = static_cast<Index>(point.size());
+    std::vector<char> missed(point.size(), 0);
+    csr = build_rows(rows, [&](Index s, std::vector<Index>& row) {
+      const Vec3d here = point[s];
+      hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+        const double h = support[e.index];
+        if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
+      });
+      if (!row.empty()) return;
+      missed[s] = 1;
+      Index nearest = 0;
+      double smallest = std::numeric_limits<double>::infinity();
+      for (Index i = 0; i < static_cast<Index>(position.size()); ++i) {
+        const double d2 = dot(position[i] - here, position[i] - here);
+        if (d2 < smallest) smallest = d2, nearest = i;
+      }
+      row.push_back(nearest);
+    });
+    lost = static_cast<Index>(std::count(missed.begin(), missed.end(), 1));
+  } else {
+    csr.offsets.assign(point.size() + 1, 0);
+  }
+  if (unreached) *unreached = lost;
+  return csr;
+}
+
+}  // namespace phyxel

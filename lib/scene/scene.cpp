@@ -1,0 +1,147 @@
+#include "phyxel/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <map>
+
+#include "phyxel/error.hpp"
+#include "scene/scene_body.hpp"
+#include "scene/scene_table.hpp"
+
+namespace phyxel {
+namespace {
+
+TimeRequest read_time(const SceneTable& table) {
+  TimeRequest time;
+  table.read("end", time.end);
+  if (table.is_number("step")) {
+    table.read("step", time.step);
+    table.expect_apart("safety", "step");
+  }
+  table.read("safety", time.safety);
+  return time;
+}
+
+SolverRequest read_solver(const SceneTable& table) {
+  SolverRequest solver;
+  table.read("device", solver.device);
+  table.read_choice("precision", solver.precision);
+  table.read("threads", solver.threads);
+  return solver;
+}
+
+std::filesystem::path default_directory(const std::filesystem::path& file) {
+  std::filesystem::path name = file.stem();
+  if (file.filename() == "scene.toml") {
+    std::error_code ignored;
+    name = std::filesystem::absolute(file, ignored).lexically_normal().parent_path().filename();
+  }
+  return std::filesystem::path("out") / (name.empty() ? "scene" : name);
+}
+
+OutputRequest read_output(const SceneTable& table) {
+  OutputRequest output;
+  table.read("directory", output.directory);
+  table.read("frames_per_second", output.frames_per_second);
+  table.read("phyxels", output.phyxels);
+  table.read("surface", output.surface);
+  table.read("fields", output.fields);
+  table.read("checkpoint_every", output.checkpoint_every);
+  return output;
+}
+
+/// Scaled to a largest component of 1, so that no product of two overflows.
+Vec3d scaled(Vec3d v) {
+  return v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z), 1e-300});
+}
+
+RenderRequest read_render(const SceneTable& table) {
+  RenderRequest render;
+  table.read("pictures", render.pictures);
+  table.read("count", render.count);
+  table.read("width", render.width);
+  table.read("height", render.height);
+  table.read("view", render.view);
+  table.read("up", render.up);
+  const auto words = [](Vec3d v) { return fmt::format("[{:g}, {:g}, {:g}]", v.x, v.y, v.z); };
+  const Vec3d view = scaled(render.view), up = scaled(render.up);
+  if (norm(view) < 0.5) table.refuse("view", words(render.view) + " found; allowed: not zero");
+  if (norm(up) < 0.5) table.refuse("up", words(render.up) + " found; allowed: not zero");
+  if (norm(cross(view, up)) < 1e-6 * norm(view) * norm(up)) {
+    table.refuse(table.has("view") ? "view" : "up",
+                 fmt::format("view {} and up {} found, which are parallel; allowed: any two other "
+                             "directions",
+                             words(render.view), words(render.up)));
+  }
+  return render;
+}
+
+std::vector<BodyRequest> read_bodies(const SceneTable& root) {
+  std::vector<BodyRequest> bodies;
+  std::map<std::string, std::string> places;  // of each name
+  for (const SceneTable& table : root.tables("body")) {
+    for (BodyRequest& body : body_requests(table)) {
+      const auto [earlier, is_new] = places.emplace(body.name, body.where);
+      if (!is_new) {
+        table.refuse("name", fmt::format("{} found, the name of the body at {} too; allowed: a "
+                                         "name of its own for each body",
+                                         in_quotes(body.name), earlier->second));
+      }
+      if (bodies.size() == most_bodies) {
+        throw InputError(
+            fmt::format("{}: body: more than {} bodies found, copies included; "
+                        "allowed: {}",
+                        body.where, most_bodies, most_bodies));
+      }
+      bodies.push_back(std::move(body));
+    }
+  }
+  return bodies;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(file, unknown)) {
+    throw InputError(
+        fmt::format("{}: a folder found; allowed: a scene file (TOML)", file.string()));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) {
+    throw InputError(
+        fmt::format("{}: cannot read the scene file: {}", file.string(), std::strerror(errno)));
+  }
+  std::string text(largest_scene_file + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) {
+    throw InputError(fmt::format("{}: reading the scene file failed", file.string()));
+  }
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text;
+}
+
+}  // namespace
+
+Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
+  const toml::table parsed = parse_toml(text, file);
+  const SceneTable root(parsed, file);
+  Scene scene;
+  scene.file = file;
+  scene.text = text;
+  root.read("title", scene.title);
+  root.read("gravity", scene.gravity);
+  scene.time = read_time(root.table("time"));
+  if (root.has("solver")) scene.solver = read_solver(root.table("solver"));
+  if (root.has("output")) scene.output = read_output(root.table("output"));
+  if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
+  if (root.has("render")) scene.render = read_render(root.table("render"));
+  scene.bodies = read_bodies(root);
+  return scene;
+}
+
+Scene read_scene(const std::filesystem::path& file) { return parse_scene(read_text(file), file); }
+
+}  // namespace phyxel

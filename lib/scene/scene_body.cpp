@@ -1,0 +1,270 @@
+#include "scene/scene_body.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "phyxel/error.hpp"
+#include "phyxel/shapes.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Which keys a source of bodies uses, apart from the one that names it.
+struct SourceKeys {
+  std::vector<const char*> needed, optional;
+  bool one_of_spacing_and_phyxels = false;
+};
+
+SourceKeys lattice_keys(std::vector<const char*> needed) {
+  return {std::move(needed), {"spacing", "phyxels", "jitter", "seed", "surfels"}, true};
+}
+
+SourceKeys keys_of_source(const char* kind, const std::string& shape) {
+  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations"}};
+  if (std::string(kind) == "file") return {};
+  if (is_paper_shape(shape)) return {{}, {"surfels"}};
+  if (shape == "cylinder") return lattice_keys({"radius", "length"});
+  if (shape == "sphere") return lattice_keys({"radius"});
+  return lattice_keys({"size"});
+}
+
+/// Refuses keys that would have no effect, and asks for those that are needed.
+void check_source_keys(const SceneTable& body, const char* kind, const std::string& shape) {
+  const SourceKeys keys = keys_of_source(kind, shape);
+  const std::string source = shape.empty() ? kind : fmt::format("shape = \"{}\"", shape);
+  std::vector<std::string> used(keys.needed.begin(), keys.needed.end());
+  used.insert(used.end(), keys.optional.begin(), keys.optional.end());
+  for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "jitter", "seed",
+                           "relaxations", "surfels"}) {
+    if (!body.has(name) || std::find(used.begin(), used.end(), name) != used.end()) continue;
+    body.refuse(name,
+                fmt::format("found, but {} does not use it; allowed with {}: {}", source, source,
+                            used.empty() ? "none" : fmt::format("{}", fmt::join(used, ", "))));
+  }
+  for (const char* name : keys.needed) {
+    if (!body.has(name)) {
+      throw InputError(
+          fmt::format("{}: key body.{}: missing; {} needs it", body.where(kind), name, source));
+    }
+  }
+  if (keys.one_of_spacing_and_phyxels) {
+    body.expect_one_of({"spacing", "phyxels"});
+    if (body.has("seed") && !body.has("jitter")) {
+      body.refuse("seed",
+                  "found without jitter, the only thing random here; allowed: both or neither");
+    }
+  }
+}
+
+void check_file_exists(const SceneTable& body, const char* kind,
+                       const std::filesystem::path& file) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(file, unknown)) {
+    body.refuse(kind, fmt::format("{} found, which is a folder; allowed: a file", file.string()));
+  }
+  if (!std::filesystem::exists(file, unknown)) {
+    body.refuse(kind, fmt::format("{} found, but there is no such file; allowed: a file, relative "
+                                  "to the scene file's folder",
+                                  file.string()));
+  }
+}
+
+BodySource read_source(const SceneTable& body) {
+  body.expect_one_of({"shape", "mesh", "file"});
+  BodySource source;
+  ShapeRequest& shape = source.shape;
+  body.read("shape", shape.name);
+  if (body.has("shape")) {
+    const std::vector<std::string>& known = shape_names();
+    if (std::find(known.begin(), known.end(), shape.name) == known.end()) {
+      body.refuse("shape", fmt::format("{} found{}; allowed: {}", in_quotes(shape.name),
+                                       did_you_mean(shape.name, known), fmt::join(known, ", ")));
+    }
+  }
+  const char* kind = body.has("shape") ? "shape" : body.has("mesh") ? "mesh" : "file";
+  check_source_keys(body, kind, shape.name);
+  body.read("mesh", source.mesh);
+  body.read("file", source.file);
+  if (body.has("mesh")) check_file_exists(body, kind, source.mesh);
+  if (body.has("file")) check_file_exists(body, kind, source.file);
+  body.read("phyxels", source.phyxels);
+  body.read("spacing", shape.spacing);
+  body.read("size", shape.size);
+  body.read("radius", shape.radius);
+  body.read("length", shape.length);
+  body.read("jitter", shape.jitter);
+  body.read("surfels", shape.surface);
+  body.read("seed", source.seed);
+  body.read("relaxations", source.relaxations);
+  shape.seed = source.seed;
+  return source;
+}
+
+Material read_material(const SceneTable& table) {
+  Material material;
+  table.read("young", material.young);
+  table.read("poisson", material.poisson);
+  table.read("density", material.density);
+  table.read_choice("strain", material.strain);
+  table.read("volume_stiffness", material.volume_stiffness);
+  table.read("damping", material.damping);
+  return material;
+}
+
+NeighbourhoodRule read_neighbours(const SceneTable& table) {
+  NeighbourhoodRule rule;
+  table.expect_apart("factor", "radius");
+  table.expect_apart("support", "radius");
+  table.read_choice("support", rule.support);
+  table.read("nearest", rule.nearest);
+  table.read("factor", rule.factor);
+  table.read("radius", rule.radius);
+  table.read("max_neighbours", rule.max_neighbours);
+  return rule;
+}
+
+Selection::Ball read_ball(const SceneTable& table) {
+  Selection::Ball ball;
+  table.read("centre", ball.centre);
+  table.read("radius", ball.radius);
+  return ball;
+}
+
+Selection read_selection(const SceneTable& table) {
+  const std::vector<const char*> kinds = {"region", "indices", "box", "ball", "all"};
+  table.expect_one_of(kinds);
+  Selection select;
+  for (const char* kind : kinds) {
+    if (table.has(kind)) select.where = table.where(kind);
+  }
+  table.read("region", select.region);
+  table.read("indices", select.indices);
+  table.read("box", select.box);
+  if (table.has("ball")) select.ball = read_ball(table.table("ball"));
+  table.read("all", select.all);
+  if (table.has("all") && !select.all) {
+    table.refuse("all", "false found, which selects nothing; allowed: true");
+  }
+  if (select.box) {
+    const auto [low, high] = *select.box;
+    if (low.x > high.x || low.y > high.y || low.z > high.z) {
+      table.refuse("box", fmt::format("[[{:g}, {:g}, {:g}], [{:g}, {:g}, {:g}]] found; allowed: "
+                                      "[lowest, highest] corner, lowest <= highest along each axis",
+                                      low.x, low.y, low.z, high.x, high.y, high.z));
+    }
+  }
+  return select;
+}
+
+MotionRequest read_motion(const SceneTable& table) {
+  MotionRequest motion;
+  motion.select = read_selection(table);
+  table.expect_together("displacement", "duration");
+  table.expect_together("amplitude", "frequency");
+  if (!table.has("displacement") && !table.has("velocity") && !table.has("amplitude")) {
+    throw InputError(
+        fmt::format("{}: body.motion: a key is missing; needed: at least one of: "
+                    "displacement, velocity, amplitude",
+                    table.where()));
+  }
+  table.read("displacement", motion.displacement);
+  table.read("duration", motion.duration);
+  table.read("velocity", motion.velocity);
+  table.read("amplitude", motion.amplitude);
+  table.read("frequency", motion.frequency);
+  return motion;
+}
+
+LoadRequest read_load(const SceneTable& table) {
+  LoadRequest load;
+  load.select = read_selection(table);
+  table.expect_one_of({"force", "force_density"});
+  table.read("force", load.force);
+  table.read("force_density", load.force_density);
+  table.read("ramp", load.ramp);
+  return load;
+}
+
+std::string name_of_source(const BodySource& source) {
+  if (!source.shape.name.empty()) return source.shape.name;
+  return (source.mesh.empty() ? source.file : source.mesh).stem().string();
+}
+
+BodyRequest read_body_request(const SceneTable& table) {
+  BodyRequest body;
+  body.where = table.where();
+  body.source = read_source(table);
+  body.name = name_of_source(body.source);
+  table.read("name", body.name);
+  table.read("scale", body.scale);
+  table.read("rotation", body.rotation);
+  table.read("translation", body.translation);
+  table.read("velocity", body.velocity);
+  table.read("spin", body.spin);
+  table.read_choice("volumes", body.volume_rule);
+  body.material = read_material(table.table("material"));
+  if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
+  for (const SceneTable& fixed : table.tables("fixed")) {
+    body.fixed.push_back({read_selection(fixed)});
+  }
+  for (const SceneTable& motion : table.tables("motion")) {
+    body.motions.push_back(read_motion(motion));
+  }
+  for (const SceneTable& load : table.tables("load")) body.loads.push_back(read_load(load));
+  return body;
+}
+
+void move(Selection& select, Vec3d by) {
+  if (select.box) select.box = {select.box->low + by, select.box->high + by};
+  if (select.ball) select.ball->centre += by;
+}
+
+BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
+  BodyRequest copy = body;
+  copy.name = fmt::format("{} {}", body.name, number);
+  copy.translation += by;
+  for (FixRequest& fix : copy.fixed) move(fix.select, by);
+  for (MotionRequest& motion : copy.motions) move(motion.select, by);
+  for (LoadRequest& load : copy.loads) move(load.select, by);
+  return copy;
+}
+
+std::vector<BodyRequest> copies(const BodyRequest& body, const SceneTable& array) {
+  std::array<int, 3> count{};
+  Vec3d spacing;
+  array.read("count", count);
+  array.read("spacing", spacing);
+  const auto total = static_cast<double>(count[0]) * count[1] * count[2];
+  if (total > static_cast<double>(most_bodies)) {
+    array.refuse("count",
+                 fmt::format("{:.0f} copies found; allowed: at most {}", total, most_bodies));
+  }
+  if ((count[0] > 1 && spacing.x == 0) || (count[1] > 1 && spacing.y == 0) ||
+      (count[2] > 1 && spacing.z == 0)) {
+    array.refuse("spacing", fmt::format("[{:g}, {:g}, {:g}] found, which puts copies in one place; "
+                                        "allowed: not 0 where count is more than 1",
+                                        spacing.x, spacing.y, spacing.z));
+  }
+  std::vector<BodyRequest> result;
+  for (int k = 0; k < count[2]; ++k) {
+    for (int j = 0; j < count[1]; ++j) {
+      for (int i = 0; i < count[0]; ++i) {
+        result.push_back(
+            copy_at(body, {i * spacing.x, j * spacing.y, k * spacing.z}, result.size() + 1));
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<BodyRequest> body_requests(const SceneTable& table) {
+  const BodyRequest body = read_body_request(table);
+  if (!table.has("array")) return {body};
+  return copies(body, table.table("array"));
+}
+
+}  // namespace phyxel

@@ -1,0 +1,16 @@
+/// From a [[body]] of a scene file to body requests.
+#pragma once
+
+#include <vector>
+
+#include "phyxel/scene.hpp"
+#include "scene/scene_table.hpp"
+
+namespace phyxel {
+
+constexpr std::size_t most_bodies = 10000;
+
+/// One request, or one for each copy of an array.
+std::vector<BodyRequest> body_requests(const SceneTable& body);
+
+}  // namespace phyxel

@@ -1,0 +1,303 @@
+/// All sections and keys of a scene file: one entry each.
+#include <cstdint>
+
+#include "scene/scene_schema.hpp"
+
+namespace phyxel {
+namespace {
+
+// One line for each field would make the table twice as long.
+// clang-format off
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double largest_index = std::numeric_limits<std::int32_t>::max();
+
+Range above(double low) { return {low, infinity, true}; }
+Range at_least(double low) { return {low, infinity, false}; }
+Range between(double low, double high) { return {low, high, false}; }
+Range strictly_between(double low, double high) { return {low, high, true}; }
+
+std::vector<SceneSection> make_sections() {
+  return {
+      {"", "At the top of the file", "", "Before the first section."},
+      {"time", "[time]", "", "How long to simulate, and in which steps."},
+      {"solver", "[solver]", "", "What computes, and in which precision."},
+      {"output", "[output]", "", "What is written, where and how often."},
+      {"render", "[render]", "", "Pictures made at the end of a run."},
+      {"body", "[[body]]", "",
+       "One such section for each body. Exactly one of `shape`, `mesh` and `file` says where its "
+       "rest shape comes from:\n\n"
+       "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
+       "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
+       "`phyxels`, and may have `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
+       "along x from the origin, with its axis on the x axis; the others are centred on the "
+       "origin, the cylinder along z.\n"
+       "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
+       "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
+       "- `mesh` needs `phyxels`, and may have `seed` and `relaxations`.\n"
+       "- `file` needs nothing else.\n\n"
+       "The shape is scaled, then rotated, then translated."},
+      {"body.material", "[body.material]", "", "What the body is made of. Required."},
+      {"body.neighbours", "[body.neighbours]", "",
+       "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
+       "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
+      {"body.array", "[body.array]", "",
+       "Repeats the body on a grid, with everything it has: the copies of `name = \"dino\"` are "
+       "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
+       "Box and ball selections move along with each copy."},
+      {"body.fixed", "[[body.fixed]]", "selection",
+       "Phyxels held where they are, with one of the selection keys below and nothing else."},
+      {"body.motion", "[[body.motion]]", "selection",
+       "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
+       "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
+       "to s = 1. At least one of the three terms is needed; `displacement` and `duration` go "
+       "together, and so do `amplitude` and `frequency`."},
+      {"body.load", "[[body.load]]", "selection",
+       "A force on phyxels: exactly one of `force` and `force_density`."},
+      {"selection", "Selections", "",
+       "Each `[[body.fixed]]`, `[[body.motion]]` and `[[body.load]]` has exactly one of these "
+       "keys. Positions are those at rest, after the body is placed."},
+      {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
+  };
+}
+
+std::vector<SceneKey> top_keys() {
+  return {
+      {.name = "title", .type = KeyType::text, .otherwise = "none",
+       .meaning = "Shown in summaries and kept in the output."},
+      {.name = "gravity", .type = KeyType::vector, .unit = "m/s^2", .fallback = "[0, 0, 0]",
+       .meaning = "Acceleration of every free phyxel. The Earth's is [0, 0, -9.81]."},
+      {.name = "time", .type = KeyType::table, .required = true, .meaning = "Duration and steps."},
+      {.name = "solver", .type = KeyType::table, .otherwise = "its defaults",
+       .meaning = "Device and precision."},
+      {.name = "output", .type = KeyType::table, .otherwise = "its defaults",
+       .meaning = "Trajectory and checkpoints."},
+      {.name = "render", .type = KeyType::table, .otherwise = "its defaults",
+       .meaning = "Pictures."},
+      {.name = "body", .type = KeyType::tables, .required = true,
+       .meaning = "The bodies; at most 10000, copies included."},
+  };
+}
+
+std::vector<SceneKey> run_keys() {
+  return {
+      {.section = "time", .name = "end", .unit = "s", .required = true, .range = {0, 1e9, true},
+       .meaning = "Simulated time."},
+      {.section = "time", .name = "step", .type = KeyType::number_or_auto, .unit = "s",
+       .fallback = "\"auto\"", .range = above(0),
+       .meaning = "Time step. \"auto\": `safety` times the largest stable step, which is found "
+           "from the stiffness of the bodies. A given step above that is refused."},
+      {.section = "time", .name = "safety", .fallback = "0.8", .range = strictly_between(0, 1),
+       .meaning = "Fraction of the largest stable step; not with a given `step`."},
+
+      {.section = "solver", .name = "device", .type = KeyType::choice, .fallback = "\"auto\"",
+       .words = {"auto", "cpu", "cuda"},
+       .meaning = "\"auto\": a GPU if there is one and phyxel was built for it, else the CPU."},
+      {.section = "solver", .name = "precision", .type = KeyType::choice, .fallback = "\"float\"",
+       .words = {"float", "double", "mixed"},
+       .meaning = "\"mixed\": positions in double, forces in float."},
+      {.section = "solver", .name = "threads", .type = KeyType::integer, .fallback = "0",
+       .range = between(0, 4096),
+       .meaning = "CPU threads; 0: all. The results are the same on any number."},
+
+      {.section = "output", .name = "directory", .type = KeyType::path, .otherwise = "see meaning",
+       .meaning = "Folder for everything written, resolved from the scene file's folder. Without "
+           "it: `out/<name>` in the folder the program runs in, where the name is the "
+           "file's, or its folder's if the file is called `scene.toml`."},
+      {.section = "output", .name = "frames_per_second", .unit = "1/s", .fallback = "25",
+       .range = between(0, 1e6), .meaning = "Frames per simulated second; 0: only the last frame."},
+      {.section = "output", .name = "phyxels", .type = KeyType::boolean, .fallback = "true",
+       .meaning = "Write the phyxels."},
+      {.section = "output", .name = "surface", .type = KeyType::boolean, .fallback = "true",
+       .meaning = "Write the deformed surface, if a body has surfels."},
+      {.section = "output", .name = "fields", .type = KeyType::choices,
+       .fallback = "[\"displacement\", \"velocity\"]",
+       .words = {"displacement", "velocity", "von_mises", "volume_ratio", "mass", "volume", "body"},
+       .meaning = "What each phyxel carries beside its position, in m, m/s, Pa, 1, kg, m^3 and 1."},
+      {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
+       .range = between(0, 1e9),
+       .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},
+
+      {.section = "render", .name = "pictures", .type = KeyType::boolean, .fallback = "false",
+       .meaning = "Write pictures (PNG). The other keys here also serve `phyxel render`."},
+      {.section = "render", .name = "count", .type = KeyType::integer, .fallback = "6",
+       .range = between(1, 100000),
+       .meaning = "How many, spread evenly over the frames, first and last included."},
+      {.section = "render", .name = "width", .type = KeyType::integer, .unit = "pixels",
+       .fallback = "960", .range = between(16, 8192), .meaning = "Width of a picture."},
+      {.section = "render", .name = "height", .type = KeyType::integer, .unit = "pixels",
+       .fallback = "720", .range = between(16, 8192), .meaning = "Height of a picture."},
+      {.section = "render", .name = "view", .type = KeyType::vector, .fallback = "[-1, 2, -0.6]",
+       .meaning = "Direction the camera looks along."},
+      {.section = "render", .name = "up", .type = KeyType::vector, .fallback = "[0, 0, 1]",
+       .meaning = "Direction that points up in the picture; not parallel to `view`."},
+  };
+}
+
+std::vector<SceneKey> body_keys() {
+  return {
+      {.section = "body", .name = "name", .type = KeyType::text,
+       .otherwise = "the shape's or file's name",
+       .meaning = "For messages and summaries. No two bodies share one."},
+      {.section = "body", .name = "shape", .type = KeyType::text, .otherwise = "none",
+       .meaning = "A built-in shape: beam, block, cylinder, sphere, alien_head, horn_bug, dino."},
+      {.section = "body", .name = "mesh", .type = KeyType::path, .otherwise = "none",
+       .meaning = "A closed surface to fill with phyxels: OBJ, PLY or STL. Its vertices become "
+           "the surfels. Resolved from the scene file's folder."},
+      {.section = "body", .name = "file", .type = KeyType::path, .otherwise = "none",
+       .meaning = "A body made by `phyxel sample`. Resolved from the scene file's folder."},
+      {.section = "body", .name = "phyxels", .type = KeyType::integer, .otherwise = "none",
+       .range = between(1, largest_index),
+       .meaning = "How many: exactly for a mesh, about for a shape."},
+      {.section = "body", .name = "spacing", .unit = "m", .otherwise = "from `phyxels`",
+       .range = above(0), .meaning = "Distance between the phyxels of a shape's lattice."},
+      {.section = "body", .name = "size", .type = KeyType::vector, .unit = "m",
+       .otherwise = "none", .range = above(0),
+       .meaning = "Extents along x, y and z of a beam or block."},
+      {.section = "body", .name = "radius", .unit = "m", .otherwise = "none", .range = above(0),
+       .meaning = "Of a cylinder or sphere."},
+      {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = above(0),
+       .meaning = "Of a cylinder."},
+      {.section = "body", .name = "jitter", .fallback = "0", .range = between(0, 0.5),
+       .meaning = "Each phyxel of a lattice is moved at random by up to this many spacings."},
+      {.section = "body", .name = "seed", .type = KeyType::integer, .fallback = "1",
+       .range = at_least(0), .meaning = "Of the random numbers; the same seed, the same body."},
+      {.section = "body", .name = "relaxations", .type = KeyType::integer, .fallback = "30",
+       .range = between(0, 10000), .meaning = "Sweeps that spread the phyxels of a mesh evenly."},
+      {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
+       .meaning = "Whether a built-in shape gets its surfels."},
+      {.section = "body", .name = "scale", .fallback = "1", .range = above(0),
+       .meaning = "Applied first, about the origin."},
+      {.section = "body", .name = "rotation", .type = KeyType::vector, .unit = "degrees",
+       .fallback = "[0, 0, 0]",
+       .meaning = "Axis times angle, applied second: [0, 0, 90] turns x towards y."},
+      {.section = "body", .name = "translation", .type = KeyType::vector, .unit = "m",
+       .fallback = "[0, 0, 0]", .meaning = "Applied last."},
+      {.section = "body", .name = "velocity", .type = KeyType::vector, .unit = "m/s",
+       .fallback = "[0, 0, 0]", .meaning = "At the start."},
+      {.section = "body", .name = "spin", .type = KeyType::vector, .unit = "rad/s",
+       .fallback = "[0, 0, 0]",
+       .meaning = "Angular velocity about the centre of mass at the start."},
+      {.section = "body", .name = "volumes", .type = KeyType::choice, .fallback = "\"automatic\"",
+       .words = {"automatic", "geometry", "kernel"},
+       .meaning = "Phyxel volumes: \"geometry\" takes those the body carries, \"kernel\" the rule "
+           "of Müller et al. 2004 (mass over kernel density, as in Farias et al. 2008); "
+           "\"automatic\" is geometry where the body has volumes, else kernel."},
+      {.section = "body", .name = "material", .type = KeyType::table, .required = true,
+       .meaning = "What the body is made of."},
+      {.section = "body", .name = "neighbours", .type = KeyType::table,
+       .otherwise = "its defaults", .meaning = "Which phyxels interact."},
+      {.section = "body", .name = "array", .type = KeyType::table, .otherwise = "one body",
+       .meaning = "Repeats the body on a grid."},
+      {.section = "body", .name = "fixed", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Phyxels held where they are."},
+      {.section = "body", .name = "motion", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Phyxels moved along a path."},
+      {.section = "body", .name = "load", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Forces on phyxels."},
+
+      {.section = "body.material", .name = "young", .unit = "Pa", .required = true,
+       .range = above(0), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
+      {.section = "body.material", .name = "poisson", .required = true,
+       .range = strictly_between(-1, 0.5),
+       .meaning = "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."},
+      {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
+       .range = above(0), .meaning = "Mass density at rest: water 1000."},
+      {.section = "body.material", .name = "strain", .type = KeyType::choice,
+       .fallback = "\"green\"", .words = {"green", "cauchy"},
+       .meaning = "\"green\" is right under any rotation; \"cauchy\" is cheaper, and only right "
+           "for small rotations."},
+      {.section = "body.material", .name = "volume_stiffness", .unit = "Pa", .fallback = "0",
+       .range = at_least(0),
+       .meaning = "Extra resistance to a change of volume (Müller et al. 2004); 0: none."},
+      {.section = "body.material", .name = "damping", .unit = "1/s", .fallback = "0",
+       .range = at_least(0),
+       .meaning = "Slows every velocity v by damping * v each second; 0: none."},
+
+      {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
+       .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},
+       .meaning = "\"uniform\": one radius for the body; \"adaptive\": each phyxel its own, for "
+           "bodies with thin parts or uneven clouds."},
+      {.section = "body.neighbours", .name = "nearest", .type = KeyType::integer, .fallback = "10",
+       .range = between(1, 1000),
+       .meaning = "How many nearest phyxels the mean distance is taken over."},
+      {.section = "body.neighbours", .name = "factor", .fallback = "1.8", .range = between(1, 20),
+       .meaning = "Support radius over that mean distance. 1.8 gives about 32 neighbours; not "
+           "with `radius`."},
+      {.section = "body.neighbours", .name = "radius", .unit = "m",
+       .otherwise = "from `factor` and `nearest`", .range = above(0),
+       .meaning = "The support radius itself."},
+      {.section = "body.neighbours", .name = "max_neighbours", .type = KeyType::integer,
+       .otherwise = "no limit", .range = between(1, 1000000),
+       .meaning = "Keeps only the nearest ones, the maxNeighbors of Farias et al. 2008."},
+
+      {.section = "body.array", .name = "count", .type = KeyType::counts, .required = true,
+       .range = between(1, 10000), .meaning = "Copies along x, y and z."},
+      {.section = "body.array", .name = "spacing", .type = KeyType::vector, .unit = "m",
+       .required = true, .meaning = "Distance from copy to copy along x, y and z; not 0 where "
+           "there is more than one."},
+  };
+}
+
+std::vector<SceneKey> boundary_keys() {
+  return {
+      {.section = "body.motion", .name = "displacement", .type = KeyType::vector, .unit = "m",
+       .fallback = "[0, 0, 0]", .meaning = "Reached after `duration`, then kept."},
+      {.section = "body.motion", .name = "duration", .unit = "s", .otherwise = "none",
+       .range = above(0), .meaning = "Time to reach `displacement`."},
+      {.section = "body.motion", .name = "velocity", .type = KeyType::vector, .unit = "m/s",
+       .fallback = "[0, 0, 0]", .meaning = "Of a steady motion."},
+      {.section = "body.motion", .name = "amplitude", .type = KeyType::vector, .unit = "m",
+       .fallback = "[0, 0, 0]", .meaning = "Of an oscillation."},
+      {.section = "body.motion", .name = "frequency", .unit = "Hz", .otherwise = "none",
+       .range = above(0), .meaning = "Of the oscillation."},
+
+      {.section = "body.load", .name = "force", .type = KeyType::vector, .unit = "N",
+       .fallback = "[0, 0, 0]", .meaning = "Total, shared among the phyxels by mass."},
+      {.section = "body.load", .name = "force_density", .type = KeyType::vector, .unit = "N/m^3",
+       .fallback = "[0, 0, 0]", .meaning = "Force per volume at rest."},
+      {.section = "body.load", .name = "ramp", .unit = "s", .fallback = "0", .range = at_least(0),
+       .meaning = "Time over which the force grows from zero; 0: at once."},
+
+      {.section = "selection", .name = "region", .type = KeyType::text, .otherwise = "none",
+       .meaning = "A named region of the body: \"x-\", \"x+\", \"y-\", \"y+\", \"z-\", \"z+\" are "
+           "the outermost layers of a beam or block, \"z-\" and \"z+\" the ends of a "
+           "cylinder; the alien head has a \"neck\", the horn bug a \"leg\", the dino a "
+           "\"mouth\"."},
+      {.section = "selection", .name = "indices", .type = KeyType::indices, .otherwise = "none",
+       .range = between(0, largest_index), .meaning = "Phyxels of the body, counted from 0."},
+      {.section = "selection", .name = "box", .type = KeyType::box, .unit = "m",
+       .otherwise = "none", .meaning = "Lowest and highest corner."},
+      {.section = "selection", .name = "ball", .type = KeyType::table, .otherwise = "none",
+       .meaning = "Centre and radius."},
+      {.section = "selection", .name = "all", .type = KeyType::boolean, .otherwise = "none",
+       .meaning = "Only `true`: the whole body."},
+
+      {.section = "selection.ball", .name = "centre", .type = KeyType::vector, .unit = "m",
+       .required = true, .meaning = "Of the ball."},
+      {.section = "selection.ball", .name = "radius", .unit = "m", .required = true,
+       .range = above(0), .meaning = "Of the ball."},
+  };
+}
+
+// clang-format on
+
+}  // namespace
+
+std::span<const SceneSection> scene_sections() {
+  static const std::vector<SceneSection> sections = make_sections();
+  return sections;
+}
+
+std::span<const SceneKey> scene_keys() {
+  static const std::vector<SceneKey> all = [] {
+    std::vector<SceneKey> keys;
+    for (const auto& part : {top_keys(), run_keys(), body_keys(), boundary_keys()}) {
+      keys.insert(keys.end(), part.begin(), part.end());
+    }
+    return keys;
+  }();
+  return all;
+}
+
+}  // namespace phyxel

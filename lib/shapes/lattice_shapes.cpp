@@ -1,0 +1,214 @@
+#include "shapes/lattice_shapes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mesh/random_bits.hpp"
+
+namespace phyxel {
+namespace {
+
+using Cell = std::array<std::int64_t, 3>;
+
+/// Calls visit(cell) for the cells of the cube of 2^level cells at `corner` that lie below `end`,
+/// in Morton order (x fastest).
+template <class Visit>
+void visit_cells(const Cell& corner, int level, const Cell& end, Visit& visit) {
+  if (corner[0] >= end[0] || corner[1] >= end[1] || corner[2] >= end[2]) return;
+  if (level == 0) {
+    visit(corner);
+    return;
+  }
+  const std::int64_t half = std::int64_t{1} << (level - 1);
+  for (int child = 0; child < 8; ++child) {
+    visit_cells({corner[0] + (child & 1) * half, corner[1] + (child >> 1 & 1) * half,
+                 corner[2] + (child >> 2) * half},
+                level - 1, end, visit);
+  }
+}
+
+/// Fills the lattice in cubes of cells, the cubes in Morton order, so that each knows where its
+/// phyxels go and any number of threads may share the work.
+class Filling {
+ public:
+  Filling(const Lattice& lattice, double jitter, std::uint64_t seed)
+      : lattice_(lattice), cell_(lattice.cell()), jitter_(jitter), salt_(mix_bits(seed)) {
+    for (int axis = 0; axis < 3; ++axis) {
+      end_[axis] = static_cast<std::int64_t>(lattice.cells[axis]);
+      block_end_[axis] = (end_[axis] + block_side - 1) / block_side;
+    }
+  }
+
+  Cloud run() {
+    find_blocks();
+    Cloud cloud;
+    const auto phyxels = static_cast<std::size_t>(first_.back());
+    cloud.position.resize(phyxels);
+    cloud.volume.assign(phyxels, lattice_.volume() / static_cast<double>(phyxels));
+    const auto n = static_cast<std::ptrdiff_t>(block_.size());
+#pragma omp parallel for schedule(dynamic, 16)
+    for (std::ptrdiff_t b = 0; b < n; ++b) {
+      Vec3d* next = cloud.position.data() + first_[b];
+      visit_inside(b, [&](const Cell& c, Vec3d centre) { *next++ = jittered(c, centre); });
+    }
+    add_regions(cloud);
+    return cloud;
+  }
+
+ private:
+  static constexpr int block_level = 4;
+  static constexpr std::int64_t block_side = 1 << block_level;
+
+  void find_blocks() {
+    int level = 0;
+    while ((std::int64_t{1} << level) < std::max({block_end_[0], block_end_[1], block_end_[2]})) {
+      ++level;
+    }
+    const auto add = [&](const Cell& b) { block_.push_back(b); };
+    visit_cells({0, 0, 0}, level, block_end_, add);
+    first_.assign(block_.size() + 1, 0);
+    const auto n = static_cast<std::ptrdiff_t>(block_.size());
+#pragma omp parallel for schedule(dynamic, 16)
+    for (std::ptrdiff_t b = 0; b < n; ++b) {
+      if (lattice_.solid == Lattice::Solid::box) {
+        Offset count = 1;
+        for (int axis = 0; axis < 3; ++axis) {
+          count *= std::min(block_side, end_[axis] - block_[b][axis] * block_side);
+        }
+        first_[b + 1] = count;
+      } else {
+        visit_inside(b, [&](const Cell&, Vec3d) { ++first_[b + 1]; });
+      }
+    }
+    for (std::size_t b = 0; b < block_.size(); ++b) first_[b + 1] += first_[b];
+  }
+
+  template <class Visit>
+  void visit_inside(std::ptrdiff_t b, Visit&& visit) const {
+    const Cell& at = block_[b];
+    const Cell corner{at[0] * block_side, at[1] * block_side, at[2] * block_side};
+    const auto visit_cell = [&](const Cell& c) {
+      if (!lattice_.holds(c)) return;
+      const Vec3d centre = lattice_.low + Vec3d{(static_cast<double>(c[0]) + 0.5) * cell_.x,
+                                                (static_cast<double>(c[1]) + 0.5) * cell_.y,
+                                                (static_cast<double>(c[2]) + 0.5) * cell_.z};
+      visit(c, centre);
+    };
+    visit_cells(corner, block_level, end_, visit_cell);
+  }
+
+  Vec3d jittered(const Cell& c, Vec3d centre) const {
+    if (jitter_ == 0) return centre;
+    const auto number = static_cast<std::uint64_t>(c[0] + end_[0] * (c[1] + end_[1] * c[2]));
+    const std::uint64_t bits = mix_bits(number ^ salt_);
+    const auto signed_fraction = [](std::uint64_t part) { return 2 * unit_fraction(part) - 1; };
+    Vec3d move{jitter_ * cell_.x * signed_fraction(bits),
+               jitter_ * cell_.y * signed_fraction(bits >> 21),
+               jitter_ * cell_.z * signed_fraction(bits >> 42)};
+    for (int attempt = 0; attempt < 4; ++attempt, move = 0.5 * move) {
+      if (lattice_.contains(centre + move)) return centre + move;
+    }
+    return centre;
+  }
+
+  /// The outermost layer of cells on each side that is flat.
+  void add_regions(Cloud& cloud) const {
+    if (lattice_.solid == Lattice::Solid::sphere) return;
+    static constexpr const char* names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
+    for (int axis = lattice_.solid == Lattice::Solid::box ? 0 : 2; axis < 3; ++axis) {
+      std::vector<Index>& low = cloud.regions[names[axis][0]];
+      std::vector<Index>& high = cloud.regions[names[axis][1]];
+      for (std::size_t b = 0; b < block_.size(); ++b) {
+        const std::int64_t layer = block_[b][axis];
+        if (layer != 0 && layer != block_end_[axis] - 1) continue;
+        Offset i = first_[b];
+        visit_inside(static_cast<std::ptrdiff_t>(b), [&](const Cell& c, Vec3d) {
+          if (c[axis] == 0) low.push_back(static_cast<Index>(i));
+          if (c[axis] == end_[axis] - 1) high.push_back(static_cast<Index>(i));
+          ++i;
+        });
+      }
+    }
+  }
+
+  const Lattice& lattice_;
+  Vec3d cell_;
+  double jitter_;
+  std::uint64_t salt_;
+  Cell end_{}, block_end_{};
+  std::vector<Cell> block_;    ///< Corners, in units of blocks, in Morton order.
+  std::vector<Offset> first_;  ///< Phyxels before each block, shape [n_blocks + 1].
+};
+
+}  // namespace
+
+double Lattice::volume() const {
+  const double box = extent.x * extent.y * extent.z;
+  if (solid == Solid::cylinder) return std::numbers::pi / 4 * box;
+  if (solid == Solid::sphere) return std::numbers::pi / 6 * box;
+  return box;
+}
+
+bool Lattice::contains(Vec3d p) const {
+  const Vec3d d = p - (low + 0.5 * extent), half = 0.5 * extent;
+  if (solid == Solid::sphere) return dot(d, d) < half.x * half.x;
+  if (std::abs(d.z) >= half.z) return false;
+  if (solid == Solid::cylinder) return d.x * d.x + d.y * d.y < half.x * half.x;
+  return std::abs(d.x) < half.x && std::abs(d.y) < half.y;
+}
+
+bool Lattice::holds(const std::array<std::int64_t, 3>& cell) const {
+  if (solid == Solid::box) return true;
+  // In half cells from the axis, or from the centre, where the radius is the number of cells.
+  const auto n = static_cast<std::int64_t>(cells[0]);
+  const std::int64_t x = 2 * cell[0] + 1 - n, y = 2 * cell[1] + 1 - n, z = 2 * cell[2] + 1 - n;
+  return x * x + y * y + (solid == Solid::sphere ? z * z : 0) < n * n;
+}
+
+double Lattice::phyxels() const {
+  const double box_cells = cells[0] * cells[1] * cells[2];
+  if (solid == Solid::box) return box_cells;
+  if (box_cells > 1e11) return box_cells * (volume() / (extent.x * extent.y * extent.z));
+  // Row by row in half cells: a row holds odd numbers if n is even, and even ones if it is odd.
+  const double n = cells[0];
+  const bool odd = std::fmod(n, 2) == 0;
+  const auto numbers_within = [&](double square) {
+    if (!(square > 0)) return 0.0;
+    const double limit = std::sqrt(square);
+    return odd ? 2 * std::ceil((limit - 1) / 2) : 2 * std::ceil(limit / 2) - 1;
+  };
+  double sum = 0;
+  for (double y = 1 - n; y < n; y += 2) {
+    if (solid == Solid::cylinder) {
+      sum += cells[2] * numbers_within(n * n - y * y);
+    } else {
+      for (double z = 1 - n; z < n; z += 2) sum += numbers_within(n * n - y * y - z * z);
+    }
+  }
+  return sum;
+}
+
+Lattice make_lattice(const ShapeRequest& request, double spacing) {
+  Lattice lattice;
+  if (request.name == "cylinder") {
+    lattice.solid = Lattice::Solid::cylinder;
+    lattice.extent = {2 * request.radius, 2 * request.radius, request.length};
+  } else if (request.name == "sphere") {
+    lattice.solid = Lattice::Solid::sphere;
+    lattice.extent = {2 * request.radius, 2 * request.radius, 2 * request.radius};
+  } else {
+    lattice.extent = request.size;
+  }
+  lattice.low = -0.5 * lattice.extent;
+  if (request.name == "beam") lattice.low.x = 0;
+  const auto count = [&](double extent) { return std::max(1.0, std::round(extent / spacing)); };
+  lattice.cells = {count(lattice.extent.x), count(lattice.extent.y), count(lattice.extent.z)};
+  return lattice;
+}
+
+Cloud fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed) {
+  return Filling(lattice, jitter, seed).run();
+}
+
+}  // namespace phyxel

@@ -1,0 +1,423 @@
+/// The CPU backend: two passes over the neighbour lists, W phyxels at a time.
+///
+/// Memory moved per phyxel and step, float, k neighbours, one body with symmetric lists:
+///   pass 1 reads  one 32-byte record (X, 1/h², u) per neighbour, mostly from cache, 4 k of indices,
+///          24 of A⁻¹, 4 of v, and writes 36 of a 64-byte record (Q beside X, 1/h²);
+///   pass 2 reads  one 64-byte record per neighbour, mostly from cache, 4 k of indices, 12 of b,
+///          4 of 1/m, reads and writes 24 of (u, v) and writes 12 of the first record.
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <cmath>
+
+#include "solver/cpu_layout.hpp"
+#include "solver/pack.hpp"
+#include "phyxel/backend.hpp"
+#include "phyxel/physics/force.hpp"
+#include "phyxel/physics/strain.hpp"
+#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/surfel.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "phyxel/physics/weight.hpp"
+
+namespace phyxel {
+namespace {
+
+/// What the first pass reads of a phyxel, and where each value stands in its record.
+struct PointRecord {
+  static constexpr int size = 8;
+  enum { position = 0, inverse_h_squared = 3, displacement = 4 };
+};
+/// What the second pass reads of a phyxel.
+struct StressRecord {
+  static constexpr int size = 16;
+  enum { pair_stress = 0, position = 9, inverse_h_squared = 12 };
+};
+
+template <class Real, class StateReal>
+class CpuBackend final : public Backend {
+  static constexpr int W = static_cast<int>(simd_bytes / sizeof(Real));
+  using P = Pack<Real, W>;
+  using S = Pack<StateReal, W>;
+
+ public:
+  CpuBackend(const Model& model, int threads)
+      : model_(model),
+        threads_(threads > 0 ? threads : omp_get_max_threads()),
+        layout_(model, W),
+        lists_(model.neighbourhood.neighbours, layout_) {
+    if (!model.neighbourhood.symmetric) inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
+    const auto slots = static_cast<std::size_t>(layout_.slots());
+    points_.assign(slots * PointRecord::size, Real(0));
+    stresses_.assign(slots * StressRecord::size, Real(0));
+    inverse_moment_.assign(slots * 6, Real(0));
+    moment_offset_.assign(slots * 3, Real(0));
+    volume_.assign(slots, Real(0));
+    inverse_mass_.assign(slots, Real(0));
+    displacement_.assign(slots * 3, StateReal(0));
+    velocity_.assign(slots * 3, StateReal(0));
+    if (!model.loads.empty()) load_.assign(slots * 3, Real(0));
+    for (std::size_t p = 0; p < model.parts.size(); ++p) pack_part(p);
+    model_loads(0);
+  }
+
+  std::string name() const override {
+    const char* precision = sizeof(Real) == 8 ? "double" : sizeof(StateReal) == 8 ? "mixed" : "float";
+    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, threads_,
+                       threads_ == 1 ? "" : "s", W);
+  }
+  Index size() const override { return model_.size(); }
+
+  void upload(const State& state) override {
+    for (Index i = 0; i < model_.size(); ++i) set_state(i, state.displacement[i], state.velocity[i]);
+  }
+
+  void download(State& state) const override {
+    state.displacement.resize(static_cast<std::size_t>(model_.size()));
+    state.velocity.resize(static_cast<std::size_t>(model_.size()));
+    for (Index i = 0; i < model_.size(); ++i) {
+      state.displacement[i] = get3(displacement_, layout_.slot(i));
+      state.velocity[i] = get3(velocity_, layout_.slot(i));
+    }
+  }
+
+  void stress() override {
+    for_each_law([&](const auto& law, PackRange range) {
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+      for (Index p = range.begin; p < range.end; ++p) {
+        const Mat3<P> grad_u = displacement_gradient_of(p);
+        const Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
+                                      inverse_moment_of(p));
+        store_pair_stress(p, q);
+      }
+    });
+  }
+
+  void advance(double time, double dt) override {
+    if (!load_.empty()) model_loads(time);
+    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
+      const bool damped = model_.parts[part].material.damping > 0;
+      if (load_.empty()) {
+        damped ? advance_part<true, false>(part, dt) : advance_part<false, false>(part, dt);
+      } else {
+        damped ? advance_part<true, true>(part, dt) : advance_part<false, true>(part, dt);
+      }
+    }
+    for (const Motion& motion : model_.motions) {
+      const Vec3d after = motion.displacement_at(time + dt);
+      const Vec3d velocity = (after - motion.displacement_at(time)) / dt;
+      for (const Index i : motion.phyxels) set_state(i, after, velocity);
+    }
+  }
+
+  void internal_forces(std::vector<Vec3d>& force) override {
+    stress();
+    force.resize(static_cast<std::size_t>(model_.size()));
+    std::vector<Vec3d> by_slot(static_cast<std::size_t>(layout_.slots()));
+#pragma omp parallel for schedule(static) num_threads(threads_)
+    for (Index p = 0; p < layout_.packs(); ++p) {
+      const Vec3<P> f = force_of(p);
+      for (int l = 0; l < W; ++l) by_slot[p * W + l] = {f.x[l], f.y[l], f.z[l]};
+    }
+    for (Index i = 0; i < model_.size(); ++i) force[i] = by_slot[layout_.slot(i)];
+  }
+
+  void displacement_gradients(std::vector<Mat3d>& gradient) override {
+    std::vector<Mat3d> by_slot(static_cast<std::size_t>(layout_.slots()));
+#pragma omp parallel for schedule(static) num_threads(threads_)
+    for (Index p = 0; p < layout_.packs(); ++p) {
+      const Mat3<P> g = displacement_gradient_of(p);
+      for (int l = 0; l < W; ++l) {
+        for (int e = 0; e < 9; ++e) by_slot[p * W + l](e / 3, e % 3) = g(e / 3, e % 3)[l];
+      }
+    }
+    gradient.resize(static_cast<std::size_t>(model_.size()));
+    for (Index i = 0; i < model_.size(); ++i) gradient[i] = by_slot[layout_.slot(i)];
+  }
+
+  void advect_surfels(SurfelState& out) override {
+    const Surfels& surfels = model_.surfels;
+    std::vector<Mat3d> gradient;
+    displacement_gradients(gradient);
+    out.position.resize(surfels.position.size());
+    out.normal.resize(surfels.position.size());
+#pragma omp parallel for schedule(static) num_threads(threads_)
+    for (std::size_t s = 0; s < surfels.position.size(); ++s) {
+      SurfelBlend<double> blend;
+      const auto carriers = surfels.carriers.row(static_cast<Index>(s));
+      for (const Index i : carriers) {
+        const Vec3d x_is = surfels.position[s] - model_.position[i];
+        const double h = model_.neighbourhood.support[i];
+        // A lone carrier may be out of reach (h too small); its weight cancels anyway.
+        const double w = carriers.size() == 1 ? 1 : weight_shape(dot(x_is, x_is), 1 / (h * h));
+        blend.add(w, get3(displacement_, layout_.slot(i)), gradient[i], x_is);
+      }
+      out.position[s] = surfels.position[s] + blend.surfel_displacement();
+      out.normal[s] = normalised(blend.surfel_normal(surfels.normal[s]));
+    }
+  }
+
+  std::vector<ArrayBytes> memory() const override {
+    std::vector<ArrayBytes> list{
+        {"point records", points_.size() * sizeof(Real)},
+        {"stress records", stresses_.size() * sizeof(Real)},
+        {"inverse moments", inverse_moment_.size() * sizeof(Real)},
+        {"moment offsets", moment_offset_.size() * sizeof(Real)},
+        {"volumes and masses", (volume_.size() + inverse_mass_.size()) * sizeof(Real)},
+        {"displacements and velocities",
+         (displacement_.size() + velocity_.size()) * sizeof(StateReal)},
+        {"neighbour lists", lists_.bytes()}};
+    if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
+    if (!load_.empty()) list.push_back({"loads", load_.size() * sizeof(Real)});
+    return list;
+  }
+
+  std::size_t step_traffic() const override {
+    const auto slots = static_cast<std::size_t>(layout_.slots());
+    const std::size_t pass_1 = lists_.bytes() + slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real);
+    const std::size_t pass_2 =
+        (inverse_.start.empty() ? lists_ : inverse_).bytes() +
+        slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
+        load_.size() * sizeof(Real);
+    return pass_1 + pass_2;
+  }
+
+ private:
+  // --- the two neighbour loops ------------------------------------------------------------------
+
+  /// Pass 1: ∇u of the phyxels of pack p.
+  PHYXEL_HD Mat3<P> displacement_gradient_of(Index p) const {
+    const Vec3<P> x_i = point_of(p, PointRecord::position), u_i = point_of(p, PointRecord::displacement);
+    const P inverse_h_squared = own_point_value(p, PointRecord::inverse_h_squared);
+    Mat3<P> sum;
+    const Index* end = lists_.indices.data() + lists_.start[p + 1];
+    for (const Index* j = lists_.indices.data() + lists_.start[p]; j != end; j += W) {
+      P point[PointRecord::size];
+      load_records<PointRecord::size>(points_.data(), j, point);
+      const Vec3<P> x_ij = vec3_at(point, PointRecord::position) - x_i;
+      const Vec3<P> u_ij = vec3_at(point, PointRecord::displacement) - u_i;
+      sum += gradient_term(u_ij, x_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared));
+    }
+    return displacement_gradient(sum, inverse_moment_of(p));
+  }
+
+  /// Pass 2: internal forces on the phyxels of pack p.
+  PHYXEL_HD Vec3<P> force_of(Index p) const {
+    const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
+    Index own[W];
+    for (int l = 0; l < W; ++l) own[l] = p * W + l;
+    P record[StressRecord::size];
+    load_records<StressRecord::size>(stresses_.data(), own, record);
+    const Vec3<P> x_i = vec3_at(record, StressRecord::position);
+    Vec3<P> force = own_force(mat3_at(record), vec3_of<P>(moment_offset_, p));
+    const Index* end = lists.indices.data() + lists.start[p + 1];
+    for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
+      load_records<StressRecord::size>(stresses_.data(), j, record);
+      const Vec3<P> x_ij = vec3_at(record, StressRecord::position) - x_i;
+      const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
+      force += neighbour_force(mat3_at(record), x_ij, w_ji);
+    }
+    return force;
+  }
+
+  /// Threads worth waking for a body: a pack takes about a microsecond, so does a barrier.
+  int threads_for(PackRange range) const {
+    return std::clamp((range.end - range.begin) / 8, 1, threads_);
+  }
+
+  /// Force, loads, gravity and the Verlet step of one body.
+  template <bool Damped, bool Loaded>
+  void advance_part(std::size_t part, double dt) {
+    const double half_damping = model_.parts[part].material.damping * dt / 2;
+    const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
+    const Vec3<S> gravity{S(model_.gravity.x), S(model_.gravity.y), S(model_.gravity.z)};
+    const PackRange range = layout_.part(part);
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+    for (Index p = range.begin; p < range.end; ++p) {
+      Vec3<P> force = force_of(p);
+      if constexpr (Loaded) force += vec3_of<P>(load_, p);
+      const Vec3<P> f_over_m = load<P>(&inverse_mass_[p * W]) * force;
+      const Vec3<S> acceleration =
+          Vec3<S>{convert<StateReal>(f_over_m.x), convert<StateReal>(f_over_m.y),
+                  convert<StateReal>(f_over_m.z)} + gravity;
+      Vec3<S> velocity = vec3_of<S>(velocity_, p);
+      if constexpr (Damped) {
+        velocity = verlet_velocity_damped(velocity, acceleration, keep, gain);
+      } else {
+        velocity = verlet_velocity(velocity, acceleration, step);
+      }
+      const Vec3<S> displacement = vec3_of<S>(displacement_, p) + step * velocity;
+      store3(velocity_, p, velocity);
+      store3(displacement_, p, displacement);
+      const Vec3<P> u{convert<Real>(displacement.x), convert<Real>(displacement.y),
+                      convert<Real>(displacement.z)};
+      for (int l = 0; l < W; ++l) {
+        Real* record = &points_[(p * W + l) * PointRecord::size + PointRecord::displacement];
+        record[0] = u.x[l];
+        record[1] = u.y[l];
+        record[2] = u.z[l];
+      }
+    }
+  }
+
+  /// Calls run(law, packs) for each body, with the law its scene asks for: the one place where
+  /// terms chosen at run time become code chosen at compile time.
+  template <class Run>
+  void for_each_law(Run&& run) const {
+    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
+      const Material& m = model_.parts[part].material;
+      const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
+      const VolumeConservation<P> volume{P(m.volume_stiffness)};
+      const PackRange range = layout_.part(part);
+      if (m.strain == Strain::green) {
+        const GreenHooke<P> law{hooke};
+        m.volume_stiffness > 0 ? run(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
+                               : run(law, range);
+      } else {
+        const CauchyHooke<P> law{hooke};
+        m.volume_stiffness > 0 ? run(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
+                               : run(law, range);
+      }
+    }
+  }
+
+  // --- arrays: [pack][component][lane] ------------------------------------------------------------
+
+  template <class Q, class T>
+  PHYXEL_HD static Vec3<Q> vec3_of(const AlignedVector<T>& array, Index p) {
+    const T* at = &array[static_cast<std::size_t>(p) * 3 * W];
+    return {phyxel::load<Q>(at), phyxel::load<Q>(at + W), phyxel::load<Q>(at + 2 * W)};
+  }
+  template <class Q, class T>
+  PHYXEL_HD static void store3(AlignedVector<T>& array, Index p, const Vec3<Q>& v) {
+    T* at = &array[static_cast<std::size_t>(p) * 3 * W];
+    phyxel::store(at, v.x);
+    phyxel::store(at + W, v.y);
+    phyxel::store(at + 2 * W, v.z);
+  }
+  template <class T>
+  static T& component(AlignedVector<T>& array, Index slot, int c, int count) {
+    return array[(static_cast<std::size_t>(slot / W) * count + c) * W + slot % W];
+  }
+  template <class T>
+  static Vec3d get3(const AlignedVector<T>& array, Index slot) {
+    const T* at = &array[static_cast<std::size_t>(slot / W) * 3 * W + slot % W];
+    return {at[0], at[W], at[2 * W]};
+  }
+  template <class T>
+  static void set3(AlignedVector<T>& array, Index slot, Vec3d v) {
+    component(array, slot, 0, 3) = static_cast<T>(v.x);
+    component(array, slot, 1, 3) = static_cast<T>(v.y);
+    component(array, slot, 2, 3) = static_cast<T>(v.z);
+  }
+  PHYXEL_HD Sym3<P> inverse_moment_of(Index p) const {
+    const Real* at = &inverse_moment_[static_cast<std::size_t>(p) * 6 * W];
+    return {phyxel::load<P>(at),         phyxel::load<P>(at + W),     phyxel::load<P>(at + 2 * W),
+            phyxel::load<P>(at + 3 * W), phyxel::load<P>(at + 4 * W), phyxel::load<P>(at + 5 * W)};
+  }
+
+  // --- records --------------------------------------------------------------------------------------
+
+  PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
+    return {record[first], record[first + 1], record[first + 2]};
+  }
+  PHYXEL_HD static Mat3<P> mat3_at(const P* record) {
+    Mat3<P> m;
+    for (int e = 0; e < 9; ++e) m(e / 3, e % 3) = record[StressRecord::pair_stress + e];
+    return m;
+  }
+  PHYXEL_HD P own_point_value(Index p, int which) const {
+    P value;
+    for (int l = 0; l < W; ++l) value.lanes[l] = points_[(p * W + l) * PointRecord::size + which];
+    return value;
+  }
+  PHYXEL_HD Vec3<P> point_of(Index p, int first) const {
+    return {own_point_value(p, first), own_point_value(p, first + 1), own_point_value(p, first + 2)};
+  }
+  PHYXEL_HD void store_pair_stress(Index p, const Mat3<P>& q) {
+    for (int l = 0; l < W; ++l) {
+      Real* record = &stresses_[(p * W + l) * StressRecord::size + StressRecord::pair_stress];
+      for (int e = 0; e < 9; ++e) record[e] = q(e / 3, e % 3)[l];
+    }
+  }
+
+  // --- set-up and lists -------------------------------------------------------------------------------
+
+  /// Packs what does not change of one body. Positions are taken from the body's first phyxel, so
+  /// that a body far from the origin keeps its digits in float.
+  void pack_part(std::size_t p) {
+    const Part& part = model_.parts[p];
+    if (part.begin == part.end) return;
+    const Vec3d origin = model_.position[part.begin];
+    for (Index i = part.begin; i < part.end; ++i) {
+      const Index slot = layout_.slot(i);
+      const Vec3d x = model_.position[i] - origin;
+      const double h = model_.neighbourhood.support[i];
+      Real* point = &points_[slot * PointRecord::size];
+      Real* stress_record = &stresses_[slot * StressRecord::size];
+      set_values(point + PointRecord::position, x);
+      set_values(stress_record + StressRecord::position, x);
+      point[PointRecord::inverse_h_squared] = stress_record[StressRecord::inverse_h_squared] =
+          h > 0 ? static_cast<Real>(1 / (h * h)) : Real(0);
+      const Sym3d& a = model_.inverse_moment[i];
+      const double entries[] = {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
+      for (int e = 0; e < 6; ++e) {
+        component(inverse_moment_, slot, e, 6) = static_cast<Real>(entries[e]);
+      }
+      set3(moment_offset_, slot, model_.moment_offset[i]);
+      volume_[slot] = static_cast<Real>(model_.volume[i]);
+      inverse_mass_[slot] = static_cast<Real>(1 / model_.mass[i]);
+    }
+  }
+  static void set_values(Real* at, Vec3d v) {
+    at[0] = static_cast<Real>(v.x);
+    at[1] = static_cast<Real>(v.y);
+    at[2] = static_cast<Real>(v.z);
+  }
+
+  void set_state(Index i, Vec3d u, Vec3d v) {
+    const Index slot = layout_.slot(i);
+    set3(displacement_, slot, u);
+    set3(velocity_, slot, v);
+    set_values(&points_[slot * PointRecord::size + PointRecord::displacement], u);
+  }
+
+  /// Sums the loads at `time`; again only while one of them still grows.
+  void model_loads(double time) {
+    if (load_.empty() || time < 0) return;
+    double scales = 0;
+    for (const Load& load : model_.loads) scales += load.scale_at(time);
+    if (scales == load_scales_) return;
+    load_scales_ = scales;
+    std::fill(load_.begin(), load_.end(), Real(0));
+    for (const Load& load : model_.loads) {
+      for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+        const Index slot = layout_.slot(load.phyxels[k]);
+        set3(load_, slot, get3(load_, slot) + load.scale_at(time) * load.force[k]);
+      }
+    }
+  }
+
+  const Model& model_;
+  int threads_;
+  Layout layout_;
+  PackedLists lists_, inverse_;             // inverse_ is empty when lists_ is its own inverse
+  AlignedVector<Real> points_, stresses_;   // records, by slot
+  AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
+  AlignedVector<StateReal> displacement_, velocity_;
+  AlignedVector<Real> load_;                // empty unless the scene has loads
+  double load_scales_ = -1;
+};
+
+}  // namespace
+
+std::unique_ptr<Backend> make_cpu_backend(const Model& model, Precision precision, int threads) {
+  switch (precision) {
+    case Precision::single: return std::make_unique<CpuBackend<float, float>>(model, threads);
+    case Precision::mixed: return std::make_unique<CpuBackend<float, double>>(model, threads);
+    case Precision::double_: break;
+  }
+  return std::make_unique<CpuBackend<double, double>>(model, threads);
+}
+
+}  // namespace phyxel
