@@ -45,6 +45,7 @@ class CpuBackend final : public Backend {
       : model_(model),
         threads_(threads > 0 ? threads : omp_get_max_threads()),
         layout_(model, W),
+        runs_(find_runs()),
         lists_(model.neighbourhood.neighbours, layout_) {
     if (!model.neighbourhood.symmetric) inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
     const auto slots = static_cast<std::size_t>(layout_.slots());
@@ -63,8 +64,9 @@ class CpuBackend final : public Backend {
 
   std::string name() const override {
     const char* precision = sizeof(Real) == 8 ? "double" : sizeof(StateReal) == 8 ? "mixed" : "float";
-    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, threads_,
-                       threads_ == 1 ? "" : "s", W);
+    int used = 1;  // small bodies leave threads alone
+    for (const Run& run : runs_) used = std::max(used, threads_for(run.range));
+    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, used, used == 1 ? "" : "s", W);
   }
   Index size() const override { return model_.size(); }
 
@@ -95,12 +97,12 @@ class CpuBackend final : public Backend {
 
   void advance(double time, double dt) override {
     if (!load_.empty()) model_loads(time);
-    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
-      const bool damped = model_.parts[part].material.damping > 0;
+    for (const Run& run : runs_) {
+      const bool damped = run.material.damping > 0;
       if (load_.empty()) {
-        damped ? advance_part<true, false>(part, dt) : advance_part<false, false>(part, dt);
+        damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
       } else {
-        damped ? advance_part<true, true>(part, dt) : advance_part<false, true>(part, dt);
+        damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
       }
     }
     for (const Motion& motion : model_.motions) {
@@ -220,18 +222,38 @@ class CpuBackend final : public Backend {
     return force;
   }
 
-  /// Threads worth waking for a body: a pack takes about a microsecond, so does a barrier.
-  int threads_for(PackRange range) const {
-    return std::clamp((range.end - range.begin) / 8, 1, threads_);
+  /// Neighbouring bodies of one material: one loop over all of them.
+  struct Run {
+    Material material;
+    PackRange range;
+  };
+
+  std::vector<Run> find_runs() const {
+    std::vector<Run> runs;
+    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
+      const Material& material = model_.parts[part].material;
+      if (!runs.empty() && runs.back().material == material) {
+        runs.back().range.end = layout_.part(part).end;
+      } else {
+        runs.push_back({material, layout_.part(part)});
+      }
+    }
+    return runs;
   }
 
-  /// Force, loads, gravity and the Verlet step of one body.
+  /// Threads worth waking: 400 phyxels take a thread some 10 microseconds, a barrier about one; but
+  /// where other programs want the cores, a barrier waits for a thread that is not running.
+  int threads_for(PackRange range) const {
+    return std::clamp((range.end - range.begin) * W / 400, 1, threads_);
+  }
+
+  /// Force, loads, gravity and the Verlet step.
   template <bool Damped, bool Loaded>
-  void advance_part(std::size_t part, double dt) {
-    const double half_damping = model_.parts[part].material.damping * dt / 2;
+  void advance_run(const Run& run, double dt) {
+    const double half_damping = run.material.damping * dt / 2;
     const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
     const Vec3<S> gravity{S(model_.gravity.x), S(model_.gravity.y), S(model_.gravity.z)};
-    const PackRange range = layout_.part(part);
+    const PackRange range = run.range;
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
       Vec3<P> force = force_of(p);
@@ -260,23 +282,23 @@ class CpuBackend final : public Backend {
     }
   }
 
-  /// Calls run(law, packs) for each body, with the law its scene asks for: the one place where
-  /// terms chosen at run time become code chosen at compile time.
-  template <class Run>
-  void for_each_law(Run&& run) const {
-    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
-      const Material& m = model_.parts[part].material;
+  /// Calls apply(law, packs) for each run of bodies, with the law its scene asks for: the one place
+  /// where terms chosen at run time become code chosen at compile time.
+  template <class Apply>
+  void for_each_law(Apply&& apply) const {
+    for (const Run& run : runs_) {
+      const Material& m = run.material;
       const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
-      const PackRange range = layout_.part(part);
+      const PackRange range = run.range;
       if (m.strain == Strain::green) {
         const GreenHooke<P> law{hooke};
-        m.volume_stiffness > 0 ? run(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
-                               : run(law, range);
+        m.volume_stiffness > 0 ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
+                               : apply(law, range);
       } else {
         const CauchyHooke<P> law{hooke};
-        m.volume_stiffness > 0 ? run(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
-                               : run(law, range);
+        m.volume_stiffness > 0 ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
+                               : apply(law, range);
       }
     }
   }
@@ -401,6 +423,7 @@ class CpuBackend final : public Backend {
   const Model& model_;
   int threads_;
   Layout layout_;
+  std::vector<Run> runs_;
   PackedLists lists_, inverse_;             // inverse_ is empty when lists_ is its own inverse
   AlignedVector<Real> points_, stresses_;   // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;

@@ -22,6 +22,7 @@ struct Material {
   double lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
   /// Shear modulus [Pa], Lamé's second parameter.
   double lame_mu() const { return young / (2 * (1 + poisson)); }
+  bool operator==(const Material&) const = default;
 };
 
 /// Where phyxel volumes come from. `kernel`: the rule of Mueller et al. 2004, mass over kernel
