@@ -17,6 +17,10 @@ if(NOT PHYXEL_CUDA STREQUAL "OFF")
     enable_language(CUDA)
     find_package(CUDAToolkit REQUIRED)
     set(CMAKE_CUDA_STANDARD 20)
+    if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know that nvcc has it
+      set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+      set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
+    endif()
     set(PHYXEL_HAVE_CUDA ON)
   elseif(PHYXEL_CUDA STREQUAL "ON")
     message(FATAL_ERROR "PHYXEL_CUDA=ON, but no CUDA compiler was found. "

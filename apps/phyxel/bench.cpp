@@ -3,7 +3,6 @@
 #include <omp.h>
 #include <sys/utsname.h>
 
-#include <chrono>
 #include <ctime>
 #include <fstream>
 #include <functional>
@@ -12,15 +11,11 @@
 #include "command.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
+#include "stopwatch.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 struct BenchOptions {
   std::vector<Index> sizes;
@@ -66,7 +61,10 @@ double copy_bandwidth(int threads) {
 /// A cube of `n` phyxels, 0.1 m apart, jittered, without surfels.
 Cloud cube(Index n) {
   const double side = std::round(std::cbrt(static_cast<double>(n))) * 0.1;
-  return make_shape({.name = "block", .size = {side, side, side}, .spacing = 0.1, .jitter = 0.1,
+  return make_shape({.name = "block",
+                     .size = {side, side, side},
+                     .spacing = 0.1,
+                     .jitter = 0.1,
                      .surface = false});
 }
 
@@ -84,7 +82,8 @@ Scene cube_scene(const std::string& terms) {
   scene.bodies.push_back(body);
   return scene;
 }
-const std::vector<std::string> all_terms = {"green", "cauchy", "volume", "damping", "load", "adaptive"};
+const std::vector<std::string> all_terms = {"green",   "cauchy", "volume",
+                                            "damping", "load",   "adaptive"};
 
 Precision precision_of(const std::string& name) {
   if (name == "float") return Precision::single;
@@ -99,8 +98,11 @@ double force_error(const Model& model, Backend& backend) {
   std::mt19937_64 engine(3);
   State state;
   for (const Vec3d& x : model.position) {
-    const auto noise = [&] { return 0.002 * (static_cast<double>(engine() >> 11) * 0x1p-53 - 0.5); };
-    state.displacement.push_back({0.1 * x.y + noise(), -0.05 * x.z + noise(), 0.02 * x.x + noise()});
+    const auto noise = [&] {
+      return 0.002 * (static_cast<double>(engine() >> 11) * 0x1p-53 - 0.5);
+    };
+    state.displacement.push_back(
+        {0.1 * x.y + noise(), -0.05 * x.z + noise(), 0.02 * x.x + noise()});
   }
   state.velocity.resize(state.displacement.size());
   std::vector<Vec3d> force, exact;
@@ -121,7 +123,8 @@ double force_error(const Model& model, Backend& backend) {
 class Table {
  public:
   Table(const BenchOptions& options, const std::string& columns) {
-    fmt::print("# {} | {} | {} | {}\n{}\n", program_version(), processor_name(), compiler_name(), today(), columns);
+    fmt::print("# {} | {} | {} | {}\n{}\n", program_version(), processor_name(), compiler_name(),
+               today(), columns);
     if (options.csv.empty()) return;
     if (std::filesystem::exists(options.csv) && !options.force) {
       throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
@@ -143,8 +146,8 @@ class Table {
 
 void bench_step(const BenchOptions& options) {
   if (options.device != "cpu") {
-    throw InputError(fmt::format("--device {}: this version simulates on the CPU only; allowed: cpu",
-                                 options.device));
+    throw InputError(fmt::format(
+        "--device {}: this version simulates on the CPU only; allowed: cpu", options.device));
   }
   for (const std::string& terms : options.terms) {
     if (std::find(all_terms.begin(), all_terms.end(), terms) == all_terms.end()) {
@@ -152,9 +155,11 @@ void bench_step(const BenchOptions& options) {
                                    did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
     }
   }
-  Table table(options,
-              "terms,precision,threads,phyxels,neighbours,steps_per_s,phyxel_steps_per_s,spread,pairs_per_s,"
-              "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error");
+  Table table(
+      options,
+      "terms,precision,threads,phyxels,neighbours,steps_per_s,phyxel_steps_per_s,spread,pairs_per_"
+      "s,"
+      "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error");
   std::vector<double> copy;
   for (const int threads : options.threads) copy.push_back(copy_bandwidth(threads));
   for (const std::string& terms : options.terms) {
@@ -168,7 +173,8 @@ void bench_step(const BenchOptions& options) {
           const auto backend = make_cpu_backend(model, precision_of(precision), options.threads[t]);
           const double error = force_error(model, *backend);
           // A tenth of the sound step: any speed, no risk.
-          const double dt = 0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
+          const double dt =
+              0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
           Solver solver(*backend, initial_state(model, scene, dt));
           const auto warm = Clock::now();
           int steps = 0;
@@ -185,11 +191,11 @@ void bench_step(const BenchOptions& options) {
           std::size_t memory = 0;
           for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
           const double traffic = static_cast<double>(backend->step_traffic());
-          table.row(fmt::format("{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e}",
-                                terms, precision, options.threads[t], model.size(), pairs / n, median,
-                                median * n, (rate.back() - rate.front()) / median, median * 2 * pairs,
-                                traffic / n, median * traffic, copy[t],
-                                static_cast<double>(memory) / n, error));
+          table.row(fmt::format(
+              "{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e}",
+              terms, precision, options.threads[t], model.size(), pairs / n, median, median * n,
+              (rate.back() - rate.front()) / median, median * 2 * pairs, traffic / n,
+              median * traffic, copy[t], static_cast<double>(memory) / n, error));
         }
       }
     }
@@ -197,7 +203,9 @@ void bench_step(const BenchOptions& options) {
 }
 
 void bench_neighbours(const BenchOptions& options) {
-  Table table(options, "threads,phyxels,neighbours,spacing_us_per_phyxel,search_us_per_phyxel,transpose_us_per_phyxel");
+  Table table(options,
+              "threads,phyxels,neighbours,spacing_us_per_phyxel,search_us_per_phyxel,transpose_us_"
+              "per_phyxel");
   for (const int threads : options.threads) {
     omp_set_num_threads(threads);
     for (const Index size : options.sizes) {
@@ -205,7 +213,8 @@ void bench_neighbours(const BenchOptions& options) {
       const double n = static_cast<double>(cloud.position.size());
       std::vector<double> spacing_time, search_time, transpose_time;
       double pairs = 0;
-      for (int repeat = 0; repeat < std::max(1, size > 3'000'000 ? 1 : options.repeats / 2); ++repeat) {
+      for (int repeat = 0; repeat < std::max(1, size > 3'000'000 ? 1 : options.repeats / 2);
+           ++repeat) {
         auto start = Clock::now();
         const std::vector<double> spacing = mean_spacing(cloud.position, 10);
         spacing_time.push_back(seconds_since(start));
@@ -221,8 +230,9 @@ void bench_neighbours(const BenchOptions& options) {
         std::sort(times.begin(), times.end());
         return times[times.size() / 2] / n * 1e6;
       };
-      table.row(fmt::format("{},{},{:.1f},{:.3f},{:.3f},{:.3f}", threads, cloud.position.size(), pairs / n,
-                            median(spacing_time), median(search_time), median(transpose_time)));
+      table.row(fmt::format("{},{},{:.1f},{:.3f},{:.3f},{:.3f}", threads, cloud.position.size(),
+                            pairs / n, median(spacing_time), median(search_time),
+                            median(transpose_time)));
     }
   }
 }
@@ -235,17 +245,24 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
   options->terms = all_terms;
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
-      ->delimiter(',')->check(CLI::Range(8, 100'000'000));
+      ->delimiter(',')
+      ->check(CLI::Range(8, 100'000'000));
   command->add_option("--threads", options->threads, "Thread counts, comma separated")
-      ->delimiter(',')->check(CLI::Range(1, 4096));
+      ->delimiter(',')
+      ->check(CLI::Range(1, 4096));
   command->add_option("--csv", options->csv, "Also write the table to this file");
-  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")->check(CLI::Range(1, 1000));
+  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
+      ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the CSV file");
   if (std::string(name) == "step") {
     command->add_option("--device", options->device, "cpu");
     command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
-    command->add_option("--terms", options->terms, "Term sets: green, cauchy, volume, damping, load, adaptive")->delimiter(',');
-    command->add_option("--seconds", options->seconds, "Length of one repeat [s]")->check(CLI::Range(0.01, 60.0));
+    command
+        ->add_option("--terms", options->terms,
+                     "Term sets: green, cauchy, volume, damping, load, adaptive")
+        ->delimiter(',');
+    command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
+        ->check(CLI::Range(0.01, 60.0));
   }
   command->callback([options, body] { body(*options); });
   return command;
@@ -258,7 +275,8 @@ void add_bench(CLI::App& program) {
   bench->require_subcommand(1);
   add_bench_of(*bench, "step", "Time steps per second of a jittered cube, per term and precision",
                {1000, 10648, 103823, 1000000}, bench_step);
-  add_bench_of(*bench, "neighbours", "Neighbour search: time per phyxel against the number of phyxels",
+  add_bench_of(*bench, "neighbours",
+               "Neighbour search: time per phyxel against the number of phyxels",
                {10648, 103823, 1000000, 9938375}, bench_neighbours);
 }
 

@@ -6,8 +6,8 @@
 
 #include "command.hpp"
 #include "files/hdf5_file.hpp"
-#include "phyxel/phyxel.hpp"
 #include "files/sealed_file.hpp"
+#include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 
 namespace phyxel::app {

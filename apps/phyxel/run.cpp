@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
@@ -11,15 +10,11 @@
 #include "progress.hpp"
 #include "setup.hpp"
 #include "stop_signal.hpp"
+#include "stopwatch.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 struct RunOptions {
   Overrides overrides;
@@ -248,7 +243,8 @@ class Run {
       return;
     }
     fmt::print(
-        "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s with "
+        "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
+        "with "
         "output; {:.0f} bytes per phyxel\n",
         steps / step_seconds_, steps * model_.size() / step_seconds_, step_seconds_, loop_seconds_,
         static_cast<double>(bytes) / std::max(1, model_.size()));

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +9,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "stopwatch.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -109,7 +109,7 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
 }
 
 void sample(const SampleOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const SampleRequest request = request_of(options);
   check_output(options);
   const Surface surface = read_mesh(options.mesh);
@@ -121,8 +121,7 @@ void sample(const SampleOptions& options) {
     throw InputError(fmt::format("{}: {}", options.mesh.string(), error.what()));
   }
   write_body(options.out, cloud, options.force);
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   (options.json ? say_json : say_summary)(options, cloud, report, seconds);
 }
 

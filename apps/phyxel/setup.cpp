@@ -12,7 +12,8 @@ namespace {
 
 std::string terms_of(const Material& m) {
   std::string terms = m.strain == Strain::green ? "Green strain" : "Cauchy strain";
-  if (m.volume_stiffness > 0) terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
+  if (m.volume_stiffness > 0)
+    terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
   return terms;
 }
@@ -33,9 +34,12 @@ std::string neighbours_of(const Model& model, const Part& part) {
 
 const char* precision_name(Precision precision) {
   switch (precision) {
-    case Precision::single: return "float";
-    case Precision::double_: return "double";
-    case Precision::mixed: break;
+    case Precision::single:
+      return "float";
+    case Precision::double_:
+      return "double";
+    case Precision::mixed:
+      break;
   }
   return "mixed";
 }
@@ -56,12 +60,11 @@ Scene scene_with(const Overrides& o) {
   if (!o.out.empty()) scene.output.directory = o.out;
   if (!o.device.empty()) scene.solver.device = o.device;
   if (o.device != "" && o.device != "auto" && o.device != "cpu" && o.device != "cuda") {
-    throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda", o.device,
-                                 did_you_mean(o.device, {"auto", "cpu", "cuda"})));
+    throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda",
+                                 o.device, did_you_mean(o.device, {"auto", "cpu", "cuda"})));
   }
   if (scene.solver.device == "cuda") {
-    throw InputError(
-        "device \"cuda\": this version simulates on the CPU only; allowed: auto, cpu");
+    throw InputError("device \"cuda\": this version simulates on the CPU only; allowed: auto, cpu");
   }
   if (o.precision == "float") {
     scene.solver.precision = Precision::single;
@@ -107,10 +110,9 @@ StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step) {
         *scene.time.step, largest, plan.limit.omega_max));
   }
   const double wanted = scene.time.step ? *scene.time.step : scene.time.safety * largest;
-  const double interval =
-      scene.output.frames_per_second > 0
-          ? std::min(1 / scene.output.frames_per_second, scene.time.end)
-          : scene.time.end;
+  const double interval = scene.output.frames_per_second > 0
+                              ? std::min(1 / scene.output.frames_per_second, scene.time.end)
+                              : scene.time.end;
   // The 1e-9 keeps a step that divides the interval from being split for a rounding error.
   plan.steps_per_frame =
       std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(interval / wanted - 1e-9)));
@@ -119,9 +121,9 @@ StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step) {
   const std::string limit_words = fmt::format(
       "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations",
       largest, plan.limit.omega_max, plan.limit.iterations);
-  plan.why = scene.time.step
-                 ? fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words)
-                 : fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest, limit_words);
+  plan.why = scene.time.step ? fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words)
+                             : fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest,
+                                           limit_words);
   return plan;
 }
 
@@ -136,9 +138,10 @@ std::string describe_model(const Scene& scene, const Model& model) {
       mass += model.mass[i];
       volume += model.volume[i];
     }
-    text += fmt::format("  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n",
-                        part.name, part.end - part.begin, part.surfel_end - part.surfel_begin, mass,
-                        volume, part.kernel_volumes ? "kernel" : "geometric");
+    text += fmt::format(
+        "  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n", part.name,
+        part.end - part.begin, part.surfel_end - part.surfel_begin, mass, volume,
+        part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(model, part), part.neighbourhood);
     text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
                         m.poisson, m.density, terms_of(m));
@@ -149,9 +152,11 @@ std::string describe_model(const Scene& scene, const Model& model) {
   Index moved = 0, loaded = 0;
   for (const Motion& motion : model.motions) moved += static_cast<Index>(motion.phyxels.size());
   for (const Load& load : model.loads) loaded += static_cast<Index>(load.phyxels.size());
-  text += fmt::format("  boundary    {} phyxels fixed or moved, {} loaded; gravity [{:g}, {:g}, {:g}] m/s^2\n",
-                      moved, loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
-  for (const std::string& warning : model.warnings) text += fmt::format("  warning     {}\n", warning);
+  text += fmt::format(
+      "  boundary    {} phyxels fixed or moved, {} loaded; gravity [{:g}, {:g}, {:g}] m/s^2\n",
+      moved, loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
+  for (const std::string& warning : model.warnings)
+    text += fmt::format("  warning     {}\n", warning);
   return text;
 }
 

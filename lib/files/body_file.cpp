@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "files/hdf5_file.hpp"
-#include "phyxel/error.hpp"
 #include "files/sealed_file.hpp"
+#include "phyxel/error.hpp"
 #include "version.hpp"
 
 namespace phyxel {

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "files/hdf5_file.hpp"
-#include "phyxel/error.hpp"
 #include "files/sealed_file.hpp"
+#include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {

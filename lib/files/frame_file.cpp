@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "files/hdf5_file.hpp"
-#include "phyxel/error.hpp"
 #include "files/sealed_file.hpp"
+#include "phyxel/error.hpp"
 #include "version.hpp"
 
 namespace phyxel {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "phyxel/error.hpp"
 #include "files/sealed_file.hpp"
+#include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {

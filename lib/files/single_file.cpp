@@ -7,9 +7,9 @@
 #include "files/atomic_file.hpp"
 #include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
+#include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
-#include "files/sealed_file.hpp"
 #include "version.hpp"
 
 namespace phyxel {

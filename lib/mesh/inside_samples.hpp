@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include "phyxel/cloud.hpp"
 #include "mesh/winding_number.hpp"
+#include "phyxel/cloud.hpp"
 
 namespace phyxel {
 

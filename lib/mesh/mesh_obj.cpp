@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "mesh/mesh_formats.hpp"
-#include "phyxel/error.hpp"
 #include "mesh/text_cursor.hpp"
+#include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {

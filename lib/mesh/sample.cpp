@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numeric>
 
-#include "phyxel/error.hpp"
-#include "phyxel/mesh.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/surface_topology.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
 
 namespace phyxel {
 namespace {

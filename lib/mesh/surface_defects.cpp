@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "phyxel/mesh.hpp"
 #include "mesh/surface_topology.hpp"
+#include "phyxel/mesh.hpp"
 
 namespace phyxel {
 

@@ -43,8 +43,8 @@ double enclosed_volume(const Surface& surface) {
   const Vec3d origin = surface.position.empty() ? Vec3d{} : surface.position.front();
   double six_volumes = 0;
   for (const Triangle& t : surface.triangle) {
-    six_volumes += dot(surface.position[t[0]] - origin, cross(surface.position[t[1]] - origin,
-                                                              surface.position[t[2]] - origin));
+    six_volumes += dot(surface.position[t[0]] - origin,
+                       cross(surface.position[t[1]] - origin, surface.position[t[2]] - origin));
   }
   return six_volumes / 6;
 }

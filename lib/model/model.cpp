@@ -6,12 +6,12 @@
 #include <numbers>
 #include <numeric>
 
+#include "model/selection.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
-#include "model/selection.hpp"
 
 namespace phyxel {
 namespace {
@@ -48,7 +48,8 @@ Masses kernel_masses(const Cloud& cloud, const Neighbourhood& hood,
   const std::size_t n = cloud.position.size();
   Masses result{std::vector<double>(n), std::vector<double>(n), true};
   std::vector<double> relative(n);  // kernel density over ρ, for s = 1
-  for (std::size_t i = 0; i < n; ++i) result.mass[i] = spacing[i] * spacing[i] * spacing[i] * density;
+  for (std::size_t i = 0; i < n; ++i)
+    result.mass[i] = spacing[i] * spacing[i] * spacing[i] * density;
 #pragma omp parallel for
   for (std::size_t i = 0; i < n; ++i) {
     const double h = hood.support[i];
@@ -73,9 +74,9 @@ Masses masses_of(const Cloud& cloud, const Neighbourhood& hood, const std::vecto
                       (request.volume_rule == VolumeRule::automatic && cloud.volume.empty());
   if (kernel) {
     if (cloud.position.size() < 2) {
-      throw InputError(fmt::format(
-          "{}: body \"{}\" has a single phyxel: the kernel rule cannot tell its volume",
-          request.where, request.name));
+      throw InputError(
+          fmt::format("{}: body \"{}\" has a single phyxel: the kernel rule cannot tell its volume",
+                      request.where, request.name));
     }
     return kernel_masses(cloud, hood, spacing, request.material.density);
   }
@@ -96,9 +97,10 @@ std::string in_words(const NeighbourhoodRule& rule) {
   if (rule.radius) {
     words = fmt::format("support radius {:g} m", *rule.radius);
   } else {
-    words = fmt::format("{} support, {:g} x the mean distance to the {} nearest",
-                        rule.support == NeighbourhoodRule::Support::uniform ? "uniform" : "adaptive",
-                        rule.factor, rule.nearest);
+    words =
+        fmt::format("{} support, {:g} x the mean distance to the {} nearest",
+                    rule.support == NeighbourhoodRule::Support::uniform ? "uniform" : "adaptive",
+                    rule.factor, rule.nearest);
   }
   if (rule.max_neighbours) words += fmt::format(", at most {} neighbours", *rule.max_neighbours);
   return words;
@@ -106,7 +108,8 @@ std::string in_words(const NeighbourhoodRule& rule) {
 
 void append(Csr& to, const Csr& rows, Index shift) {
   const Offset base = to.entries();
-  for (std::size_t r = 1; r < rows.offsets.size(); ++r) to.offsets.push_back(base + rows.offsets[r]);
+  for (std::size_t r = 1; r < rows.offsets.size(); ++r)
+    to.offsets.push_back(base + rows.offsets[r]);
   to.indices.reserve(to.indices.size() + rows.indices.size());
   for (const Index j : rows.indices) to.indices.push_back(j + shift);
 }
@@ -181,7 +184,8 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& cloud, 
     }
     return shifted(chosen, shift);
   };
-  for (const FixRequest& fix : request.fixed) model.motions.push_back({.phyxels = claim(fix.select)});
+  for (const FixRequest& fix : request.fixed)
+    model.motions.push_back({.phyxels = claim(fix.select)});
   for (const MotionRequest& m : request.motions) {
     model.motions.push_back({.phyxels = claim(m.select),
                              .displacement = m.displacement,
@@ -264,9 +268,10 @@ std::string Degenerate::describe() const {
   const auto add = [&](const char* kind, const std::vector<Index>& which) {
     if (which.empty()) return;
     const std::size_t shown = std::min<std::size_t>(which.size(), 5);
-    kinds.push_back(fmt::format("{} {} ({}{})", which.size(), kind,
-                                fmt::join(which.begin(), which.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
-                                which.size() > shown ? ", ..." : ""));
+    kinds.push_back(fmt::format(
+        "{} {} ({}{})", which.size(), kind,
+        fmt::join(which.begin(), which.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+        which.size() > shown ? ", ..." : ""));
   };
   add("isolated", isolated);
   add("with collinear neighbours", collinear);
@@ -290,9 +295,9 @@ Cloud rest_cloud(const BodySource& source) {
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
     try {
-      return sample_surface(surface, {.phyxels = source.phyxels,
-                                      .seed = source.seed,
-                                      .relaxations = source.relaxations});
+      return sample_surface(
+          surface,
+          {.phyxels = source.phyxels, .seed = source.seed, .relaxations = source.relaxations});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }

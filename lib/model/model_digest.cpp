@@ -17,7 +17,7 @@ void add(XXH3_state_t* state, const std::vector<T>& values) {
 
 std::uint64_t model_digest(const Model& model) {
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
-                                                                      &XXH3_freeState);
+                                                                       &XXH3_freeState);
   XXH3_64bits_reset(state.get());
   add(state.get(), model.position);
   add(state.get(), model.mass);
@@ -26,8 +26,8 @@ std::uint64_t model_digest(const Model& model) {
   add(state.get(), model.neighbourhood.neighbours.indices);
   for (const Part& part : model.parts) {
     const Material& m = part.material;
-    add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness, m.damping,
-                                         m.strain == Strain::green ? 1.0 : 0.0});
+    add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
+                                         m.damping, m.strain == Strain::green ? 1.0 : 0.0});
   }
   for (const Motion& motion : model.motions) add(state.get(), motion.phyxels);
   for (const Load& load : model.loads) {

@@ -24,8 +24,9 @@ std::vector<Index> of_region(const Selection& selection, const Cloud& cloud,
   if (found != cloud.regions.end()) return found->second;
   std::vector<std::string> names;
   for (const auto& [name, members] : cloud.regions) names.push_back(name);
-  throw InputError(fmt::format("{}: body \"{}\" has no region \"{}\"{}; it has: {}", selection.where,
-                               body, *selection.region, did_you_mean(*selection.region, names),
+  throw InputError(fmt::format("{}: body \"{}\" has no region \"{}\"{}; it has: {}",
+                               selection.where, body, *selection.region,
+                               did_you_mean(*selection.region, names),
                                names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
 }
 

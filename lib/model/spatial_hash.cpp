@@ -46,8 +46,9 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
 
 int SpatialHash::farthest_ring(Vec3d place) const {
   const Cell c = cell_of(place), a = cell_of(low_), b = cell_of(high_);
-  return static_cast<int>(std::max({std::abs(c.x - a.x), std::abs(b.x - c.x), std::abs(c.y - a.y),
-                                    std::abs(b.y - c.y), std::abs(c.z - a.z), std::abs(b.z - c.z)}));
+  return static_cast<int>(
+      std::max({std::abs(c.x - a.x), std::abs(b.x - c.x), std::abs(c.y - a.y), std::abs(b.y - c.y),
+                std::abs(c.z - a.z), std::abs(b.z - c.z)}));
 }
 
 }  // namespace phyxel

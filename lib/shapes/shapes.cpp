@@ -8,9 +8,9 @@
 #include <fstream>
 #include <limits>
 
+#include "phyxel/error.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "shapes/paper_bodies.hpp"
-#include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {

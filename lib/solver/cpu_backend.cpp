@@ -1,7 +1,8 @@
 /// The CPU backend: two passes over the neighbour lists, W phyxels at a time.
 ///
 /// Memory moved per phyxel and step, float, k neighbours, one body with symmetric lists:
-///   pass 1 reads  one 32-byte record (X, 1/h², u) per neighbour, mostly from cache, 4 k of indices,
+///   pass 1 reads  one 32-byte record (X, 1/h², u) per neighbour, mostly from cache, 4 k of
+///   indices,
 ///          24 of A⁻¹, 4 of v, and writes 36 of a 64-byte record (Q beside X, 1/h²);
 ///   pass 2 reads  one 64-byte record per neighbour, mostly from cache, 4 k of indices, 12 of b,
 ///          4 of 1/m, reads and writes 24 of (u, v) and writes 12 of the first record.
@@ -10,8 +11,6 @@
 
 #include <cmath>
 
-#include "solver/cpu_layout.hpp"
-#include "solver/pack.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/strain.hpp"
@@ -19,6 +18,8 @@
 #include "phyxel/physics/surfel.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "solver/cpu_layout.hpp"
+#include "solver/pack.hpp"
 
 namespace phyxel {
 namespace {
@@ -47,7 +48,8 @@ class CpuBackend final : public Backend {
         layout_(model, W),
         runs_(find_runs()),
         lists_(model.neighbourhood.neighbours, layout_) {
-    if (!model.neighbourhood.symmetric) inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
+    if (!model.neighbourhood.symmetric)
+      inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
     const auto slots = static_cast<std::size_t>(layout_.slots());
     points_.assign(slots * PointRecord::size, Real(0));
     stresses_.assign(slots * StressRecord::size, Real(0));
@@ -63,7 +65,9 @@ class CpuBackend final : public Backend {
   }
 
   std::string name() const override {
-    const char* precision = sizeof(Real) == 8 ? "double" : sizeof(StateReal) == 8 ? "mixed" : "float";
+    const char* precision = sizeof(Real) == 8        ? "double"
+                            : sizeof(StateReal) == 8 ? "mixed"
+                                                     : "float";
     int used = 1;  // small bodies leave threads alone
     for (const Run& run : runs_) used = std::max(used, threads_for(run.range));
     return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, used, used == 1 ? "" : "s", W);
@@ -71,7 +75,8 @@ class CpuBackend final : public Backend {
   Index size() const override { return model_.size(); }
 
   void upload(const State& state) override {
-    for (Index i = 0; i < model_.size(); ++i) set_state(i, state.displacement[i], state.velocity[i]);
+    for (Index i = 0; i < model_.size(); ++i)
+      set_state(i, state.displacement[i], state.velocity[i]);
   }
 
   void download(State& state) const override {
@@ -176,7 +181,8 @@ class CpuBackend final : public Backend {
 
   std::size_t step_traffic() const override {
     const auto slots = static_cast<std::size_t>(layout_.slots());
-    const std::size_t pass_1 = lists_.bytes() + slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real);
+    const std::size_t pass_1 =
+        lists_.bytes() + slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real);
     const std::size_t pass_2 =
         (inverse_.start.empty() ? lists_ : inverse_).bytes() +
         slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
@@ -189,7 +195,8 @@ class CpuBackend final : public Backend {
 
   /// Pass 1: ∇u of the phyxels of pack p.
   PHYXEL_HD Mat3<P> displacement_gradient_of(Index p) const {
-    const Vec3<P> x_i = point_of(p, PointRecord::position), u_i = point_of(p, PointRecord::displacement);
+    const Vec3<P> x_i = point_of(p, PointRecord::position),
+                  u_i = point_of(p, PointRecord::displacement);
     const P inverse_h_squared = own_point_value(p, PointRecord::inverse_h_squared);
     Mat3<P> sum;
     const Index* end = lists_.indices.data() + lists_.start[p + 1];
@@ -261,7 +268,8 @@ class CpuBackend final : public Backend {
       const Vec3<P> f_over_m = load<P>(&inverse_mass_[p * W]) * force;
       const Vec3<S> acceleration =
           Vec3<S>{convert<StateReal>(f_over_m.x), convert<StateReal>(f_over_m.y),
-                  convert<StateReal>(f_over_m.z)} + gravity;
+                  convert<StateReal>(f_over_m.z)} +
+          gravity;
       Vec3<S> velocity = vec3_of<S>(velocity_, p);
       if constexpr (Damped) {
         velocity = verlet_velocity_damped(velocity, acceleration, keep, gain);
@@ -293,17 +301,20 @@ class CpuBackend final : public Backend {
       const PackRange range = run.range;
       if (m.strain == Strain::green) {
         const GreenHooke<P> law{hooke};
-        m.volume_stiffness > 0 ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
-                               : apply(law, range);
+        m.volume_stiffness > 0
+            ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
+            : apply(law, range);
       } else {
         const CauchyHooke<P> law{hooke};
-        m.volume_stiffness > 0 ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
-                               : apply(law, range);
+        m.volume_stiffness > 0
+            ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
+            : apply(law, range);
       }
     }
   }
 
-  // --- arrays: [pack][component][lane] ------------------------------------------------------------
+  // --- arrays: [pack][component][lane]
+  // ------------------------------------------------------------
 
   template <class Q, class T>
   PHYXEL_HD static Vec3<Q> vec3_of(const AlignedVector<T>& array, Index p) {
@@ -338,7 +349,8 @@ class CpuBackend final : public Backend {
             phyxel::load<P>(at + 3 * W), phyxel::load<P>(at + 4 * W), phyxel::load<P>(at + 5 * W)};
   }
 
-  // --- records --------------------------------------------------------------------------------------
+  // --- records
+  // --------------------------------------------------------------------------------------
 
   PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
     return {record[first], record[first + 1], record[first + 2]};
@@ -354,7 +366,8 @@ class CpuBackend final : public Backend {
     return value;
   }
   PHYXEL_HD Vec3<P> point_of(Index p, int first) const {
-    return {own_point_value(p, first), own_point_value(p, first + 1), own_point_value(p, first + 2)};
+    return {own_point_value(p, first), own_point_value(p, first + 1),
+            own_point_value(p, first + 2)};
   }
   PHYXEL_HD void store_pair_stress(Index p, const Mat3<P>& q) {
     for (int l = 0; l < W; ++l) {
@@ -363,7 +376,8 @@ class CpuBackend final : public Backend {
     }
   }
 
-  // --- set-up and lists -------------------------------------------------------------------------------
+  // --- set-up and lists
+  // -------------------------------------------------------------------------------
 
   /// Packs what does not change of one body. Positions are taken from the body's first phyxel, so
   /// that a body far from the origin keeps its digits in float.
@@ -424,11 +438,11 @@ class CpuBackend final : public Backend {
   int threads_;
   Layout layout_;
   std::vector<Run> runs_;
-  PackedLists lists_, inverse_;             // inverse_ is empty when lists_ is its own inverse
-  AlignedVector<Real> points_, stresses_;   // records, by slot
+  PackedLists lists_, inverse_;            // inverse_ is empty when lists_ is its own inverse
+  AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
-  AlignedVector<Real> load_;                // empty unless the scene has loads
+  AlignedVector<Real> load_;  // empty unless the scene has loads
   double load_scales_ = -1;
 };
 
@@ -436,9 +450,12 @@ class CpuBackend final : public Backend {
 
 std::unique_ptr<Backend> make_cpu_backend(const Model& model, Precision precision, int threads) {
   switch (precision) {
-    case Precision::single: return std::make_unique<CpuBackend<float, float>>(model, threads);
-    case Precision::mixed: return std::make_unique<CpuBackend<float, double>>(model, threads);
-    case Precision::double_: break;
+    case Precision::single:
+      return std::make_unique<CpuBackend<float, float>>(model, threads);
+    case Precision::mixed:
+      return std::make_unique<CpuBackend<float, double>>(model, threads);
+    case Precision::double_:
+      break;
   }
   return std::make_unique<CpuBackend<double, double>>(model, threads);
 }

@@ -22,7 +22,9 @@ struct AlignedAllocator {
   T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
   void deallocate(T* p, std::size_t) { ::operator delete(p, alignment); }
   template <class U>
-  bool operator==(const AlignedAllocator<U>&) const { return true; }
+  bool operator==(const AlignedAllocator<U>&) const {
+    return true;
+  }
 };
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
@@ -72,7 +74,7 @@ class Layout {
 /// indices[start[p] + k * width ...]. Short rows are filled with the phyxel itself, whose share of
 /// every sum is exactly zero (x_ii = 0, u_ii = 0).
 struct PackedLists {
-  std::vector<Offset> start;      ///< shape [packs + 1]
+  std::vector<Offset> start;  ///< shape [packs + 1]
   AlignedVector<Index> indices;
 
   PackedLists() = default;

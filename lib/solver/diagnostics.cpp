@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "phyxel/error.hpp"
-
 #include "phyxel/physics/stress.hpp"
 
 namespace phyxel {
@@ -138,7 +137,8 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start)
 void StabilityWatch::check(const Diagnostics& now) {
   const auto body_of = [&](Index i) {
     for (const Part& part : model_.parts) {
-      if (i >= part.begin && i < part.end) return fmt::format("phyxel {} of body \"{}\"", i - part.begin, part.name);
+      if (i >= part.begin && i < part.end)
+        return fmt::format("phyxel {} of body \"{}\"", i - part.begin, part.name);
     }
     return std::string("no phyxel");
   };

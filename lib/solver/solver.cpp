@@ -115,10 +115,10 @@ StepLimit step_limit(const Model& model, int threads) {
     current = next / beta;
   }
   if (!(limit.omega_max > 0) || !std::isfinite(limit.omega_max)) {
-    throw InputError(fmt::format(
-        "nothing in this model resists deformation (largest eigenfrequency {}): {}",
-        limit.omega_max,
-        model.degenerate.none() ? "check the material" : model.degenerate.describe()));
+    throw InputError(
+        fmt::format("nothing in this model resists deformation (largest eigenfrequency {}): {}",
+                    limit.omega_max,
+                    model.degenerate.none() ? "check the material" : model.degenerate.describe()));
   }
   limit.largest_step = 2 / limit.omega_max;
   return limit;
@@ -167,8 +167,8 @@ Solver::Solver(Backend& backend, const State& start)
 }
 
 void Solver::step() {
-  backend_.stress();                // u -> ∇u -> ε -> σ -> Q
-  backend_.advance(time(), dt_);    // gather of Q -> f -> loads -> Verlet -> u⁺
+  backend_.stress();              // u -> ∇u -> ε -> σ -> Q
+  backend_.advance(time(), dt_);  // gather of Q -> f -> loads -> Verlet -> u⁺
   ++steps_;
 }
 

@@ -13,11 +13,13 @@
 
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/recorder.hpp"
+#include "support/folder.hpp"
 
 namespace phyxel {
 namespace {
 
 namespace fs = std::filesystem;
+using test::text_of;
 using ::testing::HasSubstr;
 
 struct Outcome {
@@ -25,27 +27,8 @@ struct Outcome {
   std::string out, err;
 };
 
-std::string text_of(const fs::path& file) {
-  std::ifstream in(file);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-class Program : public ::testing::Test {
+class Program : public test::Folder {
  protected:
-  Program() {
-    folder_ = fs::temp_directory_path() /
-              ("phyxel_program_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~Program() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-
   /// Starts the program in the test's folder; its output goes to files.
   pid_t start(const std::vector<std::string>& arguments) const {
     const pid_t child = fork();
@@ -66,9 +49,6 @@ class Program : public ::testing::Test {
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
 
-  void write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name) << text;
-  }
   /// A small beam that swings; `end` seconds, `extra` goes on top of the file.
   void write_beam(const std::string& end = "0.2", const std::string& extra = "") const {
     write("beam.toml", extra + R"(
@@ -92,8 +72,6 @@ density = 1000
 region = "x-"
 )");
   }
-
-  fs::path folder_;
 };
 
 TEST_F(Program, RunsASceneAndWritesWhatItSays) {
@@ -136,8 +114,12 @@ State final_state(const fs::path& directory) {
   return file ? read_checkpoint(*file).state : State{};
 }
 
-TEST_F(Program, StoppedBySigtermAndResumedIsBitwiseTheWholeRun) {
-  for (const std::string precision : {"float", "double", "mixed"}) {
+TEST_F(Program, StoppedByASignalAndResumedIsBitwiseTheWholeRun) {
+  const struct {
+    std::string precision;
+    int signal;
+  } cases[] = {{"float", SIGTERM}, {"double", SIGINT}, {"mixed", SIGTERM}};
+  for (const auto& [precision, signal] : cases) {
     write_beam("1.5");
     const std::string whole = "whole_" + precision, parts = "parts_" + precision;
     ASSERT_EQ(run({"run", "beam.toml", "--out", whole, "--precision", precision}).code, 0);
@@ -145,7 +127,7 @@ TEST_F(Program, StoppedBySigtermAndResumedIsBitwiseTheWholeRun) {
     for (int wait = 0; wait < 1000 && !fs::exists(folder_ / parts / "phyxels_000003.hdf"); ++wait) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    kill(child, SIGTERM);
+    kill(child, signal);
     const Outcome stopped = finish(child);
     ASSERT_EQ(stopped.code, 75) << stopped.out << stopped.err;
     EXPECT_THAT(stopped.err, HasSubstr("--resume auto"));
@@ -212,7 +194,9 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
   write("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   write("ok.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   write("kept.h5", "precious");
-  write("bad.toml", "[time]\nend = 1\n[[body]]\nshape = \"dinno\"\n[body.material]\nyoung = 1\npoisson = 0.3\ndensity = 1\n");
+  write("bad.toml",
+        "[time]\nend = 1\n[[body]]\nshape = \"dinno\"\n[body.material]\nyoung = 1\npoisson = "
+        "0.3\ndensity = 1\n");
   write("broken.toml", "[time\nend = 1\n");
   const struct {
     std::vector<std::string> arguments;
@@ -274,22 +258,63 @@ density = 1000
   EXPECT_THAT(outcome.err, HasSubstr("memory"));
 }
 
-TEST_F(Program, ADiskThatFillsUpEndsTheRunCleanly) {
-  const fs::path disk = folder_ / "disk";
-  fs::create_directories(disk);
-  const std::string mount = "mount -t tmpfs -o size=600k tmpfs " + disk.string() + " 2>/dev/null";
-  if (std::system(mount.c_str()) != 0) GTEST_SKIP() << "mounting a small disk is not permitted here";
+/// A file system of its own, unmounted at the end.
+class SmallDisk {
+ public:
+  SmallDisk(const fs::path& folder, const std::string& size) : folder_(folder) {
+    fs::create_directories(folder);
+    const std::string options = "-o size=" + size + " tmpfs ";
+    mounted_ =
+        std::system(("mount -t tmpfs " + options + folder.string() + " 2>/dev/null").c_str()) == 0;
+  }
+  ~SmallDisk() {
+    if (!mounted_) return;
+    EXPECT_EQ(std::system(("umount " + folder_.string()).c_str()), 0);
+  }
+  bool mounted() const { return mounted_; }
+
+ private:
+  fs::path folder_;
+  bool mounted_ = false;
+};
+
+TEST_F(Program, ADiskTooSmallForTheRunIsRefusedBeforeItStarts) {
+  const SmallDisk disk(folder_ / "disk", "600k");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a small disk is not permitted here";
   write_beam("4");
   const Outcome outcome = run({"run", "beam.toml", "--out", "disk/out"});
-  EXPECT_TRUE(outcome.code == 74 || outcome.code == 2) << outcome.code << outcome.err;
+  EXPECT_EQ(outcome.code, 2) << outcome.out;
   EXPECT_THAT(outcome.err, HasSubstr("disk/out"));
-  // Whatever was finished before is still readable.
-  if (fs::exists(disk / "out" / "phyxels.hdf.series")) {
-    for (const SeriesEntry& entry : read_series(disk / "out" / "phyxels.hdf.series")) {
-      EXPECT_NO_THROW(read_frame(entry.file));
+  EXPECT_THAT(outcome.err, HasSubstr("are needed"));
+}
+
+TEST_F(Program, ADiskThatFillsUpEndsTheRunAndSpoilsNothing) {
+  const SmallDisk disk(folder_ / "disk", "100m");
+  if (!disk.mounted()) GTEST_SKIP() << "mounting a small disk is not permitted here";
+  write_beam("20");
+  const fs::path out = folder_ / "disk" / "out";
+  const pid_t child = start({"run", "beam.toml", "--out", "disk/out"});
+  for (int wait = 0; wait < 2000 && !fs::exists(out / "surface_000003.hdf"); ++wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  {
+    std::ofstream filler(folder_ / "disk" / "filler", std::ios::binary);
+    const std::string block(1 << 16, 'x');
+    while (filler.write(block.data(), static_cast<std::streamsize>(block.size()))) {
     }
   }
-  EXPECT_EQ(std::system(("umount " + disk.string()).c_str()), 0);
+  const Outcome outcome = finish(child);
+  EXPECT_EQ(outcome.code, 74) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("disk/out"));
+  EXPECT_THAT(outcome.err, HasSubstr("No space left"));
+  // Whatever the series lists was finished before and is whole; the log has its line.
+  const auto series = read_series(out / "phyxels.hdf.series");
+  EXPECT_GE(series.size(), 3u);
+  for (const SeriesEntry& entry : series) EXPECT_NO_THROW(read_frame(entry.file));
+  for (const SeriesEntry& entry : read_series(out / "surface.hdf.series")) {
+    EXPECT_NO_THROW(read_frame(entry.file));
+  }
+  EXPECT_EQ(text_of(out / "energy.csv").back(), '\n');
 }
 
 TEST_F(Program, SamplesAMeshAndRunsIt) {

@@ -11,6 +11,7 @@
 #include "ball.hpp"
 #include "picture.hpp"
 #include "png_file.hpp"
+#include "support/folder.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -96,19 +97,8 @@ TEST(Picture, BodiesHaveTheirOwnColours) {
 
 // --- files -------------------------------------------------------------------------------------
 
-class Files : public ::testing::Test {
+class Files : public test::Folder {
  protected:
-  Files() {
-    folder_ = fs::temp_directory_path() /
-              ("phyxel_render_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~Files() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
   static Image read_png(const fs::path& file) {
     png_image png = {};
     png.version = PNG_IMAGE_VERSION;
@@ -127,7 +117,6 @@ class Files : public ::testing::Test {
     std::sort(names.begin(), names.end());
     return names;
   }
-  fs::path folder_;
 };
 
 TEST_F(Files, APngHoldsExactlyThePixels) {

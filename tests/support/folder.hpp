@@ -32,7 +32,8 @@ class Folder : public ::testing::Test {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
   }
-  std::filesystem::path write(const std::string& name, const std::string& text) const {
+  std::filesystem::path write(const std::string& name, const std::string& text = "") const {
+    std::filesystem::create_directories((folder_ / name).parent_path());
     std::ofstream(folder_ / name, std::ios::binary) << text;
     return folder_ / name;
   }

@@ -88,8 +88,8 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const M3 g = grad_u(b, u, i), e = strain(b, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    total += b.v[i] * (0.5 * e.cwiseProduct(stress(b, e)).sum() +
-                       0.5 * b.volume_stiffness * dj * dj);
+    total +=
+        b.v[i] * (0.5 * e.cwiseProduct(stress(b, e)).sum() + 0.5 * b.volume_stiffness * dj * dj);
   }
   return total;
 }

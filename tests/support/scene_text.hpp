@@ -1,27 +1,18 @@
 /// Pieces of scene files, and what is said about them.
 #pragma once
 
-#include <gtest/gtest.h>
-#include <unistd.h>
-
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include "phyxel/error.hpp"
 #include "phyxel/scene.hpp"
+#include "support/folder.hpp"
 
 namespace phyxel {
 
 namespace fs = std::filesystem;
 
-inline std::string text_of(const fs::path& file) {
-  std::ifstream in(file);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
+using test::text_of;
 
 inline std::string message_of(const std::string& text, const fs::path& file = "scene.toml") {
   try {
@@ -32,27 +23,7 @@ inline std::string message_of(const std::string& text, const fs::path& file = "s
   return "accepted";
 }
 
-/// A folder that is gone after the test.
-class SceneFiles : public ::testing::Test {
- protected:
-  SceneFiles() {
-    folder_ = fs::temp_directory_path() /
-              ("phyxel_scene_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~SceneFiles() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  fs::path write(const std::string& name, const std::string& text = "") const {
-    fs::create_directories((folder_ / name).parent_path());
-    std::ofstream(folder_ / name) << text;
-    return folder_ / name;
-  }
-  fs::path folder_;
-};
+class SceneFiles : public test::Folder {};
 
 inline const std::string time_section = "[time]\nend = 1\n";  // 2 lines
 inline const std::string beam =

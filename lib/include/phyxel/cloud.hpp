@@ -14,9 +14,9 @@ using Triangle = std::array<Index, 3>;
 
 /// A triangulated surface. As part of a `Cloud` its vertices are the surfels.
 struct Surface {
-  std::vector<Vec3d> position;      ///< Vertex positions [m], shape [n_surfels, 3].
-  std::vector<Vec3d> normal;        ///< Outward unit normals, shape [n_surfels, 3].
-  std::vector<Triangle> triangle;   ///< Vertex indices, counter-clockwise seen from outside.
+  std::vector<Vec3d> position;     ///< Vertex positions [m], shape [n_surfels, 3].
+  std::vector<Vec3d> normal;       ///< Outward unit normals, shape [n_surfels, 3].
+  std::vector<Triangle> triangle;  ///< Vertex indices, counter-clockwise seen from outside.
 };
 
 /// Rest points of one body, in the caller's order.

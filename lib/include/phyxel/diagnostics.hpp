@@ -33,8 +33,8 @@ class StabilityWatch {
  private:
   const Model& model_;
   double start_energy_;
-  double exchanged_ = 0;   // largest kinetic + elastic energy of a state found good [J]
-  double speed_limit_ = 0; // [m/s]
+  double exchanged_ = 0;    // largest kinetic + elastic energy of a state found good [J]
+  double speed_limit_ = 0;  // [m/s]
   bool conservative_;
 };
 

@@ -12,10 +12,10 @@ namespace phyxel {
 /// Exit codes of the program; documented in `phyxel --help`.
 enum class ExitCode : int {
   success = 0,
-  bad_input = 2,     ///< a file, key or option is wrong; nothing was computed or overwritten
-  diverged = 3,      ///< NaN or runaway energy; the last good state is on disk
-  output_failed = 74,///< writing failed during the run (disk full); earlier files are intact
-  stopped = 75,      ///< a signal ended the run; the checkpoint lets it go on
+  bad_input = 2,       ///< a file, key or option is wrong; nothing was computed or overwritten
+  diverged = 3,        ///< NaN or runaway energy; the last good state is on disk
+  output_failed = 74,  ///< writing failed during the run (disk full); earlier files are intact
+  stopped = 75,        ///< a signal ended the run; the checkpoint lets it go on
 };
 
 /// Base of every error phyxel throws on purpose. `what()` is the whole message for the user.

@@ -11,12 +11,13 @@ enum class Strain { green, cauchy };
 
 /// Isotropic Hookean material, one per body.
 struct Material {
-  double young = 0;             ///< Young's modulus E [Pa], > 0.
-  double poisson = 0;           ///< Poisson's ratio, -1 < nu < 0.5.
-  double density = 0;           ///< [kg/m^3], > 0.
+  double young = 0;    ///< Young's modulus E [Pa], > 0.
+  double poisson = 0;  ///< Poisson's ratio, -1 < nu < 0.5.
+  double density = 0;  ///< [kg/m^3], > 0.
   Strain strain = Strain::green;
-  double volume_stiffness = 0;  ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
-  double damping = 0;           ///< Mass-proportional damping [1/s]; 0: none.
+  double volume_stiffness =
+      0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
+  double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
 
   /// Lamé's first parameter [Pa].
   double lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }

@@ -17,24 +17,24 @@ Surface read_mesh(const std::filesystem::path& file);
 
 /// What is wrong with a surface, by count and place.
 struct SurfaceDefects {
-  Index open_edges = 0;           ///< Edges with one triangle: holes.
-  Index crowded_edges = 0;        ///< Edges with more than two triangles.
-  Index flipped_edges = 0;        ///< Edges whose two triangles disagree on the outside.
-  Index degenerate_triangles = 0; ///< Triangles without area.
+  Index open_edges = 0;            ///< Edges with one triangle: holes.
+  Index crowded_edges = 0;         ///< Edges with more than two triangles.
+  Index flipped_edges = 0;         ///< Edges whose two triangles disagree on the outside.
+  Index degenerate_triangles = 0;  ///< Triangles without area.
   Index unused_vertices = 0;
-  Index parts = 0;                ///< Connected parts.
-  bool inside_out = false;        ///< The enclosed volume is negative.
-  Vec3d example;                  ///< Midpoint of one defective edge or triangle [m].
+  Index parts = 0;          ///< Connected parts.
+  bool inside_out = false;  ///< The enclosed volume is negative.
+  Vec3d example;            ///< Midpoint of one defective edge or triangle [m].
   bool clean() const;
-  std::string describe() const;   ///< One line for the user.
+  std::string describe() const;  ///< One line for the user.
 };
 SurfaceDefects inspect_surface(const Surface& surface);
 
 /// How a surface is filled with phyxels.
 struct SampleRequest {
-  Index phyxels = 0;        ///< Exact number of phyxels.
-  std::uint64_t seed = 1;   ///< The same seed gives the same cloud on any number of threads.
-  int relaxations = 30;     ///< Sweeps of the relaxation (Lloyd); 0: none.
+  Index phyxels = 0;       ///< Exact number of phyxels.
+  std::uint64_t seed = 1;  ///< The same seed gives the same cloud on any number of threads.
+  int relaxations = 30;    ///< Sweeps of the relaxation (Lloyd); 0: none.
 };
 
 /// What sampling found out.

@@ -28,7 +28,7 @@ struct Degenerate {
   std::vector<Index> coplanar;    ///< Rank 2.
   std::vector<Index> coincident;  ///< At the same place as another phyxel.
   bool none() const;
-  std::string describe() const;   ///< Counts and the first few indices of each kind.
+  std::string describe() const;  ///< Counts and the first few indices of each kind.
 };
 
 /// Phyxels that follow a path. Fixed phyxels are a motion with every term zero.
@@ -45,34 +45,35 @@ struct Motion {
 /// Constant forces on some phyxels, grown over `ramp` seconds.
 struct Load {
   std::vector<Index> phyxels;
-  std::vector<Vec3d> force;   ///< [N], shape [phyxels]
-  double ramp = 0;            ///< [s]
+  std::vector<Vec3d> force;  ///< [N], shape [phyxels]
+  double ramp = 0;           ///< [s]
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
 
 /// Surfels and the phyxels that carry each.
 struct Surfels {
-  std::vector<Vec3d> position;      ///< At rest [m], shape [n_surfels, 3].
-  std::vector<Vec3d> normal;        ///< At rest, unit.
+  std::vector<Vec3d> position;  ///< At rest [m], shape [n_surfels, 3].
+  std::vector<Vec3d> normal;    ///< At rest, unit.
   std::vector<Triangle> triangle;
-  Csr carriers;                     ///< Row s: phyxels near surfel s.
-  Index unreached = 0;              ///< Surfels outside every support, carried by the nearest phyxel.
+  Csr carriers;         ///< Row s: phyxels near surfel s.
+  Index unreached = 0;  ///< Surfels outside every support, carried by the nearest phyxel.
 };
 
 /// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never
 /// neighbour each other. Immutable after `build_model`; host memory, double precision.
 struct Model {
   std::vector<Part> parts;
-  std::vector<Vec3d> position;        ///< Rest positions X [m], shape [n, 3].
-  std::vector<double> volume;         ///< v [m^3], shape [n].
-  std::vector<double> mass;           ///< m [kg], shape [n].
-  std::vector<Sym3d> inverse_moment;  ///< Pseudo-inverse of A_i = sum_j w_ij x_ij x_ij^T, shape [n].
-  std::vector<Vec3d> moment_offset;   ///< b_i = sum_j w_ij x_ij, shape [n, 3].
+  std::vector<Vec3d> position;  ///< Rest positions X [m], shape [n, 3].
+  std::vector<double> volume;   ///< v [m^3], shape [n].
+  std::vector<double> mass;     ///< m [kg], shape [n].
+  std::vector<Sym3d>
+      inverse_moment;                ///< Pseudo-inverse of A_i = sum_j w_ij x_ij x_ij^T, shape [n].
+  std::vector<Vec3d> moment_offset;  ///< b_i = sum_j w_ij x_ij, shape [n, 3].
   Neighbourhood neighbourhood;
   Surfels surfels;
-  std::vector<Motion> motions;        ///< Fixed and prescribed phyxels.
+  std::vector<Motion> motions;  ///< Fixed and prescribed phyxels.
   std::vector<Load> loads;
-  Vec3d gravity;                      ///< [m/s^2]
+  Vec3d gravity;  ///< [m/s^2]
   Degenerate degenerate;
   std::vector<std::string> warnings;  ///< For the summary.
 

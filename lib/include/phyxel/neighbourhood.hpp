@@ -30,22 +30,24 @@ Csr transpose(const Csr& csr, Index columns);
 /// h_i = factor * (mean distance to the `nearest` nearest phyxels).
 struct NeighbourhoodRule {
   enum class Support {
-    uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for both passes.
+    uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for
+               ///< both passes.
     adaptive,  ///< Each phyxel its own h, as in the 2004 paper (factor 3 there).
   };
   Support support = Support::uniform;
   int nearest = 10;
-  double factor = 1.8;                 ///< 1.8 gives about 32 neighbours in a uniform cloud.
-  std::optional<double> radius;        ///< [m]: h itself, instead of the rule.
-  std::optional<int> max_neighbours;   ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
+  double factor = 1.8;           ///< 1.8 gives about 32 neighbours in a uniform cloud.
+  std::optional<double> radius;  ///< [m]: h itself, instead of the rule.
+  std::optional<int>
+      max_neighbours;  ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
 };
 
 /// Neighbours of every phyxel (itself excluded): j in N(i) if |x_j - x_i| < h_i.
 struct Neighbourhood {
-  Csr neighbours;                ///< N(i)
-  Csr inverse_lists;             ///< {j : i in N(j)}; empty if `symmetric`.
-  bool symmetric = true;         ///< N is its own inverse; `inverse()` then returns `neighbours`.
-  std::vector<double> support;   ///< h_i [m], shape [n_phyxels].
+  Csr neighbours;               ///< N(i)
+  Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
+  bool symmetric = true;        ///< N is its own inverse; `inverse()` then returns `neighbours`.
+  std::vector<double> support;  ///< h_i [m], shape [n_phyxels].
   const Csr& inverse() const { return symmetric ? neighbours : inverse_lists; }
 };
 

@@ -19,21 +19,29 @@ enum class Precision { single, double_, mixed };
 
 /// A choice of phyxels, in rest coordinates after placement. Exactly one member is set.
 struct Selection {
-  struct Box { Vec3d low, high; };                  ///< [m]
-  struct Ball { Vec3d centre; double radius = 0; }; ///< [m]
-  std::optional<std::string> region;                ///< A named region of the cloud.
-  std::optional<std::vector<Index>> indices;        ///< Phyxel indices within the body.
+  struct Box {
+    Vec3d low, high;
+  };  ///< [m]
+  struct Ball {
+    Vec3d centre;
+    double radius = 0;
+  };                                          ///< [m]
+  std::optional<std::string> region;          ///< A named region of the cloud.
+  std::optional<std::vector<Index>> indices;  ///< Phyxel indices within the body.
   std::optional<Box> box;
   std::optional<Ball> ball;
-  bool all = false;                                 ///< The whole body.
-  std::string where;                                ///< "scene.toml:12:3", for errors.
+  bool all = false;   ///< The whole body.
+  std::string where;  ///< "scene.toml:12:3", for errors.
 };
 
 /// Phyxels held where they are.
-struct FixRequest { Selection select; };
+struct FixRequest {
+  Selection select;
+};
 
 /// Phyxels moved along a given path:
-/// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency t).
+/// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency
+/// t).
 struct MotionRequest {
   Selection select;
   Vec3d displacement;    ///< [m]
@@ -43,21 +51,21 @@ struct MotionRequest {
   double frequency = 0;  ///< [Hz]
 };
 
-/// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density` [N/m^3].
-/// Grows linearly from zero during `ramp` seconds.
+/// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density`
+/// [N/m^3]. Grows linearly from zero during `ramp` seconds.
 struct LoadRequest {
   Selection select;
-  Vec3d force;           ///< [N]
-  Vec3d force_density;   ///< [N/m^3]
-  double ramp = 0;       ///< [s]
+  Vec3d force;          ///< [N]
+  Vec3d force_density;  ///< [N/m^3]
+  double ramp = 0;      ///< [s]
 };
 
 /// Where a body's rest shape comes from. Exactly one of `shape.name`, `mesh`, `file` is set.
 struct BodySource {
   ShapeRequest shape;
-  std::filesystem::path mesh;   ///< Surface to fill with `phyxels` phyxels.
-  std::filesystem::path file;   ///< body.h5 written by `phyxel sample`.
-  Index phyxels = 0;            ///< Mesh: exact count. Lattice shapes: about this many.
+  std::filesystem::path mesh;  ///< Surface to fill with `phyxels` phyxels.
+  std::filesystem::path file;  ///< body.h5 written by `phyxel sample`.
+  Index phyxels = 0;           ///< Mesh: exact count. Lattice shapes: about this many.
   std::uint64_t seed = 1;
   int relaxations = 30;
   bool operator==(const BodySource&) const = default;
@@ -67,56 +75,56 @@ struct BodySource {
 struct BodyRequest {
   std::string name;
   BodySource source;
-  double scale = 1;             ///< Applied first, about the origin.
-  Vec3d rotation;               ///< Axis times angle [degrees], applied second.
-  Vec3d translation;            ///< [m], applied last.
-  Vec3d velocity;               ///< Initial velocity [m/s].
-  Vec3d spin;                   ///< Initial angular velocity about the centre of mass [rad/s].
+  double scale = 1;   ///< Applied first, about the origin.
+  Vec3d rotation;     ///< Axis times angle [degrees], applied second.
+  Vec3d translation;  ///< [m], applied last.
+  Vec3d velocity;     ///< Initial velocity [m/s].
+  Vec3d spin;         ///< Initial angular velocity about the centre of mass [rad/s].
   Material material;
   NeighbourhoodRule neighbourhood;
   VolumeRule volume_rule = VolumeRule::automatic;
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;
-  std::string where;            ///< "scene.toml:7:1", for errors.
+  std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
 struct TimeRequest {
-  double end = 0;               ///< Simulated time [s].
-  std::optional<double> step;   ///< [s]; unset: from the spectral radius of the stiffness.
-  double safety = 0.8;          ///< Fraction of the largest stable step, 0 to 1.
+  double end = 0;              ///< Simulated time [s].
+  std::optional<double> step;  ///< [s]; unset: from the spectral radius of the stiffness.
+  double safety = 0.8;         ///< Fraction of the largest stable step, 0 to 1.
 };
 
 struct SolverRequest {
   std::string device = "auto";  ///< "auto", "cpu" or "cuda".
   Precision precision = Precision::single;
-  int threads = 0;              ///< 0: OpenMP's choice.
+  int threads = 0;  ///< 0: OpenMP's choice.
 };
 
 struct OutputRequest {
-  std::filesystem::path directory;             ///< Default: out/<scene file's name>.
-  double frames_per_second = 25;               ///< Frames per simulated second; 0: last frame only.
-  bool phyxels = true;                         ///< Write the phyxel family.
-  bool surface = true;                         ///< Write the deformed surface family.
+  std::filesystem::path directory;  ///< Default: out/<scene file's name>.
+  double frames_per_second = 25;    ///< Frames per simulated second; 0: last frame only.
+  bool phyxels = true;              ///< Write the phyxel family.
+  bool surface = true;              ///< Write the deformed surface family.
   /// Phyxel fields beside the positions: "displacement", "velocity", "von_mises" [Pa],
   /// "volume_ratio", "mass", "volume", "body".
   std::vector<std::string> fields = {"displacement", "velocity"};
-  double checkpoint_every = 300;               ///< Wall-clock seconds between checkpoints; 0: only at the end.
+  double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
 };
 
 struct RenderRequest {
-  bool pictures = false;        ///< Write PNG pictures at the end of a run.
-  int count = 6;                ///< How many frames, evenly spread, first and last included.
+  bool pictures = false;  ///< Write PNG pictures at the end of a run.
+  int count = 6;          ///< How many frames, evenly spread, first and last included.
   int width = 960, height = 720;
-  Vec3d view{-1, 2, -0.6};      ///< Direction the camera looks along.
+  Vec3d view{-1, 2, -0.6};  ///< Direction the camera looks along.
   Vec3d up{0, 0, 1};
 };
 
 struct Scene {
   std::string title;
-  std::filesystem::path file;   ///< Where it was read from; may be empty.
-  std::string text;             ///< The file's text, kept in checkpoints and outputs.
-  Vec3d gravity;                ///< [m/s^2], zero if the scene names none.
+  std::filesystem::path file;  ///< Where it was read from; may be empty.
+  std::string text;            ///< The file's text, kept in checkpoints and outputs.
+  Vec3d gravity;               ///< [m/s^2], zero if the scene names none.
   TimeRequest time;
   SolverRequest solver;
   OutputRequest output;

@@ -17,13 +17,13 @@ namespace phyxel {
 /// the bodies of Farias et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
   std::string name;
-  Vec3d size;                 ///< Extents [m].
-  double radius = 0;          ///< [m]
-  double length = 0;          ///< [m]
-  double spacing = 0;         ///< Lattice spacing [m].
-  double jitter = 0;          ///< Fraction of the spacing, 0 to 0.5.
-  std::uint64_t seed = 1;     ///< Of the jitter; the same on any number of threads.
-  bool surface = true;        ///< Whether to make surfels.
+  Vec3d size;              ///< Extents [m].
+  double radius = 0;       ///< [m]
+  double length = 0;       ///< [m]
+  double spacing = 0;      ///< Lattice spacing [m].
+  double jitter = 0;       ///< Fraction of the spacing, 0 to 0.5.
+  std::uint64_t seed = 1;  ///< Of the jitter; the same on any number of threads.
+  bool surface = true;     ///< Whether to make surfels.
   bool operator==(const ShapeRequest&) const = default;
 };
 

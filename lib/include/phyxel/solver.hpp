@@ -34,8 +34,8 @@ class Solver {
   void step();
   double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
   std::int64_t steps() const { return steps_; }
-  double dt() const { return dt_; }                                  ///< [s]
-  State state() const;                                               ///< Downloaded copy.
+  double dt() const { return dt_; }  ///< [s]
+  State state() const;               ///< Downloaded copy.
 
  private:
   Backend& backend_;

@@ -13,7 +13,7 @@ struct State {
   std::vector<Vec3d> velocity;      ///< v(t - dt/2) [m/s], shape [n, 3]: (u(t) - u(t - dt)) / dt.
   double time = 0;                  ///< t [s] = step * dt.
   std::int64_t step = 0;
-  double dt = 0;                    ///< [s]
+  double dt = 0;  ///< [s]
 };
 
 /// Deformed surfels.
@@ -25,26 +25,26 @@ struct SurfelState {
 /// Energies and conserved quantities at one instant, all bodies together.
 struct Diagnostics {
   std::int64_t step = 0;
-  double time = 0;               ///< [s]
-  double kinetic_energy = 0;     ///< [J], at t (velocity centred with the force).
-  double strain_energy = 0;      ///< [J]
-  double volume_energy = 0;      ///< [J], of the volume-conservation term.
-  double gravity_energy = 0;     ///< [J], zero at rest.
-  double load_energy = 0;        ///< [J], potential of the point and body loads.
+  double time = 0;            ///< [s]
+  double kinetic_energy = 0;  ///< [J], at t (velocity centred with the force).
+  double strain_energy = 0;   ///< [J]
+  double volume_energy = 0;   ///< [J], of the volume-conservation term.
+  double gravity_energy = 0;  ///< [J], zero at rest.
+  double load_energy = 0;     ///< [J], potential of the point and body loads.
   double total_energy() const {
     return kinetic_energy + strain_energy + volume_energy + gravity_energy + load_energy;
   }
-  Vec3d momentum;                ///< [kg m/s]
-  Vec3d angular_momentum;        ///< [kg m^2/s] about the origin.
-  Vec3d internal_force;          ///< Sum of internal forces [N]: zero but for rounding.
-  Vec3d internal_torque;         ///< Sum of their torques [N m]: zero but for rounding with Green strain.
-  double force_scale = 0;        ///< Sum of the internal forces' magnitudes [N].
-  double torque_scale = 0;       ///< Sum of |x| |f| [N m].
+  Vec3d momentum;          ///< [kg m/s]
+  Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.
+  Vec3d internal_force;    ///< Sum of internal forces [N]: zero but for rounding.
+  Vec3d internal_torque;   ///< Sum of their torques [N m]: zero but for rounding with Green strain.
+  double force_scale = 0;  ///< Sum of the internal forces' magnitudes [N].
+  double torque_scale = 0;          ///< Sum of |x| |f| [N m].
   double largest_displacement = 0;  ///< [m]
   double largest_speed = 0;         ///< [m/s]
   Index fastest_phyxel = -1;
-  Index inverted = 0;            ///< Phyxels whose deformation gradient has det F <= 0.
-  Index bad_phyxel = -1;         ///< First phyxel whose state is not finite, or -1.
+  Index inverted = 0;     ///< Phyxels whose deformation gradient has det F <= 0.
+  Index bad_phyxel = -1;  ///< First phyxel whose state is not finite, or -1.
 };
 
 }  // namespace phyxel

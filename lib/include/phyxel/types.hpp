@@ -1,8 +1,8 @@
 /// Small vectors and matrices shared by host and device code.
 ///
 /// Everything here is a plain value templated on the scalar type `Real`, which may be `float`,
-/// `double`, or a SIMD pack of either (see lib/solver/pack.hpp): the physics in `phyxel/physics/` is
-/// written once against these types. Public headers hold no Eigen types on purpose: their
+/// `double`, or a SIMD pack of either (see lib/solver/pack.hpp): the physics in `phyxel/physics/`
+/// is written once against these types. Public headers hold no Eigen types on purpose: their
 /// alignment depends on the compiler flags of whoever includes them.
 #pragma once
 
@@ -45,27 +45,45 @@ using Offset = std::int64_t;  ///< offset into a list of pairs; never 32-bit
 
 // --- Vec3 ---------------------------------------------------------------------------------------
 template <class R>
-PHYXEL_HD Vec3<R> operator+(Vec3<R> a, Vec3<R> b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+PHYXEL_HD Vec3<R> operator+(Vec3<R> a, Vec3<R> b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
 template <class R>
-PHYXEL_HD Vec3<R> operator-(Vec3<R> a, Vec3<R> b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+PHYXEL_HD Vec3<R> operator-(Vec3<R> a, Vec3<R> b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 template <class R>
-PHYXEL_HD Vec3<R> operator-(Vec3<R> a) { return {-a.x, -a.y, -a.z}; }
+PHYXEL_HD Vec3<R> operator-(Vec3<R> a) {
+  return {-a.x, -a.y, -a.z};
+}
 template <class R>
-PHYXEL_HD Vec3<R> operator*(R s, Vec3<R> a) { return {s * a.x, s * a.y, s * a.z}; }
+PHYXEL_HD Vec3<R> operator*(R s, Vec3<R> a) {
+  return {s * a.x, s * a.y, s * a.z};
+}
 template <class R>
-PHYXEL_HD Vec3<R> operator*(Vec3<R> a, R s) { return {a.x * s, a.y * s, a.z * s}; }
+PHYXEL_HD Vec3<R> operator*(Vec3<R> a, R s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
 template <class R>
-PHYXEL_HD Vec3<R> operator/(Vec3<R> a, R s) { return {a.x / s, a.y / s, a.z / s}; }
+PHYXEL_HD Vec3<R> operator/(Vec3<R> a, R s) {
+  return {a.x / s, a.y / s, a.z / s};
+}
 template <class R>
-PHYXEL_HD Vec3<R>& operator+=(Vec3<R>& a, Vec3<R> b) { return a = a + b; }
+PHYXEL_HD Vec3<R>& operator+=(Vec3<R>& a, Vec3<R> b) {
+  return a = a + b;
+}
 template <class R>
-PHYXEL_HD Vec3<R>& operator-=(Vec3<R>& a, Vec3<R> b) { return a = a - b; }
+PHYXEL_HD Vec3<R>& operator-=(Vec3<R>& a, Vec3<R> b) {
+  return a = a - b;
+}
 template <class R>
 PHYXEL_HD bool operator==(const Vec3<R>& a, const Vec3<R>& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 template <class R>
-PHYXEL_HD R dot(Vec3<R> a, Vec3<R> b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+PHYXEL_HD R dot(Vec3<R> a, Vec3<R> b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 template <class R>
 PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
@@ -102,7 +120,9 @@ PHYXEL_HD Mat3<R> operator-(const Mat3<R>& p, const Mat3<R>& q) {
   return m;
 }
 template <class R>
-PHYXEL_HD Mat3<R>& operator+=(Mat3<R>& p, const Mat3<R>& q) { return p = p + q; }
+PHYXEL_HD Mat3<R>& operator+=(Mat3<R>& p, const Mat3<R>& q) {
+  return p = p + q;
+}
 template <class R>
 PHYXEL_HD Mat3<R> operator*(R s, const Mat3<R>& q) {
   Mat3<R> m;
@@ -114,8 +134,7 @@ template <class R>
 PHYXEL_HD Mat3<R> operator*(const Mat3<R>& p, const Mat3<R>& q) {
   Mat3<R> m;
   for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c)
-      m(r, c) = p(r, 0) * q(0, c) + p(r, 1) * q(1, c) + p(r, 2) * q(2, c);
+    for (int c = 0; c < 3; ++c) m(r, c) = p(r, 0) * q(0, c) + p(r, 1) * q(1, c) + p(r, 2) * q(2, c);
   return m;
 }
 template <class R>
@@ -135,9 +154,15 @@ PHYXEL_HD Mat3<R> transpose(const Mat3<R>& q) {
 template <class R>
 PHYXEL_HD Mat3<R> outer(Vec3<R> a, Vec3<R> b) {
   Mat3<R> m;
-  m(0, 0) = a.x * b.x; m(0, 1) = a.x * b.y; m(0, 2) = a.x * b.z;
-  m(1, 0) = a.y * b.x; m(1, 1) = a.y * b.y; m(1, 2) = a.y * b.z;
-  m(2, 0) = a.z * b.x; m(2, 1) = a.z * b.y; m(2, 2) = a.z * b.z;
+  m(0, 0) = a.x * b.x;
+  m(0, 1) = a.x * b.y;
+  m(0, 2) = a.x * b.z;
+  m(1, 0) = a.y * b.x;
+  m(1, 1) = a.y * b.y;
+  m(1, 2) = a.y * b.z;
+  m(2, 0) = a.z * b.x;
+  m(2, 1) = a.z * b.y;
+  m(2, 2) = a.z * b.z;
   return m;
 }
 template <class R>
@@ -168,25 +193,34 @@ PHYXEL_HD Sym3<R> operator+(const Sym3<R>& p, const Sym3<R>& q) {
   return {p.xx + q.xx, p.xy + q.xy, p.xz + q.xz, p.yy + q.yy, p.yz + q.yz, p.zz + q.zz};
 }
 template <class R>
-PHYXEL_HD Sym3<R>& operator+=(Sym3<R>& p, const Sym3<R>& q) { return p = p + q; }
+PHYXEL_HD Sym3<R>& operator+=(Sym3<R>& p, const Sym3<R>& q) {
+  return p = p + q;
+}
 template <class R>
 PHYXEL_HD Sym3<R> operator*(R s, const Sym3<R>& q) {
   return {s * q.xx, s * q.xy, s * q.xz, s * q.yy, s * q.yz, s * q.zz};
 }
 template <class R>
-PHYXEL_HD R trace(const Sym3<R>& s) { return s.xx + s.yy + s.zz; }
+PHYXEL_HD R trace(const Sym3<R>& s) {
+  return s.xx + s.yy + s.zz;
+}
 /// Double contraction p : q.
 template <class R>
 PHYXEL_HD R contract(const Sym3<R>& p, const Sym3<R>& q) {
-  return p.xx * q.xx + p.yy * q.yy + p.zz * q.zz +
-         R(2) * (p.xy * q.xy + p.xz * q.xz + p.yz * q.yz);
+  return p.xx * q.xx + p.yy * q.yy + p.zz * q.zz + R(2) * (p.xy * q.xy + p.xz * q.xz + p.yz * q.yz);
 }
 template <class R>
 PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
   Mat3<R> m;
-  m(0, 0) = s.xx; m(0, 1) = s.xy; m(0, 2) = s.xz;
-  m(1, 0) = s.xy; m(1, 1) = s.yy; m(1, 2) = s.yz;
-  m(2, 0) = s.xz; m(2, 1) = s.yz; m(2, 2) = s.zz;
+  m(0, 0) = s.xx;
+  m(0, 1) = s.xy;
+  m(0, 2) = s.xz;
+  m(1, 0) = s.xy;
+  m(1, 1) = s.yy;
+  m(1, 2) = s.yz;
+  m(2, 0) = s.xz;
+  m(2, 1) = s.yz;
+  m(2, 2) = s.zz;
   return m;
 }
 template <class R>
@@ -195,6 +229,8 @@ PHYXEL_HD Vec3<R> operator*(const Sym3<R>& s, Vec3<R> v) {
           s.xz * v.x + s.yz * v.y + s.zz * v.z};
 }
 template <class R>
-PHYXEL_HD Mat3<R> operator*(const Mat3<R>& m, const Sym3<R>& s) { return m * full(s); }
+PHYXEL_HD Mat3<R> operator*(const Mat3<R>& m, const Sym3<R>& s) {
+  return m * full(s);
+}
 
 }  // namespace phyxel

@@ -7,10 +7,10 @@
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
+#include "files/sealed_file.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
-#include "files/sealed_file.hpp"
 #include "support/folder.hpp"
 
 namespace phyxel {

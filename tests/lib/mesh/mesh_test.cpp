@@ -4,13 +4,13 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
 
 #include "mesh/mesh_formats.hpp"
 #include "phyxel/error.hpp"
+#include "support/folder.hpp"
 #include "support/mesh_content.hpp"
 
 namespace phyxel {
@@ -184,20 +184,8 @@ TEST(Mesh, DecimalsAreRead) {
   EXPECT_EQ(s.position[2], (Vec3d{0, 0, 0.5}));
 }
 
-class MeshFile : public ::testing::Test {
+class MeshFile : public test::Folder {
  protected:
-  MeshFile() {
-    folder_ = fs::temp_directory_path() / fmt::format("phyxel_mesh_{}", getpid());
-    fs::create_directories(folder_);
-  }
-  ~MeshFile() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  fs::path write(const std::string& name, const std::string& content) const {
-    std::ofstream(folder_ / name, std::ios::binary) << content;
-    return folder_ / name;
-  }
   static std::string message(const fs::path& file) {
     try {
       read_mesh(file);
@@ -206,7 +194,6 @@ class MeshFile : public ::testing::Test {
     }
     return "no error";
   }
-  fs::path folder_;
 };
 
 TEST_F(MeshFile, ExtensionChoosesTheReaderInAnyCase) {

@@ -7,10 +7,10 @@
 #include <numeric>
 #include <random>
 
+#include "mesh/winding_number.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "support/surfaces.hpp"
-#include "mesh/winding_number.hpp"
 
 namespace phyxel {
 namespace {

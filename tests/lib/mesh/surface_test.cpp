@@ -5,9 +5,9 @@
 #include <numbers>
 #include <random>
 
+#include "mesh/winding_number.hpp"
 #include "phyxel/mesh.hpp"
 #include "support/surfaces.hpp"
-#include "mesh/winding_number.hpp"
 
 namespace phyxel {
 namespace {

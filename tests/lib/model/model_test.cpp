@@ -38,8 +38,8 @@ TEST(KernelMasses, HaveTheBodysDensityOnAverage) {
   for (Index i = 0; i < model.size(); ++i) {
     double density = model.mass[i] * weight(0, model.neighbourhood.support[i]);
     for (const Index j : model.neighbourhood.neighbours.row(i)) {
-      density += model.mass[j] *
-                 weight(norm(model.position[j] - model.position[i]), model.neighbourhood.support[i]);
+      density += model.mass[j] * weight(norm(model.position[j] - model.position[i]),
+                                        model.neighbourhood.support[i]);
     }
     EXPECT_NEAR(model.mass[i] / model.volume[i], density, 1e-10 * density);  // v = m / ρ_i
     // m_i = s r̄_i³ ρ with one s for all.
@@ -57,11 +57,12 @@ TEST(GeometricMasses, AreDensityTimesVolume) {
 }
 
 TEST(Degenerate, IsolatedCollinearCoplanarAndCoincidentAreNamed) {
-  Cloud cloud = lattice(3, 3, 3, 1);                       // 0 to 26, sound
-  for (int k = 0; k < 3; ++k) cloud.position.push_back({20.0 + k, 0, 0});          // 27-29 thread
-  for (int k = 0; k < 9; ++k) cloud.position.push_back({40.0 + k % 3, k / 3 * 1.0, 0});  // 30-38 sheet
-  cloud.position.push_back({80, 0, 0});                    // 39 alone
-  cloud.position.push_back({0.5, 0.5, 0.5});               // 40 on top of phyxel 0
+  Cloud cloud = lattice(3, 3, 3, 1);                                       // 0 to 26, sound
+  for (int k = 0; k < 3; ++k) cloud.position.push_back({20.0 + k, 0, 0});  // 27-29 thread
+  for (int k = 0; k < 9; ++k)
+    cloud.position.push_back({40.0 + k % 3, k / 3 * 1.0, 0});  // 30-38 sheet
+  cloud.position.push_back({80, 0, 0});                        // 39 alone
+  cloud.position.push_back({0.5, 0.5, 0.5});                   // 40 on top of phyxel 0
   cloud.volume.assign(cloud.position.size(), 1);
   Scene scene = one_body();
   scene.bodies[0].neighbourhood.radius = 1.6;
@@ -197,8 +198,9 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
     return list;
   };
   // Terms a scene leaves out allocate nothing.
-  EXPECT_THAT(names(*make_cpu_backend(uniform, Precision::single)),
-              ::testing::Not(::testing::Contains(::testing::AnyOf("loads", "inverse neighbour lists"))));
+  EXPECT_THAT(
+      names(*make_cpu_backend(uniform, Precision::single)),
+      ::testing::Not(::testing::Contains(::testing::AnyOf("loads", "inverse neighbour lists"))));
   Scene scene = one_body();
   scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
   LoadRequest load;

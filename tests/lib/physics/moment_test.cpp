@@ -76,7 +76,8 @@ TEST(PseudoInverse, EqualsSvdForRanksOneToThreeInDouble) {
 TEST(PseudoInverse, EqualsSvdForRanksOneToThreeInFloat) {
   // In float a rank-2 matrix carries eigenvalues of rounding size, 1e-7: the cut-off lies above.
   for (const int rank : {1, 2, 3}) {
-    for (const double scale : {1e-12, 1.0, 1e12}) expect_equals_svd<float>(rank, scale, 2e-6, 1e-5f);
+    for (const double scale : {1e-12, 1.0, 1e12})
+      expect_equals_svd<float>(rank, scale, 2e-6, 1e-5f);
   }
 }
 

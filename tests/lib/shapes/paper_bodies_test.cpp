@@ -7,13 +7,13 @@
 #include <map>
 #include <numeric>
 
+#include "mesh/winding_number.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "phyxel/shapes.hpp"
 #include "support/surface_checks.hpp"
-#include "mesh/winding_number.hpp"
 
 namespace phyxel {
 namespace {

@@ -112,7 +112,8 @@ TEST(Verlet, EnergyStaysBoundedOver100000Steps) {
     (s <= 10000 ? early : late) = std::max(s <= 10000 ? early : late, error);
     // Pairwise cancelling forces: momentum only gathers rounding, some 1e-16 a step.
     ASSERT_LT(norm(d.momentum), 1e-11 * std::sqrt(2 * start.kinetic_energy * 36 * 1.0));
-    ASSERT_LT(norm(d.angular_momentum - start.angular_momentum), 1e-10 * norm(start.angular_momentum));
+    ASSERT_LT(norm(d.angular_momentum - start.angular_momentum),
+              1e-10 * norm(start.angular_momentum));
   }
   // A symplectic method's energy error oscillates within a few percent at half the stable step and
   // does not grow: the late error is no larger than the early one but for sampling.
@@ -136,8 +137,8 @@ TEST(Verlet, IsThePapersRecursion) {
     backend->internal_forces(force);
     std::vector<Vec3d> next(now.size());
     for (std::size_t i = 0; i < now.size(); ++i) {
-      next[i] = 2.0 * now[i] - before[i] +
-                dt * dt * ((1 / model.mass[i]) * force[i] + scene.gravity);
+      next[i] =
+          2.0 * now[i] - before[i] + dt * dt * ((1 / model.mass[i]) * force[i] + scene.gravity);
     }
     before = now;
     now = next;
@@ -235,7 +236,8 @@ std::pair<double, double> measured_constants(Strain strain) {
   int count = 0;
   for (Index i = 0; i < model.size(); ++i) {
     const Vec3d p = model.position[i];
-    if (std::abs(p.x - 0.4) > 0.08 || std::abs(p.y - 0.15) > 0.08 || std::abs(p.z - 0.15) > 0.08) continue;
+    if (std::abs(p.x - 0.4) > 0.08 || std::abs(p.y - 0.15) > 0.08 || std::abs(p.z - 0.15) > 0.08)
+      continue;
     axial += gradient[i](0, 0);
     lateral += 0.5 * (gradient[i](1, 1) + gradient[i](2, 2));
     ++count;

@@ -34,7 +34,8 @@ PHYXEL_HD void jacobi_rotate(Mat3<Real>& m, Mat3<Real>& vectors, int p, int q) {
   const Real off = m(p, q);
   if (off == Real(0)) return;
   const Real theta = (m(q, q) - m(p, p)) / (Real(2) * off);
-  const Real t = (theta >= Real(0) ? Real(1) : Real(-1)) / (abs(theta) + sqrt(theta * theta + Real(1)));
+  const Real t =
+      (theta >= Real(0) ? Real(1) : Real(-1)) / (abs(theta) + sqrt(theta * theta + Real(1)));
   const Real c = Real(1) / sqrt(t * t + Real(1));
   const Real s = t * c;
   m(p, p) -= t * off;
@@ -57,7 +58,8 @@ PHYXEL_HD void jacobi_rotate(Mat3<Real>& m, Mat3<Real>& vectors, int p, int q) {
 /// rotations (which keep small eigenvalues accurate). Eigenvalues at or below
 /// `cutoff` × the largest are treated as zero. Rank 0 gives the zero matrix.
 template <class Real>
-PHYXEL_HD PseudoInverse<Real> pseudo_inverse(const Sym3<Real>& a, Real cutoff = Real(moment_cutoff)) {
+PHYXEL_HD PseudoInverse<Real> pseudo_inverse(const Sym3<Real>& a,
+                                             Real cutoff = Real(moment_cutoff)) {
   using std::abs;
   PseudoInverse<Real> result;
   // Scaled to a largest entry of one, so that no product leaves the range of Real.

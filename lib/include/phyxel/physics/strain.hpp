@@ -15,7 +15,8 @@ PHYXEL_HD Mat3<Real> gradient_term(Vec3<Real> u_ij, Vec3<Real> x_ij, Real w_ij) 
 /// ∇u_i = (Σ_j (u_j - u_i) (w_ij x_ij)ᵀ) A_i⁻¹; row a, column b is ∂u_a/∂X_b. Exact for linear
 /// displacement fields on any neighbourhood of rank 3. Source: Mueller et al. 2004, equation (11).
 template <class Real>
-PHYXEL_HD Mat3<Real> displacement_gradient(const Mat3<Real>& sum, const Sym3<Real>& inverse_moment) {
+PHYXEL_HD Mat3<Real> displacement_gradient(const Mat3<Real>& sum,
+                                           const Sym3<Real>& inverse_moment) {
   return sum * inverse_moment;
 }
 

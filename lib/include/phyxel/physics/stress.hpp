@@ -32,7 +32,9 @@ struct Hooke {
 template <class Real>
 struct GreenHooke {
   Hooke<Real> hooke;
-  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const { return hooke.energy(green_strain(grad_u)); }
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    return hooke.energy(green_strain(grad_u));
+  }
   /// First Piola–Kirchhoff stress [Pa].
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     const Sym3<Real> s = hooke.stress(green_strain(grad_u));
@@ -44,7 +46,9 @@ struct GreenHooke {
 template <class Real>
 struct CauchyHooke {
   Hooke<Real> hooke;
-  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const { return hooke.energy(cauchy_strain(grad_u)); }
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    return hooke.energy(cauchy_strain(grad_u));
+  }
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return full(hooke.stress(cauchy_strain(grad_u)));
   }

@@ -8,9 +8,9 @@ namespace phyxel {
 /// Weighted sums over the phyxels that carry one surfel.
 template <class Real>
 struct SurfelBlend {
-  Vec3<Real> displacement;    ///< Σ w (u_i + ∇u_i (x_s - x_i)) [m]
-  Mat3<Real> gradient;        ///< Σ w ∇u_i
-  Real weight{};              ///< Σ w
+  Vec3<Real> displacement;  ///< Σ w (u_i + ∇u_i (x_s - x_i)) [m]
+  Mat3<Real> gradient;      ///< Σ w ∇u_i
+  Real weight{};            ///< Σ w
 
   PHYXEL_HD void add(Real w, Vec3<Real> u_i, const Mat3<Real>& grad_u_i, Vec3<Real> x_is) {
     displacement += w * (u_i + grad_u_i * x_is);
