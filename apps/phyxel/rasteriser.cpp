@@ -284,7 +284,8 @@ void Rasteriser::draw_dots(std::span<const Vec3d> centre, std::span<const Colour
   std::sort(order.begin(), order.end());
   const float faintest = static_cast<float>(style.faintest);
   const float per_fade = style.fade > 0 ? static_cast<float>(1 / style.fade) : 0.0f;
-  for (const auto& [key, i] : order) {
+  for (const auto& entry : order) {
+    const Index i = entry.second;
     const Disc d = disc(centre[i], style);
     const Index own = body.empty() ? 0 : body[i];
     for_each_sample(d, [&](std::size_t s, Vec3f n) {

@@ -41,7 +41,8 @@ class LineCheck {
       std::string joined;
       std::string_view text = next_line(at);
       while (!text.empty() && text.back() == '\\' && at < content_.size()) {  // continued
-        joined.append(text.substr(0, text.size() - 1)).push_back(' ');
+        if (joined.empty()) joined = text;
+        joined.back() = ' ';
         joined += next_line(at);
         text = joined;
         ++line;
@@ -90,7 +91,7 @@ class LineCheck {
         fail(fmt::format("the coordinate \"{}\" is not a number within +-{:g}", printable(word),
                          largest_coordinate));
       }
-      checked_.text.append(" ").append(word);
+      checked_.text += fmt::format(" {}", *value);  // 0e999 would become NaN in tinyobjloader
     }
     checked_.text += '\n';
     ++checked_.vertices;

@@ -106,7 +106,7 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
 }
 
 NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
-    : site_(site), hash_(site, 1.2 * spacing) {}
+    : hash_(site, 1.2 * spacing) {}
 
 void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   const std::size_t n = block.offset.size();

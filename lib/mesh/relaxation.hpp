@@ -33,7 +33,6 @@ class NearestSite {
   void find(const SampleBlock& block, Scratch& scratch) const;
 
  private:
-  const std::vector<Vec3d>& site_;
   SpatialHash hash_;
 };
 

@@ -21,6 +21,14 @@ struct ParserLost {};
 #define TOML_ASSERT(expression) ((expression) ? void() : ::phyxel::lose_parser())
 #pragma push_macro("NDEBUG")
 #undef NDEBUG
+// Where toml++ 3.3 holds a character outside ASCII for unreachable, it is simply none that TOML
+// allows there.
+#include <toml++/impl/forward_declarations.h>
+#pragma push_macro("TOML_UNREACHABLE")
+#undef TOML_UNREACHABLE
+#define TOML_UNREACHABLE return false
+#include <toml++/impl/unicode.h>
+#pragma pop_macro("TOML_UNREACHABLE")
 #include <toml++/toml.h>
 #pragma pop_macro("NDEBUG")
 

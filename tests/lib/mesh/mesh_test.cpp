@@ -218,5 +218,26 @@ TEST_F(MeshFile, WhatCannotBeReadIsNamed) {
   EXPECT_THAT(message(folder_ / "huge.stl"), HasSubstr("2147483649 bytes; at most 2147483648"));
 }
 
+TEST_F(MeshFile, AnObjLineMayGoOnOverManyLines) {
+  std::string face = "f";
+  for (const char* corner : {"1", "3", "2"}) {
+    face += " ";
+    for (int k = 0; k < 200; ++k) face += "\\\n";  // joined text must not grow by more than a line
+    face += corner;
+  }
+  const std::string text =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n" + face + "\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+  const Surface surface = read_mesh(write("chain.obj", text));
+  ASSERT_EQ(surface.triangle.size(), 4u);
+  EXPECT_NEAR(enclosed_volume(surface), 1.0 / 6, 1e-15);  // rounding of a handful of products
+}
+
+TEST_F(MeshFile, AnObjCoordinateIsTheNumberThatWasChecked) {
+  // tinyobjloader's own arithmetic makes 0 x infinity of this zero.
+  const std::string text =
+      "v 0000E0888 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+  EXPECT_EQ(read_mesh(write("zero.obj", text)).position[0].x, 0.0);
+}
+
 }  // namespace
 }  // namespace phyxel
