@@ -60,8 +60,9 @@ double usable_memory() {
 }
 
 void refuse_too_many(const std::string& shape, double phyxels) {
-  // A phyxel with its neighbour lists and solver arrays takes about this much.
-  constexpr double bytes_per_phyxel = 500;
+  // The most that a phyxel with its neighbour lists and solver arrays takes at any time: measured
+  // while the time step is found, in `phyxel check` of a block of two million.
+  constexpr double bytes_per_phyxel = 950;
   const double most_index = std::numeric_limits<Index>::max();
   const double memory = usable_memory();
   if (phyxels <= most_index && phyxels * bytes_per_phyxel <= memory) return;
