@@ -3,10 +3,13 @@
 #include <omp.h>
 #include <sys/utsname.h>
 
+#include <atomic>
+#include <cmath>
 #include <ctime>
 #include <fstream>
 #include <functional>
 #include <random>
+#include <thread>
 
 #include "command.hpp"
 #include "phyxel/phyxel.hpp"
@@ -56,6 +59,29 @@ double copy_bandwidth(int threads) {
     best = std::max(best, 2.0 * sizeof(double) * static_cast<double>(count) / seconds_since(start));
   }
   return to[count / 2] == 1.0 ? best : 0;
+}
+
+/// Nanoseconds in which two cores answer each other through a cache line; best of five. What it
+/// costs to share a body between threads: virtual machines move their cores about, and this tells.
+double core_round_trip() {
+  constexpr int trips = 2000;
+  double best = HUGE_VAL;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    alignas(128) std::atomic<int> ball{0};
+    const auto play = [&ball](int first) {
+      for (int turn = first; turn < 2 * trips; turn += 2) {
+        while (ball.load(std::memory_order_acquire) != turn) {
+        }
+        ball.store(turn + 1, std::memory_order_release);
+      }
+    };
+    const auto start = Clock::now();
+    std::thread other(play, 1);
+    play(0);
+    other.join();
+    best = std::min(best, seconds_since(start) / trips * 1e9);
+  }
+  return best;
 }
 
 /// A cube of `n` phyxels, 0.1 m apart, jittered, without surfels.
@@ -159,7 +185,8 @@ void bench_step(const BenchOptions& options) {
       options,
       "terms,precision,threads,phyxels,neighbours,steps_per_s,phyxel_steps_per_s,spread,pairs_per_"
       "s,"
-      "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error");
+      "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error,"
+      "core_round_trip_ns");
   std::vector<double> copy;
   for (const int threads : options.threads) copy.push_back(copy_bandwidth(threads));
   for (const std::string& terms : options.terms) {
@@ -192,10 +219,12 @@ void bench_step(const BenchOptions& options) {
           for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
           const double traffic = static_cast<double>(backend->step_traffic());
           table.row(fmt::format(
-              "{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e}",
+              "{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e},{:"
+              ".0f}",
               terms, precision, options.threads[t], model.size(), pairs / n, median, median * n,
               (rate.back() - rate.front()) / median, median * 2 * pairs, traffic / n,
-              median * traffic, copy[t], static_cast<double>(memory) / n, error));
+              median * traffic, copy[t], static_cast<double>(memory) / n, error,
+              options.threads[t] > 1 && omp_get_num_procs() > 1 ? core_round_trip() : 0.0));
         }
       }
     }
