@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/phyxel.hpp"
@@ -102,7 +103,7 @@ Facts sealed_facts(const fs::path& file) {
                  {"digest", "fits"}};
   if (kind == "body") facts.update(body_facts(file));
   if (kind == "checkpoint") facts.update(checkpoint_facts(file));
-  if (kind == "phyxel frame" || kind == "surface frame") facts.update(frame_facts(file));
+  if (kind == phyxel_frame_kind || kind == surface_frame_kind) facts.update(frame_facts(file));
   if (kind == "trajectory") facts.update(trajectory_facts(file));
   return facts;
 }

@@ -46,13 +46,18 @@ class Run {
     solver_ = &solver;
     first_step_ = solver.steps();
     say_plan();
+    if (begin_ && solver.steps() >= plan_.steps) {
+      say_finished_already();
+      return;
+    }
 
     Diagnostics now = diagnose(model_, *backend, solver.steps(), solver.dt());
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
     peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
     StabilityWatch watch(model_, now);
     good_ = solver.state();
-    if (!begin_) write_frame(now);
+    // Without a rate only the last frame is wanted.
+    if (!begin_ && scene_.output.frames_per_second > 0) write_frame(now);
 
     StopSignal signals;
     Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr,
@@ -198,6 +203,20 @@ class Run {
         plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
     if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_->time(), first_step_);
     std::fflush(stdout);
+  }
+
+  /// Not an error: a job script that resumes until it is done ends here.
+  void say_finished_already() const {
+    const std::string message = fmt::format(
+        "the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
+        solver_->time(), scene_.time.end);
+    if (options_.json) {
+      fmt::print(
+          "{}\n",
+          nlohmann::ordered_json{{"program", program_version()}, {"finished", message}}.dump(2));
+    } else {
+      fmt::print("  finished    {}\n", message);
+    }
   }
 
   void say_summary(const Diagnostics& now) const {

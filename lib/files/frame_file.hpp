@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-inline constexpr const char* phyxel_frame_kind = "phyxel frame";
+inline constexpr const char* phyxel_frame_kind = "point frame";
 inline constexpr const char* surface_frame_kind = "surface frame";
 
 /// A number of `Diagnostics`, as a column of the energy log and an attribute of every frame.

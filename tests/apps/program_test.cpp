@@ -148,6 +148,32 @@ TEST_F(Program, StoppedByASignalAndResumedIsBitwiseTheWholeRun) {
   }
 }
 
+TEST_F(Program, ResumingAFinishedRunSaysSoAndChangesNothing) {
+  write_beam("0.1");
+  ASSERT_EQ(run({"run", "beam.toml"}).code, 0);
+  const std::string log = text_of(folder_ / "out" / "energy.csv");
+  for (const char* end : {"0.1", "0.05"}) {
+    const Outcome again = run({"run", "beam.toml", "--resume", "auto", "--until", end});
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_THAT(again.out, HasSubstr("nothing is left to do"));
+    EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), log);
+  }
+  const Outcome further = run({"run", "beam.toml", "--resume", "auto", "--until", "0.2"});
+  EXPECT_EQ(further.code, 0) << further.err;
+  EXPECT_NEAR(read_series(folder_ / "out" / "phyxels.hdf.series").back().time, 0.2, 1e-12);
+}
+
+TEST_F(Program, WithoutAFrameRateOnlyTheLastFrameIsWritten) {
+  write_beam("0.1");
+  std::string text = text_of(folder_ / "beam.toml");
+  text.replace(text.find("frames_per_second = 50"), 22, "frames_per_second = 0");
+  write("beam.toml", text);
+  ASSERT_EQ(run({"run", "beam.toml"}).code, 0);
+  const auto series = read_series(folder_ / "out" / "phyxels.hdf.series");
+  ASSERT_EQ(series.size(), 1u);
+  EXPECT_NEAR(series.front().time, 0.1, 1e-12);
+}
+
 TEST_F(Program, RefusesToResumeWhatDoesNotFit) {
   write_beam("0.05");
   ASSERT_EQ(run({"run", "beam.toml"}).code, 0);
