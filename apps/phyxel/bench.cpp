@@ -111,13 +111,6 @@ Scene cube_scene(const std::string& terms) {
 const std::vector<std::string> all_terms = {"green",   "cauchy", "volume",
                                             "damping", "load",   "adaptive"};
 
-Precision precision_of(const std::string& name) {
-  if (name == "float") return Precision::single;
-  if (name == "double") return Precision::double_;
-  if (name == "mixed") return Precision::mixed;
-  throw InputError(fmt::format("--precision {}: allowed: float, double, mixed", name));
-}
-
 /// Largest difference of internal forces from those in double, over the largest force, after a
 /// deformation of 10%.
 double force_error(const Model& model, Backend& backend) {
@@ -197,7 +190,8 @@ void bench_step(const BenchOptions& options) {
       const double pairs = static_cast<double>(model.neighbourhood.neighbours.entries());
       for (const std::string& precision : options.precisions) {
         for (std::size_t t = 0; t < options.threads.size(); ++t) {
-          const auto backend = make_cpu_backend(model, precision_of(precision), options.threads[t]);
+          const auto backend =
+              make_cpu_backend(model, precision_option(precision), options.threads[t]);
           const double error = force_error(model, *backend);
           // A tenth of the sound step: any speed, no risk.
           const double dt =

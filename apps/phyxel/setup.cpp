@@ -32,16 +32,10 @@ std::string neighbours_of(const Model& model, const Part& part) {
 
 }  // namespace
 
-const char* precision_name(Precision precision) {
-  switch (precision) {
-    case Precision::single:
-      return "float";
-    case Precision::double_:
-      return "double";
-    case Precision::mixed:
-      break;
-  }
-  return "mixed";
+Precision precision_option(const std::string& name) {
+  if (const auto precision = precision_named(name)) return *precision;
+  throw InputError(fmt::format("--precision {}: unknown{}; allowed: float, double, mixed", name,
+                               did_you_mean(name, {"float", "double", "mixed"})));
 }
 
 void add_overrides(CLI::App& command, Overrides& o) {
@@ -66,17 +60,7 @@ Scene scene_with(const Overrides& o) {
   if (scene.solver.device == "cuda") {
     throw InputError("device \"cuda\": this version simulates on the CPU only; allowed: auto, cpu");
   }
-  if (o.precision == "float") {
-    scene.solver.precision = Precision::single;
-  } else if (o.precision == "double") {
-    scene.solver.precision = Precision::double_;
-  } else if (o.precision == "mixed") {
-    scene.solver.precision = Precision::mixed;
-  } else if (!o.precision.empty()) {
-    throw InputError(fmt::format("--precision {}: unknown{}; allowed: float, double, mixed",
-                                 o.precision,
-                                 did_you_mean(o.precision, {"float", "double", "mixed"})));
-  }
+  if (!o.precision.empty()) scene.solver.precision = precision_option(o.precision);
   if (o.threads) {
     if (*o.threads < 1 || *o.threads > 4096) {
       throw InputError(fmt::format("--threads {}: out of range: allowed 1 to 4096", *o.threads));

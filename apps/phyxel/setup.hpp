@@ -41,6 +41,7 @@ StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step);
 /// Bodies, materials, terms, neighbours and warnings, one per line.
 std::string describe_model(const Scene& scene, const Model& model);
 
-const char* precision_name(Precision precision);
+/// The value of `--precision`. @throws InputError
+Precision precision_option(const std::string& name);
 
 }  // namespace phyxel::app

@@ -46,26 +46,6 @@ std::vector<std::pair<std::int64_t, fs::path>> checkpoints_in(const fs::path& di
   return found;
 }
 
-const char* name_of(Precision precision) {
-  switch (precision) {
-    case Precision::single:
-      return "float";
-    case Precision::double_:
-      return "double";
-    case Precision::mixed:
-      break;
-  }
-  return "mixed";
-}
-
-Precision precision_of(const Hdf5Reader& in) {
-  const std::string name = in.text_attribute("/phyxel", "precision");
-  for (const Precision p : {Precision::single, Precision::double_, Precision::mixed}) {
-    if (name == name_of(p)) return p;
-  }
-  in.refuse(fmt::format("unknown precision \"{}\"", name));
-}
-
 void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3d>& values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!is_finite(values[i])) in.refuse(fmt::format("{} is not finite in row {}", path, i));
@@ -80,7 +60,7 @@ fs::path write_checkpoint(const fs::path& directory, const State& state,
   out.group("/phyxel");
   out.attribute("/phyxel", "version", version);
   out.attribute("/phyxel", "program", info.program);
-  out.attribute("/phyxel", "precision", std::string(name_of(info.precision)));
+  out.attribute("/phyxel", "precision", std::string(precision_name(info.precision)));
   out.attribute("/phyxel", "model_digest", fmt::format("{:016x}", info.model_digest));
   out.attribute("/phyxel", "total_energy", info.total_energy);
   out.attribute("/phyxel", "initial_energy", info.initial_energy);
@@ -118,7 +98,10 @@ Checkpoint read_checkpoint(const fs::path& file) {
         fmt::format("format version {}; this program reads version {}", info.version, version));
   }
   info.program = in.text_attribute("/phyxel", "program");
-  info.precision = precision_of(in);
+  const std::string precision = in.text_attribute("/phyxel", "precision");
+  const auto known = precision_named(precision);
+  if (!known) in.refuse(fmt::format("unknown precision \"{}\"", precision));
+  info.precision = *known;
   const std::string digest = in.text_attribute("/phyxel", "model_digest");
   const auto [end, error] =
       std::from_chars(digest.data(), digest.data() + digest.size(), info.model_digest, 16);

@@ -144,4 +144,23 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
 
 Scene read_scene(const std::filesystem::path& file) { return parse_scene(read_text(file), file); }
 
+const char* precision_name(Precision precision) {
+  switch (precision) {
+    case Precision::single:
+      return "float";
+    case Precision::double_:
+      return "double";
+    case Precision::mixed:
+      break;
+  }
+  return "mixed";
+}
+
+std::optional<Precision> precision_named(std::string_view name) {
+  for (const Precision p : {Precision::single, Precision::double_, Precision::mixed}) {
+    if (name == precision_name(p)) return p;
+  }
+  return std::nullopt;
+}
+
 }  // namespace phyxel

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "phyxel/material.hpp"
@@ -16,6 +17,12 @@ namespace phyxel {
 
 /// Arithmetic of a run. `mixed`: state in double, forces in float.
 enum class Precision { single, double_, mixed };
+
+/// "float", "double" or "mixed".
+const char* precision_name(Precision precision);
+
+/// The precision of that name; nothing for another word.
+std::optional<Precision> precision_named(std::string_view name);
 
 /// A choice of phyxels, in rest coordinates after placement. Exactly one member is set.
 struct Selection {
