@@ -21,12 +21,22 @@ if(NOT PHYXEL_CUDA STREQUAL "OFF")
       set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
       set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
     endif()
+    # Constexpr functions of the standard library in device code; g++'s warnings for host code.
+    set(PHYXEL_NVCC_FLAGS --expt-relaxed-constexpr -Xcompiler=-Wall,-Wextra)
     set(PHYXEL_HAVE_CUDA ON)
   elseif(PHYXEL_CUDA STREQUAL "ON")
     message(FATAL_ERROR "PHYXEL_CUDA=ON, but no CUDA compiler was found. "
                         "Install the CUDA Toolkit, or set CUDACXX to its nvcc.")
   endif()
 endif()
+
+# Lets a target's CUDA sources say for which architectures they were built.
+function(phyxel_name_architectures target)
+  get_target_property(architectures ${target} CUDA_ARCHITECTURES)
+  list(JOIN architectures ", " text)
+  target_compile_definitions(${target} PRIVATE
+    $<$<COMPILE_LANGUAGE:CUDA>:PHYXEL_CUDA_ARCHITECTURES="${text}">)
+endfunction()
 
 set(PHYXEL_HAVE_MPI OFF)
 if(NOT PHYXEL_MPI STREQUAL "OFF")

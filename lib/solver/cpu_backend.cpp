@@ -156,7 +156,7 @@ class CpuBackend final : public Backend {
         const Vec3d x_is = surfels.position[s] - model_.position[i];
         const double h = model_.neighbourhood.support[i];
         // A lone carrier may be out of reach (h too small); its weight cancels anyway.
-        const double w = carriers.size() == 1 ? 1 : weight_shape(dot(x_is, x_is), 1 / (h * h));
+        const double w = carriers.size() == 1 ? 1 : weight(norm(x_is), h);
         blend.add(w, get3(displacement_, layout_.slot(i)), gradient[i], x_is);
       }
       out.position[s] = surfels.position[s] + blend.surfel_displacement();

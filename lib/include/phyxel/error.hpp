@@ -14,6 +14,7 @@ enum class ExitCode : int {
   success = 0,
   bad_input = 2,       ///< a file, key or option is wrong; nothing was computed or overwritten
   diverged = 3,        ///< NaN or runaway energy; the last good state is on disk
+  device_failed = 4,   ///< the GPU: none found, not one of ours, out of memory, or it failed
   output_failed = 74,  ///< writing failed during the run (disk full); earlier files are intact
   stopped = 75,        ///< a signal ended the run; the checkpoint lets it go on
 };
@@ -39,6 +40,13 @@ class InputError : public Error {
 class OutputError : public Error {
  public:
   explicit OutputError(const std::string& message) : Error(ExitCode::output_failed, message) {}
+};
+
+/// A GPU is missing, cannot run this program's kernels, has too little memory, or failed. The
+/// message names the device and what was asked of it.
+class DeviceError : public Error {
+ public:
+  explicit DeviceError(const std::string& message) : Error(ExitCode::device_failed, message) {}
 };
 
 /// The simulation became unstable.

@@ -1,0 +1,174 @@
+/// Devices and the errors of CUDA calls.
+#include "device.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "check.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Only asked whether the device could run it.
+__global__ void probe() {}
+
+std::string version_text(int version) {
+  return std::to_string(version / 1000) + "." + std::to_string(version % 1000 / 10);
+}
+
+std::string gigabytes(std::size_t bytes) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g GB", static_cast<double>(bytes) * 1e-9);
+  return text;
+}
+
+std::string reason(cudaError_t error) {
+  return std::string(cudaGetErrorString(error)) + " (" + cudaGetErrorName(error) + ")";
+}
+
+Device describe_device(int index) {
+  cudaDeviceProp p{};
+  PHYXEL_CUDA(cudaGetDeviceProperties(&p, index));
+  return {index, p.name, p.major, p.minor, p.multiProcessorCount, p.totalGlobalMem};
+}
+
+std::string current_device() {
+  int index = 0;
+  cudaDeviceProp p{};
+  if (cudaGetDevice(&index) != cudaSuccess || cudaGetDeviceProperties(&p, index) != cudaSuccess) {
+    return "the GPU";
+  }
+  return "GPU " + std::to_string(index) + ", " + p.name;
+}
+
+/// Nothing if there are devices, else why there are none.
+std::string why_no_device(int* count) {
+  const cudaError_t error = cudaGetDeviceCount(count);
+  if (error == cudaSuccess && *count > 0) return "";
+  if (error == cudaErrorInsufficientDriver) {
+    int driver = 0;
+    cudaDriverGetVersion(&driver);
+    if (driver == 0) return "no NVIDIA driver is loaded on this machine";
+    return "the NVIDIA driver supports CUDA " + version_text(driver) +
+           ", this program needs CUDA " + version_text(CUDART_VERSION) +
+           ": a newer driver, or a build with an older toolkit";
+  }
+  if (error == cudaSuccess || error == cudaErrorNoDevice) {
+    const char* visible = std::getenv("CUDA_VISIBLE_DEVICES");
+    return "no CUDA device was found" +
+           (visible ? " (CUDA_VISIBLE_DEVICES is \"" + std::string(visible) + "\")" : std::string());
+  }
+  return "the CUDA devices could not be listed: " + reason(error);
+}
+
+}  // namespace
+
+std::string Device::describe() const {
+  char text[256];
+  std::snprintf(text, sizeof text, "%s (compute capability %d.%d, %d SMs, %.1f GB)", name.c_str(),
+                major, minor, multiprocessors, static_cast<double>(memory) * 1e-9);
+  return text;
+}
+
+std::vector<Device> cuda_devices(std::string* why) {
+  int count = 0;
+  const std::string none = why_no_device(&count);
+  if (why) *why = none;
+  std::vector<Device> devices;
+  if (!none.empty()) return devices;
+  for (int i = 0; i < count; ++i) devices.push_back(describe_device(i));
+  return devices;
+}
+
+Device use_cuda_device(int index) {
+  std::string why;
+  const std::vector<Device> devices = cuda_devices(&why);
+  if (devices.empty()) throw DeviceError(why + "; allowed is the CPU");
+  if (index < 0 || index >= static_cast<int>(devices.size())) {
+    throw DeviceError("CUDA device " + std::to_string(index) + ": there is none; allowed 0 to " +
+                      std::to_string(devices.size() - 1));
+  }
+  PHYXEL_CUDA(cudaSetDevice(index));
+  cudaFuncAttributes attributes{};
+  const cudaError_t error = cudaFuncGetAttributes(&attributes, probe);
+  if (error == cudaErrorNoKernelImageForDevice || error == cudaErrorInvalidDeviceFunction) {
+    cudaGetLastError();  // an answer, not a failure to be met again later
+    throw DeviceError("this program holds no kernels for " + devices[index].describe() +
+                      ", only for the architectures " PHYXEL_CUDA_ARCHITECTURES
+                      ": build it with -DCMAKE_CUDA_ARCHITECTURES=" +
+                      std::to_string(devices[index].major * 10 + devices[index].minor));
+  }
+  check_cuda(error, "cudaFuncGetAttributes");
+  return devices[index];
+}
+
+std::size_t cuda_free_memory() {
+  std::size_t free = 0, total = 0;
+  PHYXEL_CUDA(cudaMemGetInfo(&free, &total));
+  return free;
+}
+
+std::string cuda_version() {
+  int driver = 0;
+  cudaDriverGetVersion(&driver);
+  return "CUDA " + version_text(CUDART_VERSION) + ", " +
+         (driver ? "driver for " + version_text(driver) : std::string("no driver"));
+}
+
+void check_cuda(cudaError_t error, const char* call) {
+  if (error == cudaSuccess) return;
+  cudaGetLastError();
+  throw DeviceError(current_device() + ": " + call + " failed: " + reason(error));
+}
+
+std::string Launch::describe() const {
+  return std::string(kernel) + "<<<" + std::to_string(blocks) + ", " + std::to_string(threads) +
+         ">>> (" + subject + ")";
+}
+
+void check_launch(const Launch& launch) {
+  cudaError_t error = cudaGetLastError();
+  if (error != cudaSuccess) {
+    throw DeviceError(current_device() + ": " + launch.describe() +
+                      " could not be launched: " + reason(error));
+  }
+  static const bool wait = [] {
+    const char* value = std::getenv("PHYXEL_CUDA_SYNC");
+    return value && std::strcmp(value, "0") != 0;
+  }();
+  if (!wait) return;
+  error = cudaDeviceSynchronize();
+  if (error != cudaSuccess) {
+    throw DeviceError(current_device() + ": " + launch.describe() + " failed: " + reason(error));
+  }
+}
+
+void wait_for_device(const Launch& last) {
+  const cudaError_t error = cudaDeviceSynchronize();
+  if (error == cudaSuccess) return;
+  throw DeviceError(current_device() + ": a kernel failed: " + reason(error) + "; the last launch was " +
+                    last.describe() + ", and PHYXEL_CUDA_SYNC=1 in the environment tells which one failed");
+}
+
+namespace detail {
+
+void* allocate(std::size_t bytes, const std::string& what) {
+  if (bytes == 0) return nullptr;
+  void* data = nullptr;
+  const cudaError_t error = cudaMalloc(&data, bytes);
+  if (error == cudaErrorMemoryAllocation) {
+    cudaGetLastError();
+    std::size_t free = 0, total = 0;
+    cudaMemGetInfo(&free, &total);
+    throw DeviceError(current_device() + ": out of memory: " + what + " asks for " +
+                      gigabytes(bytes) + ", " + gigabytes(free) + " of " + gigabytes(total) +
+                      " are free");
+  }
+  check_cuda(error, "cudaMalloc");
+  return data;
+}
+
+}  // namespace detail
+}  // namespace phyxel

@@ -1,0 +1,33 @@
+/// The GPUs of this machine. No CUDA header is needed to include this, and a program built without
+/// CUDA has it too: it then finds none and says why.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace phyxel {
+
+struct Device {
+  int index = 0;
+  std::string name;           ///< e.g. "NVIDIA H200".
+  int major = 0, minor = 0;   ///< Compute capability.
+  int multiprocessors = 0;
+  std::size_t memory = 0;     ///< Bytes in all.
+  std::string describe() const;  ///< "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
+};
+
+/// The devices found; if there are none, `why` says for what reason.
+std::vector<Device> cuda_devices(std::string* why = nullptr);
+
+/// Makes a device the current one of this thread.
+/// @throws DeviceError if this program was built without CUDA, if there is no such device, if the
+///   driver is too old, or if the program holds no kernels for the device's architecture.
+Device use_cuda_device(int index = 0);
+
+/// Bytes free on the current device.
+std::size_t cuda_free_memory();
+
+/// Toolkit and driver, e.g. "CUDA 13.0, driver for 13.0"; "no CUDA" if built without.
+std::string cuda_version();
+
+}  // namespace phyxel

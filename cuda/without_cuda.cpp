@@ -1,0 +1,37 @@
+/// What a program built without CUDA answers.
+#include "device.hpp"
+#include "paper/paper_backend.hpp"
+#include "paper/paper_model.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+const std::string without = "this program was built without CUDA";
+
+}  // namespace
+
+std::vector<Device> cuda_devices(std::string* why) {
+  if (why) *why = without;
+  return {};
+}
+
+Device use_cuda_device(int) {
+  throw DeviceError(without +
+                    ": allowed is the CPU, or a build with -DPHYXEL_CUDA=ON where nvcc is");
+}
+
+std::size_t cuda_free_memory() { return 0; }
+
+std::string cuda_version() { return "no CUDA"; }
+
+namespace paper {
+
+std::unique_ptr<PaperBackend> make_gpu_backend(const Model& model, const GpuOptions& options) {
+  check_paper_model(model);
+  use_cuda_device(options.device);
+  return nullptr;
+}
+
+}  // namespace paper
+}  // namespace phyxel

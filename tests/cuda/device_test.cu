@@ -1,0 +1,104 @@
+/// What a user is told when a GPU refuses, runs out of memory or fails.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "check.hpp"
+#include "device.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+__global__ void write_through(int* target) { *target = 1; }
+
+template <class Throwing>
+std::string message_of(Throwing&& act) {
+  try {
+    act();
+  } catch (const DeviceError& error) {
+    EXPECT_EQ(error.code(), ExitCode::device_failed);
+    return error.what();
+  }
+  ADD_FAILURE() << "no DeviceError";
+  return "";
+}
+
+class DeviceErrors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
+    use_cuda_device(0);
+  }
+};
+using DeviceErrorsDeathTest = DeviceErrors;
+
+TEST(Device, NoneIsExplained) {
+  if (!cuda_devices().empty()) GTEST_SKIP() << "there is a CUDA device";
+  EXPECT_THAT(message_of([] { use_cuda_device(0); }),
+              AllOf(HasSubstr("no "), HasSubstr("allowed is the CPU")));
+}
+
+TEST_F(DeviceErrors, OutOfMemorySaysForWhatHowMuchAndWhatIsThere) {
+  const std::string message =
+      message_of([] { DeviceArray<float>(std::size_t{1} << 48, "a matrix of the test"); });
+  EXPECT_THAT(message, AllOf(HasSubstr("a matrix of the test"), HasSubstr("asks for 1.13e+06 GB"),
+                             HasSubstr("are free"), HasSubstr("GPU 0, ")));
+  // The device goes on working.
+  const DeviceArray<int> small(3, "three numbers");
+  const int values[] = {1, 2, 3};
+  small.upload(values);
+  int back[3] = {};
+  small.download(back);
+  EXPECT_EQ(back[2], 3);
+}
+
+TEST_F(DeviceErrors, ARefusedLaunchIsNamed) {
+  write_through<<<1, 4096>>>(nullptr);
+  EXPECT_THAT(message_of([] { check_launch({"write_through", 1, 4096, "a test"}); }),
+              AllOf(HasSubstr("write_through<<<1, 4096>>> (a test)"), HasSubstr("launched")));
+}
+
+TEST_F(DeviceErrors, DevicesAreListed) {
+  const std::vector<Device> devices = cuda_devices();
+  EXPECT_THAT(devices[0].describe(), AllOf(HasSubstr(devices[0].name), HasSubstr("GB")));
+  EXPECT_THAT(message_of([&] { use_cuda_device(static_cast<int>(devices.size())); }),
+              HasSubstr("allowed 0 to " + std::to_string(devices.size() - 1)));
+  EXPECT_GT(cuda_free_memory(), 0u);
+}
+
+/// A fault leaves the process without its GPU, so each has a process of its own.
+void fault_and_report(bool at_once) {
+  if (at_once) setenv("PHYXEL_CUDA_SYNC", "1", 1);
+  try {
+    use_cuda_device(0);
+    const Launch launch{"write_through", 1, 1, "a test"};
+    write_through<<<1, 1>>>(nullptr);
+    check_launch(launch);
+    wait_for_device(launch);
+  } catch (const DeviceError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    std::_Exit(static_cast<int>(error.code()));
+  }
+  std::_Exit(0);
+}
+
+TEST_F(DeviceErrorsDeathTest, AFaultInsideAKernelIsReportedWithTheLastLaunch) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(fault_and_report(false), ::testing::ExitedWithCode(4),
+              "a kernel failed: .*cudaErrorIllegalAddress.*last launch was write_through.*"
+              "PHYXEL_CUDA_SYNC=1");
+}
+
+TEST_F(DeviceErrorsDeathTest, WaitingForEachLaunchNamesTheOneThatFailed) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(fault_and_report(true), ::testing::ExitedWithCode(4),
+              "write_through<<<1, 1>>> \\(a test\\) failed: .*cudaErrorIllegalAddress");
+}
+
+}  // namespace
+}  // namespace phyxel
