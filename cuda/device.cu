@@ -65,13 +65,6 @@ std::string why_no_device(int* count) {
 
 }  // namespace
 
-std::string Device::describe() const {
-  char text[256];
-  std::snprintf(text, sizeof text, "%s (compute capability %d.%d, %d SMs, %.1f GB)", name.c_str(),
-                major, minor, multiprocessors, static_cast<double>(memory) * 1e-9);
-  return text;
-}
-
 std::vector<Device> cuda_devices(std::string* why) {
   int count = 0;
   const std::string none = why_no_device(&count);
@@ -108,6 +101,12 @@ std::size_t cuda_free_memory() {
   std::size_t free = 0, total = 0;
   PHYXEL_CUDA(cudaMemGetInfo(&free, &total));
   return free;
+}
+
+std::size_t cuda_measured_allocation(std::size_t bytes, const std::string& what) {
+  const std::size_t before = cuda_free_memory();
+  const DeviceArray<char> array(bytes, what);
+  return before - cuda_free_memory();
 }
 
 std::string cuda_version() {

@@ -27,6 +27,10 @@ Device use_cuda_device(int index = 0);
 /// Bytes free on the current device.
 std::size_t cuda_free_memory();
 
+/// By how much the free memory of the current device falls while `bytes` are allocated.
+/// @throws DeviceError if they do not fit, naming `what`.
+std::size_t cuda_measured_allocation(std::size_t bytes, const std::string& what);
+
 /// Toolkit and driver, e.g. "CUDA 13.0, driver for 13.0"; "no CUDA" if built without.
 std::string cuda_version();
 

@@ -23,6 +23,8 @@ Device use_cuda_device(int) {
 
 std::size_t cuda_free_memory() { return 0; }
 
+std::size_t cuda_measured_allocation(std::size_t, const std::string&) { return 0; }
+
 std::string cuda_version() { return "no CUDA"; }
 
 namespace paper {

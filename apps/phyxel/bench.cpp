@@ -1,17 +1,15 @@
 /// phyxel bench: speeds beside the error they are reached at and the machine's own limits.
 #include <fmt/format.h>
 #include <omp.h>
-#include <sys/utsname.h>
 
 #include <atomic>
 #include <cmath>
-#include <ctime>
-#include <fstream>
 #include <functional>
 #include <random>
 #include <thread>
 
 #include "command.hpp"
+#include "csv.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
@@ -30,21 +28,6 @@ struct BenchOptions {
   double seconds = 0.3;
   bool force = false;
 };
-
-std::string processor_name() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
-  }
-  return "unknown processor";
-}
-
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  char text[16];
-  std::strftime(text, sizeof text, "%Y-%m-%d", std::gmtime(&now));
-  return text;
-}
 
 /// Bytes per second that `threads` threads copy between arrays far larger than any cache; read and
 /// write both counted. Best of five.
@@ -138,29 +121,30 @@ double force_error(const Model& model, Backend& backend) {
   return worst / largest;
 }
 
-/// Writes the same row to the terminal and to the CSV file.
+/// Rows go to the terminal as they come; the CSV file is written whole after each.
 class Table {
  public:
-  Table(const BenchOptions& options, const std::string& columns) {
-    fmt::print("# {} | {} | {} | {}\n{}\n", program_version(), processor_name(), compiler_name(),
-               today(), columns);
-    if (options.csv.empty()) return;
-    if (std::filesystem::exists(options.csv) && !options.force) {
+  Table(const BenchOptions& options, const std::vector<std::string>& columns)
+      : file_(options.csv), table_{machine_facts(), columns, {}} {
+    fmt::print("{}", csv_text(table_));
+    if (!file_.empty() && std::filesystem::exists(file_) && !options.force) {
       throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
     }
-    file_.open(options.csv);
-    if (!file_) throw InputError(fmt::format("{}: cannot be written", options.csv));
-    file_ << fmt::format("# program: {}\n# hardware: {}\n# compiler: {}\n# date: {}\n{}\n",
-                         program_version(), processor_name(), compiler_name(), today(), columns);
+    write();
   }
-  void row(const std::string& line) {
-    fmt::print("{}\n", line);
+  void row(const std::vector<std::string>& cells) {
+    fmt::print("{}\n", fmt::join(cells, ","));
     std::fflush(stdout);
-    if (file_.is_open()) file_ << line << '\n' << std::flush;
+    table_.rows.push_back(cells);
+    write();
   }
 
  private:
-  std::ofstream file_;
+  void write() const {
+    if (!file_.empty()) write_csv(file_, table_);
+  }
+  std::filesystem::path file_;
+  CsvTable table_;
 };
 
 void bench_step(const BenchOptions& options) {
@@ -174,12 +158,10 @@ void bench_step(const BenchOptions& options) {
                                    did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
     }
   }
-  Table table(
-      options,
-      "terms,precision,threads,phyxels,neighbours,steps_per_s,phyxel_steps_per_s,spread,pairs_per_"
-      "s,"
-      "bytes_per_phyxel_step,bytes_per_s,copy_bytes_per_s,memory_bytes_per_phyxel,force_error,"
-      "core_round_trip_ns");
+  Table table(options, {"terms", "precision", "threads", "phyxels", "neighbours", "steps_per_s",
+                        "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step",
+                        "bytes_per_s", "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error",
+                        "core_round_trip_ns"});
   std::vector<double> copy;
   for (const int threads : options.threads) copy.push_back(copy_bandwidth(threads));
   for (const std::string& terms : options.terms) {
@@ -207,18 +189,22 @@ void bench_step(const BenchOptions& options) {
             for (int s = 0; s < steps; ++s) solver.step();
             rate.push_back(steps / seconds_since(start));
           }
-          std::sort(rate.begin(), rate.end());
-          const double median = rate[rate.size() / 2], n = model.size();
+          const Median median = median_of(rate);
+          const double n = model.size();
           std::size_t memory = 0;
           for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
           const double traffic = static_cast<double>(backend->step_traffic());
-          table.row(fmt::format(
-              "{},{},{},{},{:.1f},{:.5g},{:.5g},{:.3f},{:.5g},{:.1f},{:.4g},{:.4g},{:.1f},{:.2e},{:"
-              ".0f}",
-              terms, precision, options.threads[t], model.size(), pairs / n, median, median * n,
-              (rate.back() - rate.front()) / median, median * 2 * pairs, traffic / n,
-              median * traffic, copy[t], static_cast<double>(memory) / n, error,
-              options.threads[t] > 1 && omp_get_num_procs() > 1 ? core_round_trip() : 0.0));
+          const bool shared = options.threads[t] > 1 && omp_get_num_procs() > 1;
+          table.row({terms, precision, std::to_string(options.threads[t]),
+                     std::to_string(model.size()), fmt::format("{:.1f}", pairs / n),
+                     fmt::format("{:.5g}", median.value), fmt::format("{:.5g}", median.value * n),
+                     fmt::format("{:.3f}", median.spread),
+                     fmt::format("{:.5g}", median.value * 2 * pairs),
+                     fmt::format("{:.1f}", traffic / n), fmt::format("{:.4g}", median.value * traffic),
+                     fmt::format("{:.4g}", copy[t]),
+                     fmt::format("{:.1f}", static_cast<double>(memory) / n),
+                     fmt::format("{:.2e}", error),
+                     fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
         }
       }
     }
@@ -226,9 +212,8 @@ void bench_step(const BenchOptions& options) {
 }
 
 void bench_neighbours(const BenchOptions& options) {
-  Table table(options,
-              "threads,phyxels,neighbours,spacing_us_per_phyxel,search_us_per_phyxel,transpose_us_"
-              "per_phyxel");
+  Table table(options, {"threads", "phyxels", "neighbours", "spacing_us_per_phyxel",
+                        "search_us_per_phyxel", "transpose_us_per_phyxel"});
   for (const int threads : options.threads) {
     omp_set_num_threads(threads);
     for (const Index size : options.sizes) {
@@ -249,13 +234,12 @@ void bench_neighbours(const BenchOptions& options) {
         transpose_time.push_back(seconds_since(start));
         pairs = static_cast<double>(inverse.entries());
       }
-      const auto median = [&](std::vector<double>& times) {
-        std::sort(times.begin(), times.end());
-        return times[times.size() / 2] / n * 1e6;
+      const auto microseconds = [&](const std::vector<double>& times) {
+        return fmt::format("{:.3f}", median_of(times).value / n * 1e6);
       };
-      table.row(fmt::format("{},{},{:.1f},{:.3f},{:.3f},{:.3f}", threads, cloud.position.size(),
-                            pairs / n, median(spacing_time), median(search_time),
-                            median(transpose_time)));
+      table.row({std::to_string(threads), std::to_string(cloud.position.size()),
+                 fmt::format("{:.1f}", pairs / n), microseconds(spacing_time),
+                 microseconds(search_time), microseconds(transpose_time)});
     }
   }
 }

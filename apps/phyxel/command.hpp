@@ -13,5 +13,6 @@ void add_info(CLI::App& program);
 void add_export(CLI::App& program);
 void add_render(CLI::App& program);
 void add_bench(CLI::App& program);
+void add_paper(CLI::App& program);
 
 }  // namespace phyxel::app

@@ -33,8 +33,8 @@ int main(int argc, char** argv) {
       "  phyxel info out/dino/phyxels.hdf.series         what is in a file\n"
       "\n"
       "Exit codes: 0 done; 2 wrong input, nothing lost; 3 the simulation diverged, its last good\n"
-      "state is on disk; 74 writing failed, earlier files are intact; 75 stopped by a signal,\n"
-      "continue with --resume auto.");
+      "state is on disk; 4 no GPU that could do it, or it failed; 74 writing failed, earlier files\n"
+      "are intact; 75 stopped by a signal, continue with --resume auto.");
   phyxel::app::add_run(program);
   phyxel::app::add_check(program);
   phyxel::app::add_sample(program);
@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
   phyxel::app::add_info(program);
   phyxel::app::add_export(program);
   phyxel::app::add_bench(program);
+  phyxel::app::add_paper(program);
   try {
     program.parse(argc, argv);
     return static_cast<int>(ExitCode::success);

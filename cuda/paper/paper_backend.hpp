@@ -24,8 +24,8 @@ class PaperBackend : public Backend {
   virtual ImmutableValues immutable_values() const = 0;
 
   /// What calcStrainStressA stored in the n×n matrix by the last `stress()`: the force of each
-  /// phyxel on each of its neighbours [N], in the order of the neighbour lists. Empty where no
-  /// such matrix is kept.
+  /// phyxel on each of its neighbours [N], in the order of the neighbour lists. Empty for the CSR
+  /// gather, which stores none.
   virtual std::vector<Vec3d> pair_forces() const = 0;
 
   /// updateSurfels: fills the vertex buffer from the present displacements and the gradients of

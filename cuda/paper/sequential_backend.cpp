@@ -78,8 +78,15 @@ class SequentialBackend final : public PaperBackend {
 
   void stress() override {
     std::fill(force_.begin(), force_.end(), V{});
-    const bool green = model_.parts[0].material.strain == Strain::green;
-    green ? push_neighbours(GreenHooke<Real>{hooke_}) : push_neighbours(CauchyHooke<Real>{hooke_});
+    for_law([&](const auto& law) {
+      for (Index i = 0; i < size(); ++i) {
+        gradient_[i] = gradient_of(i);
+        for_each_push(law, i, [&](Index j, V push) {
+          force_[j] += push;
+          force_[i] -= push;
+        });
+      }
+    });
   }
 
   void advance(double, double dt) override {
@@ -148,7 +155,16 @@ class SequentialBackend final : public PaperBackend {
     }
     return values;
   }
-  std::vector<Vec3d> pair_forces() const override { return {}; }
+  /// Evaluated for the occasion: pushing needs no matrix.
+  std::vector<Vec3d> pair_forces() const override {
+    std::vector<Vec3d> forces;
+    for_law([&](const auto& law) {
+      for (Index i = 0; i < size(); ++i) {
+        for_each_push(law, i, [&](Index, V push) { forces.push_back(to_double(push)); });
+      }
+    });
+    return forces;
+  }
   void wait() const override {}
 
   std::vector<ArrayBytes> memory() const override {
@@ -164,7 +180,7 @@ class SequentialBackend final : public PaperBackend {
   }
 
  private:
-  Csr const& neighbours() const { return model_.neighbourhood.neighbours; }
+  const Csr& neighbours() const { return model_.neighbourhood.neighbours; }
 
   /// The work of precalcImutableValues.
   void prepare() {
@@ -188,25 +204,31 @@ class SequentialBackend final : public PaperBackend {
     }
   }
 
-  template <class Law>
-  void push_neighbours(const Law& law) {
+  template <class Apply>
+  void for_law(Apply&& apply) const {
+    const bool green = model_.parts[0].material.strain == Strain::green;
+    green ? apply(GreenHooke<Real>{hooke_}) : apply(CauchyHooke<Real>{hooke_});
+  }
+
+  M gradient_of(Index i) const {
     const Csr& csr = neighbours();
-    for (Index i = 0; i < size(); ++i) {
-      M sum;
-      for (Offset k = csr.offsets[i]; k < csr.offsets[i + 1]; ++k) {
-        const Index j = csr.indices[k];
-        sum += gradient_term(displacement_[j] - displacement_[i], position_[j] - position_[i],
-                             omega_[k]);
-      }
-      gradient_[i] = displacement_gradient(sum, inverse_moment_[i]);
-      const M q =
-          pair_stress(volume_[i], law.first_piola_stress(gradient_[i]), inverse_moment_[i]);
-      for (Offset k = csr.offsets[i]; k < csr.offsets[i + 1]; ++k) {
-        const Index j = csr.indices[k];
-        const V push = neighbour_force(q, position_[i] - position_[j], omega_[k]);
-        force_[j] += push;
-        force_[i] -= push;
-      }
+    M sum;
+    for (Offset k = csr.offsets[i]; k < csr.offsets[i + 1]; ++k) {
+      const Index j = csr.indices[k];
+      sum += gradient_term(displacement_[j] - displacement_[i], position_[j] - position_[i],
+                           omega_[k]);
+    }
+    return displacement_gradient(sum, inverse_moment_[i]);
+  }
+
+  /// push(j, force of phyxel i on its neighbour j), from the present gradient of i.
+  template <class Law, class Push>
+  void for_each_push(const Law& law, Index i, Push&& push) const {
+    const Csr& csr = neighbours();
+    const M q = pair_stress(volume_[i], law.first_piola_stress(gradient_[i]), inverse_moment_[i]);
+    for (Offset k = csr.offsets[i]; k < csr.offsets[i + 1]; ++k) {
+      const Index j = csr.indices[k];
+      push(j, neighbour_force(q, position_[i] - position_[j], omega_[k]));
     }
   }
 

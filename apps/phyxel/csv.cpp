@@ -1,0 +1,133 @@
+#include "csv.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <charconv>
+#include <ctime>
+#include <fstream>
+#include <sstream>
+
+#include "files/atomic_file.hpp"
+#include "phyxel/error.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+namespace {
+
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  char text[16];
+  std::strftime(text, sizeof text, "%Y-%m-%d", std::gmtime(&now));
+  return text;
+}
+
+std::vector<std::string> split(const std::string& line) {
+  std::vector<std::string> cells;
+  std::size_t begin = 0;
+  for (std::size_t end; (end = line.find(',', begin)) != std::string::npos; begin = end + 1) {
+    cells.push_back(line.substr(begin, end - begin));
+  }
+  cells.push_back(line.substr(begin));
+  return cells;
+}
+
+std::string cell(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ';');
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+std::string processor_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
+  }
+  return "unknown processor";
+}
+
+Facts machine_facts() {
+  return {{"program", program_version()},
+          {"hardware", fmt::format("{}, {} cores", processor_name(), omp_get_num_procs())},
+          {"compiler", compiler_name()},
+          {"date", today()}};
+}
+
+bool CsvTable::has(const std::string& column) const {
+  return std::find(columns.begin(), columns.end(), column) != columns.end();
+}
+
+const std::string& CsvTable::text(std::size_t row, const std::string& column) const {
+  const auto found = std::find(columns.begin(), columns.end(), column);
+  if (found == columns.end()) {
+    throw InputError(fmt::format("no column \"{}\"; there are: {}", column, fmt::join(columns, ", ")));
+  }
+  return rows[row][static_cast<std::size_t>(found - columns.begin())];
+}
+
+double CsvTable::number(std::size_t row, const std::string& column) const {
+  const std::string& value = text(row, column);
+  double number = 0;
+  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
+  if (error != std::errc() || end != value.data() + value.size()) {
+    throw InputError(fmt::format("column \"{}\", row {}: \"{}\" is no number", column, row + 1, value));
+  }
+  return number;
+}
+
+std::string CsvTable::fact(const std::string& name) const {
+  for (const auto& [key, value] : facts) {
+    if (key == name) return value;
+  }
+  return "";
+}
+
+std::string csv_text(const CsvTable& table) {
+  std::string text;
+  for (const auto& [name, value] : table.facts) text += fmt::format("# {}: {}\n", name, value);
+  text += fmt::format("{}\n", fmt::join(table.columns, ","));
+  for (const auto& row : table.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k) text += (k ? "," : "") + cell(row[k]);
+    text += '\n';
+  }
+  return text;
+}
+
+void write_csv(const std::filesystem::path& file, const CsvTable& table) {
+  write_whole_file(file, csv_text(table), Durable::no);
+}
+
+CsvTable read_csv(const std::filesystem::path& file) {
+  std::istringstream in(read_text_file(file, std::size_t{64} << 20));
+  CsvTable table;
+  std::size_t number = 0;
+  for (std::string line; std::getline(in, line);) {
+    ++number;
+    if (line.rfind("# ", 0) == 0) {
+      const std::size_t colon = line.find(": ");
+      if (colon != std::string::npos) {
+        table.facts.emplace_back(line.substr(2, colon - 2), line.substr(colon + 2));
+      }
+    } else if (table.columns.empty()) {
+      table.columns = split(line);
+    } else if (!line.empty()) {
+      table.rows.push_back(split(line));
+      if (table.rows.back().size() != table.columns.size()) {
+        throw InputError(fmt::format("{}:{}: {} cells under {} columns", file.string(), number,
+                                     table.rows.back().size(), table.columns.size()));
+      }
+    }
+  }
+  return table;
+}
+
+Median median_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const double middle = values[values.size() / 2];
+  return {middle, (values.back() - values.front()) / middle};
+}
+
+}  // namespace phyxel::app

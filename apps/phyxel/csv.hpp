@@ -1,0 +1,49 @@
+/// Measurements as CSV files that say where they come from.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace phyxel::app {
+
+/// What every measurement is labelled with, in order: program, hardware, compiler, date.
+using Facts = std::vector<std::pair<std::string, std::string>>;
+Facts machine_facts();
+
+/// "model name" of /proc/cpuinfo.
+std::string processor_name();
+
+/// A table of text cells under named columns, with facts on top.
+struct CsvTable {
+  Facts facts;
+  std::vector<std::string> columns;
+  std::vector<std::vector<std::string>> rows;
+
+  bool has(const std::string& column) const;
+  /// @throws InputError for a column that is not there.
+  const std::string& text(std::size_t row, const std::string& column) const;
+  /// @throws InputError if the cell is no number.
+  double number(std::size_t row, const std::string& column) const;
+  /// "" if there is no such fact.
+  std::string fact(const std::string& name) const;
+};
+
+/// Facts as "# name: value", then the header, then the rows. Cells must hold no comma and no line
+/// break; those in `rows` that do are written with a semicolon or a space instead.
+/// @throws OutputError
+void write_csv(const std::filesystem::path& file, const CsvTable& table);
+std::string csv_text(const CsvTable& table);
+
+/// @throws InputError if the file cannot be read, or a row has another number of cells than the
+///   header.
+CsvTable read_csv(const std::filesystem::path& file);
+
+/// The median and the spread, (largest - smallest) / median. @param values at least one
+struct Median {
+  double value = 0, spread = 0;
+};
+Median median_of(std::vector<double> values);
+
+}  // namespace phyxel::app

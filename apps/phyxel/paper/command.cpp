@@ -1,0 +1,182 @@
+/// phyxel paper: section 6 of Farias et al. 2008 run again.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "command.hpp"
+#include "files/atomic_file.hpp"
+#include "paper.hpp"
+#include "phyxel/error.hpp"
+#include "plot.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct PaperOptions {
+  PaperRequest request;
+  std::vector<int> figures;
+  std::vector<std::string> tables;
+  std::string device = "auto";
+  bool force = false, redraw = false;
+};
+
+const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
+                                          paper_table::memory, paper_table::stiffness};
+
+/// "auto", "cpu", "cuda" or "cuda:1".
+void choose_device(const std::string& name, PaperRequest& request) {
+  if (name == "cpu") {
+    request.why_no_gpu = "--device cpu";
+    return;
+  }
+  if (name == "auto") {
+    if (!cuda_devices(&request.why_no_gpu).empty()) request.gpu = use_cuda_device(0);
+    return;
+  }
+  if (name == "cuda") {
+    request.gpu = use_cuda_device(0);
+    return;
+  }
+  if (name.rfind("cuda:", 0) == 0 && name.size() > 5 && name.size() < 9 &&
+      std::all_of(name.begin() + 5, name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+    request.gpu = use_cuda_device(std::stoi(name.substr(5)));
+    return;
+  }
+  throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda, cuda:0, ...",
+                               name, did_you_mean(name, {"auto", "cpu", "cuda"})));
+}
+
+fs::path file_of(const fs::path& folder, const std::string& table) {
+  return folder / (table + ".csv");
+}
+
+void paper_command(PaperOptions& options) {
+  PaperRequest& request = options.request;
+  for (const std::string& table : options.tables) {
+    if (std::find(all_tables.begin(), all_tables.end(), table) == all_tables.end()) {
+      throw InputError(fmt::format("--table {}: unknown{}; allowed: {}", table,
+                                   did_you_mean(table, all_tables), fmt::join(all_tables, ", ")));
+    }
+  }
+  if (options.redraw) {
+    if (!fs::exists(file_of(request.out, paper_table::frames)) && !fs::is_directory(request.out)) {
+      throw InputError(fmt::format("{}: no such folder; allowed: --out with a folder that phyxel paper "
+                                   "has written",
+                                   request.out.string()));
+    }
+  } else {
+    choose_device(options.device, request);
+    const bool everything = options.figures.empty() && options.tables.empty();
+    if (everything) {
+      options.figures = {1, 2, 3, 4, 5, 6};
+      options.tables = all_tables;
+    }
+    std::vector<int> rates;
+    std::copy_if(options.figures.begin(), options.figures.end(), std::back_inserter(rates),
+                 [](int figure) { return figure > 1; });
+
+    const auto refuse_if_there = [&](const fs::path& file) {
+      if (fs::exists(file) && !options.force) {
+        throw InputError(fmt::format("{}: exists; allowed: another --out, or --force", file.string()));
+      }
+    };
+    if (!rates.empty()) refuse_if_there(file_of(request.out, paper_table::frames));
+    for (const std::string& table : options.tables) refuse_if_there(file_of(request.out, table));
+    make_writable_folder(request.out);
+
+    if (!request.gpu) {
+      say("left out, for " + request.why_no_gpu + ":");
+      const auto has = [&](int f) {
+        return std::find(rates.begin(), rates.end(), f) != rates.end();
+      };
+      if (has(2)) say("  figure 2 (GPU frame rates, phyxels)");
+      if (has(3)) say("  figure 3 (GPU frame rates, surfels)");
+      if (has(4) || has(5) || has(6)) say("  the GPU's part of figures 4, 5 and 6");
+      for (const std::string& table : options.tables) {
+        say("  " + std::string(table == paper_table::memory ? "" : "the GPU's part of ") + "table " +
+            table);
+      }
+    } else {
+      say(fmt::format("GPU: {}; {}", request.gpu->describe(), cuda_version()));
+    }
+
+    if (std::find(options.figures.begin(), options.figures.end(), 1) != options.figures.end()) {
+      draw_figure_1(request);
+    }
+    if (!rates.empty()) {
+      write_csv(file_of(request.out, paper_table::frames), measure_frames(request, rates));
+    }
+    const struct {
+      const char* name;
+      CsvTable (*measure)(const PaperRequest&);
+      bool needs_gpu;
+    } measurements[] = {{paper_table::kernels, measure_kernels, false},
+                        {paper_table::trajectory, measure_trajectories, false},
+                        {paper_table::memory, measure_memory, true},
+                        {paper_table::stiffness, measure_stiffness, false}};
+    for (const auto& m : measurements) {
+      if (std::find(options.tables.begin(), options.tables.end(), m.name) == options.tables.end()) {
+        continue;
+      }
+      if (m.needs_gpu && !request.gpu) continue;
+      write_csv(file_of(request.out, m.name), m.measure(request));
+    }
+  }
+  if (can_plot()) {
+    for (const fs::path& file : draw_figures(request.out)) say(file.string());
+  } else {
+    say("gnuplot was not found, so figures 2 to 6 are not drawn; `phyxel paper --redraw --out " +
+        request.out.string() + "` draws them later, anywhere");
+  }
+  write_paper_page(request.out);
+  say((request.out / "README.md").string());
+}
+
+}  // namespace
+
+void say(const std::string& line) {
+  fmt::print("{}\n", line);
+  std::fflush(stdout);
+}
+
+void add_paper(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "paper", "Run the measurements of Farias et al. 2008 again, with its kernels");
+  auto options = std::make_shared<PaperOptions>();
+  PaperRequest& request = options->request;
+  command->add_option("--out", request.out, "Folder for tables, figures and page")
+      ->capture_default_str();
+  command->add_option("--figure", options->figures, "Only these figures, 1 to 6, comma separated")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 6));
+  command
+      ->add_option("--table", options->tables,
+                   "Only these tables: kernels, trajectory, memory, stiffness")
+      ->delimiter(',');
+  command->add_option("--device", options->device, "auto, cpu, cuda or cuda:<number>")
+      ->capture_default_str();
+  command->add_option("--repeat", request.repeat, "Repeats; the median is reported")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--objects", request.objects, "Most objects at once")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--seconds", request.seconds, "Length of one repeat [s]")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 60.0));
+  command->add_flag("--force", options->force, "Replace earlier tables in the folder");
+  command->add_flag("--redraw", options->redraw,
+                    "Measure nothing; draw figures and page from the folder's tables");
+  command->footer(
+      "Examples:\n"
+      "  phyxel paper                              everything, to out/paper\n"
+      "  phyxel paper --figure 5 --repeat 11       one figure\n"
+      "  phyxel paper --table memory --device cuda:1\n"
+      "  phyxel paper --redraw --out docs/results/paper");
+  command->callback([options] { paper_command(*options); });
+}
+
+}  // namespace phyxel::app

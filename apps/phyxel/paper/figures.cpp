@@ -1,0 +1,216 @@
+/// The figures of section 6: Figure 1 from a simulation, the others from the tables.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "camera.hpp"
+#include "compose.hpp"
+#include "paper.hpp"
+#include "paper/paper_backend.hpp"
+#include "paper/paper_model.hpp"
+#include "phyxel/solver.hpp"
+#include "plot.hpp"
+#include "png_file.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+Vec3d view_of(const std::string& body) {
+  return body == "alien_head" ? Vec3d{-1, -0.6, -0.2} : Vec3d{-1, 2, -0.6};
+}
+
+using Match = std::vector<std::pair<std::string, std::string>>;
+
+bool matches(const CsvTable& table, std::size_t row, const Match& match) {
+  for (const auto& [column, value] : match) {
+    if (table.text(row, column) != value) return false;
+  }
+  return true;
+}
+
+/// y against x of the rows that match.
+Curve curve_of(const CsvTable& table, const std::string& label, const std::string& x,
+               const std::string& y, const Match& match) {
+  Curve curve{label, {}, {}};
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    if (!matches(table, r, match) || table.text(r, y).empty()) continue;
+    curve.x.push_back(table.number(r, x));
+    curve.y.push_back(table.number(r, y));
+  }
+  return curve;
+}
+
+void add_if_any(LineChart& chart, Curve curve) {
+  if (!curve.x.empty()) chart.curves.push_back(std::move(curve));
+}
+
+LineChart rates(const CsvTable& frames, const std::string& title, const std::string& with_surfels) {
+  LineChart chart{title, "objects", "frames per second", false, true, {}};
+  for (const std::string& body : paper::body_names()) {
+    add_if_any(chart, curve_of(frames, body, "objects", "frames_per_s",
+                               {{"body", body},
+                                {"program", "kernels of 2008"},
+                                {"with_surfels", with_surfels},
+                                {"frames", "shown"}}));
+  }
+  return chart;
+}
+
+BarChart comparison(const CsvTable& frames, const std::string& title,
+                    const std::string& with_surfels) {
+  BarChart chart{title, "frames per second, one object", true, paper::body_names(), {}};
+  std::vector<std::pair<std::string, std::string>> programs;  // program, threads
+  for (std::size_t r = 0; r < frames.rows.size(); ++r) {
+    const std::pair<std::string, std::string> program{frames.text(r, "program"),
+                                                      frames.text(r, "threads")};
+    if (std::find(programs.begin(), programs.end(), program) == programs.end()) {
+      programs.push_back(program);
+    }
+  }
+  for (const auto& [program, threads] : programs) {
+    BarChart::Series series{
+        threads == "0" ? program + " (GPU)" : fmt::format("{} ({} thread{})", program, threads,
+                                                          threads == "1" ? "" : "s"),
+        {}};
+    bool any = false;
+    for (const std::string& body : chart.groups) {
+      const Curve one = curve_of(frames, "", "objects", "frames_per_s",
+                                 {{"body", body},
+                                  {"program", program},
+                                  {"threads", threads},
+                                  {"objects", "1"},
+                                  {"with_surfels", with_surfels},
+                                  {"frames", "shown"}});
+      any = any || !one.y.empty();
+      series.values.push_back(one.y.empty() ? std::numeric_limits<double>::quiet_NaN() : one.y[0]);
+    }
+    if (any) chart.series.push_back(std::move(series));
+  }
+  return chart;
+}
+
+LineChart absolute_times(const CsvTable& frames) {
+  LineChart chart{"Figure 6: phyxels and surfels, kernels of 2008", "objects",
+                  "milliseconds per frame", false, true, {}};
+  for (const std::string& body : paper::body_names()) {
+    for (const char* how : {"shown", "queued"}) {
+      add_if_any(chart, curve_of(frames, fmt::format("{}, {}", body, how), "objects",
+                                 "ms_per_frame",
+                                 {{"body", body},
+                                  {"program", "kernels of 2008"},
+                                  {"with_surfels", "yes"},
+                                  {"frames", how}}));
+    }
+  }
+  return chart;
+}
+
+LineChart memory_chart(const CsvTable& memory) {
+  LineChart chart{"Memory that one body takes", "phyxels", "bytes, measured", true, true, {}};
+  const auto add = [&](const char* label, const char* program, const char* numbers) {
+    add_if_any(chart, curve_of(memory, label, "phyxels", "measured_bytes",
+                               {{"program", program},
+                                {"numbers_a_pair", numbers},
+                                {"bodies", "1"},
+                                {"answer", "fits"}}));
+  };
+  add("n x n forces", "kernels of 2008", "3");
+  add("nine numbers a pair", "matrix alone", "9");
+  add("CSR gather", "CSR gather", "0");
+  return chart;
+}
+
+LineChart stiffness_chart(const CsvTable& stiffness) {
+  LineChart chart{"Stress of a spinning bar against long double", "Young's modulus [Pa]",
+                  "relative error", true, true, {}};
+  for (const char* precision : {"float", "double"}) {
+    for (const char* fraction : {"0.1", "0.5", "0.9"}) {
+      add_if_any(chart, curve_of(stiffness, fmt::format("{}, {} of the step limit", precision, fraction),
+                                 "young_pa", "stress_error",
+                                 {{"precision", precision}, {"step_of_limit", fraction}}));
+    }
+  }
+  return chart;
+}
+
+}  // namespace
+
+std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
+  std::vector<fs::path> files;
+  for (const std::string& name : paper::body_names()) {
+    const Scene scene = paper::body_scene(name);
+    const Model model = paper::paper_model(scene);
+    const auto backend = request.gpu
+                             ? paper::make_gpu_backend(model, {.device = request.gpu->index})
+                             : paper::make_sequential_backend<float>(model);
+    Solver solver(*backend, initial_state(model, scene, 0.5 * step_limit(model).largest_step));
+    while (solver.time() < 0.6) solver.step();
+    const State state = solver.state();
+    SurfelState surfels;
+    backend->advect_surfels(surfels);
+
+    FrameData surface, phyxels;
+    surface.time = phyxels.time = state.time;
+    surface.point = surfels.position;
+    surface.normal = surfels.normal;
+    surface.triangle = model.surfels.triangle;
+    for (Index i = 0; i < model.size(); ++i) {
+      phyxels.point.push_back(model.position[i] + state.displacement[i]);
+    }
+    CameraFit fit(640, 640, view_of(name), {0, 0, 1});
+    fit.include(surface.point);
+    Setting setting;
+    setting.camera = fit.camera();
+    setting.extent = fit.extent();
+    setting.spacing = typical_spacing(phyxels.point);
+    files.push_back(request.out / fmt::format("figure1_{}.png", name));
+    write_png(files.back(), draw_picture(&surface, &phyxels, setting));
+    say(fmt::format("{} after {:.2f} s by {}", files.back().string(), state.time, backend->name()));
+  }
+  return files;
+}
+
+std::vector<fs::path> draw_figures(const fs::path& folder) {
+  std::vector<fs::path> files;
+  const auto table_of = [&](const char* name) -> std::optional<CsvTable> {
+    const fs::path file = folder / (std::string(name) + ".csv");
+    if (!fs::exists(file)) return std::nullopt;
+    return read_csv(file);
+  };
+  const auto draw = [&](const char* name, const auto& chart, bool any) {
+    const fs::path file = folder / (std::string(name) + ".svg");
+    if (!any) {
+      fs::remove(file);  // of an earlier measurement, with a GPU perhaps
+      return;
+    }
+    draw_svg(script_of(chart), file);
+    files.push_back(file);
+  };
+  const auto draw_lines = [&](const char* name, const LineChart& chart) {
+    draw(name, chart, !chart.curves.empty());
+  };
+  const auto draw_bars = [&](const char* name, const BarChart& chart) {
+    draw(name, chart, !chart.series.empty());
+  };
+  if (const auto frames = table_of(paper_table::frames)) {
+    draw_lines("figure2", rates(*frames, "Figure 2: phyxels only, kernels of 2008", "no"));
+    draw_lines("figure3", rates(*frames, "Figure 3: phyxels and surfels, kernels of 2008", "yes"));
+    draw_bars("figure4", comparison(*frames, "Figure 4: CPU and GPU, phyxels only", "no"));
+    draw_bars("figure5", comparison(*frames, "Figure 5: CPU and GPU, phyxels and surfels", "yes"));
+    draw_lines("figure6", absolute_times(*frames));
+  }
+  if (const auto memory = table_of(paper_table::memory)) {
+    draw_lines("memory", memory_chart(*memory));
+  }
+  if (const auto stiffness = table_of(paper_table::stiffness)) {
+    draw_lines("stiffness", stiffness_chart(*stiffness));
+  }
+  return files;
+}
+
+}  // namespace phyxel::app

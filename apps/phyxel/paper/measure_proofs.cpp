@@ -1,0 +1,174 @@
+/// How far the kernels of 2008 are from the same equations in higher precision: kernel by kernel,
+/// and over a second of motion.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <functional>
+
+#include "paper.hpp"
+#include "paper/paper_backend.hpp"
+#include "paper/paper_model.hpp"
+#include "phyxel/solver.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using paper::PaperBackend;
+
+struct Program {
+  std::string name, precision;
+  std::function<std::unique_ptr<PaperBackend>(const Model&)> make;
+};
+
+std::vector<Program> programs(const PaperRequest& request) {
+  std::vector<Program> list{
+      {"sequential of 2008", "float", paper::make_sequential_backend<float>},
+      {"sequential of 2008", "double", paper::make_sequential_backend<double>}};
+  if (!request.gpu) return list;
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
+      list.push_back({store == paper::ForceStore::dense ? "kernels of 2008" : "CSR gather",
+                      precision_name(precision), [=, &request](const Model& model) {
+                        return paper::make_gpu_backend(model, {.precision = precision,
+                                                               .store = store,
+                                                               .device = request.gpu->index});
+                      }});
+    }
+  }
+  return list;
+}
+
+double size_of(double a) { return std::abs(a); }
+double size_of(Vec3d a) { return norm(a); }
+double size_of(const Mat3d& a) {
+  double sum = 0;
+  for (int e = 0; e < 9; ++e) sum += a(e / 3, e % 3) * a(e / 3, e % 3);
+  return std::sqrt(sum);
+}
+
+/// Largest |a - b| over the largest |b|.
+template <class T>
+double distance(const std::vector<T>& a, const std::vector<T>& b) {
+  double error = 0, size = 0;
+  for (std::size_t k = 0; k < b.size(); ++k) {
+    error = std::max(error, size_of(a[k] - b[k]));
+    size = std::max(size, size_of(b[k]));
+  }
+  return size > 0 ? error / size : error;
+}
+
+/// A bend and a twist with strains of some 10%, exact in float.
+State deformed(const Model& model) {
+  State state;
+  state.dt = 0x1p-12;
+  for (const Vec3d& x : model.position) {
+    const Vec3d u{0.1 * x.y + 0.05 * x.z * x.z, -0.08 * x.z, 0.06 * x.x - 0.07 * x.y * x.x};
+    state.displacement.push_back(
+        {static_cast<float>(u.x), static_cast<float>(u.y), static_cast<float>(u.z)});
+  }
+  state.velocity.resize(state.displacement.size());
+  return state;
+}
+
+/// Everything that the kernels leave behind, after one step from that state.
+struct Results {
+  PaperBackend::ImmutableValues immutable;
+  std::vector<Mat3d> gradient;
+  std::vector<Vec3d> pair_forces, forces;
+  SurfelState surfels;
+  State next;
+};
+Results results_of(PaperBackend& backend, const State& state) {
+  Results r;
+  r.immutable = backend.immutable_values();
+  backend.upload(state);
+  backend.displacement_gradients(r.gradient);
+  r.pair_forces = backend.pair_forces();
+  backend.internal_forces(r.forces);
+  backend.advect_surfels(r.surfels);
+  backend.stress();
+  backend.advance(0, state.dt);
+  backend.download(r.next);
+  return r;
+}
+
+CsvTable new_table(const PaperRequest& request, std::vector<std::string> columns) {
+  CsvTable table;
+  table.facts = machine_facts();
+  table.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
+  table.facts.emplace_back("cuda", cuda_version());
+  table.columns = std::move(columns);
+  return table;
+}
+
+}  // namespace
+
+CsvTable measure_kernels(const PaperRequest& request) {
+  CsvTable table =
+      new_table(request, {"body", "program", "precision", "kernel", "quantity", "relative_error"});
+  for (const std::string& name : paper::body_names()) {
+    const Model model = paper::paper_model(paper::body_scene(name));
+    const State state = deformed(model);
+    const Results exact =
+        results_of(*paper::make_sequential_backend<long double>(model), state);
+    for (const Program& program : programs(request)) {
+      const Results r = results_of(*program.make(model), state);
+      const auto add = [&](const char* kernel, const char* quantity, double error) {
+        table.rows.push_back({name, program.name, program.precision, kernel, quantity,
+                              fmt::format("{:.2e}", error)});
+        say(fmt::format("{:10} {:20} {:6} {:22} {:24} {:.2e}", name, program.name,
+                        program.precision, kernel, quantity, error));
+      };
+      add("precalcImutableValues", "weights", distance(r.immutable.omega, exact.immutable.omega));
+      add("precalcImutableValues", "inverse moment matrices",
+          distance(r.immutable.inverse_moment, exact.immutable.inverse_moment));
+      add("precalcImutableValues", "volumes", distance(r.immutable.volume, exact.immutable.volume));
+      add("calcStrainStressA", "displacement gradients", distance(r.gradient, exact.gradient));
+      if (!r.pair_forces.empty()) {
+        add("calcStrainStressA", "forces on neighbours", distance(r.pair_forces, exact.pair_forces));
+      }
+      add("calcStrainStressB", "summed forces", distance(r.forces, exact.forces));
+      add("integrate", "displacements", distance(r.next.displacement, exact.next.displacement));
+      add("updateSurfels", "vertices", distance(r.surfels.position, exact.surfels.position));
+      add("updateSurfels", "normals", distance(r.surfels.normal, exact.surfels.normal));
+    }
+  }
+  return table;
+}
+
+CsvTable measure_trajectories(const PaperRequest& request) {
+  CsvTable table = new_table(request, {"body", "program", "precision", "time_s", "steps",
+                                       "relative_error", "largest_displacement_m"});
+  for (const std::string& name : paper::body_names()) {
+    const Scene scene = paper::body_scene(name);
+    const Model model = paper::paper_model(scene);
+    const State start = initial_state(model, scene, 0.5 * step_limit(model).largest_step);
+    const double times[] = {0.25, 0.5, 0.75, 1};
+    const auto follow = [&](PaperBackend& backend) {
+      Solver solver(backend, start);
+      std::vector<State> stops{};
+      for (const double time : times) {
+        while (solver.time() < time) solver.step();
+        stops.push_back(solver.state());
+      }
+      return stops;
+    };
+    const auto exact = follow(*paper::make_sequential_backend<long double>(model));
+    for (const Program& program : programs(request)) {
+      const auto found = follow(*program.make(model));
+      for (std::size_t k = 0; k < exact.size(); ++k) {
+        const double error = distance(found[k].displacement, exact[k].displacement);
+        double largest = 0;
+        for (const Vec3d& u : exact[k].displacement) largest = std::max(largest, norm(u));
+        table.rows.push_back({name, program.name, program.precision, fmt::format("{}", times[k]),
+                              std::to_string(exact[k].step), fmt::format("{:.2e}", error),
+                              fmt::format("{:.3g}", largest)});
+        say(fmt::format("{:10} {:20} {:6} after {:4} s, {:5} steps: {:.2e}", name, program.name,
+                        program.precision, times[k], exact[k].step, error));
+      }
+    }
+  }
+  return table;
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,386 @@
+/// The page that sets the paper's printed figures beside ours. Every number on it is read from the
+/// tables.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "files/atomic_file.hpp"
+#include "paper.hpp"
+#include "paper/paper_model.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Match = std::vector<std::pair<std::string, std::string>>;
+
+/// What the paper prints: speedups of section 6.2 ("about 20 times").
+struct Printed {
+  const char* body;
+  double speedup;
+};
+constexpr Printed printed[] = {{"horn_bug", 10.05}, {"dino", 20.57}, {"alien_head", 24.76}};
+constexpr const char* printed_hardware =
+    "Athlon 64 X2 4800+ (one core) and GeForce 8800 GTX (128 scalar processors, 768 MB)";
+
+std::string table_text(const std::vector<std::string>& head,
+                       const std::vector<std::vector<std::string>>& rows) {
+  std::string text = fmt::format("| {} |\n|", fmt::join(head, " | "));
+  for (std::size_t k = 0; k < head.size(); ++k) text += " --- |";
+  text += "\n";
+  for (const auto& row : rows) text += fmt::format("| {} |\n", fmt::join(row, " | "));
+  return text + "\n";
+}
+
+/// Distinct values of a column, in order of appearance.
+std::vector<std::string> values_of(const CsvTable& table, const std::string& column,
+                                   const Match& match = {}) {
+  std::vector<std::string> values;
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    bool fits = true;
+    for (const auto& [c, v] : match) fits = fits && table.text(r, c) == v;
+    const std::string& value = table.text(r, column);
+    if (fits && std::find(values.begin(), values.end(), value) == values.end()) {
+      values.push_back(value);
+    }
+  }
+  return values;
+}
+
+std::optional<std::size_t> row_of(const CsvTable& table, const Match& match) {
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    bool fits = true;
+    for (const auto& [c, v] : match) fits = fits && table.text(r, c) == v;
+    if (fits) return r;
+  }
+  return std::nullopt;
+}
+
+/// The cell of the row that matches, or a dash.
+std::string cell(const CsvTable& table, const std::string& column, const Match& match) {
+  const auto row = row_of(table, match);
+  return row && !table.text(*row, column).empty() ? table.text(*row, column) : "–";
+}
+
+class Page {
+ public:
+  explicit Page(fs::path folder) : folder_(std::move(folder)) {}
+
+  std::string write() {
+    text_ = "# The 2008 paper, run again\n\n";
+    text_ +=
+        "Written by `phyxel paper` from the CSV files beside it. Farias, Almeida, Teixeira, "
+        "Teichrieb, Kelner: *A High Performance Massively Parallel Approach for Real Time "
+        "Deformable Body Physics Simulation*, SBAC-PAD 2008. The kernels are theirs by name and "
+        "role; what their text leaves open, and how it was filled, is in "
+        "`docs/paper.md`.\n\n";
+    with(paper_table::frames, [&](const CsvTable& t) { frames(t); });
+    pictures();
+    with(paper_table::kernels, [&](const CsvTable& t) { kernels(t); });
+    with(paper_table::trajectory, [&](const CsvTable& t) { trajectories(t); });
+    with(paper_table::memory, [&](const CsvTable& t) { memory(t); });
+    with(paper_table::stiffness, [&](const CsvTable& t) { stiffness(t); });
+    return text_;
+  }
+
+ private:
+  void with(const char* name, const std::function<void(const CsvTable&)>& section) {
+    const fs::path file = folder_ / (std::string(name) + ".csv");
+    if (fs::exists(file)) {
+      const CsvTable table = read_csv(file);
+      if (!table.rows.empty()) section(table);
+    }
+  }
+
+  void measured_by(const CsvTable& t) {
+    text_ += fmt::format("Measured by {} on {}; GPU: {}; {}; {}; {}.\n\n", t.fact("program"),
+                         t.fact("hardware"), t.fact("gpu"), t.fact("cuda"), t.fact("compiler"),
+                         t.fact("date"));
+  }
+
+  void figure(const std::string& name, const std::string& caption) {
+    if (fs::exists(folder_ / name)) text_ += fmt::format("![{}]({})\n\n", caption, name);
+  }
+
+  void frames(const CsvTable& t) {
+    text_ += "## Frame rates and speedups (Figures 2 to 6)\n\n";
+    measured_by(t);
+    text_ +=
+        "A frame is one time step of every object, each by its own launches of "
+        "`calcStrainStressA`, `calcStrainStressB`, `integrate` and, with surfels, "
+        "`updateSurfels`; *shown* frames end with the host knowing that they are done, *queued* "
+        "ones follow each other without waiting. Medians over " +
+        t.fact("repeats") + " repeats, float.\n\n";
+    speedups(t);
+    for (int f = 2; f <= 6; ++f) {
+      figure(fmt::format("figure{}.svg", f), fmt::format("Figure {}", f));
+    }
+    all_rates(t);
+  }
+
+  /// One object: GPU over each CPU program.
+  void speedups(const CsvTable& t) {
+    const std::vector<std::string> threads = values_of(t, "threads", {{"program", "phyxel CPU"}});
+    std::vector<std::string> head{"body", "phyxels", "surfels", "the paper prints"};
+    const auto rate = [&](const std::string& body, const char* program, const std::string& n,
+                          const char* surfels) {
+      const auto row = row_of(t, {{"body", body},
+                                  {"program", program},
+                                  {"threads", n},
+                                  {"objects", "1"},
+                                  {"with_surfels", surfels},
+                                  {"frames", "shown"}});
+      return row ? t.number(*row, "frames_per_s") : NAN;
+    };
+    std::vector<std::vector<std::string>> rows;
+    bool any = false;
+    for (const Printed& p : printed) {
+      const auto some = row_of(t, {{"body", p.body}});
+      if (!some) continue;
+      std::vector<std::string> row{p.body, t.text(*some, "phyxels"), t.text(*some, "surfels"),
+                                   fmt::format("{}", p.speedup)};
+      head.resize(4);
+      for (const char* surfels : {"no", "yes"}) {
+        const char* what = surfels[0] == 'y' ? "phyxels + surfels" : "phyxels";
+        const double gpu = rate(p.body, "kernels of 2008", "0", surfels);
+        const auto ratio = [&](const std::string& label, double cpu) {
+          head.push_back(fmt::format("{}: GPU / {}", what, label));
+          row.push_back(std::isfinite(gpu / cpu) ? fmt::format("{:.3g}", gpu / cpu) : "–");
+          any = any || std::isfinite(gpu / cpu);
+        };
+        ratio("sequential, 1 core", rate(p.body, "sequential of 2008", "1", surfels));
+        for (const std::string& n : threads) {
+          ratio(fmt::format("phyxel CPU, {} thread{}", n, n == "1" ? "" : "s"),
+                rate(p.body, "phyxel CPU", n, surfels));
+        }
+      }
+      rows.push_back(row);
+    }
+    if (!any) {
+      text_ += "No GPU was measured, so there are no speedups.\n\n";
+      return;
+    }
+    text_ += fmt::format(
+        "Speedup of the GPU, one object. The paper's figures are for {}. *Sequential* is the "
+        "program that the paper describes, one phyxel after the other on one core of today; "
+        "*phyxel CPU* is this project's own solver (vector units, threads), which the kernels of "
+        "2008 meet on unequal terms: a body of a few hundred phyxels fills a hundredth of today's "
+        "GPU, and three or four launches a frame are most of its time.\n\n",
+        printed_hardware);
+    text_ += table_text(head, rows);
+  }
+
+  void all_rates(const CsvTable& t) {
+    std::vector<std::string> head{"body", "surfels", "program", "threads", "frames"};
+    const std::vector<std::string> counts = values_of(t, "objects");
+    for (const std::string& n : counts) head.push_back(n + (n == "1" ? " object" : " objects"));
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& body : values_of(t, "body")) {
+      for (const std::string& surfels : values_of(t, "with_surfels")) {
+        for (const std::string& program : values_of(t, "program")) {
+          for (const std::string& threads : values_of(t, "threads", {{"program", program}})) {
+            for (const std::string& how : values_of(t, "frames")) {
+              std::vector<std::string> row{body, surfels, program, threads == "0" ? "GPU" : threads,
+                                           how};
+              bool any = false;
+              for (const std::string& n : counts) {
+                row.push_back(cell(t, "frames_per_s",
+                                   {{"body", body},
+                                    {"with_surfels", surfels},
+                                    {"program", program},
+                                    {"threads", threads},
+                                    {"frames", how},
+                                    {"objects", n}}));
+                any = any || row.back() != "–";
+              }
+              if (any) rows.push_back(row);
+            }
+          }
+        }
+      }
+    }
+    text_ += "Frames per second:\n\n" + table_text(head, rows);
+  }
+
+  void pictures() {
+    std::vector<std::string> head, row;
+    for (const std::string& body : paper::body_names()) {
+      const std::string file = fmt::format("figure1_{}.png", body);
+      if (!fs::exists(folder_ / file)) continue;
+      head.push_back(body);
+      row.push_back(fmt::format("![{}]({})", body, file));
+    }
+    if (head.empty()) return;
+    text_ += "## Figure 1\n\nThe bodies hung by a leg, the neck and the mouth, after 0.6 s of "
+             "falling; dots are phyxels.\n\n" +
+             table_text(head, {row});
+  }
+
+  void kernels(const CsvTable& t) {
+    text_ += "## Errors of each kernel\n\n";
+    measured_by(t);
+    text_ +=
+        "Largest difference from the same equations in long double, over the largest value, for a "
+        "bend and twist with strains of some 10%. The tests hold the same kernels against an "
+        "independent evaluation of the papers' equations.\n\n";
+    std::vector<std::string> head{"kernel", "quantity"};
+    std::vector<Match> columns;
+    for (const std::string& precision : values_of(t, "precision")) {
+      for (const std::string& program : values_of(t, "program", {{"precision", precision}})) {
+        if (program == "CSR gather") continue;  // bitwise the same
+        for (const std::string& body : values_of(t, "body")) {
+          head.push_back(fmt::format("{}, {}, {}", program, precision, body));
+          columns.push_back({{"precision", precision}, {"program", program}, {"body", body}});
+        }
+      }
+    }
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& kernel : values_of(t, "kernel")) {
+      for (const std::string& quantity : values_of(t, "quantity", {{"kernel", kernel}})) {
+        std::vector<std::string> row{"`" + kernel + "`", quantity};
+        for (Match match : columns) {
+          match.emplace_back("kernel", kernel);
+          match.emplace_back("quantity", quantity);
+          row.push_back(cell(t, "relative_error", match));
+        }
+        rows.push_back(row);
+      }
+    }
+    text_ += table_text(head, rows);
+  }
+
+  void trajectories(const CsvTable& t) {
+    text_ += "## A second of motion\n\n";
+    measured_by(t);
+    text_ +=
+        "Largest difference of a displacement from the trajectory in long double with the same "
+        "step, over the largest displacement. From float to double the distance shrinks by about "
+        "2²⁹ ≈ 5·10⁸, the ratio of their roundings: it is rounding that grows along the motion, and "
+        "nothing else.\n\n";
+    const std::vector<std::string> times = values_of(t, "time_s");
+    std::vector<std::string> head{"body", "program", "precision"};
+    for (const std::string& time : times) head.push_back(time + " s");
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& body : values_of(t, "body")) {
+      for (const std::string& program : values_of(t, "program")) {
+        for (const std::string& precision : values_of(t, "precision")) {
+          std::vector<std::string> row{body, program, precision};
+          for (const std::string& time : times) {
+            row.push_back(cell(t, "relative_error", {{"body", body},
+                                                     {"program", program},
+                                                     {"precision", precision},
+                                                     {"time_s", time}}));
+          }
+          if (row.back() != "–") rows.push_back(row);
+        }
+      }
+    }
+    text_ += table_text(head, rows);
+  }
+
+  void memory(const CsvTable& t) {
+    text_ += "## The n×n matrix\n\n";
+    measured_by(t);
+    text_ +=
+        "Section 5.2 gives 34.33 MB for 1,000 phyxels, which is nine floats a pair (36 bytes, in "
+        "MiB); a force is three (11.44 MiB). Ours stores three. Measured: what the GPU's free "
+        "memory fell by, in steps of its allocator (2 MiB); the CSR gather does the same work "
+        "without the matrix, to the same bits.\n\n";
+    const auto mebibytes = [&](const Match& match) {
+      const auto row = row_of(t, match);
+      if (!row) return std::string("–");
+      if (t.text(*row, "answer") != "fits") return std::string("does not fit");
+      return fmt::format("{:.2f}", t.number(*row, "measured_bytes") / (1 << 20));
+    };
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& n : values_of(t, "phyxels", {{"program", "CSR gather"}})) {
+      const Match dense{{"phyxels", n}, {"program", "kernels of 2008"}, {"bodies", "1"}};
+      const Match csr{{"phyxels", n}, {"program", "CSR gather"}};
+      const auto arrays = row_of(t, dense);
+      rows.push_back({n,
+                      arrays ? fmt::format("{:.2f}", t.number(*arrays, "array_bytes") / (1 << 20))
+                             : "–",
+                      mebibytes(dense),
+                      mebibytes({{"phyxels", n}, {"program", "matrix alone"}}), mebibytes(csr),
+                      cell(t, "steps_per_s", dense), cell(t, "steps_per_s", csr)});
+    }
+    text_ += table_text({"phyxels", "arrays, 3 a pair [MiB]", "measured [MiB]",
+                         "matrix with 9 a pair, measured [MiB]", "CSR gather, measured [MiB]",
+                         "steps/s, matrix", "steps/s, CSR"},
+                        rows);
+    figure("memory.svg", "Memory against phyxels");
+    text_ += "What is refused, in the program's words:\n\n";
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      if (t.text(r, "answer") == "fits") continue;
+      text_ += fmt::format("- {} × {} phyxels, {} numbers a pair: {}\n", t.text(r, "bodies"),
+                           t.text(r, "phyxels"), t.text(r, "numbers_a_pair"), t.text(r, "answer"));
+    }
+    text_ += "\n";
+  }
+
+  void stiffness(const CsvTable& t) {
+    text_ += "## Young's modulus and single precision\n\n";
+    measured_by(t);
+    text_ +=
+        "Section 6.1 warns that a large Young's modulus \"may cause unexpected results, due the "
+        "single floating point precision\". A free bar of 54 phyxels spins at 10 rad/s for 0.1 s. "
+        "Its displacements grow to the size of the bar whatever E is; its strains, which the spin "
+        "alone decides, fall as 1/E. A displacement u rounds to ε|u|, so a difference of neighbours "
+        "carries a strain error of about ε|u|/spacing, and a stress error of E times that: the "
+        "share of rounding in the stress grows with E, and with the number of steps that its noise "
+        "has time to shake the bar (smaller steps are more steps, and their Δt²f/m is lost against "
+        "u the sooner). Error of the stress, over the largest stress, against long double with the "
+        "same step; at 1.1 of the limit, against half the step: there every precision diverges.\n\n";
+    std::vector<std::string> head{"E [Pa]", "stress [Pa]"};
+    std::vector<Match> columns;
+    for (const std::string& precision : values_of(t, "precision")) {
+      for (const std::string& fraction : values_of(t, "step_of_limit")) {
+        head.push_back(fmt::format("{}, {} Δt_max", precision, fraction));
+        columns.push_back({{"precision", precision}, {"step_of_limit", fraction}});
+      }
+    }
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& young : values_of(t, "young_pa")) {
+      std::vector<std::string> row{
+          young, cell(t, "largest_stress_pa", {{"young_pa", young}, {"step_of_limit", "0.5"}})};
+      for (Match match : columns) {
+        match.emplace_back("young_pa", young);
+        row.push_back(cell(t, "stress_error", match));
+      }
+      rows.push_back(row);
+    }
+    text_ += table_text(head, rows);
+    for (const std::string& precision : values_of(t, "precision")) breaks(t, precision);
+    figure("stiffness.svg", "Error of the stress against Young's modulus");
+  }
+
+  /// From which E on a tenth of the stress is rounding.
+  void breaks(const CsvTable& t, const std::string& precision) {
+    double first = INFINITY;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      if (t.text(r, "precision") != precision || t.number(r, "step_of_limit") != 0.5) continue;
+      if (!(t.number(r, "stress_error") < 0.1)) first = std::min(first, t.number(r, "young_pa"));
+    }
+    text_ += std::isfinite(first)
+                 ? fmt::format("At half the largest step, in {}, more than a tenth of the stress is "
+                               "rounding from E = {:g} Pa on.\n\n",
+                               precision, first)
+                 : fmt::format("At half the largest step, in {}, rounding stays below a tenth of the "
+                               "stress over the whole table.\n\n",
+                               precision);
+  }
+
+  fs::path folder_;
+  std::string text_;
+};
+
+}  // namespace
+
+void write_paper_page(const fs::path& folder) {
+  write_whole_file(folder / "README.md", Page(folder).write(), Durable::no);
+}
+
+}  // namespace phyxel::app

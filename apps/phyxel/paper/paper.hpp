@@ -1,0 +1,53 @@
+/// What `phyxel paper` measures, and the page it makes of it. Every measurement ends as a CSV
+/// table; figures and page are made from those alone.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "csv.hpp"
+#include "device.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel::app {
+
+struct PaperRequest {
+  std::filesystem::path out = "out/paper";
+  std::optional<Device> gpu;  ///< Nothing: the CPU parts only.
+  std::string why_no_gpu;
+  int repeat = 5;
+  int objects = 10;      ///< Figures 2, 3 and 6: from one to so many.
+  double seconds = 0.1;  ///< Of one repeat.
+};
+
+/// Names of the tables, which are also those of their files: <name>.csv.
+namespace paper_table {
+inline constexpr const char* frames = "frames";          ///< Figures 2 to 6.
+inline constexpr const char* kernels = "kernels";        ///< Errors of each kernel.
+inline constexpr const char* trajectory = "trajectory";  ///< Errors over a second of motion.
+inline constexpr const char* memory = "memory";          ///< The n×n matrix.
+inline constexpr const char* stiffness = "stiffness";    ///< Young's modulus against error.
+}  // namespace paper_table
+
+/// Frame rates. @param figures which of 2 to 6
+CsvTable measure_frames(const PaperRequest& request, const std::vector<int>& figures);
+CsvTable measure_kernels(const PaperRequest& request);
+CsvTable measure_trajectories(const PaperRequest& request);
+CsvTable measure_memory(const PaperRequest& request);
+CsvTable measure_stiffness(const PaperRequest& request);
+
+/// Figure 1: each body at rest and in motion, figure1_<body>.png. @returns the files.
+std::vector<std::filesystem::path> draw_figure_1(const PaperRequest& request);
+
+/// Figures 2 to 6 and two more, from the tables in `folder`. @returns the files.
+std::vector<std::filesystem::path> draw_figures(const std::filesystem::path& folder);
+
+/// README.md from the tables and figures in `folder`.
+void write_paper_page(const std::filesystem::path& folder);
+
+/// One line on the terminal while measuring.
+void say(const std::string& line);
+
+}  // namespace phyxel::app
