@@ -195,16 +195,14 @@ void bench_step(const BenchOptions& options) {
           for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
           const double traffic = static_cast<double>(backend->step_traffic());
           const bool shared = options.threads[t] > 1 && omp_get_num_procs() > 1;
-          table.row({terms, precision, std::to_string(options.threads[t]),
-                     std::to_string(model.size()), fmt::format("{:.1f}", pairs / n),
-                     fmt::format("{:.5g}", median.value), fmt::format("{:.5g}", median.value * n),
-                     fmt::format("{:.3f}", median.spread),
-                     fmt::format("{:.5g}", median.value * 2 * pairs),
-                     fmt::format("{:.1f}", traffic / n), fmt::format("{:.4g}", median.value * traffic),
-                     fmt::format("{:.4g}", copy[t]),
-                     fmt::format("{:.1f}", static_cast<double>(memory) / n),
-                     fmt::format("{:.2e}", error),
-                     fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
+          table.row(
+              {terms, precision, std::to_string(options.threads[t]), std::to_string(model.size()),
+               fmt::format("{:.1f}", pairs / n), fmt::format("{:.5g}", median.value),
+               fmt::format("{:.5g}", median.value * n), fmt::format("{:.3f}", median.spread),
+               fmt::format("{:.5g}", median.value * 2 * pairs), fmt::format("{:.1f}", traffic / n),
+               fmt::format("{:.4g}", median.value * traffic), fmt::format("{:.4g}", copy[t]),
+               fmt::format("{:.1f}", static_cast<double>(memory) / n), fmt::format("{:.2e}", error),
+               fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
         }
       }
     }

@@ -63,7 +63,8 @@ bool CsvTable::has(const std::string& column) const {
 const std::string& CsvTable::text(std::size_t row, const std::string& column) const {
   const auto found = std::find(columns.begin(), columns.end(), column);
   if (found == columns.end()) {
-    throw InputError(fmt::format("no column \"{}\"; there are: {}", column, fmt::join(columns, ", ")));
+    throw InputError(
+        fmt::format("no column \"{}\"; there are: {}", column, fmt::join(columns, ", ")));
   }
   return rows[row][static_cast<std::size_t>(found - columns.begin())];
 }
@@ -73,9 +74,33 @@ double CsvTable::number(std::size_t row, const std::string& column) const {
   double number = 0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
   if (error != std::errc() || end != value.data() + value.size()) {
-    throw InputError(fmt::format("column \"{}\", row {}: \"{}\" is no number", column, row + 1, value));
+    throw InputError(
+        fmt::format("column \"{}\", row {}: \"{}\" is no number", column, row + 1, value));
   }
   return number;
+}
+
+bool CsvTable::matches(std::size_t row, const Match& match) const {
+  return std::all_of(match.begin(), match.end(),
+                     [&](const auto& cell) { return text(row, cell.first) == cell.second; });
+}
+
+std::optional<std::size_t> CsvTable::find(const Match& match) const {
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    if (matches(r, match)) return r;
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string> CsvTable::values(const std::string& column, const Match& match) const {
+  std::vector<std::string> found;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const std::string& value = text(r, column);
+    if (matches(r, match) && std::find(found.begin(), found.end(), value) == found.end()) {
+      found.push_back(value);
+    }
+  }
+  return found;
 }
 
 std::string CsvTable::fact(const std::string& name) const {

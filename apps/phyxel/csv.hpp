@@ -2,7 +2,7 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +15,9 @@ Facts machine_facts();
 /// "model name" of /proc/cpuinfo.
 std::string processor_name();
 
+/// Column and value, all of which a row must have.
+using Match = std::vector<std::pair<std::string, std::string>>;
+
 /// A table of text cells under named columns, with facts on top.
 struct CsvTable {
   Facts facts;
@@ -26,6 +29,11 @@ struct CsvTable {
   const std::string& text(std::size_t row, const std::string& column) const;
   /// @throws InputError if the cell is no number.
   double number(std::size_t row, const std::string& column) const;
+  bool matches(std::size_t row, const Match& match) const;
+  /// The first row that matches.
+  std::optional<std::size_t> find(const Match& match) const;
+  /// Distinct values of a column among the rows that match, in order of appearance.
+  std::vector<std::string> values(const std::string& column, const Match& match = {}) const;
   /// "" if there is no such fact.
   std::string fact(const std::string& name) const;
 };

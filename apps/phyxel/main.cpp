@@ -33,7 +33,8 @@ int main(int argc, char** argv) {
       "  phyxel info out/dino/phyxels.hdf.series         what is in a file\n"
       "\n"
       "Exit codes: 0 done; 2 wrong input, nothing lost; 3 the simulation diverged, its last good\n"
-      "state is on disk; 4 no GPU that could do it, or it failed; 74 writing failed, earlier files\n"
+      "state is on disk; 4 no GPU that could do it, or it failed; 74 writing failed, earlier "
+      "files\n"
       "are intact; 75 stopped by a signal, continue with --resume auto.");
   phyxel::app::add_run(program);
   phyxel::app::add_check(program);

@@ -25,12 +25,15 @@ std::string quoted(const std::string& text) {
   return out + "\"";
 }
 
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "?"; }
+std::string number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.9g}", value) : "?";
+}
 
 std::string head(const std::string& title, const std::string& y_label) {
   return "set encoding utf8\nset title " + quoted(title) + " noenhanced\nset ylabel " +
          quoted(y_label) +
-         " noenhanced\nset grid ytics lc rgb '#d0d0d0'\nset border 3\nset tics nomirror\nset datafile missing '?'\n"
+         " noenhanced\nset grid ytics lc rgb '#d0d0d0'\nset border 3\nset tics nomirror\nset "
+         "datafile missing '?'\n"
          "set key below noenhanced\n"
          "set linetype 1 lc rgb '#0072b2' lw 2 pt 7\nset linetype 2 lc rgb '#d55e00' lw 2 pt 5\n"
          "set linetype 3 lc rgb '#009e73' lw 2 pt 9\nset linetype 4 lc rgb '#cc79a7' lw 2 pt 13\n"
@@ -55,7 +58,8 @@ std::string output_of(const std::string& command, int* status) {
     return "no process could be started";
   }
   char buffer[4096];
-  for (std::size_t got; (got = fread(buffer, 1, sizeof buffer, pipe)) > 0;) text.append(buffer, got);
+  for (std::size_t got; (got = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
+    text.append(buffer, got);
   *status = pclose(pipe);
   return text;
 }
@@ -85,8 +89,9 @@ std::string script_of(const LineChart& chart) {
 
 std::string script_of(const BarChart& chart) {
   std::string script = head(chart.title, chart.y_label);
-  script += "set style data histogram\nset style histogram clustered gap 1\n"
-            "set style fill solid noborder\nset boxwidth 0.9\nset xtics noenhanced\n";
+  script +=
+      "set style data histogram\nset style histogram clustered gap 1\n"
+      "set style fill solid noborder\nset boxwidth 0.9\nset xtics noenhanced\n";
   if (chart.log_y) {
     double lowest = HUGE_VAL;
     for (const auto& series : chart.series) {
@@ -96,8 +101,8 @@ std::string script_of(const BarChart& chart) {
     }
     // Bars of a logarithmic axis stand on a power of ten below them all.
     const double floor = std::pow(10, std::floor(std::log10(lowest) - 0.3));
-    script += fmt::format("set logscale y\nset yrange [{}:*]\nset format y '10^{{%T}}'\n",
-                          number(floor));
+    script +=
+        fmt::format("set logscale y\nset yrange [{}:*]\nset format y '10^{{%T}}'\n", number(floor));
   }
   script += "$bars << EOD\n";
   for (std::size_t g = 0; g < chart.groups.size(); ++g) {
@@ -119,11 +124,14 @@ void draw_svg(const std::string& script, const fs::path& file) {
   fs::path source = file, drawing = file;
   source += ".gp.tmp";
   drawing += ".tmp";
-  write_whole_file(source, "set terminal svg size 800,450 font 'sans,14' background rgb 'white'\n"
-                           "set output " + quoted(drawing.string()) + "\n" + script,
+  write_whole_file(source,
+                   "set terminal svg size 800,450 font 'sans,14' background rgb 'white'\n"
+                   "set output " +
+                       quoted(drawing.string()) + "\n" + script,
                    Durable::no);
   std::string shell = "'";
-  for (const char c : source.string()) shell += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  for (const char c : source.string())
+    shell += c == '\'' ? std::string("'\\''") : std::string(1, c);
   int status = 0;
   const std::string words = output_of(program.string() + " " + shell + "' 2>&1", &status);
   fs::remove(source);

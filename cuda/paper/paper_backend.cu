@@ -48,6 +48,19 @@ class Texture {
   cudaTextureObject_t object_ = 0;
 };
 
+/// Out of the matrix, into slots like those of the neighbours; zero where there is none.
+template <class Real>
+__global__ void copy_pair_forces(CuBody<Real> body, Real* copies) {
+  const int i = thread_index(), n = body.numPhyxels;
+  if (i >= n) return;
+  for (int k = 0; k < body.maxNeighbors; ++k) {
+    const std::size_t slot = static_cast<std::size_t>(k) * n + i;
+    const int j = body.d_neighbors[slot];
+    store3(copies, slot,
+           j == no_neighbor ? Vec3<Real>{} : load3(body.d_forces, matrix_entry(i, j, n)));
+  }
+}
+
 template <class Real>
 class GpuBackend final : public PaperBackend {
   template <class T>
@@ -193,14 +206,15 @@ class GpuBackend final : public PaperBackend {
   std::vector<Vec3d> pair_forces() const override {
     std::vector<Vec3d> forces;
     if (!dense_) return forces;
-    wait();
-    const std::size_t n = static_cast<std::size_t>(n_);
-    std::vector<Real> row(3 * n);
-    for (std::size_t i = 0; i < n; ++i) {
-      PHYXEL_CUDA(cudaMemcpy(row.data(), forces_.data() + 3 * n * i, row.size() * sizeof(Real),
-                             cudaMemcpyDeviceToHost));
-      for (const Index j : model_.neighbourhood.neighbours.row(static_cast<Index>(i))) {
-        forces.push_back(at3(row, 3 * static_cast<std::size_t>(j)));
+    const Array<Real> copied(3 * neighbors_.size(), "copies of the forces of " + subject_);
+    const Launch launch{"copy_pair_forces", blocks(), block_, subject_};
+    copy_pair_forces<Real><<<launch.blocks, launch.threads>>>(body_, copied.data());
+    check_launch(launch);
+    wait_for_device(launch);
+    const std::vector<Real> slots = copy_of(copied);
+    for (Index i = 0; i < n_; ++i) {
+      for (Index k = 0; k < model_.neighbourhood.neighbours.length(i); ++k) {
+        forces.push_back(at3(slots, 3 * (static_cast<std::size_t>(k) * n_ + i)));
       }
     }
     return forces;

@@ -1,4 +1,6 @@
 /// The program as a user meets it: whole runs, exit codes, messages, signals and restart.
+#include "support/program.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -13,42 +15,17 @@
 
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/recorder.hpp"
-#include "support/folder.hpp"
 
 namespace phyxel {
 namespace {
 
 namespace fs = std::filesystem;
+using test::Outcome;
 using test::text_of;
 using ::testing::HasSubstr;
 
-struct Outcome {
-  int code = -1;
-  std::string out, err;
-};
-
-class Program : public test::Folder {
+class Program : public test::Program {
  protected:
-  /// Starts the program in the test's folder; its output goes to files.
-  pid_t start(const std::vector<std::string>& arguments) const {
-    const pid_t child = fork();
-    if (child != 0) return child;
-    if (chdir(folder_.c_str()) != 0) _exit(99);
-    if (!freopen("stdout.txt", "w", stdout) || !freopen("stderr.txt", "w", stderr)) _exit(99);
-    std::vector<char*> argv{const_cast<char*>(PHYXEL_PROGRAM)};
-    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
-    argv.push_back(nullptr);
-    execv(PHYXEL_PROGRAM, argv.data());
-    _exit(99);
-  }
-  Outcome finish(pid_t child) const {
-    int status = 0;
-    waitpid(child, &status, 0);
-    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
-            text_of(folder_ / "stdout.txt"), text_of(folder_ / "stderr.txt")};
-  }
-  Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
-
   /// A small beam that swings; `end` seconds, `extra` goes on top of the file.
   void write_beam(const std::string& end = "0.2", const std::string& extra = "") const {
     write("beam.toml", extra + R"(

@@ -59,7 +59,9 @@ TEST_F(DeviceErrors, OutOfMemorySaysForWhatHowMuchAndWhatIsThere) {
 
 TEST_F(DeviceErrors, ARefusedLaunchIsNamed) {
   write_through<<<1, 4096>>>(nullptr);
-  EXPECT_THAT(message_of([] { check_launch({"write_through", 1, 4096, "a test"}); }),
+  EXPECT_THAT(message_of([] {
+                check_launch({"write_through", 1, 4096, "a test"});
+              }),
               AllOf(HasSubstr("write_through<<<1, 4096>>> (a test)"), HasSubstr("launched")));
 }
 

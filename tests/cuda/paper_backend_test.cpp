@@ -20,8 +20,8 @@
 namespace phyxel::paper {
 namespace {
 
-using ::testing::HasSubstr;
 using phyxel::testing::relative_error;
+using ::testing::HasSubstr;
 
 struct Implementation {
   const char* name;
@@ -166,8 +166,7 @@ TEST_P(Kernels, CalcStrainStressAEqualsTheReference) {
     const std::vector<Vec3d> forces = backend->pair_forces();
     if (forces.empty()) continue;  // no matrix is kept
     expect_small(name, "forces on neighbours",
-                 relative_error(forces, testing::oracle_pair_forces(b, u)),
-                 190);
+                 relative_error(forces, testing::oracle_pair_forces(b, u)), 190);
   }
 }
 
@@ -294,10 +293,10 @@ TEST_P(Trajectories, OverOneSecondTheDistanceIsRounding) {
     const auto found = after(*GetParam().make(model), start, 1).displacement;
     const double error = relative_error(found, exact);
     std::printf("  %-14s after 1 s: %.2e\n", name.c_str(), error);
-    // About a thousand steps. Rounding errors of a step are some epsilon of u; as accelerations they
-    // are kept and add up with the square of the number of steps at worst, which is never reached:
-    // a tenth of that. In double the same factor holds, so that the distance is rounding and
-    // nothing else. Every phyxel must have moved, or the test would say nothing.
+    // About a thousand steps. Rounding errors of a step are some epsilon of u; as accelerations
+    // they are kept and add up with the square of the number of steps at worst, which is never
+    // reached: a tenth of that. In double the same factor holds, so that the distance is rounding
+    // and nothing else. Every phyxel must have moved, or the test would say nothing.
     EXPECT_LE(error, 1e5 * GetParam().epsilon) << name;
     double moved = 0;
     for (const Vec3d& u : exact) moved = std::max(moved, norm(u));

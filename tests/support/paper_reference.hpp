@@ -67,7 +67,8 @@ inline std::vector<Vec3d> oracle_pair_forces(const oracle::Body& b,
 inline SurfelState oracle_surfels(const Model& model, const oracle::Body& b,
                                   const std::vector<oracle::V3>& u) {
   std::vector<oracle::M3> gradient;
-  for (int i = 0; i < static_cast<int>(b.x.size()); ++i) gradient.push_back(oracle::grad_u(b, u, i));
+  for (int i = 0; i < static_cast<int>(b.x.size()); ++i)
+    gradient.push_back(oracle::grad_u(b, u, i));
   SurfelState out;
   for (Index s = 0; s < model.surfels.carriers.rows(); ++s) {
     oracle::V3 sum = oracle::V3::Zero();
@@ -83,7 +84,8 @@ inline SurfelState oracle_surfels(const Model& model, const oracle::Body& b,
     }
     out.position.push_back(model.surfels.position[s] + from_eigen(sum / weight));
     const oracle::M3 f = oracle::M3::Identity() + blend / weight;
-    const oracle::V3 n = f.determinant() * f.inverse().transpose() * to_eigen(model.surfels.normal[s]);
+    const oracle::V3 n =
+        f.determinant() * f.inverse().transpose() * to_eigen(model.surfels.normal[s]);
     out.normal.push_back(from_eigen(n.normalized()));
   }
   return out;

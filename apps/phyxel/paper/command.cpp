@@ -1,12 +1,14 @@
 /// phyxel paper: section 6 of Farias et al. 2008 run again.
+#include "command.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 
-#include "command.hpp"
 #include "files/atomic_file.hpp"
 #include "paper.hpp"
+#include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
 #include "plot.hpp"
 
@@ -45,8 +47,9 @@ void choose_device(const std::string& name, PaperRequest& request) {
     request.gpu = use_cuda_device(std::stoi(name.substr(5)));
     return;
   }
-  throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda, cuda:0, ...",
-                               name, did_you_mean(name, {"auto", "cpu", "cuda"})));
+  throw InputError(
+      fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda, cuda:0, ...", name,
+                  did_you_mean(name, {"auto", "cpu", "cuda"})));
 }
 
 fs::path file_of(const fs::path& folder, const std::string& table) {
@@ -55,6 +58,8 @@ fs::path file_of(const fs::path& folder, const std::string& table) {
 
 void paper_command(PaperOptions& options) {
   PaperRequest& request = options.request;
+  if (request.bodies.empty()) request.bodies = paper::body_names();
+  for (const std::string& body : request.bodies) paper::body_scene(body);  // is there such a body?
   for (const std::string& table : options.tables) {
     if (std::find(all_tables.begin(), all_tables.end(), table) == all_tables.end()) {
       throw InputError(fmt::format("--table {}: unknown{}; allowed: {}", table,
@@ -62,10 +67,15 @@ void paper_command(PaperOptions& options) {
     }
   }
   if (options.redraw) {
-    if (!fs::exists(file_of(request.out, paper_table::frames)) && !fs::is_directory(request.out)) {
-      throw InputError(fmt::format("{}: no such folder; allowed: --out with a folder that phyxel paper "
-                                   "has written",
-                                   request.out.string()));
+    std::vector<std::string> tables = all_tables;
+    tables.push_back(paper_table::frames);
+    if (std::none_of(tables.begin(), tables.end(), [&](const std::string& table) {
+          return fs::exists(file_of(request.out, table));
+        })) {
+      throw InputError(
+          fmt::format("{}: none of the tables is there ({}.csv); allowed: --out with a "
+                      "folder that phyxel paper has written",
+                      request.out.string(), fmt::join(tables, ".csv, ")));
     }
   } else {
     choose_device(options.device, request);
@@ -80,9 +90,17 @@ void paper_command(PaperOptions& options) {
 
     const auto refuse_if_there = [&](const fs::path& file) {
       if (fs::exists(file) && !options.force) {
-        throw InputError(fmt::format("{}: exists; allowed: another --out, or --force", file.string()));
+        throw InputError(
+            fmt::format("{}: exists; allowed: another --out, or --force", file.string()));
       }
     };
+    const bool pictures =
+        std::find(options.figures.begin(), options.figures.end(), 1) != options.figures.end();
+    if (pictures) {
+      for (const std::string& body : request.bodies) {
+        refuse_if_there(figure_1_file(request.out, body));
+      }
+    }
     if (!rates.empty()) refuse_if_there(file_of(request.out, paper_table::frames));
     for (const std::string& table : options.tables) refuse_if_there(file_of(request.out, table));
     make_writable_folder(request.out);
@@ -96,16 +114,14 @@ void paper_command(PaperOptions& options) {
       if (has(3)) say("  figure 3 (GPU frame rates, surfels)");
       if (has(4) || has(5) || has(6)) say("  the GPU's part of figures 4, 5 and 6");
       for (const std::string& table : options.tables) {
-        say("  " + std::string(table == paper_table::memory ? "" : "the GPU's part of ") + "table " +
-            table);
+        say("  " + std::string(table == paper_table::memory ? "" : "the GPU's part of ") +
+            "table " + table);
       }
     } else {
       say(fmt::format("GPU: {}; {}", request.gpu->describe(), cuda_version()));
     }
 
-    if (std::find(options.figures.begin(), options.figures.end(), 1) != options.figures.end()) {
-      draw_figure_1(request);
-    }
+    if (pictures) draw_figure_1(request);
     if (!rates.empty()) {
       write_csv(file_of(request.out, paper_table::frames), measure_frames(request, rates));
     }
@@ -132,7 +148,7 @@ void paper_command(PaperOptions& options) {
         request.out.string() + "` draws them later, anywhere");
   }
   write_paper_page(request.out);
-  say((request.out / "README.md").string());
+  say((request.out / paper_page_name).string());
 }
 
 }  // namespace
@@ -155,6 +171,8 @@ void add_paper(CLI::App& program) {
   command
       ->add_option("--table", options->tables,
                    "Only these tables: kernels, trajectory, memory, stiffness")
+      ->delimiter(',');
+  command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');
   command->add_option("--device", options->device, "auto, cpu, cuda or cuda:<number>")
       ->capture_default_str();

@@ -24,21 +24,12 @@ Vec3d view_of(const std::string& body) {
   return body == "alien_head" ? Vec3d{-1, -0.6, -0.2} : Vec3d{-1, 2, -0.6};
 }
 
-using Match = std::vector<std::pair<std::string, std::string>>;
-
-bool matches(const CsvTable& table, std::size_t row, const Match& match) {
-  for (const auto& [column, value] : match) {
-    if (table.text(row, column) != value) return false;
-  }
-  return true;
-}
-
 /// y against x of the rows that match.
 Curve curve_of(const CsvTable& table, const std::string& label, const std::string& x,
                const std::string& y, const Match& match) {
   Curve curve{label, {}, {}};
   for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    if (!matches(table, r, match) || table.text(r, y).empty()) continue;
+    if (!table.matches(r, match) || table.text(r, y).empty()) continue;
     curve.x.push_back(table.number(r, x));
     curve.y.push_back(table.number(r, y));
   }
@@ -63,7 +54,7 @@ LineChart rates(const CsvTable& frames, const std::string& title, const std::str
 
 BarChart comparison(const CsvTable& frames, const std::string& title,
                     const std::string& with_surfels) {
-  BarChart chart{title, "frames per second, one object", true, paper::body_names(), {}};
+  BarChart chart{title, "frames per second, one object", true, frames.values("body"), {}};
   std::vector<std::pair<std::string, std::string>> programs;  // program, threads
   for (std::size_t r = 0; r < frames.rows.size(); ++r) {
     const std::pair<std::string, std::string> program{frames.text(r, "program"),
@@ -73,10 +64,10 @@ BarChart comparison(const CsvTable& frames, const std::string& title,
     }
   }
   for (const auto& [program, threads] : programs) {
-    BarChart::Series series{
-        threads == "0" ? program + " (GPU)" : fmt::format("{} ({} thread{})", program, threads,
-                                                          threads == "1" ? "" : "s"),
-        {}};
+    BarChart::Series series{threads == "0" ? program + " (GPU)"
+                                           : fmt::format("{} ({} thread{})", program, threads,
+                                                         threads == "1" ? "" : "s"),
+                            {}};
     bool any = false;
     for (const std::string& body : chart.groups) {
       const Curve one = curve_of(frames, "", "objects", "frames_per_s",
@@ -95,16 +86,20 @@ BarChart comparison(const CsvTable& frames, const std::string& title,
 }
 
 LineChart absolute_times(const CsvTable& frames) {
-  LineChart chart{"Figure 6: phyxels and surfels, kernels of 2008", "objects",
-                  "milliseconds per frame", false, true, {}};
+  LineChart chart{"Figure 6: phyxels and surfels, kernels of 2008",
+                  "objects",
+                  "milliseconds per frame",
+                  false,
+                  true,
+                  {}};
   for (const std::string& body : paper::body_names()) {
     for (const char* how : {"shown", "queued"}) {
-      add_if_any(chart, curve_of(frames, fmt::format("{}, {}", body, how), "objects",
-                                 "ms_per_frame",
-                                 {{"body", body},
-                                  {"program", "kernels of 2008"},
-                                  {"with_surfels", "yes"},
-                                  {"frames", how}}));
+      add_if_any(chart,
+                 curve_of(frames, fmt::format("{}, {}", body, how), "objects", "ms_per_frame",
+                          {{"body", body},
+                           {"program", "kernels of 2008"},
+                           {"with_surfels", "yes"},
+                           {"frames", how}}));
     }
   }
   return chart;
@@ -126,13 +121,18 @@ LineChart memory_chart(const CsvTable& memory) {
 }
 
 LineChart stiffness_chart(const CsvTable& stiffness) {
-  LineChart chart{"Stress of a spinning bar against long double", "Young's modulus [Pa]",
-                  "relative error", true, true, {}};
+  LineChart chart{"Stress of a spinning bar against long double",
+                  "Young's modulus [Pa]",
+                  "relative error",
+                  true,
+                  true,
+                  {}};
   for (const char* precision : {"float", "double"}) {
     for (const char* fraction : {"0.1", "0.5", "0.9"}) {
-      add_if_any(chart, curve_of(stiffness, fmt::format("{}, {} of the step limit", precision, fraction),
-                                 "young_pa", "stress_error",
-                                 {{"precision", precision}, {"step_of_limit", fraction}}));
+      add_if_any(chart,
+                 curve_of(stiffness, fmt::format("{}, {} of the step limit", precision, fraction),
+                          "young_pa", "stress_error",
+                          {{"precision", precision}, {"step_of_limit", fraction}}));
     }
   }
   return chart;
@@ -140,9 +140,13 @@ LineChart stiffness_chart(const CsvTable& stiffness) {
 
 }  // namespace
 
+fs::path figure_1_file(const fs::path& folder, const std::string& body) {
+  return folder / fmt::format("figure1_{}.png", body);
+}
+
 std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
   std::vector<fs::path> files;
-  for (const std::string& name : paper::body_names()) {
+  for (const std::string& name : request.bodies) {
     const Scene scene = paper::body_scene(name);
     const Model model = paper::paper_model(scene);
     const auto backend = request.gpu
@@ -168,7 +172,7 @@ std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
     setting.camera = fit.camera();
     setting.extent = fit.extent();
     setting.spacing = typical_spacing(phyxels.point);
-    files.push_back(request.out / fmt::format("figure1_{}.png", name));
+    files.push_back(figure_1_file(request.out, name));
     write_png(files.back(), draw_picture(&surface, &phyxels, setting));
     say(fmt::format("{} after {:.2f} s by {}", files.back().string(), state.time, backend->name()));
   }

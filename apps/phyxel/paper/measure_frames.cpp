@@ -83,9 +83,9 @@ class FrameTable {
     table_.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
     table_.facts.emplace_back("cuda", cuda_version());
     table_.facts.emplace_back("repeats", std::to_string(request.repeat));
-    table_.columns = {"body",    "phyxels",      "surfels", "program", "threads",
-                      "objects", "with_surfels", "frames",  "frames_per_s", "ms_per_frame",
-                      "spread"};
+    table_.columns = {"body",         "phyxels",      "surfels",      "program",
+                      "threads",      "objects",      "with_surfels", "frames",
+                      "frames_per_s", "ms_per_frame", "spread"};
   }
   void add(const Body& body, const char* program, int threads, int objects, bool surfels,
            const char* frames, const std::function<void(int)>& run) {
@@ -122,24 +122,22 @@ void measure_gpu(const PaperRequest& request, const Body& body, bool surfels, bo
 }
 
 /// The sequential program of 2008, and phyxel's own CPU solver on one core and on all.
-void measure_cpu(const PaperRequest& request, const std::string& name, bool surfels,
-                 FrameTable& table) {
-  std::vector<int> counts{1};
-  if (request.objects > 1) counts.push_back(request.objects);
-  for (const int objects : counts) {
-    const Body one = make_body(name, 1);
+/// @param together the same objects in one model
+void measure_cpu(const Body& one, const Body& together, bool surfels, FrameTable& table) {
+  for (const Body* all : {&one, &together}) {
+    const int objects = static_cast<int>(all->scene.bodies.size());
+    if (all == &together && objects == 1) break;
     Objects group(one, objects, surfels, paper::make_sequential_backend<float>);
     table.add(one, "sequential of 2008", 1, objects, surfels, "shown",
               [&](int frames) { group.run(frames, true); });
 
-    const Body all = make_body(name, objects);
     std::vector<int> threads{1};
     if (omp_get_num_procs() > 1) threads.push_back(omp_get_num_procs());
     for (const int t : threads) {
-      const auto backend = make_cpu_backend(all.model, Precision::single, t);
-      Solver solver(*backend, all.start);
+      const auto backend = make_cpu_backend(all->model, Precision::single, t);
+      Solver solver(*backend, all->start);
       SurfelState vertices;
-      table.add(all, "phyxel CPU", t, objects, surfels, "shown", [&](int frames) {
+      table.add(*all, "phyxel CPU", t, objects, surfels, "shown", [&](int frames) {
         for (int f = 0; f < frames; ++f) {
           solver.step();
           if (surfels) backend->advect_surfels(vertices);
@@ -158,12 +156,15 @@ CsvTable measure_frames(const PaperRequest& request, const std::vector<int>& fig
     });
   };
   FrameTable table(request);
-  for (const std::string& name : paper::body_names()) {
+  const bool any_cpu = wanted({4, 5, 6});
+  for (const std::string& name : request.bodies) {
+    const Body one = make_body(name, 1);
+    const Body together = make_body(name, any_cpu ? request.objects : 1);
     for (const bool surfels : {false, true}) {
       const bool gpu = surfels ? wanted({3, 5, 6}) : wanted({2, 4});
       const bool cpu = surfels ? wanted({5, 6}) : wanted({4});
-      if (gpu && request.gpu) measure_gpu(request, make_body(name, 1), surfels, surfels, table);
-      if (cpu) measure_cpu(request, name, surfels, table);
+      if (gpu && request.gpu) measure_gpu(request, one, surfels, surfels, table);
+      if (cpu) measure_cpu(one, together, surfels, table);
     }
   }
   return table.take();

@@ -53,7 +53,8 @@ double steps_per_second(PaperBackend& backend, const Model& model, const PaperRe
     return seconds_since(start);
   };
   steps_take(3);
-  const int steps = std::clamp(static_cast<int>(request.seconds / (steps_take(10) / 10)), 10, 100000);
+  const int steps =
+      std::clamp(static_cast<int>(request.seconds / (steps_take(10) / 10)), 10, 100000);
   std::vector<double> rates;
   for (int r = 0; r < request.repeat; ++r) rates.push_back(steps / steps_take(steps));
   return median_of(rates).value;
@@ -72,16 +73,16 @@ CsvTable measure_memory(const PaperRequest& request) {
   table.facts = machine_facts();
   table.facts.emplace_back("gpu", request.gpu->describe());
   table.facts.emplace_back("cuda", cuda_version());
-  table.columns = {"phyxels",      "bodies",        "numbers_a_pair",    "program",
-                   "array_bytes", "measured_bytes", "steps_per_s", "answer"};
+  table.columns = {"phyxels",     "bodies",         "numbers_a_pair", "program",
+                   "array_bytes", "measured_bytes", "steps_per_s",    "answer"};
   const auto add = [&](Index n, int bodies, int numbers, const char* program, std::size_t arrays,
                        std::size_t measured, double rate, const std::string& answer) {
-    table.rows.push_back({std::to_string(n), std::to_string(bodies), std::to_string(numbers), program,
-                          std::to_string(arrays), std::to_string(measured),
+    table.rows.push_back({std::to_string(n), std::to_string(bodies), std::to_string(numbers),
+                          program, std::to_string(arrays), std::to_string(measured),
                           rate > 0 ? fmt::format("{:.4g}", rate) : "", answer});
-    say(fmt::format("{:6} phyxels x {} {:16} {:3} numbers a pair: {:10.2f} MiB measured, {:9.4g} steps/s {}", n,
-                    bodies, program, numbers, static_cast<double>(measured) / (1 << 20), rate,
-                    answer));
+    say(fmt::format(
+        "{:6} phyxels x {} {:16} {:3} numbers a pair: {:10.2f} MiB measured, {:9.4g} steps/s {}", n,
+        bodies, program, numbers, static_cast<double>(measured) / (1 << 20), rate, answer));
   };
 
   const Index sizes[] = {238, 575, 666, 1000, 2000, 5000, 10000, 20000, 40000, paper::most_phyxels};
@@ -97,10 +98,12 @@ CsvTable measure_memory(const PaperRequest& request) {
           steps_per_second(*backend, model, request), "fits");
     }
     // The paper's figure, 34.33 MB for 1,000 phyxels, is that of nine numbers a pair.
-    const std::size_t nine = 9 * sizeof(float) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
+    const std::size_t nine =
+        9 * sizeof(float) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
     try {
       add(n, 1, 9, "matrix alone", nine,
-          cuda_measured_allocation(nine, fmt::format("a matrix of nine numbers a pair for {} phyxels", n)),
+          cuda_measured_allocation(
+              nine, fmt::format("a matrix of nine numbers a pair for {} phyxels", n)),
           0, "fits");
     } catch (const DeviceError& error) {
       add(n, 1, 9, "matrix alone", nine, 0, 0, error.what());
@@ -215,9 +218,9 @@ CsvTable measure_stiffness(const PaperRequest& request) {
   table.facts = machine_facts();
   table.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
   table.facts.emplace_back("cuda", cuda_version());
-  table.columns = {"young_pa", "step_of_limit",      "step_s",       "steps",
-                   "program",  "precision",          "displacement_error", "stress_error",
-                   "largest_stress_pa"};
+  table.columns = {
+      "young_pa",           "step_of_limit", "step_s",           "steps", "program", "precision",
+      "displacement_error", "stress_error",  "largest_stress_pa"};
   std::vector<SpinCase> cases;
   for (double young = 1e4; young < 2e12; young *= 10) {
     for (const double fraction : {0.1, 0.5, 0.9, 1.1}) {
@@ -248,8 +251,8 @@ CsvTable measure_stiffness(const PaperRequest& request) {
     for (const Precision precision : {Precision::single, Precision::double_}) {
       arithmetics.push_back(
           {"kernels of 2008", precision_name(precision), [=, &request](const Model& model) {
-             return paper::make_gpu_backend(
-                 model, {.precision = precision, .device = request.gpu->index});
+             return paper::make_gpu_backend(model,
+                                            {.precision = precision, .device = request.gpu->index});
            }});
     }
   } else {
@@ -262,9 +265,11 @@ CsvTable measure_stiffness(const PaperRequest& request) {
       table.rows.push_back({fmt::format("{:g}", c.young), fmt::format("{:g}", c.fraction),
                             fmt::format("{:.4g}", c.dt), std::to_string(c.steps), a.program,
                             a.precision, fmt::format("{:.2e}", e.displacement),
-                            fmt::format("{:.2e}", e.stress), fmt::format("{:.4g}", e.largest_stress)});
-      say(fmt::format("E = {:g} Pa, {:g} of the largest step, {:6}: displacement {:.1e}, stress {:.1e}",
-                      c.young, c.fraction, a.precision, e.displacement, e.stress));
+                            fmt::format("{:.2e}", e.stress),
+                            fmt::format("{:.4g}", e.largest_stress)});
+      say(fmt::format(
+          "E = {:g} Pa, {:g} of the largest step, {:6}: displacement {:.1e}, stress {:.1e}",
+          c.young, c.fraction, a.precision, e.displacement, e.stress));
     }
   }
   return table;

@@ -29,9 +29,9 @@ std::vector<Program> programs(const PaperRequest& request) {
     for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
       list.push_back({store == paper::ForceStore::dense ? "kernels of 2008" : "CSR gather",
                       precision_name(precision), [=, &request](const Model& model) {
-                        return paper::make_gpu_backend(model, {.precision = precision,
-                                                               .store = store,
-                                                               .device = request.gpu->index});
+                        return paper::make_gpu_backend(
+                            model,
+                            {.precision = precision, .store = store, .device = request.gpu->index});
                       }});
     }
   }
@@ -106,11 +106,10 @@ CsvTable new_table(const PaperRequest& request, std::vector<std::string> columns
 CsvTable measure_kernels(const PaperRequest& request) {
   CsvTable table =
       new_table(request, {"body", "program", "precision", "kernel", "quantity", "relative_error"});
-  for (const std::string& name : paper::body_names()) {
+  for (const std::string& name : request.bodies) {
     const Model model = paper::paper_model(paper::body_scene(name));
     const State state = deformed(model);
-    const Results exact =
-        results_of(*paper::make_sequential_backend<long double>(model), state);
+    const Results exact = results_of(*paper::make_sequential_backend<long double>(model), state);
     for (const Program& program : programs(request)) {
       const Results r = results_of(*program.make(model), state);
       const auto add = [&](const char* kernel, const char* quantity, double error) {
@@ -125,7 +124,8 @@ CsvTable measure_kernels(const PaperRequest& request) {
       add("precalcImutableValues", "volumes", distance(r.immutable.volume, exact.immutable.volume));
       add("calcStrainStressA", "displacement gradients", distance(r.gradient, exact.gradient));
       if (!r.pair_forces.empty()) {
-        add("calcStrainStressA", "forces on neighbours", distance(r.pair_forces, exact.pair_forces));
+        add("calcStrainStressA", "forces on neighbours",
+            distance(r.pair_forces, exact.pair_forces));
       }
       add("calcStrainStressB", "summed forces", distance(r.forces, exact.forces));
       add("integrate", "displacements", distance(r.next.displacement, exact.next.displacement));
@@ -139,7 +139,7 @@ CsvTable measure_kernels(const PaperRequest& request) {
 CsvTable measure_trajectories(const PaperRequest& request) {
   CsvTable table = new_table(request, {"body", "program", "precision", "time_s", "steps",
                                        "relative_error", "largest_displacement_m"});
-  for (const std::string& name : paper::body_names()) {
+  for (const std::string& name : request.bodies) {
     const Scene scene = paper::body_scene(name);
     const Model model = paper::paper_model(scene);
     const State start = initial_state(model, scene, 0.5 * step_limit(model).largest_step);

@@ -15,7 +15,6 @@ namespace phyxel::app {
 namespace {
 
 namespace fs = std::filesystem;
-using Match = std::vector<std::pair<std::string, std::string>>;
 
 /// What the paper prints: speedups of section 6.2 ("about 20 times").
 struct Printed {
@@ -35,33 +34,9 @@ std::string table_text(const std::vector<std::string>& head,
   return text + "\n";
 }
 
-/// Distinct values of a column, in order of appearance.
-std::vector<std::string> values_of(const CsvTable& table, const std::string& column,
-                                   const Match& match = {}) {
-  std::vector<std::string> values;
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    bool fits = true;
-    for (const auto& [c, v] : match) fits = fits && table.text(r, c) == v;
-    const std::string& value = table.text(r, column);
-    if (fits && std::find(values.begin(), values.end(), value) == values.end()) {
-      values.push_back(value);
-    }
-  }
-  return values;
-}
-
-std::optional<std::size_t> row_of(const CsvTable& table, const Match& match) {
-  for (std::size_t r = 0; r < table.rows.size(); ++r) {
-    bool fits = true;
-    for (const auto& [c, v] : match) fits = fits && table.text(r, c) == v;
-    if (fits) return r;
-  }
-  return std::nullopt;
-}
-
 /// The cell of the row that matches, or a dash.
 std::string cell(const CsvTable& table, const std::string& column, const Match& match) {
-  const auto row = row_of(table, match);
+  const auto row = table.find(match);
   return row && !table.text(*row, column).empty() ? table.text(*row, column) : "–";
 }
 
@@ -123,22 +98,22 @@ class Page {
 
   /// One object: GPU over each CPU program.
   void speedups(const CsvTable& t) {
-    const std::vector<std::string> threads = values_of(t, "threads", {{"program", "phyxel CPU"}});
+    const std::vector<std::string> threads = t.values("threads", {{"program", "phyxel CPU"}});
     std::vector<std::string> head{"body", "phyxels", "surfels", "the paper prints"};
     const auto rate = [&](const std::string& body, const char* program, const std::string& n,
                           const char* surfels) {
-      const auto row = row_of(t, {{"body", body},
-                                  {"program", program},
-                                  {"threads", n},
-                                  {"objects", "1"},
-                                  {"with_surfels", surfels},
-                                  {"frames", "shown"}});
+      const auto row = t.find({{"body", body},
+                               {"program", program},
+                               {"threads", n},
+                               {"objects", "1"},
+                               {"with_surfels", surfels},
+                               {"frames", "shown"}});
       return row ? t.number(*row, "frames_per_s") : NAN;
     };
     std::vector<std::vector<std::string>> rows;
     bool any = false;
     for (const Printed& p : printed) {
-      const auto some = row_of(t, {{"body", p.body}});
+      const auto some = t.find({{"body", p.body}});
       if (!some) continue;
       std::vector<std::string> row{p.body, t.text(*some, "phyxels"), t.text(*some, "surfels"),
                                    fmt::format("{}", p.speedup)};
@@ -175,14 +150,14 @@ class Page {
 
   void all_rates(const CsvTable& t) {
     std::vector<std::string> head{"body", "surfels", "program", "threads", "frames"};
-    const std::vector<std::string> counts = values_of(t, "objects");
+    const std::vector<std::string> counts = t.values("objects");
     for (const std::string& n : counts) head.push_back(n + (n == "1" ? " object" : " objects"));
     std::vector<std::vector<std::string>> rows;
-    for (const std::string& body : values_of(t, "body")) {
-      for (const std::string& surfels : values_of(t, "with_surfels")) {
-        for (const std::string& program : values_of(t, "program")) {
-          for (const std::string& threads : values_of(t, "threads", {{"program", program}})) {
-            for (const std::string& how : values_of(t, "frames")) {
+    for (const std::string& body : t.values("body")) {
+      for (const std::string& surfels : t.values("with_surfels")) {
+        for (const std::string& program : t.values("program")) {
+          for (const std::string& threads : t.values("threads", {{"program", program}})) {
+            for (const std::string& how : t.values("frames")) {
               std::vector<std::string> row{body, surfels, program, threads == "0" ? "GPU" : threads,
                                            how};
               bool any = false;
@@ -208,15 +183,16 @@ class Page {
   void pictures() {
     std::vector<std::string> head, row;
     for (const std::string& body : paper::body_names()) {
-      const std::string file = fmt::format("figure1_{}.png", body);
+      const std::string file = figure_1_file({}, body).string();
       if (!fs::exists(folder_ / file)) continue;
       head.push_back(body);
       row.push_back(fmt::format("![{}]({})", body, file));
     }
     if (head.empty()) return;
-    text_ += "## Figure 1\n\nThe bodies hung by a leg, the neck and the mouth, after 0.6 s of "
-             "falling; dots are phyxels.\n\n" +
-             table_text(head, {row});
+    text_ +=
+        "## Figure 1\n\nThe bodies hung by a leg, the neck and the mouth, after 0.6 s of "
+        "falling; dots are phyxels.\n\n" +
+        table_text(head, {row});
   }
 
   void kernels(const CsvTable& t) {
@@ -228,18 +204,18 @@ class Page {
         "independent evaluation of the papers' equations.\n\n";
     std::vector<std::string> head{"kernel", "quantity"};
     std::vector<Match> columns;
-    for (const std::string& precision : values_of(t, "precision")) {
-      for (const std::string& program : values_of(t, "program", {{"precision", precision}})) {
+    for (const std::string& precision : t.values("precision")) {
+      for (const std::string& program : t.values("program", {{"precision", precision}})) {
         if (program == "CSR gather") continue;  // bitwise the same
-        for (const std::string& body : values_of(t, "body")) {
+        for (const std::string& body : t.values("body")) {
           head.push_back(fmt::format("{}, {}, {}", program, precision, body));
           columns.push_back({{"precision", precision}, {"program", program}, {"body", body}});
         }
       }
     }
     std::vector<std::vector<std::string>> rows;
-    for (const std::string& kernel : values_of(t, "kernel")) {
-      for (const std::string& quantity : values_of(t, "quantity", {{"kernel", kernel}})) {
+    for (const std::string& kernel : t.values("kernel")) {
+      for (const std::string& quantity : t.values("quantity", {{"kernel", kernel}})) {
         std::vector<std::string> row{"`" + kernel + "`", quantity};
         for (Match match : columns) {
           match.emplace_back("kernel", kernel);
@@ -258,21 +234,23 @@ class Page {
     text_ +=
         "Largest difference of a displacement from the trajectory in long double with the same "
         "step, over the largest displacement. From float to double the distance shrinks by about "
-        "2²⁹ ≈ 5·10⁸, the ratio of their roundings: it is rounding that grows along the motion, and "
+        "2²⁹ ≈ 5·10⁸, the ratio of their roundings: it is rounding that grows along the motion, "
+        "and "
         "nothing else.\n\n";
-    const std::vector<std::string> times = values_of(t, "time_s");
+    const std::vector<std::string> times = t.values("time_s");
     std::vector<std::string> head{"body", "program", "precision"};
     for (const std::string& time : times) head.push_back(time + " s");
     std::vector<std::vector<std::string>> rows;
-    for (const std::string& body : values_of(t, "body")) {
-      for (const std::string& program : values_of(t, "program")) {
-        for (const std::string& precision : values_of(t, "precision")) {
+    for (const std::string& body : t.values("body")) {
+      for (const std::string& program : t.values("program")) {
+        for (const std::string& precision : t.values("precision")) {
           std::vector<std::string> row{body, program, precision};
           for (const std::string& time : times) {
-            row.push_back(cell(t, "relative_error", {{"body", body},
-                                                     {"program", program},
-                                                     {"precision", precision},
-                                                     {"time_s", time}}));
+            row.push_back(cell(t, "relative_error",
+                               {{"body", body},
+                                {"program", program},
+                                {"precision", precision},
+                                {"time_s", time}}));
           }
           if (row.back() != "–") rows.push_back(row);
         }
@@ -290,22 +268,20 @@ class Page {
         "memory fell by, in steps of its allocator (2 MiB); the CSR gather does the same work "
         "without the matrix, to the same bits.\n\n";
     const auto mebibytes = [&](const Match& match) {
-      const auto row = row_of(t, match);
+      const auto row = t.find(match);
       if (!row) return std::string("–");
       if (t.text(*row, "answer") != "fits") return std::string("does not fit");
       return fmt::format("{:.2f}", t.number(*row, "measured_bytes") / (1 << 20));
     };
     std::vector<std::vector<std::string>> rows;
-    for (const std::string& n : values_of(t, "phyxels", {{"program", "CSR gather"}})) {
+    for (const std::string& n : t.values("phyxels", {{"program", "CSR gather"}})) {
       const Match dense{{"phyxels", n}, {"program", "kernels of 2008"}, {"bodies", "1"}};
       const Match csr{{"phyxels", n}, {"program", "CSR gather"}};
-      const auto arrays = row_of(t, dense);
-      rows.push_back({n,
-                      arrays ? fmt::format("{:.2f}", t.number(*arrays, "array_bytes") / (1 << 20))
-                             : "–",
-                      mebibytes(dense),
-                      mebibytes({{"phyxels", n}, {"program", "matrix alone"}}), mebibytes(csr),
-                      cell(t, "steps_per_s", dense), cell(t, "steps_per_s", csr)});
+      const auto arrays = t.find(dense);
+      rows.push_back(
+          {n, arrays ? fmt::format("{:.2f}", t.number(*arrays, "array_bytes") / (1 << 20)) : "–",
+           mebibytes(dense), mebibytes({{"phyxels", n}, {"program", "matrix alone"}}),
+           mebibytes(csr), cell(t, "steps_per_s", dense), cell(t, "steps_per_s", csr)});
     }
     text_ += table_text({"phyxels", "arrays, 3 a pair [MiB]", "measured [MiB]",
                          "matrix with 9 a pair, measured [MiB]", "CSR gather, measured [MiB]",
@@ -328,22 +304,24 @@ class Page {
         "Section 6.1 warns that a large Young's modulus \"may cause unexpected results, due the "
         "single floating point precision\". A free bar of 54 phyxels spins at 10 rad/s for 0.1 s. "
         "Its displacements grow to the size of the bar whatever E is; its strains, which the spin "
-        "alone decides, fall as 1/E. A displacement u rounds to ε|u|, so a difference of neighbours "
+        "alone decides, fall as 1/E. A displacement u rounds to ε|u|, so a difference of "
+        "neighbours "
         "carries a strain error of about ε|u|/spacing, and a stress error of E times that: the "
         "share of rounding in the stress grows with E, and with the number of steps that its noise "
         "has time to shake the bar (smaller steps are more steps, and their Δt²f/m is lost against "
         "u the sooner). Error of the stress, over the largest stress, against long double with the "
-        "same step; at 1.1 of the limit, against half the step: there every precision diverges.\n\n";
+        "same step; at 1.1 of the limit, against half the step: there every precision "
+        "diverges.\n\n";
     std::vector<std::string> head{"E [Pa]", "stress [Pa]"};
     std::vector<Match> columns;
-    for (const std::string& precision : values_of(t, "precision")) {
-      for (const std::string& fraction : values_of(t, "step_of_limit")) {
+    for (const std::string& precision : t.values("precision")) {
+      for (const std::string& fraction : t.values("step_of_limit")) {
         head.push_back(fmt::format("{}, {} Δt_max", precision, fraction));
         columns.push_back({{"precision", precision}, {"step_of_limit", fraction}});
       }
     }
     std::vector<std::vector<std::string>> rows;
-    for (const std::string& young : values_of(t, "young_pa")) {
+    for (const std::string& young : t.values("young_pa")) {
       std::vector<std::string> row{
           young, cell(t, "largest_stress_pa", {{"young_pa", young}, {"step_of_limit", "0.5"}})};
       for (Match match : columns) {
@@ -353,7 +331,7 @@ class Page {
       rows.push_back(row);
     }
     text_ += table_text(head, rows);
-    for (const std::string& precision : values_of(t, "precision")) breaks(t, precision);
+    for (const std::string& precision : t.values("precision")) breaks(t, precision);
     figure("stiffness.svg", "Error of the stress against Young's modulus");
   }
 
@@ -365,12 +343,14 @@ class Page {
       if (!(t.number(r, "stress_error") < 0.1)) first = std::min(first, t.number(r, "young_pa"));
     }
     text_ += std::isfinite(first)
-                 ? fmt::format("At half the largest step, in {}, more than a tenth of the stress is "
-                               "rounding from E = {:g} Pa on.\n\n",
-                               precision, first)
-                 : fmt::format("At half the largest step, in {}, rounding stays below a tenth of the "
-                               "stress over the whole table.\n\n",
-                               precision);
+                 ? fmt::format(
+                       "At half the largest step, in {}, more than a tenth of the stress is "
+                       "rounding from E = {:g} Pa on.\n\n",
+                       precision, first)
+                 : fmt::format(
+                       "At half the largest step, in {}, rounding stays below a tenth of the "
+                       "stress over the whole table.\n\n",
+                       precision);
   }
 
   fs::path folder_;
@@ -380,7 +360,7 @@ class Page {
 }  // namespace
 
 void write_paper_page(const fs::path& folder) {
-  write_whole_file(folder / "README.md", Page(folder).write(), Durable::no);
+  write_whole_file(folder / paper_page_name, Page(folder).write(), Durable::no);
 }
 
 }  // namespace phyxel::app

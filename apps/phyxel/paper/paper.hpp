@@ -17,6 +17,7 @@ struct PaperRequest {
   std::filesystem::path out = "out/paper";
   std::optional<Device> gpu;  ///< Nothing: the CPU parts only.
   std::string why_no_gpu;
+  std::vector<std::string> bodies;  ///< Names of section 6.
   int repeat = 5;
   int objects = 10;      ///< Figures 2, 3 and 6: from one to so many.
   double seconds = 0.1;  ///< Of one repeat.
@@ -38,13 +39,17 @@ CsvTable measure_trajectories(const PaperRequest& request);
 CsvTable measure_memory(const PaperRequest& request);
 CsvTable measure_stiffness(const PaperRequest& request);
 
-/// Figure 1: each body at rest and in motion, figure1_<body>.png. @returns the files.
+/// figure1_<body>.png
+std::filesystem::path figure_1_file(const std::filesystem::path& folder, const std::string& body);
+
+/// Figure 1: each body in motion, with its phyxels. @returns the files.
 std::vector<std::filesystem::path> draw_figure_1(const PaperRequest& request);
 
 /// Figures 2 to 6 and two more, from the tables in `folder`. @returns the files.
 std::vector<std::filesystem::path> draw_figures(const std::filesystem::path& folder);
 
-/// README.md from the tables and figures in `folder`.
+/// The page, from the tables and figures in `folder`.
+inline constexpr const char* paper_page_name = "paper.md";
 void write_paper_page(const std::filesystem::path& folder);
 
 /// One line on the terminal while measuring.

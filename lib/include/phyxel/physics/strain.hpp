@@ -20,8 +20,8 @@ PHYXEL_HD Mat3<Real> displacement_gradient(const Mat3<Real>& sum,
   return sum * inverse_moment;
 }
 
-/// Green's strain ½(∇u + ∇uᵀ + ∇uᵀ∇u) = ½(FᵀF - I): equation (2) of Farias et al. 2008, with the
-/// transpose that its print lost. Written in ∇u, so that small strains keep their digits.
+/// Green's strain ½(∇u + ∇uᵀ + ∇uᵀ∇u) = ½(FᵀF - I): equation (2) of Farias et al. 2008, whose ∇u
+/// is the transpose of ours. Written in ∇u, so that small strains keep their digits.
 template <class Real>
 PHYXEL_HD Sym3<Real> green_strain(const Mat3<Real>& g) {
   const Real half = Real(0.5);

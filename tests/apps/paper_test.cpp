@@ -1,0 +1,220 @@
+/// `phyxel paper` as a user meets it, on the CPU; what it measures on a GPU is in docs/results.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "csv.hpp"
+#include "phyxel/error.hpp"
+#include "plot.hpp"
+#include "support/program.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::text_of;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class Paper : public test::Program {
+ protected:
+  /// Short measurements: what is tested is not speed.
+  Outcome paper(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {"paper", "--repeat", "1", "--seconds", "0.001"});
+    return run(arguments);
+  }
+};
+
+TEST_F(Paper, WithoutAGpuMeasuresTheCpuAndSaysWhatItLeftOut) {
+  const Outcome outcome = paper({"--device", "cpu", "--body", "horn_bug,alien_head", "--figure",
+                                 "2,4,5", "--table", "memory", "--objects", "2", "--out", "p"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("left out, for --device cpu"), HasSubstr("figure 2 (GPU"),
+                    HasSubstr("the GPU's part of figures 4, 5 and 6"), HasSubstr("table memory")));
+  const CsvTable frames = read_csv(folder_ / "p" / "frames.csv");
+  EXPECT_THAT(frames.values("body"), ElementsAre("horn_bug", "alien_head"));
+  EXPECT_THAT(frames.values("program"), ElementsAre("sequential of 2008", "phyxel CPU"));
+  EXPECT_THAT(frames.values("objects"), ElementsAre("1", "2"));
+  // The counts of section 6.
+  EXPECT_THAT(frames.values("phyxels", {{"body", "horn_bug"}}), ElementsAre("666"));
+  EXPECT_THAT(frames.values("surfels", {{"body", "alien_head"}}), ElementsAre("16000"));
+  for (const char* fact : {"program", "hardware", "compiler", "date", "gpu"}) {
+    EXPECT_NE(frames.fact(fact), "") << fact;
+  }
+  for (std::size_t r = 0; r < frames.rows.size(); ++r) {
+    // Both are printed with five digits.
+    EXPECT_NEAR(frames.number(r, "frames_per_s") * frames.number(r, "ms_per_frame"), 1000, 0.1);
+  }
+  EXPECT_FALSE(fs::exists(folder_ / "p" / "memory.csv"));
+  EXPECT_EQ(fs::exists(folder_ / "p" / "figure4.svg"), can_plot());
+  EXPECT_FALSE(fs::exists(folder_ / "p" / "figure2.svg"));
+  const std::string page = text_of(folder_ / "p" / "paper.md");
+  EXPECT_THAT(page, AllOf(HasSubstr("No GPU was measured"), HasSubstr("sequential of 2008")));
+}
+
+TEST_F(Paper, KernelErrorsOfTheSequentialProgramAreThoseOfItsPrecision) {
+  const Outcome outcome =
+      paper({"--device", "cpu", "--body", "horn_bug", "--table", "kernels", "--out", "p"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const CsvTable kernels = read_csv(folder_ / "p" / "kernels.csv");
+  EXPECT_THAT(kernels.values("kernel"),
+              ::testing::IsSupersetOf({"precalcImutableValues", "calcStrainStressA",
+                                       "calcStrainStressB", "integrate", "updateSurfels"}));
+  for (std::size_t r = 0; r < kernels.rows.size(); ++r) {
+    // Sums of some 30 neighbours and inverses of condition 10: a hundred roundings at most.
+    const double epsilon = kernels.text(r, "precision") == "float" ? 1.2e-7 : 2.3e-16;
+    const double error = kernels.number(r, "relative_error");
+    EXPECT_LT(error, 100 * epsilon) << kernels.text(r, "quantity");
+    EXPECT_GT(error, 0) << kernels.text(r, "quantity");
+  }
+}
+
+TEST_F(Paper, RedrawsFromTheTablesAlone) {
+  ASSERT_EQ(paper({"--device", "cpu", "--body", "horn_bug", "--figure", "4", "--objects", "1",
+                   "--out", "p"})
+                .code,
+            0);
+  fs::create_directory(folder_ / "q");
+  fs::copy_file(folder_ / "p" / "frames.csv", folder_ / "q" / "frames.csv");
+  const Outcome outcome = run({"paper", "--redraw", "--out", "q"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(text_of(folder_ / "q" / "paper.md"), text_of(folder_ / "p" / "paper.md"));
+  EXPECT_EQ(text_of(folder_ / "q" / "frames.csv"), text_of(folder_ / "p" / "frames.csv"));
+}
+
+TEST_F(Paper, RefusesToOverwriteAndChangesNothing) {
+  write("p/frames.csv", "a measurement of last week");
+  const Outcome outcome = paper({"--device", "cpu", "--figure", "4", "--out", "p"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("p/frames.csv: exists"), HasSubstr("--force")));
+  EXPECT_EQ(text_of(folder_ / "p" / "frames.csv"), "a measurement of last week");
+  EXPECT_FALSE(fs::exists(folder_ / "p" / "paper.md"));
+}
+
+TEST_F(Paper, WrongOptionsNameWhatIsAllowed) {
+  const struct {
+    std::vector<std::string> arguments;
+    const char* message;
+  } cases[] = {
+      {{"--table", "kernel"}, "--table kernel: unknown (did you mean \"kernels\"?)"},
+      {{"--body", "dyno"}, "body \"dyno\": not one of the paper's (did you mean \"dino\"?)"},
+      {{"--device", "gpu"}, "--device gpu: unknown device"},
+      {{"--device", "cuda:x"}, "allowed: auto, cpu, cuda, cuda:0"},
+      {{"--figure", "7"}, "--figure"},
+      {{"--repeat", "0"}, "--repeat"},
+      {{"--redraw", "--out", "nothing"}, "nothing: none of the tables is there"},
+  };
+  for (const auto& c : cases) {
+    const Outcome outcome = run([&] {
+      std::vector<std::string> arguments{"paper"};
+      arguments.insert(arguments.end(), c.arguments.begin(), c.arguments.end());
+      return arguments;
+    }());
+    EXPECT_EQ(outcome.code, 2) << c.message;
+    EXPECT_THAT(outcome.err, HasSubstr(c.message));
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  }
+}
+
+/// Holds with and without GPUs in the machine, and in builds with and without CUDA.
+TEST_F(Paper, AGpuThatIsNotThereIsExitCode4) {
+  environment_ = {{"CUDA_VISIBLE_DEVICES", ""}};
+  const Outcome outcome = paper({"--device", "cuda", "--figure", "4"});
+  EXPECT_EQ(outcome.code, 4) << outcome.out;
+  EXPECT_THAT(outcome.err, HasSubstr("CPU"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  const Outcome automatic = paper({"--body", "horn_bug", "--figure", "2"});
+  EXPECT_EQ(automatic.code, 0) << automatic.err;
+  EXPECT_THAT(automatic.out, HasSubstr("left out"));
+}
+
+TEST_F(Paper, Figure1ShowsTheBodies) {
+  const std::vector<std::string> arguments{"--device", "cpu", "--body", "horn_bug,alien_head",
+                                           "--figure", "1",   "--out",  "p"};
+  const Outcome outcome = paper(arguments);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const char* body : {"horn_bug", "alien_head"}) {  // an empty picture takes some 2 kB
+    EXPECT_GT(fs::file_size(folder_ / "p" / ("figure1_" + std::string(body) + ".png")), 10000u);
+  }
+  const Outcome again = paper(arguments);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("figure1_horn_bug.png: exists"));
+}
+
+class Tables : public test::Folder {};
+
+TEST_F(Tables, ComeBackAsWritten) {
+  const CsvTable table{{{"hardware", "a: b, c"}, {"date", "2008-10-29"}},
+                       {"n", "answer"},
+                       {{"1", "yes"}, {"2.5e-3", ""}}};
+  write_csv(folder_ / "t.csv", table);
+  const CsvTable back = read_csv(folder_ / "t.csv");
+  EXPECT_EQ(back.facts, table.facts);
+  EXPECT_EQ(back.columns, table.columns);
+  EXPECT_EQ(back.rows, table.rows);
+  EXPECT_EQ(back.number(1, "n"), 2.5e-3);
+  EXPECT_EQ(back.find({{"answer", ""}}), 1u);
+  EXPECT_EQ(back.find({{"answer", "no"}}), std::nullopt);
+}
+
+TEST_F(Tables, CommasInACellDoNotMakeCells) {
+  write_csv(folder_ / "t.csv", {{}, {"answer"}, {{"no, 3 GB\nare free"}}});
+  EXPECT_EQ(read_csv(folder_ / "t.csv").text(0, "answer"), "no; 3 GB are free");
+}
+
+TEST_F(Tables, DamageIsNamedWithItsLine) {
+  write("t.csv", "# date: today\na,b\n1,2\n3\n");
+  try {
+    read_csv(folder_ / "t.csv");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("t.csv:4"), HasSubstr("1 cells under 2 columns")));
+  }
+  const CsvTable table{{}, {"a"}, {{"x"}}};
+  EXPECT_THROW(table.number(0, "a"), InputError);
+  EXPECT_THROW(table.text(0, "b"), InputError);
+}
+
+TEST(Median, OfAnyOrder) {
+  EXPECT_EQ(median_of({3, 1, 2}).value, 2);
+  EXPECT_EQ(median_of({3, 1, 2}).spread, 1);
+  EXPECT_EQ(median_of({5}).spread, 0);
+}
+
+class Charts : public test::Folder {};
+
+TEST_F(Charts, AreDrawnWithTheirLabels) {
+  if (!can_plot()) GTEST_SKIP() << "no gnuplot";
+  const LineChart lines{"It's a \"title\"",
+                        "x",
+                        "frames_per_s",
+                        false,
+                        true,
+                        {{"horn_bug", {1, 2, 3}, {10, 100, 1000}}}};
+  draw_svg(script_of(lines), folder_ / "it's.svg");
+  const std::string svg = text_of(folder_ / "it's.svg");
+  EXPECT_THAT(svg, AllOf(HasSubstr("<svg"), HasSubstr("horn_bug"), HasSubstr("frames_per_s")));
+  BarChart bars{"bars", "y", true, {"group_a", "b"}, {{"s", {1, 20}}}};
+  draw_svg(script_of(bars), folder_ / "bars.svg");
+  EXPECT_THAT(text_of(folder_ / "bars.svg"), HasSubstr("group_a"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), {}), 2);  // nothing left lying about
+}
+
+TEST_F(Charts, GnuplotsComplaintIsPassedOn) {
+  if (!can_plot()) GTEST_SKIP() << "no gnuplot";
+  try {
+    draw_svg("plot nonsense\n", folder_ / "a.svg");
+    FAIL();
+  } catch (const OutputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("nonsense"));
+  }
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+}  // namespace
+}  // namespace phyxel::app

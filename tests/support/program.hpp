@@ -1,0 +1,45 @@
+/// Runs the program in a folder of its own, as a user would.
+#pragma once
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "support/folder.hpp"
+
+namespace phyxel::test {
+
+struct Outcome {
+  int code = -1;
+  std::string out, err;
+};
+
+class Program : public Folder {
+ protected:
+  /// Starts the program in the test's folder; its output goes to files.
+  pid_t start(const std::vector<std::string>& arguments) const {
+    const pid_t child = fork();
+    if (child != 0) return child;
+    if (chdir(folder_.c_str()) != 0) _exit(99);
+    if (!freopen("stdout.txt", "w", stdout) || !freopen("stderr.txt", "w", stderr)) _exit(99);
+    for (const auto& [name, value] : environment_) setenv(name.c_str(), value.c_str(), 1);
+    std::vector<char*> argv{const_cast<char*>(PHYXEL_PROGRAM)};
+    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    argv.push_back(nullptr);
+    execv(PHYXEL_PROGRAM, argv.data());
+    _exit(99);
+  }
+  Outcome finish(pid_t child) const {
+    int status = 0;
+    waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status),
+            text_of(folder_ / "stdout.txt"), text_of(folder_ / "stderr.txt")};
+  }
+  Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
+
+  /// Name and value, on top of the test's own.
+  std::vector<std::pair<std::string, std::string>> environment_;
+};
+
+}  // namespace phyxel::test
