@@ -1,11 +1,10 @@
 /// Devices and the errors of CUDA calls.
-#include "device.hpp"
-
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
 #include "check.hpp"
+#include "device.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
@@ -58,7 +57,8 @@ std::string why_no_device(int* count) {
   if (error == cudaSuccess || error == cudaErrorNoDevice) {
     const char* visible = std::getenv("CUDA_VISIBLE_DEVICES");
     return "no CUDA device was found" +
-           (visible ? " (CUDA_VISIBLE_DEVICES is \"" + std::string(visible) + "\")" : std::string());
+           (visible ? " (CUDA_VISIBLE_DEVICES is \"" + std::string(visible) + "\")"
+                    : std::string());
   }
   return "the CUDA devices could not be listed: " + reason(error);
 }
@@ -147,8 +147,9 @@ void check_launch(const Launch& launch) {
 void wait_for_device(const Launch& last) {
   const cudaError_t error = cudaDeviceSynchronize();
   if (error == cudaSuccess) return;
-  throw DeviceError(current_device() + ": a kernel failed: " + reason(error) + "; the last launch was " +
-                    last.describe() + ", and PHYXEL_CUDA_SYNC=1 in the environment tells which one failed");
+  throw DeviceError(current_device() + ": a kernel failed: " + reason(error) +
+                    "; the last launch was " + last.describe() +
+                    ", and PHYXEL_CUDA_SYNC=1 in the environment tells which one failed");
 }
 
 namespace detail {

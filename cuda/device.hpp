@@ -9,10 +9,10 @@ namespace phyxel {
 
 struct Device {
   int index = 0;
-  std::string name;           ///< e.g. "NVIDIA H200".
-  int major = 0, minor = 0;   ///< Compute capability.
+  std::string name;          ///< e.g. "NVIDIA H200".
+  int major = 0, minor = 0;  ///< Compute capability.
   int multiprocessors = 0;
-  std::size_t memory = 0;     ///< Bytes in all.
+  std::size_t memory = 0;        ///< Bytes in all.
   std::string describe() const;  ///< "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
 };
 

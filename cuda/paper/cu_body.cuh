@@ -27,9 +27,9 @@ inline constexpr unsigned short no_neighbor = 0xFFFF;
 
 /// Inverse neighbourhood: "all phyxels that have a certain phyxel P as a neighbor".
 struct CuInverse {
-  int* d_offsets;               ///< Shape [n + 1].
-  unsigned short* d_phyxels;    ///< Who, ascending.
-  unsigned short* d_slots;      ///< In which of their slots (for the CSR gather).
+  int* d_offsets;             ///< Shape [n + 1].
+  unsigned short* d_phyxels;  ///< Who, ascending.
+  unsigned short* d_slots;    ///< In which of their slots (for the CSR gather).
 };
 
 /// What replaces d_forces' n×n matrix in the CSR gather.
@@ -42,8 +42,8 @@ struct CuGather {
 /// The mesh. Weights and carriers in slots like those of the neighbours.
 template <class Real>
 struct CuSurfels {
-  Real* d_positions;            ///< At rest [m], shape [n_surfels, 3].
-  Real* d_normals;              ///< At rest, shape [n_surfels, 3].
+  Real* d_positions;  ///< At rest [m], shape [n_surfels, 3].
+  Real* d_normals;    ///< At rest, shape [n_surfels, 3].
   int numSurfels;
   int maxNeighbors;
   unsigned short* d_neighbors;  ///< Shape [maxNeighbors, n_surfels].

@@ -100,7 +100,8 @@ __device__ Sym3<Real> hooke(const Sym3<Real>& strain) {
   Real s[6];
   for (int row = 0; row < 6; ++row) {
     s[row] = Real(0);
-    for (int column = 0; column < 6; ++column) s[row] += material<Real>(row * 6 + column) * e[column];
+    for (int column = 0; column < 6; ++column)
+      s[row] += material<Real>(row * 6 + column) * e[column];
   }
   return {s[0], s[3], s[5], s[1], s[4], s[2]};
 }
@@ -205,8 +206,8 @@ __global__ void integrate(CuBody<Real> body, CuGather<Real> gather, CuTextures t
   using Fetch = Vector4<Real>;
   const Real mass = Fetch::fetch(textures.positions_masses, i).w;
   if (mass == Real(0)) return;
-  const Vec3<Real> force = dense ? load3(body.d_forces, matrix_entry(i, i, n))
-                                 : load3(gather.d_ownForces, i);
+  const Vec3<Real> force =
+      dense ? load3(body.d_forces, matrix_entry(i, i, n)) : load3(gather.d_ownForces, i);
   const auto u_v = Fetch::fetch(textures.displacements_volume, i);
   const Vec3<Real> u = xyz<Real>(u_v);
   const Vec3<Real> last = load3(body.d_lastDisplacements, i);

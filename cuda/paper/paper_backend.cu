@@ -1,6 +1,4 @@
 /// Owns the arrays of one body, launches the kernels of 2008 on it.
-#include "paper_backend.hpp"
-
 #include <algorithm>
 #include <string>
 #include <type_traits>
@@ -8,6 +6,7 @@
 #include "check.hpp"
 #include "device.hpp"
 #include "kernels.cuh"
+#include "paper_backend.hpp"
 #include "paper_model.hpp"
 
 namespace phyxel::paper {
@@ -111,7 +110,8 @@ class GpuBackend final : public PaperBackend {
 
   void download(State& state) const override {
     wait();
-    const std::vector<Real> now = copy_of(displacements_volume_), last = copy_of(last_displacements_);
+    const std::vector<Real> now = copy_of(displacements_volume_),
+                            last = copy_of(last_displacements_);
     state.displacement.resize(static_cast<std::size_t>(n_));
     state.velocity.resize(static_cast<std::size_t>(n_));
     for (Index i = 0; i < n_; ++i) {
@@ -124,10 +124,11 @@ class GpuBackend final : public PaperBackend {
 
   void stress() override {
     use_material();
-    const auto kernel = green_ ? (dense_ ? calcStrainStressA<Real, true, true>
-                                         : calcStrainStressA<Real, true, false>)
-                               : (dense_ ? calcStrainStressA<Real, false, true>
-                                         : calcStrainStressA<Real, false, false>);
+    const auto kernel =
+        green_
+            ? (dense_ ? calcStrainStressA<Real, true, true> : calcStrainStressA<Real, true, false>)
+            : (dense_ ? calcStrainStressA<Real, false, true>
+                      : calcStrainStressA<Real, false, false>);
     kernel<<<blocks(), block_>>>(body_, gather_, textures_);
     launched("calcStrainStressA", blocks(), block_);
   }
@@ -136,7 +137,8 @@ class GpuBackend final : public PaperBackend {
     dt_ = dt;
     sum_forces();
     const auto kernel = dense_ ? integrate<Real, true> : integrate<Real, false>;
-    const Vec3<Real> gravity{static_cast<Real>(model_.gravity.x), static_cast<Real>(model_.gravity.y),
+    const Vec3<Real> gravity{static_cast<Real>(model_.gravity.x),
+                             static_cast<Real>(model_.gravity.y),
                              static_cast<Real>(model_.gravity.z)};
     const Real step = static_cast<Real>(dt);
     kernel<<<blocks(), block_>>>(body_, gather_, textures_, gravity, step * step);
@@ -199,7 +201,8 @@ class GpuBackend final : public PaperBackend {
     }
     values.inverse_moment = matrices(copy_of(moment_matrices_));
     const std::vector<Real> now = copy_of(displacements_volume_);
-    for (Index i = 0; i < n_; ++i) values.volume.push_back(now[4 * static_cast<std::size_t>(i) + 3]);
+    for (Index i = 0; i < n_; ++i)
+      values.volume.push_back(now[4 * static_cast<std::size_t>(i) + 3]);
     return values;
   }
 
@@ -228,10 +231,11 @@ class GpuBackend final : public PaperBackend {
          positions_masses_.bytes() + displacements_volume_.bytes() + last_displacements_.bytes()},
         {"moment matrices and gradients", moment_matrices_.bytes() + gradui_.bytes()},
         {"neighbours and weights", neighbors_.bytes() + omega_.bytes()},
-        {"inverse neighbours", inverse_offsets_.bytes() + inverse_phyxels_.bytes() +
-                                   inverse_slots_.bytes()}};
+        {"inverse neighbours",
+         inverse_offsets_.bytes() + inverse_phyxels_.bytes() + inverse_slots_.bytes()}};
     if (dense_) list.push_back({"n x n force matrix", forces_.bytes()});
-    if (!dense_) list.push_back({"pair stresses and forces", pair_stress_.bytes() + own_forces_.bytes()});
+    if (!dense_)
+      list.push_back({"pair stresses and forces", pair_stress_.bytes() + own_forces_.bytes()});
     if (surfels_.numSurfels > 0) {
       list.push_back({"surfels", surfel_positions_.bytes() + surfel_normals_.bytes() +
                                      surfel_neighbors_.bytes() + surfel_omega_.bytes() +

@@ -104,17 +104,18 @@ void check_paper_model(const Model& model) {
   }
   const Part& part = model.parts[0];
   if (model.size() > most_phyxels) {
-    refuse(fmt::format("body \"{}\" has {} phyxels, but its neighbours are named by 16-bit numbers "
-                       "(unsigned short): allowed at most {}",
-                       part.name, model.size(), most_phyxels));
+    refuse(
+        fmt::format("body \"{}\" has {} phyxels, but its neighbours are named by 16-bit numbers "
+                    "(unsigned short): allowed at most {}",
+                    part.name, model.size(), most_phyxels));
   }
   if (!part.kernel_volumes) {
-    refuse(fmt::format("body \"{}\" has geometric volumes; allowed: volumes = \"kernel\"",
-                       part.name));
+    refuse(
+        fmt::format("body \"{}\" has geometric volumes; allowed: volumes = \"kernel\"", part.name));
   }
   if (part.material.damping > 0 || part.material.volume_stiffness > 0) {
-    refuse(fmt::format("body \"{}\" has damping or volume conservation; allowed: neither",
-                       part.name));
+    refuse(
+        fmt::format("body \"{}\" has damping or volume conservation; allowed: neither", part.name));
   }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {

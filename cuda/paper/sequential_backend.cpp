@@ -1,6 +1,6 @@
-/// The program that Farias et al. 2008 compared with: one core, one phyxel after the other. Weights,
-/// moments and neighbours are prepared (section 5); each phyxel pushes its neighbours, so neither
-/// the n×n matrix nor the inverse neighbourhood is needed.
+/// The program that Farias et al. 2008 compared with: one core, one phyxel after the other.
+/// Weights, moments and neighbours are prepared (section 5); each phyxel pushes its neighbours, so
+/// neither the n×n matrix nor the inverse neighbourhood is needed.
 #include <fmt/format.h>
 
 #include <type_traits>
@@ -176,7 +176,8 @@ class SequentialBackend final : public PaperBackend {
   }
   std::size_t step_traffic() const override {
     return omega_.size() * (sizeof(Real) + sizeof(Index)) +
-           position_.size() * (6 * sizeof(V) + sizeof(Sym3<Real>) + 2 * sizeof(M) + 2 * sizeof(Real));
+           position_.size() *
+               (6 * sizeof(V) + sizeof(Sym3<Real>) + 2 * sizeof(M) + 2 * sizeof(Real));
   }
 
  private:
