@@ -70,7 +70,7 @@ bool can_plot() { return !gnuplot().empty(); }
 
 std::string script_of(const LineChart& chart) {
   std::string script = head(chart.title, chart.y_label);
-  script += "set xlabel " + quoted(chart.x_label) + " noenhanced\n";
+  script += "set xlabel " + quoted(chart.x_label) + " offset 0,0.5 noenhanced\n";
   if (chart.log_x) script += "set logscale x\nset format x '10^{%T}'\n";
   if (chart.log_y) script += "set logscale y\nset format y '10^{%T}'\n";
   std::string plots;
