@@ -31,10 +31,10 @@ function(phyxel_configure_test name)
     RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
 endfunction()
 
-# phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds]):
+# phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds] [PREFIX p]):
 # a GoogleTest program, one ctest entry a case.
 function(phyxel_add_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT;PREFIX" "LIBRARIES;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
@@ -45,5 +45,5 @@ function(phyxel_add_test name)
   if(arg_LABELS)
     list(APPEND properties LABELS "${arg_LABELS}")
   endif()
-  gtest_discover_tests(${name} NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+  gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()

@@ -109,6 +109,28 @@ std::size_t cuda_measured_allocation(std::size_t bytes, const std::string& what)
   return before - cuda_free_memory();
 }
 
+double cuda_copy_bandwidth() {
+  const std::size_t bytes = std::min(std::size_t{1} << 30, cuda_free_memory() / 4);
+  const DeviceArray<char> from(bytes, "a copy"), to(bytes, "a copy");
+  cudaEvent_t start, end;
+  PHYXEL_CUDA(cudaEventCreate(&start));
+  PHYXEL_CUDA(cudaEventCreate(&end));
+  PHYXEL_CUDA(cudaMemset(from.data(), 0, bytes));
+  float best = HUGE_VALF;
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    PHYXEL_CUDA(cudaEventRecord(start));
+    PHYXEL_CUDA(cudaMemcpyAsync(to.data(), from.data(), bytes, cudaMemcpyDeviceToDevice));
+    PHYXEL_CUDA(cudaEventRecord(end));
+    PHYXEL_CUDA(cudaEventSynchronize(end));
+    float milliseconds = 0;
+    PHYXEL_CUDA(cudaEventElapsedTime(&milliseconds, start, end));
+    best = std::min(best, milliseconds);
+  }
+  cudaEventDestroy(start);
+  cudaEventDestroy(end);
+  return 2e3 * static_cast<double>(bytes) / best;
+}
+
 std::string cuda_version() {
   int driver = 0;
   cudaDriverGetVersion(&driver);

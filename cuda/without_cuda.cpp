@@ -3,6 +3,7 @@
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
+#include "solver/cuda_backend.hpp"
 
 namespace phyxel {
 namespace {
@@ -25,7 +26,14 @@ std::size_t cuda_free_memory() { return 0; }
 
 std::size_t cuda_measured_allocation(std::size_t, const std::string&) { return 0; }
 
+double cuda_copy_bandwidth() { return 0; }
+
 std::string cuda_version() { return "no CUDA"; }
+
+std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device) {
+  use_cuda_device(device);
+  return nullptr;
+}
 
 namespace paper {
 

@@ -10,6 +10,7 @@
 
 #include "command.hpp"
 #include "csv.hpp"
+#include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
@@ -124,8 +125,9 @@ double force_error(const Model& model, Backend& backend) {
 /// Rows go to the terminal as they come; the CSV file is written whole after each.
 class Table {
  public:
-  Table(const BenchOptions& options, const std::vector<std::string>& columns)
+  Table(const BenchOptions& options, const std::vector<std::string>& columns, Facts more = {})
       : file_(options.csv), table_{machine_facts(), columns, {}} {
+    table_.facts.insert(table_.facts.end(), more.begin(), more.end());
     fmt::print("{}", csv_text(table_));
     if (!file_.empty() && std::filesystem::exists(file_) && !options.force) {
       throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
@@ -148,22 +150,25 @@ class Table {
 };
 
 void bench_step(const BenchOptions& options) {
-  if (options.device != "cpu") {
-    throw InputError(fmt::format(
-        "--device {}: this version simulates on the CPU only; allowed: cpu", options.device));
-  }
+  const ChosenDevice device = choose_device(options.device);
   for (const std::string& terms : options.terms) {
     if (std::find(all_terms.begin(), all_terms.end(), terms) == all_terms.end()) {
       throw InputError(fmt::format("--terms {}: unknown{}; allowed: {}", terms,
                                    did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
     }
   }
-  Table table(options, {"terms", "precision", "threads", "phyxels", "neighbours", "steps_per_s",
-                        "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step",
-                        "bytes_per_s", "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error",
-                        "core_round_trip_ns"});
+  Table table(
+      options,
+      {"terms", "precision", "threads", "phyxels", "neighbours", "steps_per_s",
+       "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step", "bytes_per_s",
+       "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
+      device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{});
+  // A GPU has no thread counts: 0 stands for it.
+  const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
   std::vector<double> copy;
-  for (const int threads : options.threads) copy.push_back(copy_bandwidth(threads));
+  for (const int threads : all_threads) {
+    copy.push_back(device.gpu ? cuda_copy_bandwidth() : copy_bandwidth(threads));
+  }
   for (const std::string& terms : options.terms) {
     for (const Index size : options.sizes) {
       const Scene scene = cube_scene(terms);
@@ -171,9 +176,9 @@ void bench_step(const BenchOptions& options) {
       const Model model = build_model(scene, std::span(&cloud, 1));
       const double pairs = static_cast<double>(model.neighbourhood.neighbours.entries());
       for (const std::string& precision : options.precisions) {
-        for (std::size_t t = 0; t < options.threads.size(); ++t) {
-          const auto backend =
-              make_cpu_backend(model, precision_option(precision), options.threads[t]);
+        for (std::size_t t = 0; t < all_threads.size(); ++t) {
+          const int threads = all_threads[t];
+          const auto backend = make_backend(model, precision_option(precision), device, threads);
           const double error = force_error(model, *backend);
           // A tenth of the sound step: any speed, no risk.
           const double dt =
@@ -181,12 +186,18 @@ void bench_step(const BenchOptions& options) {
           Solver solver(*backend, initial_state(model, scene, dt));
           const auto warm = Clock::now();
           int steps = 0;
-          while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) solver.step(), ++steps;
+          while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {
+            solver.step();
+            ++steps;
+            if (steps % 16 == 0) backend->wait();
+          }
+          backend->wait();
           steps = std::max(2, static_cast<int>(steps * options.seconds / seconds_since(warm)));
           std::vector<double> rate;
           for (int repeat = 0; repeat < options.repeats; ++repeat) {
             const auto start = Clock::now();
             for (int s = 0; s < steps; ++s) solver.step();
+            backend->wait();
             rate.push_back(steps / seconds_since(start));
           }
           const Median median = median_of(rate);
@@ -194,9 +205,9 @@ void bench_step(const BenchOptions& options) {
           std::size_t memory = 0;
           for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
           const double traffic = static_cast<double>(backend->step_traffic());
-          const bool shared = options.threads[t] > 1 && omp_get_num_procs() > 1;
+          const bool shared = threads > 1 && omp_get_num_procs() > 1;
           table.row(
-              {terms, precision, std::to_string(options.threads[t]), std::to_string(model.size()),
+              {terms, precision, std::to_string(threads), std::to_string(model.size()),
                fmt::format("{:.1f}", pairs / n), fmt::format("{:.5g}", median.value),
                fmt::format("{:.5g}", median.value * n), fmt::format("{:.3f}", median.spread),
                fmt::format("{:.5g}", median.value * 2 * pairs), fmt::format("{:.1f}", traffic / n),
@@ -260,7 +271,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
       ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the CSV file");
   if (std::string(name) == "step") {
-    command->add_option("--device", options->device, "cpu");
+    command->add_option("--device", options->device, device_help)->capture_default_str();
     command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
     command
         ->add_option("--terms", options->terms,

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -31,6 +32,7 @@ class Run {
   Run(const RunOptions& options)
       : options_(options),
         scene_(scene_with(options.overrides)),
+        device_(choose_device(scene_.solver.device, "device")),
         begin_(find_checkpoint()),
         model_(build_model(scene_)),
         plan_(plan_steps(scene_, model_, options.overrides.unsafe_step)),
@@ -40,7 +42,8 @@ class Run {
   }
 
   void execute() {
-    const auto backend = make_cpu_backend(model_, scene_.solver.precision, scene_.solver.threads);
+    const auto backend =
+        make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads);
     backend_ = backend.get();
     Solver solver(*backend, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt));
     solver_ = &solver;
@@ -65,26 +68,32 @@ class Run {
     loop_start_ = Clock::now();
     auto last_checkpoint = Clock::now();
     try {
+      auto stepping_since = Clock::now();
+      double look_seconds = 0;
       while (solver.steps() < plan_.steps) {
-        const auto step_start = Clock::now();
         solver.step();
-        step_seconds_ += seconds_since(step_start);
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
         const bool stop = StopSignal::stop_requested() != 0;
-        if (frame || stop || solver.steps() % watch_interval == 0) {
-          now = diagnose(model_, *backend, solver.steps(), solver.dt());
-          watch.check(now);
-          peak_energy_ =
-              std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
-          good_ = solver.state();
-        }
+        const bool due = StopSignal::checkpoint_requested() ||
+                         (scene_.output.checkpoint_every > 0 &&
+                          seconds_since(last_checkpoint) > scene_.output.checkpoint_every);
         progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+        const bool watched = solver.steps() % watch_interval == 0 &&
+                             seconds_since(stepping_since) > watch_share * look_seconds;
+        if (!frame && !stop && !due && !watched) continue;
+
+        backend->wait();
+        step_seconds_ += seconds_since(stepping_since);
+        const auto look_start = Clock::now();
+        now = diagnose(model_, *backend, solver.steps(), solver.dt());
+        look_seconds = seconds_since(look_start);
+        watch.check(now);
+        peak_energy_ =
+            std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
+        good_ = solver.state();
         if (frame) write_frame(now);
-        const bool due = scene_.output.checkpoint_every > 0 &&
-                         seconds_since(last_checkpoint) > scene_.output.checkpoint_every;
-        if (last || stop || due || StopSignal::checkpoint_requested()) {
-          good_ = solver.state();
+        if (last || stop || due) {
           write_state(now);
           last_checkpoint = Clock::now();
         }
@@ -95,12 +104,12 @@ class Run {
                                   "written, --resume auto continues",
                                   StopSignal::stop_requested(), solver.time(), solver.steps()));
         }
+        stepping_since = Clock::now();
       }
     } catch (const DivergedError& error) {
-      progress.finish();
-      write_state(now);
-      throw DivergedError(fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(),
-                                      good_.time, checkpoint_.string()));
+      throw DivergedError(with_last_good_state(error, progress, now));
+    } catch (const DeviceError& error) {
+      throw DeviceError(with_last_good_state(error, progress, now));
     }
     progress.finish();
     loop_seconds_ = seconds_since(loop_start_);
@@ -111,8 +120,17 @@ class Run {
   }
 
  private:
-  // Often enough to stop a blow-up early, seldom enough to cost under one percent.
+  // Often enough to stop a blow-up early; where looking takes long, after that many times as long.
   static constexpr std::int64_t watch_interval = 250;
+  static constexpr double watch_share = 50;
+
+  /// Writes it, and says so.
+  std::string with_last_good_state(const Error& error, Progress& progress, const Diagnostics& now) {
+    progress.finish();
+    write_state(now);
+    return fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(), good_.time,
+                       checkpoint_.string());
+  }
 
   double speed() const {
     return static_cast<double>(solver_->steps() - first_step_) /
@@ -298,6 +316,7 @@ class Run {
   const RunOptions& options_;
   Clock::time_point start_ = Clock::now();
   Scene scene_;
+  ChosenDevice device_;
   std::optional<Checkpoint> begin_;
   Model model_;
   StepPlan plan_;
@@ -317,9 +336,10 @@ void run(const RunOptions& options) { Run(options).execute(); }
 
 void check(const Overrides& overrides) {
   const Scene scene = scene_with(overrides);
+  const ChosenDevice device = choose_device(scene.solver.device, "device");
   const Model model = build_model(scene);
   const StepPlan plan = plan_steps(scene, model, overrides.unsafe_step);
-  const auto backend = make_cpu_backend(model, scene.solver.precision, scene.solver.threads);
+  const auto backend = make_backend(model, scene.solver.precision, device, scene.solver.threads);
   fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model));
   fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
   fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps,
@@ -333,6 +353,7 @@ void check(const Overrides& overrides) {
   const auto start = Clock::now();
   int steps = 0;
   for (; steps < 2 || (seconds_since(start) < 0.2 && steps < 1000); ++steps) solver.step();
+  backend->wait();
   fmt::print("  forecast    {:.3g} s for the steps alone\n",
              seconds_since(start) / steps * static_cast<double>(plan.steps));
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "device_option.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {
@@ -41,7 +42,7 @@ Precision precision_option(const std::string& name) {
 void add_overrides(CLI::App& command, Overrides& o) {
   command.add_option("scene", o.scene, "Scene file (TOML)")->required();
   command.add_option("--out", o.out, "Output folder, instead of the scene's");
-  command.add_option("--device", o.device, "auto, cpu or cuda");
+  command.add_option("--device", o.device, device_help);
   command.add_option("--precision", o.precision, "float, double or mixed");
   command.add_option("--threads", o.threads, "CPU threads (default: all)");
   command.add_option("--until", o.until, "Simulated time to stop at [s]");
@@ -53,13 +54,7 @@ Scene scene_with(const Overrides& o) {
   Scene scene = read_scene(o.scene);
   if (!o.out.empty()) scene.output.directory = o.out;
   if (!o.device.empty()) scene.solver.device = o.device;
-  if (o.device != "" && o.device != "auto" && o.device != "cpu" && o.device != "cuda") {
-    throw InputError(fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda",
-                                 o.device, did_you_mean(o.device, {"auto", "cpu", "cuda"})));
-  }
-  if (scene.solver.device == "cuda") {
-    throw InputError("device \"cuda\": this version simulates on the CPU only; allowed: auto, cpu");
-  }
+  if (!o.device.empty()) check_device_name(o.device, "--device");
   if (!o.precision.empty()) scene.solver.precision = precision_option(o.precision);
   if (o.threads) {
     if (*o.threads < 1 || *o.threads > 4096) {

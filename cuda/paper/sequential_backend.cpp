@@ -165,7 +165,6 @@ class SequentialBackend final : public PaperBackend {
     });
     return forces;
   }
-  void wait() const override {}
 
   std::vector<ArrayBytes> memory() const override {
     const std::size_t n = position_.size();

@@ -224,7 +224,7 @@ class CpuBackend final : public Backend {
       load_records<StressRecord::size>(stresses_.data(), j, record);
       const Vec3<P> x_ij = vec3_at(record, StressRecord::position) - x_i;
       const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
-      force += neighbour_force(mat3_at(record), x_ij, w_ji);
+      add_neighbour_force(force, mat3_at(record), x_ij, w_ji);
     }
     return force;
   }

@@ -212,7 +212,7 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
       {{"run", "broken.toml"}, "broken.toml:"},
       {{"run", "bad.toml"}, "dino"},
       {{"run", "beam.toml", "--device", "gpu"}, "gpu"},
-      {{"run", "beam.toml", "--device", "cuda"}, "cuda"},
+      {{"run", "beam.toml", "--device", "cuda:x"}, "cuda:x"},
       {{"run", "beam.toml", "--precision", "half"}, "half"},
       {{"run", "beam.toml", "--until", "-1"}, "-1"},
       {{"run", "beam.toml", "--threads", "0"}, "0"},
@@ -318,6 +318,19 @@ TEST_F(Program, ADiskThatFillsUpEndsTheRunAndSpoilsNothing) {
     EXPECT_NO_THROW(read_frame(entry.file));
   }
   EXPECT_EQ(text_of(out / "energy.csv").back(), '\n');
+}
+
+/// Holds with and without GPUs in the machine, and in builds with and without CUDA.
+TEST_F(Program, AGpuThatIsNotThereIsExitCode4AndAutoTakesTheCpu) {
+  write_beam("0.01");
+  environment_ = {{"CUDA_VISIBLE_DEVICES", ""}};
+  const Outcome refused = run({"run", "beam.toml", "--device", "cuda"});
+  EXPECT_EQ(refused.code, 4);
+  EXPECT_THAT(refused.err, HasSubstr("CPU"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  const Outcome automatic = run({"run", "beam.toml"});
+  EXPECT_EQ(automatic.code, 0) << automatic.err;
+  EXPECT_THAT(automatic.out, HasSubstr("cpu, float"));
 }
 
 TEST_F(Program, SamplesAMeshAndRunsIt) {

@@ -1,5 +1,6 @@
 /// phyxel paper: section 6 of Farias et al. 2008 run again.
 #include "command.hpp"
+#include "device_option.hpp"
 
 #include <fmt/format.h>
 
@@ -28,30 +29,6 @@ struct PaperOptions {
 const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
                                           paper_table::memory, paper_table::stiffness};
 
-/// "auto", "cpu", "cuda" or "cuda:1".
-void choose_device(const std::string& name, PaperRequest& request) {
-  if (name == "cpu") {
-    request.why_no_gpu = "--device cpu";
-    return;
-  }
-  if (name == "auto") {
-    if (!cuda_devices(&request.why_no_gpu).empty()) request.gpu = use_cuda_device(0);
-    return;
-  }
-  if (name == "cuda") {
-    request.gpu = use_cuda_device(0);
-    return;
-  }
-  if (name.rfind("cuda:", 0) == 0 && name.size() > 5 && name.size() < 9 &&
-      std::all_of(name.begin() + 5, name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
-    request.gpu = use_cuda_device(std::stoi(name.substr(5)));
-    return;
-  }
-  throw InputError(
-      fmt::format("--device {}: unknown device{}; allowed: auto, cpu, cuda, cuda:0, ...", name,
-                  did_you_mean(name, {"auto", "cpu", "cuda"})));
-}
-
 fs::path file_of(const fs::path& folder, const std::string& table) {
   return folder / (table + ".csv");
 }
@@ -78,7 +55,9 @@ void paper_command(PaperOptions& options) {
                       request.out.string(), fmt::join(tables, ".csv, ")));
     }
   } else {
-    choose_device(options.device, request);
+    const ChosenDevice device = choose_device(options.device);
+    request.gpu = device.gpu;
+    request.why_no_gpu = device.why_no_gpu;
     const bool everything = options.figures.empty() && options.tables.empty();
     if (everything) {
       options.figures = {1, 2, 3, 4, 5, 6};
@@ -174,7 +153,7 @@ void add_paper(CLI::App& program) {
       ->delimiter(',');
   command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');
-  command->add_option("--device", options->device, "auto, cpu, cuda or cuda:<number>")
+  command->add_option("--device", options->device, device_help)
       ->capture_default_str();
   command->add_option("--repeat", request.repeat, "Repeats; the median is reported")
       ->capture_default_str()

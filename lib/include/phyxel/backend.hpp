@@ -34,6 +34,10 @@ class Backend {
   /// takes one Verlet step of `dt` from `time`; motions are applied to the result.
   virtual void advance(double time, double dt) = 0;
 
+  /// Steps may be under way when `stress` and `advance` return; this waits for them.
+  /// @throws DeviceError
+  virtual void wait() const {}
+
   /// Internal forces [N] at the present displacements, shape [n, 3] (runs both passes).
   virtual void internal_forces(std::vector<Vec3d>& force) = 0;
   /// Displacement gradients at the present displacements, shape [n].

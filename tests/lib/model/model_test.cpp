@@ -7,6 +7,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "support/backend.hpp"
 #include "support/clouds.hpp"
 
 namespace phyxel {
@@ -154,7 +155,7 @@ TEST(Surfels, FollowAnAffineMapExactly) {
   for (const Vec3d& x : model.position) u.push_back(g * x + Vec3d{1, 2, 3});
   for (const auto& [precision, tolerance] :
        {std::pair{Precision::double_, 1e-13}, std::pair{Precision::single, 2e-5}}) {
-    const auto backend = make_cpu_backend(model, precision);
+    const auto backend = make_test_backend(model, precision);
     backend->upload(state_of(u));
     SurfelState surfels;
     backend->advect_surfels(surfels);
@@ -179,7 +180,7 @@ TEST(Surfels, OutOfReachFollowTheNearestPhyxel) {
   const Model model = model_of(one_body(), cloud);
   EXPECT_EQ(model.surfels.unreached, 1);
   ASSERT_EQ(model.warnings.size(), 1u);
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   backend->upload(state_of(std::vector<Vec3d>(64, Vec3d{0.5, 0, 0})));
   SurfelState surfels;
   backend->advect_surfels(surfels);
@@ -199,7 +200,7 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
   };
   // Terms a scene leaves out allocate nothing.
   EXPECT_THAT(
-      names(*make_cpu_backend(uniform, Precision::single)),
+      names(*make_test_backend(uniform, Precision::single)),
       ::testing::Not(::testing::Contains(::testing::AnyOf("loads", "inverse neighbour lists"))));
   Scene scene = one_body();
   scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
@@ -208,7 +209,7 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
   load.force = {1, 0, 0};
   scene.bodies[0].loads.push_back(load);
   const Model adaptive = model_of(scene, cloud);
-  EXPECT_THAT(names(*make_cpu_backend(adaptive, Precision::single)),
+  EXPECT_THAT(names(*make_test_backend(adaptive, Precision::single)),
               ::testing::IsSupersetOf({"loads", "inverse neighbour lists"}));
 }
 
@@ -222,7 +223,7 @@ TEST(Model, FarFromTheOriginFloatLosesNothing) {
   const auto u = random_deformation(model_near, 0.01);
   std::vector<Vec3d> force[2];
   for (int k = 0; k < 2; ++k) {
-    const auto backend = make_cpu_backend(k ? model_far : model_near, Precision::single);
+    const auto backend = make_test_backend(k ? model_far : model_near, Precision::single);
     backend->upload(state_of(u));
     backend->internal_forces(force[k]);
   }

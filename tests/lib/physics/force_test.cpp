@@ -3,6 +3,7 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/oracle.hpp"
 
@@ -77,7 +78,7 @@ class Force : public ::testing::TestWithParam<Terms> {};
 
 std::vector<Vec3d> backend_forces(const Model& model, const std::vector<Vec3d>& u,
                                   Precision precision) {
-  const auto backend = make_cpu_backend(model, precision, 2);
+  const auto backend = make_test_backend(model, precision, 2);
   backend->upload(state_of(u));
   std::vector<Vec3d> force;
   backend->internal_forces(force);
@@ -126,7 +127,7 @@ TEST_P(Force, IsMinusTheEnergyGradient) {
 
 TEST_P(Force, ReportedEnergyIsTheOracles) {
   const Case c = make_case(GetParam());
-  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  const auto backend = make_test_backend(c.model, Precision::double_);
   backend->upload(state_of(c.u));
   const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
   const double expected = oracle::energy(c.body, to_eigen(c.u));
@@ -136,7 +137,7 @@ TEST_P(Force, ReportedEnergyIsTheOracles) {
 
 TEST_P(Force, TotalForceAndTorqueVanish) {
   const Case c = make_case(GetParam());
-  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  const auto backend = make_test_backend(c.model, Precision::double_);
   backend->upload(state_of(c.u));
   const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
   // Pairwise cancellation: only rounding of 120 sums is left.
@@ -152,7 +153,7 @@ TEST_P(Force, TotalForceAndTorqueVanish) {
 TEST_P(Force, LinearFieldIsReproduced) {
   const Case c = make_case(GetParam());
   const auto u = random_deformation(c.model, 0);
-  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  const auto backend = make_test_backend(c.model, Precision::double_);
   backend->upload(state_of(u));
   std::vector<Mat3d> gradient;
   backend->displacement_gradients(gradient);
@@ -176,7 +177,7 @@ TEST_P(Force, TranslationAndRotationCostNothing) {
   rotation(0, 1) = -rotation(1, 0);
   std::vector<Vec3d> u;
   for (const Vec3d& x : c.model.position) u.push_back(rotation * x - x + Vec3d{3, -2, 1});
-  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  const auto backend = make_test_backend(c.model, Precision::double_);
   backend->upload(state_of(u));
   const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
   // Strain is rounding (1e-15, through the condition of the moments), against E of 1e5 and a face
@@ -193,7 +194,7 @@ TEST(Force, CauchyStrainSeesARotationAsStrain) {
   const Case c = make_case(terms);
   std::vector<Vec3d> u;
   for (const Vec3d& x : c.model.position) u.push_back(Vec3d{-x.y, x.x, x.z} - x);
-  const auto backend = make_cpu_backend(c.model, Precision::double_);
+  const auto backend = make_test_backend(c.model, Precision::double_);
   backend->upload(state_of(u));
   EXPECT_GT(diagnose(c.model, *backend, 0, 1e-3).strain_energy, 1);
 }

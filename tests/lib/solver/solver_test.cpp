@@ -8,6 +8,7 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "support/backend.hpp"
 #include "support/clouds.hpp"
 
 namespace phyxel {
@@ -39,7 +40,7 @@ TEST(StepLimit, EqualsTheLargestEigenvalueOfTheDenseStiffness) {
   Material material = rubber();
   material.volume_stiffness = 2e5;
   const Model model = model_of(one_body(material), lattice(4, 4, 3, 0.1, 0.2));
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   const Eigen::Index size = 3 * model.size();
   Eigen::MatrixXd stiffness(size, size);
   const double step = 1e-9;
@@ -64,7 +65,7 @@ TEST(StepLimit, EqualsTheLargestEigenvalueOfTheDenseStiffness) {
 }
 
 double energy_after(const Model& model, const Scene& scene, double dt, int steps) {
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   Solver solver(*backend, initial_state(model, scene, dt));
   for (int s = 0; s < steps; ++s) solver.step();
   const Diagnostics d = diagnose(model, *backend, solver.steps(), dt);
@@ -100,7 +101,7 @@ TEST(Verlet, EnergyStaysBoundedOver100000Steps) {
   scene.bodies[0].spin = {0, 0, 4};
   const Model model = model_of(scene, lattice(3, 3, 4, 0.1, 0.1));
   const double dt = 0.5 * step_limit(model).largest_step;
-  const auto backend = make_cpu_backend(model, Precision::double_, 1);
+  const auto backend = make_test_backend(model, Precision::double_, 1);
   Solver solver(*backend, initial_state(model, scene, dt));
   const Diagnostics start = diagnose(model, *backend, 0, dt);
   double early = 0, late = 0;
@@ -128,7 +129,7 @@ TEST(Verlet, IsThePapersRecursion) {
   model.motions.clear();
   model.loads.clear();
   const double dt = 0.4 * step_limit(model).largest_step;
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   State start = initial_state(model, scene, dt);
   std::vector<Vec3d> now = start.displacement, before, force;
   for (std::size_t i = 0; i < now.size(); ++i) before.push_back(now[i] - dt * start.velocity[i]);
@@ -157,7 +158,7 @@ TEST(Verlet, FallsFreelyAsGravitySays) {
   scene.gravity = {1, 0, -9.81};
   const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
   for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
-    const auto backend = make_cpu_backend(model, precision);
+    const auto backend = make_test_backend(model, precision);
     const double dt = 1e-3;
     Solver solver(*backend, initial_state(model, scene, dt));
     for (int s = 0; s < 500; ++s) solver.step();
@@ -174,7 +175,7 @@ TEST(Damping, DecaysMomentumExponentially) {
   scene.bodies[0].material.damping = 2;
   scene.bodies[0].velocity = {1, 0, 0};
   const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   const double dt = 1e-4;
   Solver solver(*backend, initial_state(model, scene, dt));
   for (int s = 0; s < 10000; ++s) solver.step();
@@ -195,7 +196,7 @@ TEST(Motion, FollowsItsPath) {
   scene.bodies[0].motions.push_back(request);
   const Model model = model_of(scene, lattice(4, 3, 3, 0.1));
   ASSERT_EQ(model.motions[0].phyxels.size(), 9u);
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   const double dt = 1e-4;
   Solver solver(*backend, initial_state(model, scene, dt));
   for (int s = 0; s < 730; ++s) solver.step();
@@ -227,7 +228,7 @@ std::pair<double, double> measured_constants(Strain strain) {
   }
   const Model model = model_of(scene, cloud);
   const double dt = 0.8 * step_limit(model).largest_step;
-  const auto backend = make_cpu_backend(model, Precision::double_);
+  const auto backend = make_test_backend(model, Precision::double_);
   Solver solver(*backend, initial_state(model, scene, dt));
   while (solver.time() < 1.5) solver.step();  // exp(-40 · 1.5 / 2) is 1e-13
   std::vector<Mat3d> gradient;
@@ -261,7 +262,7 @@ TEST_P(Restart, IsBitwiseTheRunThatNeverStopped) {
   const Scene scene = busy_scene();
   const Model model = busy_model();
   const double dt = 0.5 * step_limit(model).largest_step;
-  const auto straight = make_cpu_backend(model, GetParam(), 2);
+  const auto straight = make_test_backend(model, GetParam(), 2);
   Solver whole(*straight, initial_state(model, scene, dt));
   std::vector<State> kept;
   for (int s = 0; s < 400; ++s) {
@@ -270,7 +271,7 @@ TEST_P(Restart, IsBitwiseTheRunThatNeverStopped) {
   }
   const State end = whole.state();
   for (const State& middle : kept) {
-    const auto fresh = make_cpu_backend(model, GetParam(), 1);
+    const auto fresh = make_test_backend(model, GetParam(), 1);
     Solver rest(*fresh, middle);
     while (rest.steps() < 400) rest.step();
     const State again = rest.state();
@@ -300,7 +301,7 @@ TEST(Bodies, DoNotFeelEachOther) {
   const Model both = build_model(scene, clouds);
   const double dt = 0.5 * step_limit(both).largest_step;
   const auto run = [&](const Scene& s, const Model& model) {
-    const auto backend = make_cpu_backend(model, Precision::single);
+    const auto backend = make_test_backend(model, Precision::single);
     Solver solver(*backend, initial_state(model, s, dt));
     for (int k = 0; k < 200; ++k) solver.step();
     return solver.state();
@@ -321,7 +322,7 @@ TEST(Watch, NamesThePhyxelAndTheTimeOfABlowUp) {
   scene.bodies[0].spin = {0, 0, 1};
   const Model model = model_of(scene, lattice(5, 4, 4, 0.1, 0.2));
   const double dt = 1.3 * step_limit(model).largest_step;
-  const auto backend = make_cpu_backend(model, Precision::single);
+  const auto backend = make_test_backend(model, Precision::single);
   Solver solver(*backend, initial_state(model, scene, dt));
   StabilityWatch watch(model, diagnose(model, *backend, 0, dt));
   try {
@@ -341,7 +342,7 @@ TEST(Watch, LetsAStableFallPass) {
   const Scene scene = busy_scene();
   const Model model = busy_model();
   const double dt = 0.8 * step_limit(model).largest_step;
-  const auto backend = make_cpu_backend(model, Precision::single);
+  const auto backend = make_test_backend(model, Precision::single);
   Solver solver(*backend, initial_state(model, scene, dt));
   StabilityWatch watch(model, diagnose(model, *backend, 0, dt));
   for (int s = 0; s < 2000; ++s) {

@@ -15,6 +15,14 @@ PHYXEL_HD Real weight_shape(Real r_squared, Real inverse_h_squared) {
   return t * t * t;
 }
 
+/// The same at any distance: zero from r = h on.
+template <class Real>
+PHYXEL_HD Real weight_shape_anywhere(Real r_squared, Real inverse_h_squared) {
+  const Real t = Real(1) - r_squared * inverse_h_squared;
+  const Real inside = t > Real(0) ? t : Real(0);
+  return inside * inside * inside;
+}
+
 /// Full weight [1/m³], zero at r >= h. Used for densities.
 inline double weight(double r, double h) {
   if (r >= h) return 0;

@@ -1,0 +1,50 @@
+#include "device_option.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "phyxel/error.hpp"
+#include "solver/cuda_backend.hpp"
+
+namespace phyxel::app {
+namespace {
+
+/// n of "cuda:n".
+std::optional<int> device_number(const std::string& name) {
+  if (name == "cuda") return 0;
+  if (name.rfind("cuda:", 0) != 0 || name.size() < 6 || name.size() > 8) return std::nullopt;
+  if (!std::all_of(name.begin() + 5, name.end(), [](char c) { return c >= '0' && c <= '9'; })) {
+    return std::nullopt;
+  }
+  return std::stoi(name.substr(5));
+}
+
+}  // namespace
+
+void check_device_name(const std::string& name, const std::string& where) {
+  if (name == "auto" || name == "cpu" || device_number(name)) return;
+  throw InputError(fmt::format("{} {}: unknown device{}; allowed: auto, cpu, cuda, cuda:0, ...",
+                               where, name, did_you_mean(name, {"auto", "cpu", "cuda"})));
+}
+
+ChosenDevice choose_device(const std::string& name, const std::string& where) {
+  check_device_name(name, where);
+  ChosenDevice chosen;
+  if (name == "cpu") {
+    chosen.why_no_gpu = where + " cpu";
+  } else if (const auto number = device_number(name)) {
+    chosen.gpu = use_cuda_device(*number);
+  } else if (!cuda_devices(&chosen.why_no_gpu).empty()) {
+    chosen.gpu = use_cuda_device(0);
+  }
+  return chosen;
+}
+
+std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
+                                      const ChosenDevice& device, int threads) {
+  return device.gpu ? make_cuda_backend(model, precision, device.gpu->index)
+                    : make_cpu_backend(model, precision, threads);
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,16 @@
+/// The production solver on one GPU.
+#pragma once
+
+#include <memory>
+
+#include "phyxel/backend.hpp"
+
+namespace phyxel {
+
+/// A backend on a CUDA device: the same physics functions as `make_cpu_backend`, results equal to
+/// rounding, and bitwise the same from run to run. The model must outlive it.
+/// @throws DeviceError if there is no such device or too little memory on it; InputError for
+///   neighbourhoods too large for a tile.
+std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device = 0);
+
+}  // namespace phyxel

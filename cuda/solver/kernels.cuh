@@ -1,0 +1,279 @@
+/// The two passes of a step over tiles, one block a tile, one thread a phyxel.
+///
+/// A block copies the records of its tile and halo into shared memory, then every lane walks its
+/// list there (see tiling.hpp for its order). Per phyxel and step, float, about 32 neighbours, one
+/// list: pass 1 moves 24 bytes a point into shared memory (about three points a phyxel, two of them
+/// from the second-level cache) and 64 of list, reads 28, writes 48; pass 2 moves 48 a point and 64
+/// of list, reads 52 and writes 36. What limits it is the loads from shared memory in pass 2 and
+/// the issue of instructions in pass 1.
+#pragma once
+
+#include "phyxel/physics/force.hpp"
+#include "phyxel/physics/strain.hpp"
+#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "phyxel/physics/weight.hpp"
+#include "solver/records.cuh"
+
+namespace phyxel::cuda {
+
+/// What the scene says of a tile's body, in the working precision.
+template <class Real, class StateReal>
+struct TileConstants {
+  Real lambda, mu, volume_stiffness;  ///< [Pa]
+  Real inverse_h_squared;             ///< [1/m²], where the body has one support.
+  StateReal keep, gain;               ///< Damped Verlet's factors; gain is the step where undamped.
+};
+
+/// `TileLists` in device memory.
+struct DeviceLists {
+  const Index* halo;
+  int halo_stride, slots;
+  const TileLists::Row* rows;
+  const uint4* entries;
+};
+
+/// All that the kernels see of a model and its state.
+template <class Real, class StateReal>
+struct Fields {
+  Points<Real> points;
+  Stresses<Real> stresses;
+  const Real* inverse_h_squared;  ///< [places], or null where each body has one support.
+  const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
+  const Real* force_constants;    ///< b and 1/m, shape [4, places]; 1/m = 0: held.
+  const Real* load;               ///< [3, places], or null.
+  StateReal* velocity;            ///< [3, places]
+  StateReal* displacement;        ///< [3, places] where StateReal is not Real, or null.
+  const TileConstants<Real, StateReal>* tiles;
+  Vec3<StateReal> gravity;
+  std::size_t places;
+};
+
+template <class Real, bool green, bool volume, class Constants>
+__device__ auto law_of(const Constants& body) {
+  const Hooke<Real> hooke{body.lambda, body.mu};
+  using Elastic = std::conditional_t<green, GreenHooke<Real>, CauchyHooke<Real>>;
+  if constexpr (volume) {
+    return SumOf<Elastic, VolumeConservation<Real>>{Elastic{hooke}, {body.volume_stiffness}};
+  } else {
+    return Elastic{hooke};
+  }
+}
+
+template <class T>
+__device__ Vec3<T> column3(const T* array, std::size_t places, std::size_t place) {
+  return {array[place], array[places + place], array[2 * places + place]};
+}
+template <class T>
+__device__ void set_column3(T* array, std::size_t places, std::size_t place, Vec3<T> v) {
+  array[place] = v.x;
+  array[places + place] = v.y;
+  array[2 * places + place] = v.z;
+}
+
+/// The place of this thread's phyxel, and of its warp's first.
+__device__ inline unsigned place_of(Index tile) {
+  return static_cast<unsigned>(tile) * tile_size + threadIdx.x;
+}
+__device__ inline unsigned warp_place_of(Index tile) {
+  return static_cast<unsigned>(tile) * tile_size + (threadIdx.x & ~(warp_size - 1U));
+}
+
+/// Brings a warp's share of `rows` rows of an array, `row_elements` apart, into the second-level
+/// cache, so that it is near when the walk is done. `first` is what the warp's first lane will
+/// read.
+template <class T>
+__device__ void prefetch_rows(const T* first, std::size_t row_elements, unsigned rows) {
+  constexpr unsigned lines = warp_size * sizeof(T) / 128;
+  const unsigned lane = threadIdx.x % warp_size;
+  if (lane < rows * lines) {
+    const T* line = first + lane / lines * row_elements + lane % lines * (128 / sizeof(T));
+    asm volatile("prefetch.global.L2 [%0];" ::"l"(line));
+  }
+}
+
+/// Copies a tile and its halo into the image, fills the far slots; ends with all copies under way.
+template <class Records>
+__device__ void fetch_tile(const Records& records, const DeviceLists& lists, Index tile,
+                           char* image) {
+  constexpr int batch = 3;  // indices under way at once
+  const int thread = static_cast<int>(threadIdx.x);
+  const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride + thread;
+#pragma unroll 1
+  for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
+    Index place[batch];
+#pragma unroll
+    for (int k = 0; k < batch; ++k) {
+      place[k] = begin + k * tile_size < lists.halo_stride ? __ldg(halo + k * tile_size) : -1;
+    }
+    halo += batch * tile_size;
+    if (begin == thread) {
+      records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
+    }
+#pragma unroll
+    for (int k = 0; k < batch; ++k) {
+      if (place[k] >= 0) {
+        records.fetch(image, lists.slots, tile_size + far_slots + begin + k * tile_size, place[k]);
+      }
+    }
+  }
+  if (lists.halo_stride <= thread) {  // nothing for this thread to bring but its own
+    records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
+  }
+  if (thread < far_slots) Records::set_far(image, lists.slots, tile_size + thread);
+}
+
+/// Calls visit(offset, offset) with two entries at a time of this lane's list, in its order.
+template <class Visit>
+__device__ void walk(const DeviceLists& lists, TileLists::Row row, uint4 first, Visit&& visit) {
+  const uint4* at =
+      lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
+  const auto visit_both = [&](unsigned two) { visit(two & 0xFFFF, two >> 16); };
+  uint4 next = first;
+  int left = row.length;
+  for (; left >= chunk; left -= chunk) {
+    const uint4 now = next;
+    at += warp_size;
+    if (left > chunk) next = __ldcs(at);
+    visit_both(now.x);
+    visit_both(now.y);
+    visit_both(now.z);
+    visit_both(now.w);
+  }
+  for (; left > 0; left -= 2) {
+    visit_both(next.x);
+    next.x = next.y;
+    next.y = next.z;
+  }
+}
+
+/// The first entries of this lane's list.
+__device__ inline uint4 first_entries(const DeviceLists& lists, TileLists::Row row) {
+  const uint4* at =
+      lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
+  return row.length > 0 ? __ldcs(at) : uint4{0, 0, 0, 0};
+}
+
+template <class Real>
+constexpr int pass_1_blocks = sizeof(Real) == 4 ? 6 : 3;
+template <class Real>
+constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
+
+/// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
+/// the gradients go to `gradient`, shape [9, places], and nothing else is written.
+template <class Real, class StateReal, bool green, bool volume, bool only_gradient>
+__global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
+    pass_1(const __grid_constant__ Fields<Real, StateReal> f,
+           const __grid_constant__ DeviceLists lists, Index first_tile, Real* gradient) {
+  extern __shared__ __align__(16) char image[];
+  const Index tile = first_tile + static_cast<Index>(blockIdx.x);
+  const unsigned place = place_of(tile);
+  const TileLists::Row row = lists.rows[place / warp_size];
+  fetch_tile(f.points, lists, tile, image);
+  prefetch_rows(f.moment_constants + warp_place_of(tile), f.places, 7);
+  const uint4 first = first_entries(lists, row);
+  const TileConstants<Real, StateReal> body = f.tiles[tile];
+  const Real inverse_h_squared =
+      f.inverse_h_squared ? f.inverse_h_squared[place] : body.inverse_h_squared;
+  wait_for_copies();
+  __syncthreads();
+
+  const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
+  Mat3<Real> sum;
+  walk(lists, row, first, [&](unsigned a, unsigned b) {
+    const auto p = Points<Real>::at(image, lists.slots, a);
+    const auto q = Points<Real>::at(image, lists.slots, b);
+    const Vec3<Real> x_p = p.x - own.x, x_q = q.x - own.x;
+    sum += gradient_term(p.u - own.u, x_p, weight_shape_anywhere(dot(x_p, x_p), inverse_h_squared));
+    sum += gradient_term(q.u - own.u, x_q, weight_shape_anywhere(dot(x_q, x_q), inverse_h_squared));
+  });
+
+  const Real* c = f.moment_constants + place;
+  const Sym3<Real> inverse_moment{
+      c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
+  const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
+  if constexpr (only_gradient) {
+    for (int e = 0; e < 9; ++e) gradient[e * f.places + place] = grad_u(e / 3, e % 3);
+  } else {
+    const auto law = law_of<Real, green, volume>(body);
+    const Mat3<Real> q =
+        pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
+    f.stresses.set(place, {own.x, q});
+  }
+}
+
+/// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
+/// `force`, shape [3, places], and nothing else is written.
+template <class Real, class StateReal, bool own_supports, bool damped, bool loaded, bool only_force>
+__global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
+    pass_2(const __grid_constant__ Fields<Real, StateReal> f,
+           const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force) {
+  extern __shared__ __align__(16) char image[];
+  const Index tile = first_tile + static_cast<Index>(blockIdx.x);
+  const unsigned place = place_of(tile);
+  const TileLists::Row row = lists.rows[place / warp_size];
+  fetch_tile(f.stresses, lists, tile, image);
+  // A support of each point, after the records.
+  Real* supports = reinterpret_cast<Real*>(image + Stresses<Real>::bytes * lists.slots);
+  if constexpr (own_supports) {
+    supports[threadIdx.x] = f.inverse_h_squared[place];
+    if (threadIdx.x < far_slots) supports[tile_size + threadIdx.x] = Real(1);
+    const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride;
+    for (int h = static_cast<int>(threadIdx.x); h < lists.halo_stride; h += tile_size) {
+      if (halo[h] >= 0) supports[tile_size + far_slots + h] = f.inverse_h_squared[halo[h]];
+    }
+  }
+  prefetch_rows(f.force_constants + warp_place_of(tile), f.places, 4);
+  if constexpr (!only_force) prefetch_rows(f.velocity + warp_place_of(tile), f.places, 3);
+  const uint4 first = first_entries(lists, row);
+  const TileConstants<Real, StateReal> body = f.tiles[tile];
+  wait_for_copies();
+  __syncthreads();
+
+  const Vec3<Real> x_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).x;
+  const auto weight_of = [&](Vec3<Real> x, unsigned offset) {
+    const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
+    return weight_shape_anywhere(dot(x, x), inverse_h_squared);
+  };
+  Vec3<Real> sum;
+  walk(lists, row, first, [&](unsigned a, unsigned b) {
+    const auto p = Stresses<Real>::at(image, lists.slots, a);
+    const auto q = Stresses<Real>::at(image, lists.slots, b);
+    const Vec3<Real> x_p = p.x - x_i, x_q = q.x - x_i;
+    add_neighbour_force(sum, p.q, x_p, weight_of(x_p, a));
+    add_neighbour_force(sum, q.q, x_q, weight_of(x_q, b));
+  });
+  const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;
+  sum += own_force(q_i, column3(f.force_constants, f.places, place));
+  if constexpr (only_force) {
+    set_column3(force, f.places, place, sum);
+    return;
+  }
+
+  const Real inverse_mass = f.force_constants[3 * f.places + place];
+  if (inverse_mass == Real(0)) return;
+  if constexpr (loaded) sum += column3(f.load, f.places, place);
+  const Vec3<Real> f_over_m = inverse_mass * sum;
+  const Vec3<StateReal> acceleration =
+      Vec3<StateReal>{static_cast<StateReal>(f_over_m.x), static_cast<StateReal>(f_over_m.y),
+                      static_cast<StateReal>(f_over_m.z)} +
+      f.gravity;
+  Vec3<StateReal> velocity = column3(f.velocity, f.places, place);
+  if constexpr (damped) {
+    velocity = verlet_velocity_damped(velocity, acceleration, body.keep, body.gain);
+  } else {
+    velocity = verlet_velocity(velocity, acceleration, dt);
+  }
+  set_column3(f.velocity, f.places, place, velocity);
+  auto point = f.points.get(place);
+  if constexpr (std::is_same_v<Real, StateReal>) {
+    point.u += dt * velocity;
+  } else {
+    const Vec3<StateReal> u = column3(f.displacement, f.places, place) + dt * velocity;
+    set_column3(f.displacement, f.places, place, u);
+    point.u = {static_cast<Real>(u.x), static_cast<Real>(u.y), static_cast<Real>(u.z)};
+  }
+  f.points.set(place, point);
+}
+
+}  // namespace phyxel::cuda

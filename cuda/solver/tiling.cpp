@@ -1,0 +1,236 @@
+#include "solver/tiling.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <span>
+
+#include "model/space_filling_curve.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel::cuda {
+namespace {
+
+/// Lanes that shared memory answers together, and the 16-byte columns it has for them.
+constexpr int team = 8, columns = 8;
+
+/// Phyxels of one body along the curve.
+std::vector<Index> curve_order(const Model& model, const Part& part) {
+  Vec3d low = model.position[part.begin], high = low;
+  for (Index i = part.begin; i < part.end; ++i) {
+    const Vec3d x = model.position[i];
+    low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
+    high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
+  }
+  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const double cells = static_cast<double>((1 << hilbert_bits) - 1);
+  const double scale = extent > 0 ? cells / extent : 0;
+  const auto cell = [&](double x, double from) {
+    return static_cast<std::uint32_t>(std::clamp((x - from) * scale, 0.0, cells));
+  };
+  std::vector<std::pair<std::uint64_t, Index>> keys(
+      static_cast<std::size_t>(part.end - part.begin));
+#pragma omp parallel for schedule(static)
+  for (Index i = part.begin; i < part.end; ++i) {
+    const Vec3d x = model.position[i];
+    keys[static_cast<std::size_t>(i - part.begin)] = {
+        hilbert_key(cell(x.x, low.x), cell(x.y, low.y), cell(x.z, low.z)), i};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<Index> order;
+  order.reserve(keys.size());
+  for (const auto& key : keys) order.push_back(key.second);
+  return order;
+}
+
+/// Bodies one after the other, each from the start of a tile. Within a tile long lists come first,
+/// so that the lanes of a warp have about equally many neighbours.
+void place_phyxels(const Model& model, Tiling& tiling) {
+  const Csr& lists = model.neighbourhood.neighbours;
+  tiling.place.resize(static_cast<std::size_t>(model.size()));
+  for (std::size_t p = 0; p < model.parts.size(); ++p) {
+    std::vector<Index> order = curve_order(model, model.parts[p]);
+    for (std::size_t begin = 0; begin < order.size(); begin += tile_size) {
+      const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin);
+      const auto last =
+          order.begin() + static_cast<std::ptrdiff_t>(std::min(begin + tile_size, order.size()));
+      std::stable_sort(first, last,
+                       [&](Index a, Index b) { return lists.length(a) > lists.length(b); });
+      tiling.part.push_back(static_cast<Index>(p));
+      tiling.phyxel.insert(tiling.phyxel.end(), first, last);
+      tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
+    }
+  }
+  for (Index place = 0; place < tiling.places(); ++place) {
+    if (tiling.phyxel[place] >= 0) tiling.place[tiling.phyxel[place]] = place;
+  }
+}
+
+/// Puts the slots of eight lanes into an order in which each step's slots are the same or in
+/// different columns; a lane for which there is none takes a far slot. Lanes end up equally long.
+///
+/// Step by step, the lane with the most left to do chooses first: a slot that another lane has just
+/// chosen if it has that too, otherwise one from the column with the most left.
+/// @param lists of each lane, ascending; emptied
+void make_wait_free(std::array<std::vector<std::uint16_t>, team>& lists,
+                    std::array<std::vector<std::uint16_t>, team>& ordered) {
+  std::array<int, columns> waiting{};  // entries left in each column
+  std::size_t left = 0;
+  for (const auto& list : lists) {
+    for (const std::uint16_t slot : list) ++waiting[slot % columns];
+    left += list.size();
+  }
+  while (left > 0) {
+    std::array<int, columns> chosen;
+    chosen.fill(-1);
+    std::array<int, team> by_need{0, 1, 2, 3, 4, 5, 6, 7};
+    std::stable_sort(by_need.begin(), by_need.end(),
+                     [&](int a, int b) { return lists[a].size() > lists[b].size(); });
+    std::array<int, team> idle{};
+    int idle_count = 0;
+    for (const int lane : by_need) {
+      auto& list = lists[lane];
+      int best = -1, best_worth = -1;
+      for (std::size_t k = 0; k < list.size(); ++k) {
+        const int column = list[k] % columns;
+        if (chosen[column] >= 0 && chosen[column] != list[k]) continue;
+        const int worth = waiting[column] + (chosen[column] == list[k] ? 1 << 20 : 0);
+        if (worth > best_worth) {
+          best_worth = worth;
+          best = static_cast<int>(k);
+        }
+      }
+      if (best < 0) {
+        idle[idle_count++] = lane;
+        continue;
+      }
+      const std::uint16_t slot = list[static_cast<std::size_t>(best)];
+      chosen[slot % columns] = slot;
+      ordered[lane].push_back(slot);
+      list.erase(list.begin() + best);
+      --waiting[slot % columns];
+      --left;
+    }
+    const auto free_column = std::find(chosen.begin(), chosen.end(), -1);
+    const auto far = static_cast<std::uint16_t>(
+        tile_size + (free_column == chosen.end() ? 0 : free_column - chosen.begin()));
+    for (int k = 0; k < idle_count; ++k) ordered[idle[k]].push_back(far);
+  }
+}
+
+/// One tile's halo and lists.
+struct TileRows {
+  std::vector<Index> halo;
+  std::array<std::vector<std::uint16_t>, tile_size> slots;  ///< Of each place, in order, equally
+                                                            ///< long within a warp.
+};
+
+TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
+  const Index begin = tile * tile_size, end = begin + tile_size;
+  TileRows rows;
+  for (Index place = begin; place < end; ++place) {
+    if (tiling.phyxel[place] < 0) continue;
+    for (const Index j : lists.row(tiling.phyxel[place])) {
+      const Index other = tiling.place[j];
+      if (other < begin || other >= end) rows.halo.push_back(other);
+    }
+  }
+  std::sort(rows.halo.begin(), rows.halo.end());
+  rows.halo.erase(std::unique(rows.halo.begin(), rows.halo.end()), rows.halo.end());
+  if (tile_size + far_slots + rows.halo.size() > most_slots) {
+    throw InputError(
+        fmt::format("{} phyxels side by side have {} others as neighbours; a GPU tile holds at "
+                    "most {}: allowed "
+                    "are a smaller support or the CPU",
+                    tile_size, rows.halo.size(), most_slots - tile_size - far_slots));
+  }
+  const auto slot_of = [&](Index place) {
+    if (place >= begin && place < end) return static_cast<std::uint16_t>(place - begin);
+    const auto at = std::lower_bound(rows.halo.begin(), rows.halo.end(), place);
+    return static_cast<std::uint16_t>(tile_size + far_slots + (at - rows.halo.begin()));
+  };
+  for (int first = 0; first < tile_size; first += team) {
+    std::array<std::vector<std::uint16_t>, team> given, ordered;
+    for (int lane = 0; lane < team; ++lane) {
+      const Index i = tiling.phyxel[begin + first + lane];
+      if (i < 0) continue;
+      for (const Index j : lists.row(i)) given[lane].push_back(slot_of(tiling.place[j]));
+      std::sort(given[lane].begin(), given[lane].end());
+    }
+    make_wait_free(given, ordered);
+    for (int lane = 0; lane < team; ++lane) rows.slots[first + lane] = std::move(ordered[lane]);
+  }
+  for (int first = 0; first < tile_size; first += warp_size) {
+    std::size_t longest = 0;
+    for (int l = 0; l < warp_size; ++l) longest = std::max(longest, rows.slots[first + l].size());
+    longest = (longest + 1) / 2 * 2;
+    for (int l = 0; l < warp_size; ++l) {
+      rows.slots[first + l].resize(longest, static_cast<std::uint16_t>(tile_size + l % columns));
+    }
+  }
+  return rows;
+}
+
+TileLists make_lists(const Csr& lists, const Tiling& tiling) {
+  TileLists out;
+  const Index tiles = tiling.tiles();
+  constexpr int warps = tile_size / warp_size;
+  std::vector<TileRows> all(static_cast<std::size_t>(tiles));
+  std::string refusal;
+#pragma omp parallel for schedule(dynamic, 16)
+  for (Index tile = 0; tile < tiles; ++tile) {
+    try {
+      all[tile] = rows_of_tile(lists, tiling, tile);
+    } catch (const InputError& error) {
+#pragma omp critical
+      refusal = error.what();
+    }
+  }
+  if (!refusal.empty()) throw InputError(refusal);
+
+  for (const TileRows& rows : all) {
+    out.halo_stride = std::max(out.halo_stride, static_cast<int>(rows.halo.size()));
+  }
+  std::int32_t chunks = 0;
+  for (const TileRows& rows : all) {
+    for (int w = 0; w < warps; ++w) {
+      const auto length = static_cast<std::int32_t>(rows.slots[w * warp_size].size());
+      out.rows.push_back({chunks, length});
+      chunks += (length + chunk - 1) / chunk;
+    }
+  }
+  out.halo.assign(static_cast<std::size_t>(tiles) * out.halo_stride, -1);
+  out.entries.assign(static_cast<std::size_t>(chunks) * warp_size * chunk, 0);
+#pragma omp parallel for schedule(static)
+  for (Index tile = 0; tile < tiles; ++tile) {
+    const TileRows& rows = all[tile];
+    std::copy(rows.halo.begin(), rows.halo.end(),
+              out.halo.begin() + static_cast<std::ptrdiff_t>(tile) * out.halo_stride);
+    for (int i = 0; i < tile_size; ++i) {
+      const TileLists::Row row = out.rows[static_cast<std::size_t>(tile) * warps + i / warp_size];
+      for (std::int32_t e = 0; e < row.length; ++e) {
+        const std::size_t at =
+            (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + i % warp_size) * chunk +
+            e % chunk;
+        out.entries[at] = static_cast<std::uint16_t>(16 * rows.slots[i][e]);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Tiling make_tiling(const Model& model) {
+  Tiling tiling;
+  place_phyxels(model, tiling);
+  tiling.neighbours = make_lists(model.neighbourhood.neighbours, tiling);
+  if (!model.neighbourhood.symmetric) {
+    tiling.inverse = make_lists(model.neighbourhood.inverse(), tiling);
+  }
+  return tiling;
+}
+
+}  // namespace phyxel::cuda

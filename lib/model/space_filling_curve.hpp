@@ -1,0 +1,43 @@
+/// Order along Hilbert's curve: places near each other on the curve are near each other in space.
+#pragma once
+
+#include <cstdint>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Bits of each coordinate in a key.
+inline constexpr int hilbert_bits = 21;
+
+/// Position along the curve of a cell of a 2²¹ × 2²¹ × 2²¹ grid. Source: J. Skilling, Programming
+/// the Hilbert curve, AIP Conf. Proc. 707 (2004) 381, coordinates to transpose to key.
+PHYXEL_HD std::uint64_t hilbert_key(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+  std::uint32_t axis[3] = {x, y, z};
+  constexpr std::uint32_t top = std::uint32_t{1} << (hilbert_bits - 1);
+  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
+    const std::uint32_t below = bit - 1;
+    for (int a = 0; a < 3; ++a) {
+      if (axis[a] & bit) {
+        axis[0] ^= below;
+      } else {
+        const std::uint32_t swap = (axis[0] ^ axis[a]) & below;
+        axis[0] ^= swap;
+        axis[a] ^= swap;
+      }
+    }
+  }
+  axis[1] ^= axis[0];
+  axis[2] ^= axis[1];
+  std::uint32_t flip = 0;
+  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
+    if (axis[2] & bit) flip ^= bit - 1;
+  }
+  std::uint64_t key = 0;
+  for (int b = hilbert_bits - 1; b >= 0; --b) {
+    for (int a = 0; a < 3; ++a) key = key << 1 | ((axis[a] ^ flip) >> b & 1);
+  }
+  return key;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,208 @@
+/// The GPU solver against the CPU solver, on bodies of many tiles with every term. (The physics
+/// itself is tested by the CPU's tests, which also run on the GPU: cuda.*)
+#include "solver/cuda_backend.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/solver.hpp"
+#include "support/backend.hpp"
+#include "support/clouds.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+
+struct Case {
+  const char* name;
+  bool adaptive, capped, everything;
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+/// Two bodies of thousands of phyxels, sizes not multiples of a tile or a warp.
+Scene scene_of(const Case& c) {
+  Scene scene = one_body();
+  scene.gravity = {0.3, 0, -9.81};
+  BodyRequest body = scene.bodies[0];
+  body.spin = {0, 1, 2};
+  if (c.adaptive) body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  if (c.capped) body.neighbourhood.max_neighbours = 24;
+  scene.bodies = {body, body};
+  BodyRequest &first = scene.bodies[0], &second = scene.bodies[1];
+  FixRequest fix;
+  fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 3, 3}};
+  first.fixed.push_back(fix);
+  second.material.young = 4e5;
+  if (c.everything) {
+    first.material.volume_stiffness = 2e5;
+    first.material.damping = 1.5;
+    second.material.strain = Strain::cauchy;
+    LoadRequest load;
+    load.select.box = Selection::Box{{1.2, -1, -1}, {3, 3, 3}};
+    load.force = {0, 30, 0};
+    load.ramp = 0.02;
+    first.loads.push_back(load);
+    MotionRequest motion;
+    motion.select.box = Selection::Box{{-1, -1, -1}, {3, 0.1, 3}};
+    motion.velocity = {0.1, 0, 0};
+    motion.amplitude = {0, 0.01, 0};
+    motion.frequency = 3;
+    second.motions.push_back(motion);
+  }
+  return scene;
+}
+Model model_of_case(const Case& c) {
+  const std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3),
+                                  lattice(9, 14, 8, 0.12, 0.1, 4)};
+  return build_model(scene_of(c), clouds);
+}
+
+double largest(const std::vector<Vec3d>& values) {
+  double most = 0;
+  for (const Vec3d& v : values) most = std::max(most, norm(v));
+  return most;
+}
+double apart(const std::vector<Vec3d>& a, const std::vector<Vec3d>& b) {
+  double most = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) most = std::max(most, norm(a[i] - b[i]));
+  return most / largest(b);
+}
+
+class CudaBackend : public ::testing::TestWithParam<Case> {};
+
+TEST_P(CudaBackend, ForcesAndGradientsEqualTheCpus) {
+  const Model model = model_of_case(GetParam());
+  const State state = state_of(random_deformation(model, 0.005));
+  const auto cpu = make_cpu_backend(model, Precision::double_);
+  cpu->upload(state);
+  std::vector<Vec3d> expected, force;
+  std::vector<Mat3d> expected_gradient, gradient;
+  cpu->internal_forces(expected);
+  cpu->displacement_gradients(expected_gradient);
+  // As for the CPU's own: 40 neighbours' roundings through an inverse matrix.
+  const std::pair<Precision, double> cases[] = {
+      {Precision::double_, 1e-12}, {Precision::single, 3e-5}, {Precision::mixed, 3e-5}};
+  for (const auto& [precision, tolerance] : cases) {
+    const auto gpu = make_test_backend(model, precision);
+    gpu->upload(state);
+    gpu->internal_forces(force);
+    gpu->displacement_gradients(gradient);
+    EXPECT_LT(apart(force, expected), tolerance);
+    double worst = 0;
+    for (std::size_t i = 0; i < gradient.size(); ++i) {
+      for (int e = 0; e < 9; ++e) {
+        worst = std::max(worst,
+                         std::abs(gradient[i](e / 3, e % 3) - expected_gradient[i](e / 3, e % 3)));
+      }
+    }
+    EXPECT_LT(worst, tolerance);
+  }
+}
+
+State after(Backend& backend, const Model& model, const Scene& scene, double dt, int steps) {
+  Solver solver(backend, initial_state(model, scene, dt));
+  for (int s = 0; s < steps; ++s) solver.step();
+  return solver.state();
+}
+
+TEST_P(CudaBackend, TrajectoriesStayWithTheCpus) {
+  const Scene scene = scene_of(GetParam());
+  const Model model = model_of_case(GetParam());
+  const double dt = 0.5 * step_limit(model).largest_step;
+  const auto cpu = make_cpu_backend(model, Precision::double_);
+  const State expected = after(*cpu, model, scene, dt, 300);
+  // 300 steps: 1e-16 and 6e-8 a step, grown by the motion some tenfold.
+  const std::pair<Precision, double> cases[] = {
+      {Precision::double_, 1e-12}, {Precision::single, 3e-4}, {Precision::mixed, 3e-4}};
+  for (const auto& [precision, tolerance] : cases) {
+    const auto gpu = make_test_backend(model, precision);
+    const State found = after(*gpu, model, scene, dt, 300);
+    EXPECT_LT(apart(found.displacement, expected.displacement), tolerance);
+    EXPECT_LT(apart(found.velocity, expected.velocity), 30 * tolerance);
+  }
+}
+
+TEST_P(CudaBackend, TwoRunsAndARestartAreBitwiseEqual) {
+  const Scene scene = scene_of(GetParam());
+  const Model model = model_of_case(GetParam());
+  const double dt = 0.5 * step_limit(model).largest_step;
+  for (const Precision precision : {Precision::single, Precision::double_, Precision::mixed}) {
+    const auto first = make_test_backend(model, precision),
+               second = make_test_backend(model, precision);
+    const State whole = after(*first, model, scene, dt, 200);
+    Solver begun(*second, initial_state(model, scene, dt));
+    for (int s = 0; s < 77; ++s) begun.step();
+    const State middle = begun.state();
+    const auto third = make_test_backend(model, precision);
+    Solver rest(*third, middle);
+    while (rest.steps() < 200) rest.step();
+    EXPECT_TRUE(rest.state().displacement == whole.displacement);
+    EXPECT_TRUE(rest.state().velocity == whole.velocity);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
+                         ::testing::Values(Case{"Uniform", false, false, false},
+                                           Case{"Adaptive", true, false, false},
+                                           Case{"Capped", true, true, false},
+                                           Case{"UniformEverything", false, false, true},
+                                           Case{"AdaptiveEverything", true, false, true}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(CudaSurfels, EqualTheCpus) {
+  Scene scene;
+  for (const char* shape : {"dino", "alien_head"}) {
+    BodyRequest body;
+    body.name = shape;
+    body.where = "test";
+    body.source.shape.name = shape;
+    body.translation = {shape[0] == 'd' ? 0.0 : 40.0, 0, 0};
+    body.material = rubber();
+    scene.bodies.push_back(body);
+  }
+  const Model model = build_model(scene);
+  const State state = state_of(random_deformation(model, 0.001));
+  const auto cpu = make_cpu_backend(model, Precision::double_);
+  cpu->upload(state);
+  SurfelState expected, found;
+  cpu->advect_surfels(expected);
+  const double size = largest(expected.position);
+  for (const auto& [precision, tolerance] :
+       {std::pair{Precision::double_, 1e-13}, std::pair{Precision::single, 3e-6}}) {
+    const auto gpu = make_test_backend(model, precision);
+    gpu->upload(state);
+    gpu->advect_surfels(found);
+    ASSERT_EQ(found.position.size(), expected.position.size());
+    double off = 0, turned = 0;
+    for (std::size_t s = 0; s < found.position.size(); ++s) {
+      off = std::max(off, norm(found.position[s] - expected.position[s]) / size);
+      turned = std::max(turned, norm(found.normal[s] - expected.normal[s]));
+    }
+    EXPECT_LT(off, tolerance);
+    EXPECT_LT(turned, 30 * tolerance);  // normals come from gradients
+  }
+}
+
+TEST(CudaMemory, TermsThatAreOffTakeNone) {
+  const auto names = [](const Model& model, Precision precision) {
+    std::vector<std::string> list;
+    const auto backend = make_test_backend(model, precision);
+    for (const ArrayBytes& array : backend->memory()) list.push_back(array.name);
+    return list;
+  };
+  using ::testing::AnyOf;
+  using ::testing::Contains;
+  using ::testing::Not;
+  EXPECT_THAT(names(model_of(one_body(), lattice(8, 8, 8, 0.1)), Precision::single),
+              Not(Contains(AnyOf("loads", "supports", "inverse neighbour lists", "displacements",
+                                 "surfels"))));
+  EXPECT_THAT(
+      names(model_of_case({"", true, true, true}), Precision::mixed),
+      ::testing::IsSupersetOf({"loads", "supports", "inverse neighbour lists", "displacements"}));
+}
+
+}  // namespace
+}  // namespace phyxel

@@ -1,0 +1,192 @@
+/// The layout for a GPU: everyone placed once, lists complete, shared memory never waited for.
+#include "solver/tiling.hpp"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <map>
+
+#include "model/space_filling_curve.hpp"
+#include "phyxel/error.hpp"
+#include "support/clouds.hpp"
+
+namespace phyxel::cuda {
+namespace {
+
+using namespace phyxel::testing;
+
+TEST(HilbertCurve, StepsFromCellToCell) {
+  // All 16³ cells of a coarse grid, each the first fine cell of its cube: neighbours on the curve
+  // share a face, which no other order of cells along bits does.
+  constexpr int cells = 16, shift = hilbert_bits - 4;
+  std::vector<std::pair<std::uint64_t, std::array<int, 3>>> order;
+  for (int x = 0; x < cells; ++x) {
+    for (int y = 0; y < cells; ++y) {
+      for (int z = 0; z < cells; ++z) {
+        const std::uint64_t key = hilbert_key(static_cast<std::uint32_t>(x) << shift,
+                                              static_cast<std::uint32_t>(y) << shift,
+                                              static_cast<std::uint32_t>(z) << shift);
+        order.push_back({key >> (3 * shift), {x, y, z}});
+      }
+    }
+  }
+  std::sort(order.begin(), order.end());
+  for (std::size_t k = 0; k < order.size(); ++k) EXPECT_EQ(order[k].first, k);
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    int apart = 0;
+    for (int a = 0; a < 3; ++a) apart += std::abs(order[k].second[a] - order[k - 1].second[a]);
+    ASSERT_EQ(apart, 1) << k;
+  }
+}
+
+struct Case {
+  const char* name;
+  Model (*make)();
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+Model jittered() { return model_of(one_body(), lattice(11, 13, 9, 0.1, 0.2)); }
+Model single() {
+  Cloud cloud;
+  cloud.position = {{1, 2, 3}};
+  cloud.volume = {1};
+  return model_of(one_body(), cloud);
+}
+Model thread() { return model_of(one_body(), lattice(700, 1, 1, 0.1, 0.05)); }
+Model adaptive() {
+  Scene scene = one_body();
+  scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  scene.bodies[0].neighbourhood.max_neighbours = 20;
+  return model_of(scene, lattice(9, 8, 10, 0.1, 0.3));
+}
+Model two_bodies() {
+  Scene scene = one_body();
+  scene.bodies.push_back(scene.bodies[0]);
+  const std::vector<Cloud> clouds{lattice(7, 7, 7, 0.1, 0.1), lattice(5, 9, 8, 0.1, 0.2)};
+  return build_model(scene, clouds);
+}
+
+class Tiling : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Tiling, PlacesEveryPhyxelOnce) {
+  const Model model = GetParam().make();
+  const cuda::Tiling tiling = make_tiling(model);
+  ASSERT_EQ(tiling.places(), tiling.tiles() * tile_size);
+  std::vector<int> seen(static_cast<std::size_t>(model.size()), 0);
+  for (Index place = 0; place < tiling.places(); ++place) {
+    const Index i = tiling.phyxel[place];
+    if (i < 0) continue;
+    ++seen[i];
+    EXPECT_EQ(tiling.place[i], place);
+    const Part& part = model.parts[tiling.part[place / tile_size]];
+    EXPECT_TRUE(i >= part.begin && i < part.end);  // a tile never mixes bodies
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), model.size());
+}
+
+/// The entries of a lane's list.
+std::vector<int> slots_at(const TileLists& lists, Index place) {
+  const TileLists::Row row = lists.rows[place / warp_size];
+  std::vector<int> slots;
+  for (int e = 0; e < row.length; ++e) {
+    const std::size_t at =
+        (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + place % warp_size) * chunk +
+        e % chunk;
+    EXPECT_EQ(lists.entries[at] % 16, 0);
+    slots.push_back(lists.entries[at] / 16);
+  }
+  return slots;
+}
+
+void expect_complete(const cuda::Tiling& tiling, const TileLists& lists, const Csr& expected) {
+  for (Index place = 0; place < tiling.places(); ++place) {
+    const Index tile = place / tile_size;
+    std::vector<Index> neighbours;
+    for (const int slot : slots_at(lists, place)) {
+      if (slot >= tile_size && slot < tile_size + far_slots) continue;
+      const Index other = slot < tile_size
+                              ? tile * tile_size + slot
+                              : lists.halo[static_cast<std::size_t>(tile) * lists.halo_stride +
+                                           slot - tile_size - far_slots];
+      ASSERT_GE(other, 0);
+      neighbours.push_back(tiling.phyxel[other]);
+    }
+    std::sort(neighbours.begin(), neighbours.end());
+    const Index i = tiling.phyxel[place];
+    if (i < 0) {
+      EXPECT_TRUE(neighbours.empty());
+    } else {
+      const auto row = expected.row(i);
+      EXPECT_TRUE(std::equal(row.begin(), row.end(), neighbours.begin(), neighbours.end())) << i;
+    }
+  }
+}
+
+TEST_P(Tiling, ListsHoldEveryNeighbourOnce) {
+  const Model model = GetParam().make();
+  const cuda::Tiling tiling = make_tiling(model);
+  expect_complete(tiling, tiling.neighbours, model.neighbourhood.neighbours);
+  EXPECT_EQ(tiling.inverse.rows.empty(), model.neighbourhood.symmetric);
+  expect_complete(tiling, tiling.second(), model.neighbourhood.inverse());
+}
+
+TEST_P(Tiling, EightLanesNeverWaitForAColumn) {
+  const Model model = GetParam().make();
+  const cuda::Tiling tiling = make_tiling(model);
+  for (Index first = 0; first < tiling.places(); first += 8) {
+    std::vector<std::vector<int>> slots;
+    for (int lane = 0; lane < 8; ++lane) slots.push_back(slots_at(tiling.neighbours, first + lane));
+    for (std::size_t step = 0; step < slots[0].size(); ++step) {
+      std::map<int, int> in_column;
+      for (const auto& list : slots) {
+        const auto [at, fresh] = in_column.emplace(list[step] % 8, list[step]);
+        ASSERT_TRUE(fresh || at->second == list[step]);
+      }
+    }
+  }
+}
+
+TEST_P(Tiling, IsTheSameOnAnyNumberOfThreads) {
+  const Model model = GetParam().make();
+  omp_set_num_threads(1);
+  const cuda::Tiling one = make_tiling(model);
+  omp_set_num_threads(3);
+  const cuda::Tiling two = make_tiling(model);
+  EXPECT_EQ(one.phyxel, two.phyxel);
+  EXPECT_EQ(one.neighbours.entries, two.neighbours.entries);
+  EXPECT_EQ(one.neighbours.halo, two.neighbours.halo);
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, Tiling,
+                         ::testing::Values(Case{"Jittered", jittered}, Case{"Single", single},
+                                           Case{"Thread", thread}, Case{"Adaptive", adaptive},
+                                           Case{"TwoBodies", two_bodies}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(TileLists, AreNotMuchLongerThanTheirNeighbours) {
+  // What the order costs: lanes of a warp walk as many steps as the longest of them. 15% is a
+  // warp's spread of neighbour counts in a jittered cloud; teams that had to wait would add a
+  // third.
+  const Model model = model_of(one_body(), lattice(24, 24, 24, 0.1, 0.1));
+  const cuda::Tiling tiling = make_tiling(model);
+  std::int64_t steps = 0;
+  for (const TileLists::Row& row : tiling.neighbours.rows) steps += warp_size * row.length;
+  EXPECT_LT(static_cast<double>(steps),
+            1.15 * static_cast<double>(model.neighbourhood.neighbours.entries()));
+}
+
+TEST(TileLists, TooManyNeighboursAreRefused) {
+  Scene scene = one_body();
+  scene.bodies[0].neighbourhood.radius = 1.2;
+  const Model model = model_of(scene, lattice(18, 18, 18, 0.1));
+  try {
+    make_tiling(model);
+    FAIL() << "a halo larger than 16-bit slots was accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace phyxel::cuda

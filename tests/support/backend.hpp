@@ -1,0 +1,37 @@
+/// The backend under test: the CPU's, or in programs built with PHYXEL_TEST_CUDA the GPU's; those
+/// skip all their tests where there is none.
+#pragma once
+
+#include "phyxel/backend.hpp"
+
+#if defined(PHYXEL_TEST_CUDA)
+#include <gtest/gtest.h>
+
+#include "device.hpp"
+#include "solver/cuda_backend.hpp"
+#endif
+
+namespace phyxel::testing {
+
+/// @param threads of the CPU
+inline std::unique_ptr<Backend> make_test_backend(const Model& model, Precision precision,
+                                                  [[maybe_unused]] int threads = 0) {
+#if defined(PHYXEL_TEST_CUDA)
+  return make_cuda_backend(model, precision);
+#else
+  return make_cpu_backend(model, precision, threads);
+#endif
+}
+
+#if defined(PHYXEL_TEST_CUDA)
+/// CTest knows skipped tests by what GoogleTest prints for them.
+class NeedsDevice : public ::testing::Environment {
+ public:
+  void SetUp() override {
+    if (cuda_devices().empty()) GTEST_SKIP() << "[  SKIPPED ] no CUDA device";
+  }
+};
+inline const auto* const needs_device = ::testing::AddGlobalTestEnvironment(new NeedsDevice);
+#endif
+
+}  // namespace phyxel::testing
