@@ -87,11 +87,11 @@ class Run {
         step_seconds_ += seconds_since(stepping_since);
         const auto look_start = Clock::now();
         now = diagnose(model_, *backend, solver.steps(), solver.dt());
-        look_seconds = seconds_since(look_start);
         watch.check(now);
         peak_energy_ =
             std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
         good_ = solver.state();
+        look_seconds = seconds_since(look_start);
         if (frame) write_frame(now);
         if (last || stop || due) {
           write_state(now);

@@ -7,6 +7,7 @@
 #include "device.hpp"
 #include "phyxel/physics/surfel.hpp"
 #include "solver/cuda_backend.hpp"
+#include "solver/diagnose.cuh"
 #include "solver/kernels.cuh"
 #include "solver/tiling.hpp"
 
@@ -144,15 +145,44 @@ class CudaBackend final : public Backend {
 
   void wait() const override { wait_for_device(last_launch_); }
 
+  std::optional<Diagnostics> diagnostics(double time, double dt) override {
+    sum_loads(time);
+    const DeviceArray<Real> forces = forces_now(), gradients = gradients_now();
+    const auto tiles = static_cast<unsigned>(tiling_.tiles());
+    const DeviceArray<Totals> each(tiles, "sums of " + subject_), all(1, "sums");
+    diagnose_tiles<<<tiles, diagnose_threads>>>(fields_, materials_.data(), moved_.data(),
+                                                forces.data(), gradients.data(), dt, each.data());
+    launched("diagnose_tiles", tiles, diagnose_threads);
+    add_tiles<<<1, diagnose_threads>>>(each.data(), tiling_.tiles(), all.data());
+    launched("add_tiles", 1, diagnose_threads);
+    wait();
+    const Totals t = copy_of(all)[0];
+    const auto vector = [&](int first) {
+      return Vec3d{t.sum[first], t.sum[first + 1], t.sum[first + 2]};
+    };
+    const auto phyxel = [&](Index place) { return place < 0 ? -1 : tiling_.phyxel[place]; };
+    Diagnostics d;
+    d.kinetic_energy = t.sum[kinetic_energy];
+    d.strain_energy = t.sum[strain_energy];
+    d.volume_energy = t.sum[volume_energy];
+    d.gravity_energy = t.sum[gravity_energy];
+    d.load_energy = t.sum[load_energy];
+    d.momentum = vector(momentum);
+    d.angular_momentum = vector(angular_momentum);
+    d.internal_force = vector(internal_force);
+    d.internal_torque = vector(internal_torque);
+    d.force_scale = t.sum[force_scale];
+    d.torque_scale = t.sum[torque_scale];
+    d.inverted = static_cast<Index>(t.sum[inverted]);
+    d.largest_displacement = t.largest_displacement;
+    d.largest_speed = t.largest_speed;
+    d.fastest_phyxel = phyxel(t.fastest);
+    d.bad_phyxel = phyxel(t.first_bad);
+    return d;
+  }
+
   void internal_forces(std::vector<Vec3d>& force) override {
-    stress();
-    const DeviceArray<Real> forces(3 * places(), "forces of " + subject_);
-    for (const Run<Pass2>& run : advance_runs_) {
-      launch_pass_2(run,
-                    own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
-                                  : pass_2<Real, StateReal, false, false, false, true>,
-                    StateReal(0), forces.data());
-    }
+    const DeviceArray<Real> forces = forces_now();
     wait();
     force = by_phyxel(from_columns(copy_of(forces)));
   }
@@ -197,7 +227,8 @@ class CudaBackend final : public Backend {
     std::vector<ArrayBytes> list{
         {"points", Points<Real>::bytes * places()},
         {"stresses", Stresses<Real>::bytes * places()},
-        {"constants", moment_constants_.bytes() + force_constants_.bytes() + tiles_.bytes()},
+        {"constants", moment_constants_.bytes() + force_constants_.bytes() + tiles_.bytes() +
+                          materials_.bytes()},
         {"velocities", velocity_.bytes()},
         {"neighbour lists", list_bytes(lists_)}};
     if (inverse_lists_) list.push_back({"inverse neighbour lists", list_bytes(*inverse_lists_)});
@@ -322,7 +353,7 @@ class CudaBackend final : public Backend {
     held_ = held_phyxels();
     const auto forces = per_place(4, [&](Index i, int r) {
       const Vec3d& b = model_.moment_offset[i];
-      const double values[] = {b.x, b.y, b.z, held_[i] ? 0 : 1 / model_.mass[i]};
+      const double values[] = {b.x, b.y, b.z, (held_[i] ? -1 : 1) / model_.mass[i]};
       return values[r];
     });
     force_constants_ = {forces.size(), "masses" + of};
@@ -339,6 +370,14 @@ class CudaBackend final : public Backend {
     velocity_ = {3 * places(), "velocities" + of};
     if (mixed) displacement_ = {3 * places(), "displacements" + of};
     tiles_ = {tiling_.part.size(), "tiles" + of};
+    std::vector<TileMaterial> materials;
+    for (const Index part : tiling_.part) {
+      const Material& m = model_.parts[part].material;
+      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness, m.damping,
+                           origin_of(part), m.strain == Strain::green});
+    }
+    materials_ = {materials.size(), "tiles" + of};
+    materials_.upload(materials.data());
 
     fields_.inverse_h_squared = supports_.data();
     fields_.moment_constants = moment_constants_.data();
@@ -438,6 +477,7 @@ class CudaBackend final : public Backend {
   }
   void make_motions() {
     const auto last = last_motions();
+    std::vector<char> moved;
     for (const Motion& motion : model_.motions) {
       if (stands_still(motion)) continue;
       std::vector<Index> at;
@@ -447,7 +487,12 @@ class CudaBackend final : public Backend {
       if (at.empty()) continue;
       motions_.push_back({&motion, {at.size(), "moved phyxels"}});
       motions_.back().places.upload(at.data());
+      moved.resize(places(), 0);
+      for (const Index place : at) moved[place] = 1;
     }
+    if (moved.empty()) return;
+    moved_ = {moved.size(), "moved phyxels"};
+    moved_.upload(moved.data());
   }
 
   void make_loads() {
@@ -586,6 +631,17 @@ class CudaBackend final : public Backend {
     allowed_.push_back(kernel);
   }
 
+  DeviceArray<Real> forces_now() {
+    stress();
+    DeviceArray<Real> forces(3 * places(), "forces of " + subject_);
+    for (const Run<Pass2>& run : advance_runs_) {
+      launch_pass_2(run,
+                    own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
+                                  : pass_2<Real, StateReal, false, false, false, true>,
+                    StateReal(0), forces.data());
+    }
+    return forces;
+  }
   DeviceArray<Real> gradients_now() {
     DeviceArray<Real> gradients(9 * places(), "displacement gradients of " + subject_);
     for (const Run<Pass1>& run : stress_runs_) {
@@ -668,6 +724,8 @@ class CudaBackend final : public Backend {
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<Constants> tiles_;
+  DeviceArray<TileMaterial> materials_;
+  DeviceArray<char> moved_;  // empty unless phyxels follow a path
   DeviceArray<Vec3<Real>> surfel_position_, surfel_normal_, surfel_displacement_,
       surfel_moved_normal_;
   DeviceArray<Offset> surfel_offsets_;

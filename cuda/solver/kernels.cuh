@@ -40,7 +40,7 @@ struct Fields {
   Stresses<Real> stresses;
   const Real* inverse_h_squared;  ///< [places], or null where each body has one support.
   const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
-  const Real* force_constants;    ///< b and 1/m, shape [4, places]; 1/m = 0: held.
+  const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m: held; 0: nobody.
   const Real* load;               ///< [3, places], or null.
   StateReal* velocity;            ///< [3, places]
   StateReal* displacement;        ///< [3, places] where StateReal is not Real, or null.
@@ -251,7 +251,7 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
   }
 
   const Real inverse_mass = f.force_constants[3 * f.places + place];
-  if (inverse_mass == Real(0)) return;
+  if (inverse_mass <= Real(0)) return;
   if constexpr (loaded) sum += column3(f.load, f.places, place);
   const Vec3<Real> f_over_m = inverse_mass * sum;
   const Vec3<StateReal> acceleration =

@@ -144,6 +144,44 @@ TEST_P(CudaBackend, TwoRunsAndARestartAreBitwiseEqual) {
   }
 }
 
+TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
+  const Scene scene = scene_of(GetParam());
+  const Model model = model_of_case(GetParam());
+  const double dt = 0.5 * step_limit(model).largest_step;
+  const auto cpu = make_cpu_backend(model, Precision::double_);
+  const auto gpu = make_test_backend(model, Precision::double_);
+  const State state = after(*cpu, model, scene, dt, 150);
+  gpu->upload(state);
+  const Diagnostics e = diagnose(model, *cpu, 150, dt), d = diagnose(model, *gpu, 150, dt);
+  EXPECT_EQ(d.step, 150);
+  EXPECT_EQ(d.time, 150 * dt);
+  // Sums of 4,323 terms in another order.
+  const double energy = e.kinetic_energy + e.strain_energy;
+  EXPECT_NEAR(d.kinetic_energy, e.kinetic_energy, 1e-12 * energy);
+  EXPECT_NEAR(d.strain_energy, e.strain_energy, 1e-12 * energy);
+  EXPECT_NEAR(d.volume_energy, e.volume_energy, 1e-12 * energy);
+  EXPECT_NEAR(d.gravity_energy, e.gravity_energy, 1e-12 * energy);
+  EXPECT_NEAR(d.load_energy, e.load_energy, 1e-12 * energy);
+  EXPECT_GT(e.kinetic_energy, 0.1 * energy);
+  EXPECT_LT(norm(d.momentum - e.momentum), 1e-12 * norm(e.momentum));
+  EXPECT_LT(norm(d.angular_momentum - e.angular_momentum), 1e-12 * norm(e.angular_momentum));
+  EXPECT_NEAR(d.force_scale, e.force_scale, 1e-11 * e.force_scale);
+  EXPECT_NEAR(d.torque_scale, e.torque_scale, 1e-11 * e.torque_scale);
+  EXPECT_LT(norm(d.internal_force), 1e-12 * e.force_scale);
+  EXPECT_NEAR(d.largest_speed, e.largest_speed, 1e-12 * e.largest_speed);
+  EXPECT_NEAR(d.largest_displacement, e.largest_displacement, 1e-12 * e.largest_displacement);
+  EXPECT_EQ(d.fastest_phyxel, e.fastest_phyxel);
+  EXPECT_EQ(d.bad_phyxel, -1);
+  EXPECT_EQ(d.inverted, e.inverted);
+
+  State broken = state;
+  broken.displacement[1234].y = std::nan("");
+  gpu->upload(broken);
+  const Diagnostics bad = diagnose(model, *gpu, 150, dt);
+  ASSERT_GE(bad.bad_phyxel, 0);  // it, or a neighbour that its NaN has reached
+  EXPECT_LT(norm(model.position[bad.bad_phyxel] - model.position[1234]), 1);
+}
+
 INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
                          ::testing::Values(Case{"Uniform", false, false, false},
                                            Case{"Adaptive", true, false, false},

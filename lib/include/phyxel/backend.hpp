@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,12 @@ class Backend {
   virtual void internal_forces(std::vector<Vec3d>& force) = 0;
   /// Displacement gradients at the present displacements, shape [n].
   virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
+  /// Energies, momenta and the rest of the present state, at `time`, where the device sums them
+  /// itself; nothing where that is left to the host (see `diagnose`).
+  virtual std::optional<Diagnostics> diagnostics([[maybe_unused]] double time,
+                                                 [[maybe_unused]] double dt) {
+    return std::nullopt;
+  }
   /// Passive surfel advection, equation (6).
   virtual void advect_surfels(SurfelState& surfels) = 0;
 

@@ -8,8 +8,8 @@
 namespace phyxel {
 
 /// Energies, conserved quantities and a finiteness check of a backend's present state, which is at
-/// `time` = `step` × `dt`. Sums run in double and in the order of the phyxels, so they do not
-/// depend on the number of threads.
+/// `time` = `step` × `dt`. Sums run in double and in one order, so they do not depend on the number
+/// of threads; a device that sums itself has its own.
 Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt);
 
 /// Von Mises equivalent of the Cauchy stress [Pa] and det F of every phyxel, shape [n]; either
