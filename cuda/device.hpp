@@ -31,8 +31,8 @@ std::size_t cuda_free_memory();
 /// @throws DeviceError if they do not fit, naming `what`.
 std::size_t cuda_measured_allocation(std::size_t bytes, const std::string& what);
 
-/// Bytes per second that the current device copies between two arrays of 1 GiB (or a quarter of what
-/// is free), reads and writes both counted; best of five.
+/// Bytes per second that the current device copies between two arrays of 1 GiB (or a quarter of
+/// what is free), reads and writes both counted; best of five.
 double cuda_copy_bandwidth();
 
 /// Toolkit and driver, e.g. "CUDA 13.0, driver for 13.0"; "no CUDA" if built without.

@@ -7,9 +7,8 @@
 /// That order is also the one in which sums run, whatever kernel walks the list: results do not
 /// depend on the way of launching.
 ///
-/// (A lane with nothing to do takes a far point, which costs a comparison in every weight. Its own
-/// phyxel, with a share of exactly zero, would do without, but met others in a column in every
-/// eighth step: 13% more loads to save 4% of pass 1's instructions.)
+/// A lane with nothing to do takes a far point, which costs a comparison in every weight. Its own
+/// phyxel, with a share of exactly zero, would do without, but too often meets others in a column.
 ///
 /// Plain host code without CUDA.
 #pragma once

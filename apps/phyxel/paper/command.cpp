@@ -1,12 +1,12 @@
 /// phyxel paper: section 6 of Farias et al. 2008 run again.
 #include "command.hpp"
-#include "device_option.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 
+#include "device_option.hpp"
 #include "files/atomic_file.hpp"
 #include "paper.hpp"
 #include "paper/paper_model.hpp"
@@ -153,8 +153,7 @@ void add_paper(CLI::App& program) {
       ->delimiter(',');
   command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');
-  command->add_option("--device", options->device, device_help)
-      ->capture_default_str();
+  command->add_option("--device", options->device, device_help)->capture_default_str();
   command->add_option("--repeat", request.repeat, "Repeats; the median is reported")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
