@@ -10,6 +10,8 @@
 namespace phyxel {
 namespace {
 
+constexpr const char* sync_hint = "; PHYXEL_CUDA_SYNC=1 in the environment tells which one failed";
+
 /// Only asked whether the device could run it.
 __global__ void probe() {}
 
@@ -152,6 +154,12 @@ std::string Launch::describe() const {
 void check_launch(const Launch& launch) {
   cudaError_t error = cudaGetLastError();
   if (error != cudaSuccess) {
+    // A launch that was refused leaves the device usable; a fault inside an earlier kernel does
+    // not, and comes to light at some later call.
+    if (const cudaError_t earlier = cudaDeviceSynchronize()) {
+      throw DeviceError(current_device() + ": a kernel launched before " + launch.describe() +
+                        " failed: " + reason(earlier) + sync_hint);
+    }
     throw DeviceError(current_device() + ": " + launch.describe() +
                       " could not be launched: " + reason(error));
   }
@@ -170,8 +178,7 @@ void wait_for_device(const Launch& last) {
   const cudaError_t error = cudaDeviceSynchronize();
   if (error == cudaSuccess) return;
   throw DeviceError(current_device() + ": a kernel failed: " + reason(error) +
-                    "; the last launch was " + last.describe() +
-                    ", and PHYXEL_CUDA_SYNC=1 in the environment tells which one failed");
+                    "; the last launch was " + last.describe() + sync_hint);
 }
 
 namespace detail {

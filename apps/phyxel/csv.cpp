@@ -151,7 +151,8 @@ CsvTable read_csv(const std::filesystem::path& file) {
 
 Median median_of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
-  const double middle = values[values.size() / 2];
+  const std::size_t half = values.size() / 2;
+  const double middle = values.size() % 2 ? values[half] : 0.5 * (values[half - 1] + values[half]);
   return {middle, (values.back() - values.front()) / middle};
 }
 

@@ -36,7 +36,12 @@ ChosenDevice choose_device(const std::string& name, const std::string& where) {
   } else if (const auto number = device_number(name)) {
     chosen.gpu = use_cuda_device(*number);
   } else if (!cuda_devices(&chosen.why_no_gpu).empty()) {
-    chosen.gpu = use_cuda_device(0);
+    try {
+      chosen.gpu = use_cuda_device(0);
+    } catch (const DeviceError& error) {
+      chosen.why_no_gpu = error.what();
+      fmt::print(stderr, "phyxel: warning: the GPU is not used: {}\n", error.what());
+    }
   }
   return chosen;
 }

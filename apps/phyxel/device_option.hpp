@@ -20,7 +20,7 @@ inline constexpr const char* device_help = "auto, cpu, cuda or cuda:<number>";
 /// Whether it is one of those names. @throws InputError naming `where` it was said
 void check_device_name(const std::string& name, const std::string& where);
 
-/// "auto" is the first GPU, or the CPU if there is none.
+/// "auto" is the first GPU, or the CPU if there is none or it cannot be used (which is said).
 /// @throws InputError for another name; DeviceError if a GPU is asked for and cannot be used.
 ChosenDevice choose_device(const std::string& name, const std::string& where = "--device");
 

@@ -36,31 +36,34 @@ class Run {
         begin_(find_checkpoint()),
         model_(build_model(scene_)),
         plan_(plan_steps(scene_, model_, options.overrides.unsafe_step)),
+        backend_(make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads)),
+        solver_(*backend_, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt)),
+        first_step_(solver_.steps()),
+        start_diagnostics_(diagnose(model_, *backend_, solver_.steps(), solver_.dt())),
+        // Last, because it replaces what an earlier run has left: all that could be refused, or
+        // find no memory, has been tried by now.
         recorder_(model_, scene_, options.force,
                   begin_ ? std::optional(begin_->info.frames_written) : std::nullopt) {
     setup_seconds_ = seconds_since(start_);
   }
 
   void execute() {
-    const auto backend =
-        make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads);
-    backend_ = backend.get();
-    Solver solver(*backend, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt));
-    solver_ = &solver;
-    first_step_ = solver.steps();
+    Backend& backend = *backend_;
+    Solver& solver = solver_;
     say_plan();
     if (begin_ && solver.steps() >= plan_.steps) {
       say_finished_already();
       return;
     }
 
-    Diagnostics now = diagnose(model_, *backend, solver.steps(), solver.dt());
+    Diagnostics now = start_diagnostics_;
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
     peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
     StabilityWatch watch(model_, now);
     good_ = solver.state();
+    good_diagnostics_ = now;
     // Without a rate only the last frame is wanted.
-    if (!begin_ && scene_.output.frames_per_second > 0) write_frame(now);
+    if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_, now);
 
     StopSignal signals;
     Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr,
@@ -83,18 +86,21 @@ class Run {
                              seconds_since(stepping_since) > watch_share * look_seconds;
         if (!frame && !stop && !due && !watched) continue;
 
-        backend->wait();
+        backend.wait();
         step_seconds_ += seconds_since(stepping_since);
         const auto look_start = Clock::now();
-        now = diagnose(model_, *backend, solver.steps(), solver.dt());
+        now = diagnose(model_, backend, solver.steps(), solver.dt());
         watch.check(now);
         peak_energy_ =
             std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
-        good_ = solver.state();
+        State state = solver.state();
         look_seconds = seconds_since(look_start);
-        if (frame) write_frame(now);
+        if (frame) write_frame(state, now);
+        // Only now: a checkpoint of a state counts its frame as written.
+        good_ = std::move(state);
+        good_diagnostics_ = now;
         if (last || stop || due) {
-          write_state(now);
+          write_state();
           last_checkpoint = Clock::now();
         }
         if (stop && !last) {
@@ -107,9 +113,9 @@ class Run {
         stepping_since = Clock::now();
       }
     } catch (const DivergedError& error) {
-      throw DivergedError(with_last_good_state(error, progress, now));
+      throw DivergedError(with_last_good_state(error, progress));
     } catch (const DeviceError& error) {
-      throw DeviceError(with_last_good_state(error, progress, now));
+      throw DeviceError(with_last_good_state(error, progress));
     }
     progress.finish();
     loop_seconds_ = seconds_since(loop_start_);
@@ -125,15 +131,15 @@ class Run {
   static constexpr double watch_share = 50;
 
   /// Writes it, and says so.
-  std::string with_last_good_state(const Error& error, Progress& progress, const Diagnostics& now) {
+  std::string with_last_good_state(const Error& error, Progress& progress) {
     progress.finish();
-    write_state(now);
+    write_state();
     return fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(), good_.time,
                        checkpoint_.string());
   }
 
   double speed() const {
-    return static_cast<double>(solver_->steps() - first_step_) /
+    return static_cast<double>(solver_.steps() - first_step_) /
            std::max(1e-9, seconds_since(loop_start_));
   }
 
@@ -177,10 +183,10 @@ class Run {
     return begin_->state;
   }
 
-  void write_frame(const Diagnostics& now) {
+  void write_frame(const State& state, const Diagnostics& now) {
     SurfelState surfels;
     Frame frame;
-    frame.state = &good_;
+    frame.state = &state;
     frame.diagnostics = now;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);
@@ -197,13 +203,14 @@ class Run {
     recorder_.write(frame);
   }
 
-  void write_state(const Diagnostics& now) {
+  /// The last good one.
+  void write_state() {
     CheckpointInfo info;
     info.program = program_version();
     info.precision = scene_.solver.precision;
     info.scene_text = scene_.text;
     info.model_digest = model_digest(model_);
-    info.total_energy = now.total_energy();
+    info.total_energy = good_diagnostics_.total_energy();
     info.initial_energy = initial_energy_;
     info.frames_written = recorder_.frames_written();
     checkpoint_ = write_checkpoint(recorder_.directory(), good_, info);
@@ -219,7 +226,7 @@ class Run {
     fmt::print(
         "  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
         plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
-    if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_->time(), first_step_);
+    if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_.time(), first_step_);
     std::fflush(stdout);
   }
 
@@ -227,7 +234,7 @@ class Run {
   void say_finished_already() const {
     const std::string message = fmt::format(
         "the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
-        solver_->time(), scene_.time.end);
+        solver_.time(), scene_.time.end);
     if (options_.json) {
       fmt::print(
           "{}\n",
@@ -238,7 +245,7 @@ class Run {
   }
 
   void say_summary(const Diagnostics& now) const {
-    const double steps = static_cast<double>(solver_->steps() - first_step_);
+    const double steps = static_cast<double>(solver_.steps() - first_step_);
     const double energy_drift =
         (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
     const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
@@ -256,7 +263,7 @@ class Run {
           {"neighbours_per_phyxel", static_cast<double>(model_.neighbourhood.neighbours.entries()) /
                                         std::max(1, model_.size())},
           {"time_s", now.time},
-          {"steps", solver_->steps()},
+          {"steps", solver_.steps()},
           {"time_step_s", plan_.dt},
           {"largest_stable_step_s", plan_.limit.largest_step},
           {"omega_max_rad_s", plan_.limit.omega_max},
@@ -320,11 +327,13 @@ class Run {
   std::optional<Checkpoint> begin_;
   Model model_;
   StepPlan plan_;
-  Recorder recorder_;
-  Backend* backend_ = nullptr;
-  Solver* solver_ = nullptr;
-  State good_;  // the last state that passed the watch
+  std::unique_ptr<Backend> backend_;
+  Solver solver_;
   std::int64_t first_step_ = 0;
+  Diagnostics start_diagnostics_;
+  Recorder recorder_;
+  State good_;  // the last state that passed the watch
+  Diagnostics good_diagnostics_;
   double initial_energy_ = 0, peak_energy_ = 0;
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
   Clock::time_point loop_start_;
@@ -350,6 +359,7 @@ void check(const Overrides& overrides) {
   }
   // A few steps tell how long the run will take.
   Solver solver(*backend, initial_state(model, scene, plan.dt));
+  diagnose(model, *backend, 0, plan.dt);  // has memory of its own, which must be there too
   const auto start = Clock::now();
   int steps = 0;
   for (; steps < 2 || (seconds_since(start) < 0.2 && steps < 1000); ++steps) solver.step();

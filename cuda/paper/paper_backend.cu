@@ -92,6 +92,7 @@ class GpuBackend final : public PaperBackend {
            (dense_ ? "n x n force matrix" : "CSR gather") + ", on " + device_.name;
   }
   Index size() const override { return n_; }
+  int threads() const override { return 0; }
 
   void upload(const State& state) override {
     wait();

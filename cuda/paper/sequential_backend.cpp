@@ -56,6 +56,7 @@ class SequentialBackend final : public PaperBackend {
     return fmt::format("the sequential program of 2008, {}, 1 thread", arithmetic);
   }
   Index size() const override { return model_.size(); }
+  int threads() const override { return 1; }
 
   void upload(const State& state) override {
     dt_ = state.dt;

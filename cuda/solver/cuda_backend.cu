@@ -5,6 +5,7 @@
 
 #include "check.hpp"
 #include "device.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/physics/surfel.hpp"
 #include "solver/cuda_backend.hpp"
 #include "solver/diagnose.cuh"
@@ -43,33 +44,59 @@ __global__ void add_load(Real* load, std::size_t places, const Index* place,
 }
 
 /// Surfels in device memory. Positions are taken from the origin of their body.
-template <class Real>
+template <class Real, class StateReal>
 struct DeviceSurfels {
   const Vec3<Real>*position, *normal;
   const Offset* offsets;
   const Index* carriers;  ///< Places.
   const Real* weight;     ///< Full weights, over the largest of the surfel.
-  Vec3<Real>*displacement, *moved_normal;
+  Vec3<StateReal>* displacement;
+  Vec3<StateReal>* moved_normal;
   int count;
 };
 
+/// Equation (6), in the precision of the state.
 template <class Real, class StateReal>
 __global__ void advect(Fields<Real, StateReal> f, const Real* gradient,
-                       DeviceSurfels<Real> surfels) {
+                       DeviceSurfels<Real, StateReal> surfels) {
   const int s = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (s >= surfels.count) return;
-  SurfelBlend<Real> blend;
+  const auto wide = [](Vec3<Real> v) {
+    return Vec3<StateReal>{static_cast<StateReal>(v.x), static_cast<StateReal>(v.y),
+                           static_cast<StateReal>(v.z)};
+  };
+  SurfelBlend<StateReal> blend;
   for (Offset k = surfels.offsets[s]; k < surfels.offsets[s + 1]; ++k) {
     const Index place = surfels.carriers[k];
     const auto point = f.points.get(place);
-    Mat3<Real> grad_u;
+    Vec3<StateReal> u = wide(point.u);
+    if constexpr (!std::is_same_v<Real, StateReal>) u = column3(f.displacement, f.places, place);
+    Mat3<StateReal> grad_u;
     for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient[e * f.places + place];
-    blend.add(surfels.weight[k], point.u, grad_u, surfels.position[s] - point.x);
+    blend.add(surfels.weight[k], u, grad_u, wide(surfels.position[s] - point.x));
   }
-  const Vec3<Real> normal = blend.surfel_normal(surfels.normal[s]);
+  const Vec3<StateReal> normal = blend.surfel_normal(wide(surfels.normal[s]));
   surfels.displacement[s] = blend.surfel_displacement();
-  surfels.moved_normal[s] = (Real(1) / sqrt(dot(normal, normal))) * normal;
+  surfels.moved_normal[s] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
+
+/// A point in the queue of launches that can be waited for.
+class Event {
+ public:
+  Event() { PHYXEL_CUDA(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming)); }
+  Event(Event&& other) noexcept { std::swap(event_, other.event_); }
+  Event& operator=(Event&& other) noexcept {
+    std::swap(event_, other.event_);
+    return *this;
+  }
+  ~Event() {
+    if (event_) cudaEventDestroy(event_);
+  }
+  cudaEvent_t get() const { return event_; }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
 
 template <class Real, class StateReal>
 class CudaBackend final : public Backend {
@@ -82,6 +109,8 @@ class CudaBackend final : public Backend {
  public:
   CudaBackend(const Model& model, int device)
       : model_(model), device_(use_cuda_device(device)), tiling_(make_tiling(model)) {
+    PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
+                                       cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
     subject_ = std::to_string(model.size()) + " phyxels";
     make_lists();
@@ -96,10 +125,12 @@ class CudaBackend final : public Backend {
     return device_.name + ", " + precision + ", tiles of " + std::to_string(tile_size);
   }
   Index size() const override { return model_.size(); }
+  int threads() const override { return 0; }
 
   void upload(const State& state) override {
     wait();
     dt_ = -1;  // whatever depends on it is sent with the next step
+    fresh_ = true;
     std::vector<Vec3d> u(places()), v(places());
     for (Index i = 0; i < size(); ++i) {
       u[tiling_.place[i]] = state.displacement[i];
@@ -124,10 +155,12 @@ class CudaBackend final : public Backend {
   }
 
   void stress() override {
+    use_device();
     for (const Run<Pass1>& run : stress_runs_) launch_pass_1(run, run.kernel, nullptr);
   }
 
   void advance(double time, double dt) override {
+    use_device();
     if (dt != dt_) send_constants(dt);
     sum_loads(time);
     for (const Run<Pass2>& run : advance_runs_) {
@@ -141,11 +174,23 @@ class CudaBackend final : public Backend {
                                                to<StateReal>(after), to<StateReal>(velocity));
       launched("follow", blocks_for(count), tile_size);
     }
+    if (fresh_ && held_places_.size() > 0) {  // they stay where their motion says: at rest
+      const auto count = static_cast<int>(held_places_.size());
+      follow<<<blocks_for(count), tile_size>>>(fields_, held_places_.data(), count,
+                                               Vec3<StateReal>{}, Vec3<StateReal>{});
+      launched("follow", blocks_for(count), tile_size);
+    }
+    fresh_ = false;
+    bound_queue();
   }
 
-  void wait() const override { wait_for_device(last_launch_); }
+  void wait() const override {
+    use_device();
+    wait_for_device(last_launch_);
+  }
 
   std::optional<Diagnostics> diagnostics(double time, double dt) override {
+    use_device();
     sum_loads(time);
     const DeviceArray<Real> forces = forces_now(), gradients = gradients_now();
     const auto tiles = static_cast<unsigned>(tiling_.tiles());
@@ -188,6 +233,7 @@ class CudaBackend final : public Backend {
   }
 
   void displacement_gradients(std::vector<Mat3d>& gradient) override {
+    use_device();
     const DeviceArray<Real> gradients = gradients_now();
     wait();
     const std::vector<Real> values = copy_of(gradients);
@@ -205,18 +251,19 @@ class CudaBackend final : public Backend {
     out.position.resize(count);
     out.normal.resize(count);
     if (count == 0) return;
-    if (surfel_position_.size() == 0) make_surfels();
+    use_device();
+    if (surfel_moved_normal_.size() == 0) make_surfels();  // the array made last
     const DeviceArray<Real> gradients = gradients_now();
-    const DeviceSurfels<Real> surfels{surfel_position_.data(),     surfel_normal_.data(),
-                                      surfel_offsets_.data(),      surfel_carriers_.data(),
-                                      surfel_weight_.data(),       surfel_displacement_.data(),
-                                      surfel_moved_normal_.data(), static_cast<int>(count)};
+    const DeviceSurfels<Real, StateReal> surfels{
+        surfel_position_.data(),     surfel_normal_.data(),  surfel_offsets_.data(),
+        surfel_carriers_.data(),     surfel_weight_.data(),  surfel_displacement_.data(),
+        surfel_moved_normal_.data(), static_cast<int>(count)};
     const unsigned blocks = blocks_for(static_cast<int>(count));
     advect<<<blocks, tile_size>>>(fields_, gradients.data(), surfels);
     launched("advect", blocks, tile_size);
     wait();
-    const std::vector<Vec3<Real>> moved = copy_of(surfel_displacement_),
-                                  normal = copy_of(surfel_moved_normal_);
+    const std::vector<Vec3<StateReal>> moved = copy_of(surfel_displacement_),
+                                       normal = copy_of(surfel_moved_normal_);
     for (std::size_t s = 0; s < count; ++s) {
       out.position[s] = model_.surfels.position[s] + to<double>(moved[s]);
       out.normal[s] = normalised(to<double>(normal[s]));
@@ -235,7 +282,8 @@ class CudaBackend final : public Backend {
     if (own_supports_) list.push_back({"supports", supports_.bytes()});
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
     if (load_.size()) list.push_back({"loads", load_.bytes()});
-    if (surfel_position_.size()) {
+    list.push_back({"while energies are summed", 12 * sizeof(Real) * places()});
+    if (surfel_moved_normal_.size()) {
       list.push_back({"surfels", surfel_position_.bytes() + surfel_normal_.bytes() +
                                      surfel_offsets_.bytes() + surfel_carriers_.bytes() +
                                      surfel_weight_.bytes() + surfel_displacement_.bytes() +
@@ -299,6 +347,7 @@ class CudaBackend final : public Backend {
     arrays.rows.upload(lists.rows.data());
     arrays.entries = {lists.entries.size(), what};
     arrays.entries.upload(lists.entries.data());
+    check_shared_memory(lists);
     return {arrays.halo.data(), lists.halo_stride, lists.slots(), arrays.rows.data(),
             reinterpret_cast<const uint4*>(arrays.entries.data())};
   }
@@ -307,6 +356,19 @@ class CudaBackend final : public Backend {
     if (!tiling_.inverse.rows.empty()) {
       inverse_lists_ = send_lists(tiling_.inverse, inverse_arrays_);
     }
+    tiling_.neighbours = tiling_.inverse = {};  // the device has them now
+  }
+  /// @throws InputError if a tile does not fit what one block may have
+  void check_shared_memory(const TileLists& lists) const {
+    const int bytes = (Stresses<Real>::bytes + static_cast<int>(own_supports_ ? sizeof(Real) : 0)) *
+                      lists.slots();
+    if (bytes <= most_shared_memory_) return;
+    throw InputError(device_.name + ": " + std::to_string(tile_size) +
+                     " phyxels side by side and their " + std::to_string(lists.halo_stride) +
+                     " neighbours take " + std::to_string(bytes) +
+                     " bytes of shared memory, of which a block may have " +
+                     std::to_string(most_shared_memory_) +
+                     ": allowed are a smaller support, precision \"float\" or the CPU");
   }
   std::size_t list_bytes(const DeviceLists& lists) const {
     const ListArrays& a = lists.rows == lists_.rows ? list_arrays_ : inverse_arrays_;
@@ -350,10 +412,16 @@ class CudaBackend final : public Backend {
     moment_constants_ = {moments.size(), "inverse moments" + of};
     moment_constants_.upload(moments.data());
 
-    held_ = held_phyxels();
+    const std::vector<char> held = held_phyxels();
+    std::vector<Index> held_places;
+    for (Index i = 0; i < size(); ++i) {
+      if (held[i]) held_places.push_back(tiling_.place[i]);
+    }
+    held_places_ = {held_places.size(), "held phyxels"};
+    held_places_.upload(held_places.data());
     const auto forces = per_place(4, [&](Index i, int r) {
       const Vec3d& b = model_.moment_offset[i];
-      const double values[] = {b.x, b.y, b.z, (held_[i] ? -1 : 1) / model_.mass[i]};
+      const double values[] = {b.x, b.y, b.z, (held[i] ? -1 : 1) / model_.mass[i]};
       return values[r];
     });
     force_constants_ = {forces.size(), "masses" + of};
@@ -614,21 +682,35 @@ class CudaBackend final : public Backend {
 
   void launch_pass_1(const Run<Pass1>& run, Pass1 kernel, Real* gradient) {
     const int bytes = pass_1_bytes(lists_);
-    allow_shared_memory(reinterpret_cast<const void*>(kernel), bytes);
+    allow_shared_memory(reinterpret_cast<const void*>(kernel));
     kernel<<<run.tiles, tile_size, bytes>>>(fields_, lists_, run.first_tile, gradient);
     launched("pass_1", run.tiles, tile_size);
   }
   void launch_pass_2(const Run<Pass2>& run, Pass2 kernel, StateReal dt, Real* force) {
     const int bytes = pass_2_bytes(second_lists());
-    allow_shared_memory(reinterpret_cast<const void*>(kernel), bytes);
+    allow_shared_memory(reinterpret_cast<const void*>(kernel));
     kernel<<<run.tiles, tile_size, bytes>>>(fields_, second_lists(), run.first_tile, dt, force);
     launched("pass_2", run.tiles, tile_size);
   }
-  /// Beyond 48 KiB a kernel has to ask; once.
-  void allow_shared_memory(const void* kernel, int bytes) {
+  /// Beyond 48 KiB a kernel has to ask. It asks for all there is: the answer is the kernel's, not
+  /// this object's, and other models may need more.
+  void allow_shared_memory(const void* kernel) {
     if (std::find(allowed_.begin(), allowed_.end(), kernel) != allowed_.end()) return;
-    PHYXEL_CUDA(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, bytes));
+    PHYXEL_CUDA(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                     most_shared_memory_));
     allowed_.push_back(kernel);
+  }
+  void use_device() const { PHYXEL_CUDA(cudaSetDevice(device_.index)); }
+
+  /// Lets the host run ahead by some ten milliseconds of steps, not by the hundreds that the queue
+  /// takes: a signal would wait for them all.
+  void bound_queue() {
+    const auto ahead = static_cast<int>(std::clamp<std::size_t>(50'000'000 / places(), 1, 128));
+    if (++steps_since_mark_ < ahead) return;
+    steps_since_mark_ = 0;
+    PHYXEL_CUDA(cudaEventSynchronize(marks_[0].get()));  // of the batch before; at once if none
+    std::swap(marks_[0], marks_[1]);
+    PHYXEL_CUDA(cudaEventRecord(marks_[1].get()));
   }
 
   DeviceArray<Real> forces_now() {
@@ -701,10 +783,13 @@ class CudaBackend final : public Backend {
   const Model& model_;
   Device device_;
   Tiling tiling_;
+  int most_shared_memory_ = 0;  // of one block, in bytes
   bool own_supports_ = false;
   std::string subject_;
   double dt_ = -1, load_scales_ = -1;
-  std::vector<char> held_;
+  bool fresh_ = true;  // no step has been taken since the last upload
+  Event marks_[2];
+  int steps_since_mark_ = 0;
   std::vector<Run<Pass1>> stress_runs_;
   std::vector<Run<Pass2>> advance_runs_;
   std::vector<const void*> allowed_;
@@ -725,9 +810,10 @@ class CudaBackend final : public Backend {
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<Constants> tiles_;
   DeviceArray<TileMaterial> materials_;
+  DeviceArray<Index> held_places_;
   DeviceArray<char> moved_;  // empty unless phyxels follow a path
-  DeviceArray<Vec3<Real>> surfel_position_, surfel_normal_, surfel_displacement_,
-      surfel_moved_normal_;
+  DeviceArray<Vec3<Real>> surfel_position_, surfel_normal_;
+  DeviceArray<Vec3<StateReal>> surfel_displacement_, surfel_moved_normal_;
   DeviceArray<Offset> surfel_offsets_;
   DeviceArray<Index> surfel_carriers_;
   DeviceArray<Real> surfel_weight_;

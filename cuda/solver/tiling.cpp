@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <numeric>
 #include <span>
 
@@ -18,6 +19,7 @@ constexpr int team = 8, columns = 8;
 
 /// Phyxels of one body along the curve.
 std::vector<Index> curve_order(const Model& model, const Part& part) {
+  if (part.begin == part.end) return {};
   Vec3d low = model.position[part.begin], high = low;
   for (Index i = part.begin; i < part.end; ++i) {
     const Vec3d x = model.position[i];
@@ -174,49 +176,58 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
 }
 
 TileLists make_lists(const Csr& lists, const Tiling& tiling) {
-  TileLists out;
-  const Index tiles = tiling.tiles();
   constexpr int warps = tile_size / warp_size;
-  std::vector<TileRows> all(static_cast<std::size_t>(tiles));
-  std::string refusal;
-#pragma omp parallel for schedule(dynamic, 16)
-  for (Index tile = 0; tile < tiles; ++tile) {
-    try {
-      all[tile] = rows_of_tile(lists, tiling, tile);
-    } catch (const InputError& error) {
-#pragma omp critical
-      refusal = error.what();
-    }
-  }
-  if (!refusal.empty()) throw InputError(refusal);
-
-  for (const TileRows& rows : all) {
-    out.halo_stride = std::max(out.halo_stride, static_cast<int>(rows.halo.size()));
-  }
+  constexpr Index batch = 4096;  // tiles; their rows take some 40 kB each before they are packed
+  const Index tiles = tiling.tiles();
+  TileLists out;
+  std::vector<std::vector<Index>> halos(static_cast<std::size_t>(tiles));
   std::int32_t chunks = 0;
-  for (const TileRows& rows : all) {
-    for (int w = 0; w < warps; ++w) {
-      const auto length = static_cast<std::int32_t>(rows.slots[w * warp_size].size());
-      out.rows.push_back({chunks, length});
-      chunks += (length + chunk - 1) / chunk;
-    }
-  }
-  out.halo.assign(static_cast<std::size_t>(tiles) * out.halo_stride, -1);
-  out.entries.assign(static_cast<std::size_t>(chunks) * warp_size * chunk, 0);
-#pragma omp parallel for schedule(static)
-  for (Index tile = 0; tile < tiles; ++tile) {
-    const TileRows& rows = all[tile];
-    std::copy(rows.halo.begin(), rows.halo.end(),
-              out.halo.begin() + static_cast<std::ptrdiff_t>(tile) * out.halo_stride);
-    for (int i = 0; i < tile_size; ++i) {
-      const TileLists::Row row = out.rows[static_cast<std::size_t>(tile) * warps + i / warp_size];
-      for (std::int32_t e = 0; e < row.length; ++e) {
-        const std::size_t at =
-            (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + i % warp_size) * chunk +
-            e % chunk;
-        out.entries[at] = static_cast<std::uint16_t>(16 * rows.slots[i][e]);
+  for (Index first = 0; first < tiles; first += batch) {
+    const Index last = std::min(tiles, first + batch);
+    std::vector<TileRows> rows(static_cast<std::size_t>(last - first));
+    std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic, 16)
+    for (Index tile = first; tile < last; ++tile) {
+      try {
+        rows[tile - first] = rows_of_tile(lists, tiling, tile);
+        halos[tile] = rows[tile - first].halo;  // a copy has no room to spare
+      } catch (...) {
+#pragma omp critical
+        failure = std::current_exception();
       }
     }
+    if (failure) std::rethrow_exception(failure);
+
+    for (const TileRows& of_tile : rows) {
+      for (int w = 0; w < warps; ++w) {
+        const auto length = static_cast<std::int32_t>(of_tile.slots[w * warp_size].size());
+        out.rows.push_back({chunks, length});
+        chunks += (length + chunk - 1) / chunk;
+      }
+    }
+    out.entries.resize(static_cast<std::size_t>(chunks) * warp_size * chunk, 0);
+#pragma omp parallel for schedule(static)
+    for (Index tile = first; tile < last; ++tile) {
+      for (int i = 0; i < tile_size; ++i) {
+        const TileLists::Row row = out.rows[static_cast<std::size_t>(tile) * warps + i / warp_size];
+        for (std::int32_t e = 0; e < row.length; ++e) {
+          const std::size_t at =
+              (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + i % warp_size) *
+                  chunk +
+              e % chunk;
+          out.entries[at] = static_cast<std::uint16_t>(16 * rows[tile - first].slots[i][e]);
+        }
+      }
+    }
+  }
+  for (const std::vector<Index>& halo : halos) {
+    out.halo_stride = std::max(out.halo_stride, static_cast<int>(halo.size()));
+  }
+  out.halo.assign(static_cast<std::size_t>(tiles) * out.halo_stride, -1);
+  for (Index tile = 0; tile < tiles; ++tile) {
+    std::copy(halos[tile].begin(), halos[tile].end(),
+              out.halo.begin() + static_cast<std::ptrdiff_t>(tile) * out.halo_stride);
+    halos[tile] = {};
   }
   return out;
 }

@@ -29,10 +29,16 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0});
   }
-  for (const Motion& motion : model.motions) add(state.get(), motion.phyxels);
+  for (const Motion& motion : model.motions) {
+    add(state.get(), motion.phyxels);
+    const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
+    add(state.get(), std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z,
+                                         motion.duration, motion.frequency});
+  }
   for (const Load& load : model.loads) {
     add(state.get(), load.phyxels);
     add(state.get(), load.force);
+    add(state.get(), std::vector<double>{load.ramp});
   }
   return XXH3_64bits_digest(state.get());
 }

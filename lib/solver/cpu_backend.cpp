@@ -68,9 +68,13 @@ class CpuBackend final : public Backend {
     const char* precision = sizeof(Real) == 8        ? "double"
                             : sizeof(StateReal) == 8 ? "mixed"
                                                      : "float";
+    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, threads(),
+                       threads() == 1 ? "" : "s", W);
+  }
+  int threads() const override {
     int used = 1;  // small bodies leave threads alone
     for (const Run& run : runs_) used = std::max(used, threads_for(run.range));
-    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, used, used == 1 ? "" : "s", W);
+    return used;
   }
   Index size() const override { return model_.size(); }
 
@@ -282,7 +286,8 @@ class CpuBackend final : public Backend {
       const Vec3<P> u{convert<Real>(displacement.x), convert<Real>(displacement.y),
                       convert<Real>(displacement.z)};
       for (int l = 0; l < W; ++l) {
-        Real* record = &points_[(p * W + l) * PointRecord::size + PointRecord::displacement];
+        Real* record = &points_[static_cast<std::size_t>(p * W + l) * PointRecord::size +
+                                PointRecord::displacement];
         record[0] = u.x[l];
         record[1] = u.y[l];
         record[2] = u.z[l];
@@ -362,7 +367,8 @@ class CpuBackend final : public Backend {
   }
   PHYXEL_HD P own_point_value(Index p, int which) const {
     P value;
-    for (int l = 0; l < W; ++l) value.lanes[l] = points_[(p * W + l) * PointRecord::size + which];
+    for (int l = 0; l < W; ++l)
+      value.lanes[l] = points_[static_cast<std::size_t>(p * W + l) * PointRecord::size + which];
     return value;
   }
   PHYXEL_HD Vec3<P> point_of(Index p, int first) const {
@@ -371,7 +377,8 @@ class CpuBackend final : public Backend {
   }
   PHYXEL_HD void store_pair_stress(Index p, const Mat3<P>& q) {
     for (int l = 0; l < W; ++l) {
-      Real* record = &stresses_[(p * W + l) * StressRecord::size + StressRecord::pair_stress];
+      Real* record = &stresses_[static_cast<std::size_t>(p * W + l) * StressRecord::size +
+                                StressRecord::pair_stress];
       for (int e = 0; e < 9; ++e) record[e] = q(e / 3, e % 3)[l];
     }
   }
@@ -389,8 +396,8 @@ class CpuBackend final : public Backend {
       const Index slot = layout_.slot(i);
       const Vec3d x = model_.position[i] - origin;
       const double h = model_.neighbourhood.support[i];
-      Real* point = &points_[slot * PointRecord::size];
-      Real* stress_record = &stresses_[slot * StressRecord::size];
+      Real* point = &points_[static_cast<std::size_t>(slot) * PointRecord::size];
+      Real* stress_record = &stresses_[static_cast<std::size_t>(slot) * StressRecord::size];
       set_values(point + PointRecord::position, x);
       set_values(stress_record + StressRecord::position, x);
       point[PointRecord::inverse_h_squared] = stress_record[StressRecord::inverse_h_squared] =
@@ -415,7 +422,9 @@ class CpuBackend final : public Backend {
     const Index slot = layout_.slot(i);
     set3(displacement_, slot, u);
     set3(velocity_, slot, v);
-    set_values(&points_[slot * PointRecord::size + PointRecord::displacement], u);
+    set_values(
+        &points_[static_cast<std::size_t>(slot) * PointRecord::size + PointRecord::displacement],
+        u);
   }
 
   /// Sums the loads at `time`; again only while one of them still grows.

@@ -184,6 +184,7 @@ TEST(Median, OfAnyOrder) {
   EXPECT_EQ(median_of({3, 1, 2}).value, 2);
   EXPECT_EQ(median_of({3, 1, 2}).spread, 1);
   EXPECT_EQ(median_of({5}).spread, 0);
+  EXPECT_EQ(median_of({4, 1, 3, 2}).value, 2.5);
 }
 
 class Charts : public test::Folder {};

@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
+#include <thread>
 
 #include "check.hpp"
 #include "device.hpp"
@@ -15,6 +17,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 __global__ void write_through(int* target) { *target = 1; }
+__global__ void harmless() {}
 
 template <class Throwing>
 std::string message_of(Throwing&& act) {
@@ -74,13 +77,18 @@ TEST_F(DeviceErrors, DevicesAreListed) {
 }
 
 /// A fault leaves the process without its GPU, so each has a process of its own.
-void fault_and_report(bool at_once) {
+void fault_and_report(bool at_once, bool later_launch = false) {
   if (at_once) setenv("PHYXEL_CUDA_SYNC", "1", 1);
   try {
     use_cuda_device(0);
     const Launch launch{"write_through", 1, 1, "a test"};
     write_through<<<1, 1>>>(nullptr);
     check_launch(launch);
+    if (later_launch) {
+      std::this_thread::sleep_for(std::chrono::seconds(1));  // until the fault has happened
+      harmless<<<1, 1>>>();
+      check_launch({"harmless", 1, 1, "a test"});
+    }
     wait_for_device(launch);
   } catch (const DeviceError& error) {
     std::fprintf(stderr, "%s\n", error.what());
@@ -93,6 +101,13 @@ TEST_F(DeviceErrorsDeathTest, AFaultInsideAKernelIsReportedWithTheLastLaunch) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(fault_and_report(false), ::testing::ExitedWithCode(4),
               "a kernel failed: .*cudaErrorIllegalAddress.*last launch was write_through.*"
+              "PHYXEL_CUDA_SYNC=1");
+}
+
+TEST_F(DeviceErrorsDeathTest, AFaultIsNotBlamedOnALaterLaunch) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(fault_and_report(false, true), ::testing::ExitedWithCode(4),
+              "a kernel launched before harmless.* failed: .*cudaErrorIllegalAddress.*"
               "PHYXEL_CUDA_SYNC=1");
 }
 

@@ -54,30 +54,45 @@ bool no_gpu() {
   return none;
 }
 
-/// A jittered box, 9 x 9 x 9 phyxels, held at one end.
-Model random_cloud(Strain strain = Strain::green) {
+/// A box of phyxels moved by up to 0.3 spacings, held at one end, with surfels all over it.
+Model random_cloud(int nx, int ny, int nz, std::uint64_t seed, Strain strain = Strain::green) {
   Scene scene = testing::one_body(testing::rubber());
   scene.gravity = {0, 0, -9.81};
   scene.bodies[0].material.strain = strain;
   scene.bodies[0].fixed.push_back({.select = {.indices = {{0, 1, 9, 10, 81}}}});
   use_paper_rules(scene.bodies[0]);
-  return paper_model(scene, testing::lattice(9, 9, 9, 0.1, 0.3));
+  Cloud cloud = testing::lattice(nx, ny, nz, 0.1, 0.3, seed);
+  std::mt19937_64 engine(seed);
+  for (int s = 0; s < 400; ++s) {
+    cloud.surface.position.push_back({testing::uniform(engine, 0, 0.1 * nx),
+                                      testing::uniform(engine, 0, 0.1 * ny),
+                                      testing::uniform(engine, 0, 0.1 * nz)});
+    cloud.surface.normal.push_back(normalised(testing::uniform_vector(engine, 1)));
+  }
+  return paper_model(scene, cloud);
 }
 
-/// The paper's bodies and the random cloud, made once.
+/// The paper's bodies and the random clouds, made once.
 const Model& model_named(std::string name) {
   static std::map<std::string, Model> models;
   auto found = models.find(name);
   if (found == models.end()) {
-    Model model = name == "random"          ? random_cloud()
-                  : name == "random_cauchy" ? random_cloud(Strain::cauchy)
+    Model model = name == "random"          ? random_cloud(9, 9, 9, 1)
+                  : name == "random_2"      ? random_cloud(7, 13, 8, 2)
+                  : name == "random_3"      ? random_cloud(20, 6, 5, 3)
+                  : name == "random_cauchy" ? random_cloud(9, 9, 9, 4, Strain::cauchy)
                                             : paper_model(body_scene(name));
     found = models.emplace(name, std::move(model)).first;
   }
   return found->second;
 }
-const std::vector<std::string> all_models{"horn_bug", "alien_head", "dino", "random",
-                                          "random_cauchy"};
+const std::vector<std::string> all_models{"horn_bug", "alien_head", "dino",         "random",
+                                          "random_2", "random_3",   "random_cauchy"};
+
+/// The larger, where a value that is no number is the largest of all.
+double worse(double error, double value) {
+  return std::isfinite(value) ? std::max(error, value) : HUGE_VAL;
+}
 
 /// Strains of some 10%, rough by a hundredth of the spacing, exact in float.
 std::vector<Vec3d> deformation(const Model& model) {
@@ -128,13 +143,13 @@ TEST_P(Kernels, PrecalcImutableValuesEqualsTheReference) {
       const double centre = oracle::w(0, b.h[i]);
       for (const int j : b.neighbours[i]) {
         const double w = oracle::w((b.x[j] - b.x[i]).norm(), b.h[i]);
-        omega_error = std::max(omega_error, std::abs(values.omega[pair++] - w) / centre);
+        omega_error = worse(omega_error, std::abs(values.omega[pair++] - w) / centre);
       }
-      volume_error = std::max(volume_error, std::abs(values.volume[i] / b.v[i] - 1));
+      volume_error = worse(volume_error, std::abs(values.volume[i] / b.v[i] - 1));
       const oracle::M3 exact = oracle::inverse_moment(b, i);
       oracle::M3 found;
       for (int e = 0; e < 9; ++e) found(e / 3, e % 3) = values.inverse_moment[i](e / 3, e % 3);
-      moment_error = std::max(moment_error, (found - exact).norm() / exact.norm());
+      moment_error = worse(moment_error, (found - exact).norm() / exact.norm());
     }
     ASSERT_EQ(pair, values.omega.size());
     // (1 - r²/h²)³ relative to its value at the centre: three factors, each with the error of r².
@@ -158,7 +173,7 @@ TEST_P(Kernels, CalcStrainStressAEqualsTheReference) {
       const oracle::M3 exact = oracle::grad_u(b, u, i);
       oracle::M3 found;
       for (int e = 0; e < 9; ++e) found(e / 3, e % 3) = gradient[i](e / 3, e % 3);
-      error = std::max(error, (found - exact).norm());
+      error = worse(error, (found - exact).norm());
       size = std::max(size, exact.norm());
     }
     expect_small(name, "displacement gradient", error / size, 64);
@@ -222,7 +237,7 @@ TEST_P(Kernels, IntegrateIsVerlet) {
 }
 
 TEST_P(Kernels, UpdateSurfelsIsEquationSix) {
-  for (const std::string& name : body_names()) {
+  for (const std::string& name : all_models) {
     const Model& model = model_named(name);
     const SurfelState exact = testing::oracle_surfels(model, testing::oracle_body(model),
                                                       testing::to_eigen(deformation(model)));
@@ -251,17 +266,19 @@ State hanging_start(const Model& model, const std::string& name) {
 
 /// Held against the sequential program in double.
 class Trajectories : public Kernels {};
+class Steps : public Kernels {};
 
-std::vector<Implementation> not_the_reference() {
+std::vector<Implementation> not_the_reference(bool double_only) {
   std::vector<Implementation> list;
   for (const Implementation& i : implementations) {
-    if (i.gpu || i.epsilon > twice) list.push_back(i);
+    if (i.gpu ? i.epsilon <= twice || !double_only : i.epsilon > twice && !double_only) {
+      list.push_back(i);
+    }
   }
   return list;
 }
 
-TEST_P(Trajectories, OneStepInDoubleStaysWithTheReference) {
-  if (GetParam().epsilon > twice) return;
+TEST_P(Steps, InDoubleStayWithTheReference) {
   for (const std::string& name : body_names()) {
     const Model& model = model_named(name);
     // From states all along a swing, so that strains and velocities are those of real motion.
@@ -278,7 +295,7 @@ TEST_P(Trajectories, OneStepInDoubleStaysWithTheReference) {
       backend->download(next);
       Solver solver(*reference, state);
       solver.step();
-      worst = std::max(worst, relative_error(next.displacement, solver.state().displacement));
+      worst = worse(worst, relative_error(next.displacement, solver.state().displacement));
     }
     std::printf("  %-14s one step: %.2e\n", name.c_str(), worst);
     EXPECT_LE(worst, 1e-12) << name;
@@ -293,18 +310,22 @@ TEST_P(Trajectories, OverOneSecondTheDistanceIsRounding) {
     const auto found = after(*GetParam().make(model), start, 1).displacement;
     const double error = relative_error(found, exact);
     std::printf("  %-14s after 1 s: %.2e\n", name.c_str(), error);
-    // About a thousand steps. Rounding errors of a step are some epsilon of u; as accelerations
-    // they are kept and add up with the square of the number of steps at worst, which is never
-    // reached: a tenth of that. In double the same factor holds, so that the distance is rounding
-    // and nothing else. Every phyxel must have moved, or the test would say nothing.
-    EXPECT_LE(error, 1e5 * GetParam().epsilon) << name;
+    // 200 to 2,750 steps. Rounding errors of a step are some epsilon of u; as accelerations they
+    // are kept and would add up with the square of the number of steps if they did not cancel.
+    // Some ten times the largest distance seen, on CPU and GPU (docs/results/paper has them). In
+    // double the same factors hold: the distance is rounding and nothing else.
+    const double epsilons = name == "horn_bug" ? 2e4 : name == "dino" ? 6e3 : 1.2e3;
+    EXPECT_LE(error, epsilons * GetParam().epsilon) << name;
+    // Every phyxel must have moved, or the test would say nothing.
     double moved = 0;
     for (const Vec3d& u : exact) moved = std::max(moved, norm(u));
     EXPECT_GT(moved, 0.05);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Paper, Trajectories, ::testing::ValuesIn(not_the_reference()),
+INSTANTIATE_TEST_SUITE_P(Paper, Trajectories, ::testing::ValuesIn(not_the_reference(false)),
+                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Paper, Steps, ::testing::ValuesIn(not_the_reference(true)),
                          [](const auto& test) { return std::string(test.param.name); });
 
 class CsrGather : public ::testing::TestWithParam<Precision> {
@@ -361,10 +382,15 @@ TEST(PaperGpu, TwoBodiesOfDifferentMaterialsTakeTurns) {
   const auto one = make_gpu_backend(bug), two = make_gpu_backend(head);
   Solver first(*one, bug_start), second(*two, head_start);
   for (int s = 0; s < 50; ++s) first.step(), second.step();
-  const auto alone = make_gpu_backend(bug);
-  Solver third(*alone, bug_start);
-  for (int s = 0; s < 50; ++s) third.step();
-  EXPECT_TRUE(first.state().displacement == third.state().displacement);
+  const State bug_end = first.state(), head_end = second.state();
+  const auto run_alone = [](const Model& model, const State& start) {
+    const auto backend = make_gpu_backend(model);
+    Solver solver(*backend, start);
+    for (int s = 0; s < 50; ++s) solver.step();
+    return solver.state().displacement;
+  };
+  EXPECT_TRUE(bug_end.displacement == run_alone(bug, bug_start));
+  EXPECT_TRUE(head_end.displacement == run_alone(head, head_start));
 }
 
 TEST(PaperGpu, ALaunchThatCudaRefusesIsNamed) {
@@ -407,6 +433,21 @@ Model block_of(Index n) {
   Scene scene = testing::one_body();
   use_paper_rules(scene.bodies[0]);
   return paper_model(scene, cloud);
+}
+
+TEST(PaperGpu, EntriesBeyond31BitsOfTheMatrixAreFound) {
+  if (no_gpu()) GTEST_SKIP() << "no CUDA device";
+  const Model model = block_of(30000);  // 2.7e9 numbers
+  use_cuda_device(0);
+  if (cuda_free_memory() < std::size_t{12} << 30) GTEST_SKIP() << "under 12 GiB are free";
+  std::vector<Vec3d> dense, csr;
+  for (const ForceStore store : {ForceStore::dense, ForceStore::csr}) {
+    const auto backend = make_gpu_backend(model, {.store = store});
+    backend->upload(testing::state_of(deformation(model), 0));
+    backend->internal_forces(store == ForceStore::dense ? dense : csr);
+  }
+  EXPECT_TRUE(dense == csr);
+  EXPECT_GT(norm(dense.back()), 0);
 }
 
 TEST(PaperModel, SixteenBitsNameAtMost65535Phyxels) {

@@ -33,6 +33,22 @@ fs::path file_of(const fs::path& folder, const std::string& table) {
   return folder / (table + ".csv");
 }
 
+/// Figures and page are made anew whenever a table is; what stands there under their names must
+/// have been ours.
+void refuse_foreign_files(const fs::path& folder, bool force) {
+  if (force || is_paper_page(folder / paper_page_name)) return;
+  std::vector<fs::path> files = figure_files(folder);
+  files.push_back(folder / paper_page_name);
+  for (const fs::path& file : files) {
+    if (fs::exists(file)) {
+      throw InputError(
+          fmt::format("{}: exists, and the folder holds no page of phyxel paper; "
+                      "allowed: another --out, or --force",
+                      file.string()));
+    }
+  }
+}
+
 void paper_command(PaperOptions& options) {
   PaperRequest& request = options.request;
   if (request.bodies.empty()) request.bodies = paper::body_names();
@@ -54,6 +70,7 @@ void paper_command(PaperOptions& options) {
                       "folder that phyxel paper has written",
                       request.out.string(), fmt::join(tables, ".csv, ")));
     }
+    refuse_foreign_files(request.out, options.force);
   } else {
     const ChosenDevice device = choose_device(options.device);
     request.gpu = device.gpu;
@@ -73,6 +90,7 @@ void paper_command(PaperOptions& options) {
             fmt::format("{}: exists; allowed: another --out, or --force", file.string()));
       }
     };
+    refuse_foreign_files(request.out, options.force);
     const bool pictures =
         std::find(options.figures.begin(), options.figures.end(), 1) != options.figures.end();
     if (pictures) {
@@ -169,8 +187,8 @@ void add_paper(CLI::App& program) {
   command->footer(
       "Examples:\n"
       "  phyxel paper                              everything, to out/paper\n"
-      "  phyxel paper --figure 5 --repeat 11       one figure\n"
-      "  phyxel paper --table memory --device cuda:1\n"
+      "  phyxel paper --figure 5 --repeat 11 --out out/figure5\n"
+      "  phyxel paper --table memory --device cuda:1 --out out/memory\n"
       "  phyxel paper --redraw --out docs/results/paper");
   command->callback([options] { paper_command(*options); });
 }

@@ -52,33 +52,43 @@ LineChart rates(const CsvTable& frames, const std::string& title, const std::str
   return chart;
 }
 
+/// One object, and as many as were measured, of each body.
 BarChart comparison(const CsvTable& frames, const std::string& title,
                     const std::string& with_surfels) {
-  BarChart chart{title, "frames per second, one object", true, frames.values("body"), {}};
-  std::vector<std::pair<std::string, std::string>> programs;  // program, threads
+  BarChart chart{title, "frames per second", true, {}, {}};
+  std::vector<Match> groups;
+  for (const std::string& body : frames.values("body")) {
+    std::vector<std::string> counts = frames.values(
+        "objects", {{"body", body}, {"program", "sequential of 2008"}, {"frames", "shown"}});
+    if (counts.empty()) counts = {"1"};
+    for (const std::string& objects : counts) {
+      chart.groups.push_back(body + " x " + objects);
+      groups.push_back({{"body", body}, {"objects", objects}});
+    }
+  }
+  std::vector<std::pair<std::string, std::string>> programs;  // program, cores offered
   for (std::size_t r = 0; r < frames.rows.size(); ++r) {
     const std::pair<std::string, std::string> program{frames.text(r, "program"),
-                                                      frames.text(r, "threads")};
+                                                      frames.text(r, "cores")};
     if (std::find(programs.begin(), programs.end(), program) == programs.end()) {
       programs.push_back(program);
     }
   }
-  for (const auto& [program, threads] : programs) {
-    BarChart::Series series{threads == "0" ? program + " (GPU)"
-                                           : fmt::format("{} ({} thread{})", program, threads,
-                                                         threads == "1" ? "" : "s"),
-                            {}};
+  for (const auto& [program, cores] : programs) {
+    const std::string label =
+        cores == "0" ? program + " (GPU)"
+                     : fmt::format("{} ({} core{})", program, cores, cores == "1" ? "" : "s");
+    BarChart::Series series{label, {}};
     bool any = false;
-    for (const std::string& body : chart.groups) {
-      const Curve one = curve_of(frames, "", "objects", "frames_per_s",
-                                 {{"body", body},
-                                  {"program", program},
-                                  {"threads", threads},
-                                  {"objects", "1"},
-                                  {"with_surfels", with_surfels},
-                                  {"frames", "shown"}});
-      any = any || !one.y.empty();
-      series.values.push_back(one.y.empty() ? std::numeric_limits<double>::quiet_NaN() : one.y[0]);
+    for (Match match : groups) {
+      match.insert(match.end(), {{"program", program},
+                                 {"cores", cores},
+                                 {"with_surfels", with_surfels},
+                                 {"frames", "shown"}});
+      const auto row = frames.find(match);
+      any = any || row;
+      series.values.push_back(row ? frames.number(*row, "frames_per_s")
+                                  : std::numeric_limits<double>::quiet_NaN());
     }
     if (any) chart.series.push_back(std::move(series));
   }
@@ -175,6 +185,15 @@ std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
     files.push_back(figure_1_file(request.out, name));
     write_png(files.back(), draw_picture(&surface, &phyxels, setting));
     say(fmt::format("{} after {:.2f} s by {}", files.back().string(), state.time, backend->name()));
+  }
+  return files;
+}
+
+std::vector<fs::path> figure_files(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const char* name :
+       {"figure2", "figure3", "figure4", "figure5", "figure6", "memory", "stiffness"}) {
+    files.push_back(folder / (std::string(name) + ".svg"));
   }
   return files;
 }

@@ -83,19 +83,20 @@ class FrameTable {
     table_.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
     table_.facts.emplace_back("cuda", cuda_version());
     table_.facts.emplace_back("repeats", std::to_string(request.repeat));
-    table_.columns = {"body",         "phyxels",      "surfels",      "program",
-                      "threads",      "objects",      "with_surfels", "frames",
-                      "frames_per_s", "ms_per_frame", "spread"};
+    table_.columns = {"body",   "phyxels",      "surfels",      "program",
+                      "cores",  "threads",      "objects",      "with_surfels",
+                      "frames", "frames_per_s", "ms_per_frame", "spread"};
   }
-  void add(const Body& body, const char* program, int threads, int objects, bool surfels,
+  /// @param cores offered to a CPU program, which may leave some alone; 0: a GPU's
+  void add(const Body& body, const char* program, int cores, int threads, int objects, bool surfels,
            const char* frames, const std::function<void(int)>& run) {
     const Median time = time_frames(request_, run);
     table_.rows.push_back(
         {body.name, std::to_string(body.model.size() / body.scene.bodies.size()),
          std::to_string(body.model.surfels.position.size() / body.scene.bodies.size()), program,
-         std::to_string(threads), std::to_string(objects), surfels ? "yes" : "no", frames,
-         fmt::format("{:.5g}", 1 / time.value), fmt::format("{:.5g}", 1e3 * time.value),
-         fmt::format("{:.3f}", time.spread)});
+         std::to_string(cores), std::to_string(threads), std::to_string(objects),
+         surfels ? "yes" : "no", frames, fmt::format("{:.5g}", 1 / time.value),
+         fmt::format("{:.5g}", 1e3 * time.value), fmt::format("{:.3f}", time.spread)});
     say(fmt::format("{:10} x {:2} {:8} {:22} {:2} threads, {:6}: {:10.1f} frames/s", body.name,
                     objects, surfels ? "surfels" : "phyxels", program, threads, frames,
                     1 / time.value));
@@ -113,10 +114,10 @@ void measure_gpu(const PaperRequest& request, const Body& body, bool surfels, bo
     Objects group(body, objects, surfels, [&](const Model& model) {
       return paper::make_gpu_backend(model, {.device = request.gpu->index});
     });
-    table.add(body, "kernels of 2008", 0, objects, surfels, "shown",
+    table.add(body, "kernels of 2008", 0, 0, objects, surfels, "shown",
               [&](int frames) { group.run(frames, true); });
     if (!queued) continue;
-    table.add(body, "kernels of 2008", 0, objects, surfels, "queued",
+    table.add(body, "kernels of 2008", 0, 0, objects, surfels, "queued",
               [&](int frames) { group.run(frames, false); });
   }
 }
@@ -128,21 +129,22 @@ void measure_cpu(const Body& one, const Body& together, bool surfels, FrameTable
     const int objects = static_cast<int>(all->scene.bodies.size());
     if (all == &together && objects == 1) break;
     Objects group(one, objects, surfels, paper::make_sequential_backend<float>);
-    table.add(one, "sequential of 2008", 1, objects, surfels, "shown",
+    table.add(one, "sequential of 2008", 1, 1, objects, surfels, "shown",
               [&](int frames) { group.run(frames, true); });
 
-    std::vector<int> threads{1};
-    if (omp_get_num_procs() > 1) threads.push_back(omp_get_num_procs());
-    for (const int t : threads) {
-      const auto backend = make_cpu_backend(all->model, Precision::single, t);
+    std::vector<int> cores{1};
+    if (omp_get_num_procs() > 1) cores.push_back(omp_get_num_procs());
+    for (const int c : cores) {
+      const auto backend = make_cpu_backend(all->model, Precision::single, c);
       Solver solver(*backend, all->start);
       SurfelState vertices;
-      table.add(*all, "phyxel CPU", t, objects, surfels, "shown", [&](int frames) {
-        for (int f = 0; f < frames; ++f) {
-          solver.step();
-          if (surfels) backend->advect_surfels(vertices);
-        }
-      });
+      table.add(*all, "phyxel CPU", c, backend->threads(), objects, surfels, "shown",
+                [&](int frames) {
+                  for (int f = 0; f < frames; ++f) {
+                    solver.step();
+                    if (surfels) backend->advect_surfels(vertices);
+                  }
+                });
     }
   }
 }

@@ -90,12 +90,18 @@ CsvTable measure_memory(const PaperRequest& request) {
     const Model model = block_of(n);
     for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
       const bool dense = store == paper::ForceStore::dense;
-      const std::size_t before = cuda_free_memory();
-      const auto backend =
-          paper::make_gpu_backend(model, {.store = store, .device = request.gpu->index});
-      const std::size_t taken = before - cuda_free_memory();
-      add(n, 1, dense ? 3 : 0, dense ? "kernels of 2008" : "CSR gather", bytes_of(*backend), taken,
-          steps_per_second(*backend, model, request), "fits");
+      const int numbers = dense ? 3 : 0;
+      const char* program = dense ? "kernels of 2008" : "CSR gather";
+      try {
+        const std::size_t before = cuda_free_memory();
+        const auto backend =
+            paper::make_gpu_backend(model, {.store = store, .device = request.gpu->index});
+        const std::size_t taken = before - cuda_free_memory();
+        add(n, 1, numbers, program, bytes_of(*backend), taken,
+            steps_per_second(*backend, model, request), "fits");
+      } catch (const DeviceError& error) {
+        add(n, 1, numbers, program, 0, 0, 0, error.what());
+      }
     }
     // The paper's figure, 34.33 MB for 1,000 phyxels, is that of nine numbers a pair.
     const std::size_t nine =

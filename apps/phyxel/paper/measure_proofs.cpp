@@ -51,7 +51,9 @@ template <class T>
 double distance(const std::vector<T>& a, const std::vector<T>& b) {
   double error = 0, size = 0;
   for (std::size_t k = 0; k < b.size(); ++k) {
-    error = std::max(error, size_of(a[k] - b[k]));
+    const double apart = size_of(a[k] - b[k]);
+    if (!std::isfinite(apart)) return apart;  // which a maximum would hide
+    error = std::max(error, apart);
     size = std::max(size, size_of(b[k]));
   }
   return size > 0 ? error / size : error;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <optional>
 
@@ -15,6 +16,8 @@ namespace phyxel::app {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* first_line = "# The 2008 paper, run again";
 
 /// What the paper prints: speedups of section 6.2 ("about 20 times").
 struct Printed {
@@ -45,7 +48,8 @@ class Page {
   explicit Page(fs::path folder) : folder_(std::move(folder)) {}
 
   std::string write() {
-    text_ = "# The 2008 paper, run again\n\n";
+    text_ = first_line;
+    text_ += "\n\n";
     text_ +=
         "Written by `phyxel paper` from the CSV files beside it. Farias, Almeida, Teixeira, "
         "Teichrieb, Kelner: *A High Performance Massively Parallel Approach for Real Time "
@@ -87,8 +91,8 @@ class Page {
         "A frame is one time step of every object, each by its own launches of "
         "`calcStrainStressA`, `calcStrainStressB`, `integrate` and, with surfels, "
         "`updateSurfels`; *shown* frames end with the host knowing that they are done, *queued* "
-        "ones follow each other without waiting. Medians over " +
-        t.fact("repeats") + " repeats, float.\n\n";
+        "ones follow each other without waiting. Float; medians over " +
+        t.fact("repeats") + " repeats.\n\n";
     speedups(t);
     for (int f = 2; f <= 6; ++f) {
       figure(fmt::format("figure{}.svg", f), fmt::format("Figure {}", f));
@@ -96,82 +100,101 @@ class Page {
     all_rates(t);
   }
 
-  /// One object: GPU over each CPU program.
+  /// GPU over each CPU program, for one object and for as many as the CPU was given.
   void speedups(const CsvTable& t) {
-    const std::vector<std::string> threads = t.values("threads", {{"program", "phyxel CPU"}});
-    std::vector<std::string> head{"body", "phyxels", "surfels", "the paper prints"};
-    const auto rate = [&](const std::string& body, const char* program, const std::string& n,
-                          const char* surfels) {
-      const auto row = t.find({{"body", body},
-                               {"program", program},
-                               {"threads", n},
-                               {"objects", "1"},
-                               {"with_surfels", surfels},
-                               {"frames", "shown"}});
-      return row ? t.number(*row, "frames_per_s") : NAN;
+    struct Program {
+      std::string name, cores;
     };
+    std::vector<Program> programs{{"sequential of 2008", "1"}};
+    for (const std::string& cores : t.values("cores", {{"program", "phyxel CPU"}})) {
+      programs.push_back({"phyxel CPU", cores});
+    }
+    std::vector<std::string> head{"body", "phyxels", "surfels", "objects", "the paper prints"};
+    for (const char* what : {"phyxels", "phyxels + surfels"}) {
+      for (const Program& p : programs) {
+        head.push_back(fmt::format("{}: GPU / {}, {} core{}", what, p.name, p.cores,
+                                   p.cores == "1" ? "" : "s"));
+      }
+    }
     std::vector<std::vector<std::string>> rows;
     bool any = false;
-    for (const Printed& p : printed) {
-      const auto some = t.find({{"body", p.body}});
-      if (!some) continue;
-      std::vector<std::string> row{p.body, t.text(*some, "phyxels"), t.text(*some, "surfels"),
-                                   fmt::format("{}", p.speedup)};
-      head.resize(4);
-      for (const char* surfels : {"no", "yes"}) {
-        const char* what = surfels[0] == 'y' ? "phyxels + surfels" : "phyxels";
-        const double gpu = rate(p.body, "kernels of 2008", "0", surfels);
-        const auto ratio = [&](const std::string& label, double cpu) {
-          head.push_back(fmt::format("{}: GPU / {}", what, label));
-          row.push_back(std::isfinite(gpu / cpu) ? fmt::format("{:.3g}", gpu / cpu) : "–");
-          any = any || std::isfinite(gpu / cpu);
+    for (const Printed& printed_one : printed) {
+      const Match body{{"body", printed_one.body}, {"frames", "shown"}};
+      Match on_cpu = body;
+      on_cpu.emplace_back("program", "sequential of 2008");
+      for (const std::string& objects : t.values("objects", on_cpu)) {
+        const auto rate = [&](const Program& program, const char* surfels) {
+          Match match = body;
+          match.insert(match.end(), {{"program", program.name},
+                                     {"cores", program.cores},
+                                     {"objects", objects},
+                                     {"with_surfels", surfels}});
+          const auto row = t.find(match);
+          return row ? t.number(*row, "frames_per_s") : NAN;
         };
-        ratio("sequential, 1 core", rate(p.body, "sequential of 2008", "1", surfels));
-        for (const std::string& n : threads) {
-          ratio(fmt::format("phyxel CPU, {} thread{}", n, n == "1" ? "" : "s"),
-                rate(p.body, "phyxel CPU", n, surfels));
+        const auto some = t.find(body);
+        std::vector<std::string> row{printed_one.body, t.text(*some, "phyxels"),
+                                     t.text(*some, "surfels"), objects,
+                                     objects == "1" ? fmt::format("{}", printed_one.speedup) : ""};
+        for (const char* surfels : {"no", "yes"}) {
+          for (const Program& program : programs) {
+            const double ratio = rate({"kernels of 2008", "0"}, surfels) / rate(program, surfels);
+            row.push_back(std::isfinite(ratio) ? fmt::format("{:.3g}", ratio) : "–");
+            any = any || std::isfinite(ratio);
+          }
         }
+        rows.push_back(row);
       }
-      rows.push_back(row);
     }
     if (!any) {
       text_ += "No GPU was measured, so there are no speedups.\n\n";
       return;
     }
     text_ += fmt::format(
-        "Speedup of the GPU, one object. The paper's figures are for {}. *Sequential* is the "
-        "program that the paper describes, one phyxel after the other on one core of today; "
-        "*phyxel CPU* is this project's own solver (vector units, threads), which the kernels of "
-        "2008 meet on unequal terms: a body of a few hundred phyxels fills a hundredth of today's "
-        "GPU, and three or four launches a frame are most of its time.\n\n",
+        "Speedups of the GPU. The paper's figures are for one object on {}. *Sequential* is the "
+        "program that the paper describes, one phyxel after the other on one core of today. "
+        "*phyxel "
+        "CPU* is this project's own solver: vector units and, from 800 phyxels on, several cores, "
+        "of "
+        "which a single one of these bodies therefore uses one. The kernels of 2008 take one body "
+        "a "
+        "launch, a thread a phyxel: each launch takes as long as a thread needs to walk its list, "
+        "however empty the GPU is, and objects follow one another.\n\n",
         printed_hardware);
     text_ += table_text(head, rows);
   }
 
   void all_rates(const CsvTable& t) {
-    std::vector<std::string> head{"body", "surfels", "program", "threads", "frames"};
+    std::vector<std::string> head{"body",  "surfels",         "program",
+                                  "cores", "threads at work", "frames"};
     const std::vector<std::string> counts = t.values("objects");
     for (const std::string& n : counts) head.push_back(n + (n == "1" ? " object" : " objects"));
     std::vector<std::vector<std::string>> rows;
     for (const std::string& body : t.values("body")) {
       for (const std::string& surfels : t.values("with_surfels")) {
         for (const std::string& program : t.values("program")) {
-          for (const std::string& threads : t.values("threads", {{"program", program}})) {
+          for (const std::string& cores : t.values("cores", {{"program", program}})) {
             for (const std::string& how : t.values("frames")) {
-              std::vector<std::string> row{body, surfels, program, threads == "0" ? "GPU" : threads,
-                                           how};
-              bool any = false;
+              const Match match{{"body", body},
+                                {"with_surfels", surfels},
+                                {"program", program},
+                                {"cores", cores},
+                                {"frames", how}};
+              if (!t.find(match)) continue;
+              const bool gpu = cores == "0";
+              std::vector<std::string> row{
+                  body,
+                  surfels,
+                  program,
+                  gpu ? "GPU" : cores,
+                  gpu ? "" : fmt::format("{}", fmt::join(t.values("threads", match), ", ")),
+                  how};
               for (const std::string& n : counts) {
-                row.push_back(cell(t, "frames_per_s",
-                                   {{"body", body},
-                                    {"with_surfels", surfels},
-                                    {"program", program},
-                                    {"threads", threads},
-                                    {"frames", how},
-                                    {"objects", n}}));
-                any = any || row.back() != "–";
+                Match one = match;
+                one.emplace_back("objects", n);
+                row.push_back(cell(t, "frames_per_s", one));
               }
-              if (any) rows.push_back(row);
+              rows.push_back(row);
             }
           }
         }
@@ -307,11 +330,13 @@ class Page {
         "alone decides, fall as 1/E. A displacement u rounds to ε|u|, so a difference of "
         "neighbours "
         "carries a strain error of about ε|u|/spacing, and a stress error of E times that: the "
-        "share of rounding in the stress grows with E, and with the number of steps that its noise "
-        "has time to shake the bar (smaller steps are more steps, and their Δt²f/m is lost against "
-        "u the sooner). Error of the stress, over the largest stress, against long double with the "
-        "same step; at 1.1 of the limit, against half the step: there every precision "
-        "diverges.\n\n";
+        "share "
+        "of rounding in the stress grows with E. It is largest for the smallest steps, of which "
+        "there "
+        "are most and whose Δt²f/m is the smallest beside u. Error of the stress, over the largest "
+        "stress, against long double with the same step; at 1.1 of the limit, against half the "
+        "step: "
+        "there every precision diverges.\n\n";
     std::vector<std::string> head{"E [Pa]", "stress [Pa]"};
     std::vector<Match> columns;
     for (const std::string& precision : t.values("precision")) {
@@ -331,26 +356,37 @@ class Page {
       rows.push_back(row);
     }
     text_ += table_text(head, rows);
-    for (const std::string& precision : t.values("precision")) breaks(t, precision);
+    text_ += "From which E on more than a tenth of the stress is rounding:\n\n";
+    std::vector<std::vector<std::string>> limits;
+    for (const std::string& precision : t.values("precision")) {
+      std::vector<std::string> row{precision};
+      for (const char* fraction : stable_fractions) row.push_back(breaks(t, precision, fraction));
+      limits.push_back(row);
+    }
+    std::vector<std::string> limits_head{"precision"};
+    for (const char* fraction : stable_fractions) {
+      limits_head.push_back(fmt::format("{} Δt_max", fraction));
+    }
+    text_ += table_text(limits_head, limits);
     figure("stiffness.svg", "Error of the stress against Young's modulus");
   }
 
-  /// From which E on a tenth of the stress is rounding.
-  void breaks(const CsvTable& t, const std::string& precision) {
-    double first = INFINITY;
+  static constexpr const char* stable_fractions[] = {"0.1", "0.5", "0.9"};
+
+  /// The first E of the table with an error of a tenth or more; where there is none, the E that the
+  /// last row's error extrapolates to, growing as E does.
+  static std::string breaks(const CsvTable& t, const std::string& precision,
+                            const std::string& fraction) {
+    double last_young = 0, last_error = 0;
     for (std::size_t r = 0; r < t.rows.size(); ++r) {
-      if (t.text(r, "precision") != precision || t.number(r, "step_of_limit") != 0.5) continue;
-      if (!(t.number(r, "stress_error") < 0.1)) first = std::min(first, t.number(r, "young_pa"));
+      if (!t.matches(r, {{"precision", precision}, {"step_of_limit", fraction}})) continue;
+      last_young = t.number(r, "young_pa");
+      last_error = t.number(r, "stress_error");
+      if (!(last_error < 0.1)) return fmt::format("{:g} Pa", last_young);
     }
-    text_ += std::isfinite(first)
-                 ? fmt::format(
-                       "At half the largest step, in {}, more than a tenth of the stress is "
-                       "rounding from E = {:g} Pa on.\n\n",
-                       precision, first)
-                 : fmt::format(
-                       "At half the largest step, in {}, rounding stays below a tenth of the "
-                       "stress over the whole table.\n\n",
-                       precision);
+    return last_error > 0 ? fmt::format("about {:.0e} Pa, extrapolated from the last row",
+                                        last_young * 0.1 / last_error)
+                          : "–";
   }
 
   fs::path folder_;
@@ -358,6 +394,12 @@ class Page {
 };
 
 }  // namespace
+
+bool is_paper_page(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  return std::getline(in, line) && line == first_line;
+}
 
 void write_paper_page(const fs::path& folder) {
   write_whole_file(folder / paper_page_name, Page(folder).write(), Durable::no);

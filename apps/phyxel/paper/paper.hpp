@@ -45,11 +45,17 @@ std::filesystem::path figure_1_file(const std::filesystem::path& folder, const s
 /// Figure 1: each body in motion, with its phyxels. @returns the files.
 std::vector<std::filesystem::path> draw_figure_1(const PaperRequest& request);
 
-/// Figures 2 to 6 and two more, from the tables in `folder`. @returns the files.
+/// Names that figures 2 to 6 and two more take in `folder`.
+std::vector<std::filesystem::path> figure_files(const std::filesystem::path& folder);
+
+/// Draws them from the tables in `folder`; removes those for which a table has no rows any more.
+/// @returns the files drawn.
 std::vector<std::filesystem::path> draw_figures(const std::filesystem::path& folder);
 
 /// The page, from the tables and figures in `folder`.
 inline constexpr const char* paper_page_name = "paper.md";
+/// Whether the file begins as our pages do.
+bool is_paper_page(const std::filesystem::path& file);
 void write_paper_page(const std::filesystem::path& folder);
 
 /// One line on the terminal while measuring.

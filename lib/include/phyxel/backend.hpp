@@ -26,6 +26,8 @@ class Backend {
   /// e.g. "cpu, float, 2 threads, 16 lanes".
   virtual std::string name() const = 0;
   virtual Index size() const = 0;
+  /// Threads of the CPU that share the work; 0: it is another device's.
+  virtual int threads() const = 0;
   virtual void upload(const State& state) = 0;
   virtual void download(State& state) const = 0;
 

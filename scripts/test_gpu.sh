@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# On a machine with a GPU: all tests of the CUDA build, then NVIDIA's sanitizers on the kernels.
+#
+#   scripts/test_gpu.sh [summary.txt]     after cmake --preset cuda && cmake --build --preset cuda
+#
+# Ends with exit code 1 if anything failed. With a file name, a summary goes there too.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+
+if ! nvidia-smi -L >/dev/null 2>&1; then
+  echo "scripts/test_gpu.sh: no NVIDIA GPU here; scripts/test.sh tests everything else" >&2
+  exit 1
+fi
+tests=build/cuda/tests
+logs=build/cuda/gpu-logs
+mkdir -p "$logs"
+summary=$logs/summary.txt
+failed=0
+
+say() { echo "$*" | tee -a "$summary"; }
+
+: >"$summary"
+say "$(build/cuda/bin/phyxel --version), $(nvidia-smi --query-gpu=name --format=csv,noheader | head -1), $(date -u +%F)"
+
+OMP_WAIT_POLICY=passive ctest --test-dir build/cuda -j "$(nproc)" --timeout 300 --output-on-failure \
+  >"$logs/ctest.log" 2>&1 || failed=1
+say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
+
+# Small cases: each tool slows kernels down a hundredfold. `device_test` faults on purpose.
+check() {
+  local program=$1 filter=$2 tool log
+  for tool in memcheck racecheck initcheck synccheck; do
+    log=$logs/${program}_$tool.log
+    compute-sanitizer --tool "$tool" --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" \
+      >"$log" 2>&1 || failed=1
+    say "compute-sanitizer $tool, $program, $(grep -E '^\[==========\] [0-9]+ tests? from .* ran' "$log" |
+      sed -E 's/.*\] ([0-9]+ tests?) .*/\1/'): $(grep SUMMARY "$log" | tail -1 | sed 's/^=* //')"
+  done
+}
+check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
+check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
+check physics_device_test '*'
+
+if [[ -n ${1-} ]]; then
+  cp "$summary" "$1"
+fi
+exit $failed
