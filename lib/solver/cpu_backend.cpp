@@ -10,15 +10,16 @@
 #include <omp.h>
 
 #include <cmath>
+#include <optional>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/physics/stress.hpp"
-#include "phyxel/physics/surfel.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/cpu_layout.hpp"
+#include "solver/cpu_surfels.hpp"
 #include "solver/pack.hpp"
 
 namespace phyxel {
@@ -147,25 +148,28 @@ class CpuBackend final : public Backend {
   }
 
   void advect_surfels(SurfelState& out) override {
-    const Surfels& surfels = model_.surfels;
-    std::vector<Mat3d> gradient;
-    displacement_gradients(gradient);
-    out.position.resize(surfels.position.size());
-    out.normal.resize(surfels.position.size());
+    if (!surfels_) surfels_.emplace(model_, layout_);
+    AlignedVector<StateReal> records(static_cast<std::size_t>(layout_.slots()) *
+                                     CarrierRecord::size);
 #pragma omp parallel for schedule(static) num_threads(threads_)
-    for (std::size_t s = 0; s < surfels.position.size(); ++s) {
-      SurfelBlend<double> blend;
-      const auto carriers = surfels.carriers.row(static_cast<Index>(s));
-      for (const Index i : carriers) {
-        const Vec3d x_is = surfels.position[s] - model_.position[i];
-        const double h = model_.neighbourhood.support[i];
-        // A lone carrier may be out of reach (h too small); its weight cancels anyway.
-        const double w = carriers.size() == 1 ? 1 : weight(norm(x_is), h);
-        blend.add(w, get3(displacement_, layout_.slot(i)), gradient[i], x_is);
+    for (Index p = 0; p < layout_.packs(); ++p) {
+      const Mat3<P> grad_u = displacement_gradient_of(p);
+      const Vec3<P> x = point_of(p, PointRecord::position);
+      const Vec3<S> u = vec3_of<S>(displacement_, p);
+      for (int l = 0; l < W; ++l) {
+        StateReal* record = &records[static_cast<std::size_t>(p * W + l) * CarrierRecord::size];
+        for (int e = 0; e < 9; ++e) {
+          record[CarrierRecord::gradient + e] = grad_u(e / 3, e % 3)[l];
+        }
+        const Real at[] = {x.x[l], x.y[l], x.z[l]};
+        const StateReal moved[] = {u.x[l], u.y[l], u.z[l]};
+        for (int c = 0; c < 3; ++c) {
+          record[CarrierRecord::position + c] = at[c];
+          record[CarrierRecord::displacement + c] = moved[c];
+        }
       }
-      out.position[s] = surfels.position[s] + blend.surfel_displacement();
-      out.normal[s] = normalised(blend.surfel_normal(surfels.normal[s]));
     }
+    surfels_->advect(records, threads_, out);
   }
 
   std::vector<ArrayBytes> memory() const override {
@@ -180,6 +184,7 @@ class CpuBackend final : public Backend {
         {"neighbour lists", lists_.bytes()}};
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
     if (!load_.empty()) list.push_back({"loads", load_.size() * sizeof(Real)});
+    if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
 
@@ -453,6 +458,7 @@ class CpuBackend final : public Backend {
   AlignedVector<StateReal> displacement_, velocity_;
   AlignedVector<Real> load_;  // empty unless the scene has loads
   double load_scales_ = -1;
+  std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
 };
 
 }  // namespace

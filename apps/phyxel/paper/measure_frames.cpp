@@ -138,7 +138,7 @@ void measure_cpu(const Body& one, const Body& together, bool surfels, FrameTable
       const auto backend = make_cpu_backend(all->model, Precision::single, c);
       Solver solver(*backend, all->start);
       SurfelState vertices;
-      table.add(*all, "phyxel CPU", c, backend->threads(), objects, surfels, "shown",
+      table.add(*all, "phyxel CPU", c, surfels ? c : backend->threads(), objects, surfels, "shown",
                 [&](int frames) {
                   for (int f = 0; f < frames; ++f) {
                     solver.step();

@@ -153,13 +153,11 @@ class Page {
     text_ += fmt::format(
         "Speedups of the GPU. The paper's figures are for one object on {}. *Sequential* is the "
         "program that the paper describes, one phyxel after the other on one core of today. "
-        "*phyxel "
-        "CPU* is this project's own solver: vector units and, from 800 phyxels on, several cores, "
-        "of "
-        "which a single one of these bodies therefore uses one. The kernels of 2008 take one body "
-        "a "
-        "launch, a thread a phyxel: each launch takes as long as a thread needs to walk its list, "
-        "however empty the GPU is, and objects follow one another.\n\n",
+        "*phyxel CPU* is this project's own solver with vector units; several cores share surfels, "
+        "and phyxels from 800 on, so that a single one of these bodies is stepped by one core. The "
+        "kernels of 2008 take one body a launch, a thread a phyxel: each launch takes as long as a "
+        "thread needs to walk its list, however empty the GPU is, and objects follow one "
+        "another.\n\n",
         printed_hardware);
     text_ += table_text(head, rows);
   }
