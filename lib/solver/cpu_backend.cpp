@@ -291,8 +291,7 @@ class CpuBackend final : public Backend {
       const Vec3<P> u{convert<Real>(displacement.x), convert<Real>(displacement.y),
                       convert<Real>(displacement.z)};
       for (int l = 0; l < W; ++l) {
-        Real* record = &points_[static_cast<std::size_t>(p * W + l) * PointRecord::size +
-                                PointRecord::displacement];
+        Real* record = point_record(p * W + l) + PointRecord::displacement;
         record[0] = u.x[l];
         record[1] = u.y[l];
         record[2] = u.z[l];
@@ -362,6 +361,16 @@ class CpuBackend final : public Backend {
   // --- records
   // --------------------------------------------------------------------------------------
 
+  // An offset in records outgrows 32 bits long before a slot does.
+  PHYXEL_HD Real* point_record(Index slot) {
+    return points_.data() + std::ptrdiff_t{slot} * PointRecord::size;
+  }
+  PHYXEL_HD const Real* point_record(Index slot) const {
+    return points_.data() + std::ptrdiff_t{slot} * PointRecord::size;
+  }
+  PHYXEL_HD Real* stress_record(Index slot) {
+    return stresses_.data() + std::ptrdiff_t{slot} * StressRecord::size;
+  }
   PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
     return {record[first], record[first + 1], record[first + 2]};
   }
@@ -372,8 +381,7 @@ class CpuBackend final : public Backend {
   }
   PHYXEL_HD P own_point_value(Index p, int which) const {
     P value;
-    for (int l = 0; l < W; ++l)
-      value.lanes[l] = points_[static_cast<std::size_t>(p * W + l) * PointRecord::size + which];
+    for (int l = 0; l < W; ++l) value.lanes[l] = point_record(p * W + l)[which];
     return value;
   }
   PHYXEL_HD Vec3<P> point_of(Index p, int first) const {
@@ -382,8 +390,7 @@ class CpuBackend final : public Backend {
   }
   PHYXEL_HD void store_pair_stress(Index p, const Mat3<P>& q) {
     for (int l = 0; l < W; ++l) {
-      Real* record = &stresses_[static_cast<std::size_t>(p * W + l) * StressRecord::size +
-                                StressRecord::pair_stress];
+      Real* record = stress_record(p * W + l) + StressRecord::pair_stress;
       for (int e = 0; e < 9; ++e) record[e] = q(e / 3, e % 3)[l];
     }
   }
@@ -401,11 +408,10 @@ class CpuBackend final : public Backend {
       const Index slot = layout_.slot(i);
       const Vec3d x = model_.position[i] - origin;
       const double h = model_.neighbourhood.support[i];
-      Real* point = &points_[static_cast<std::size_t>(slot) * PointRecord::size];
-      Real* stress_record = &stresses_[static_cast<std::size_t>(slot) * StressRecord::size];
+      Real *point = point_record(slot), *stress = stress_record(slot);
       set_values(point + PointRecord::position, x);
-      set_values(stress_record + StressRecord::position, x);
-      point[PointRecord::inverse_h_squared] = stress_record[StressRecord::inverse_h_squared] =
+      set_values(stress + StressRecord::position, x);
+      point[PointRecord::inverse_h_squared] = stress[StressRecord::inverse_h_squared] =
           h > 0 ? static_cast<Real>(1 / (h * h)) : Real(0);
       const Sym3d& a = model_.inverse_moment[i];
       const double entries[] = {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
@@ -427,9 +433,7 @@ class CpuBackend final : public Backend {
     const Index slot = layout_.slot(i);
     set3(displacement_, slot, u);
     set3(velocity_, slot, v);
-    set_values(
-        &points_[static_cast<std::size_t>(slot) * PointRecord::size + PointRecord::displacement],
-        u);
+    set_values(point_record(slot) + PointRecord::displacement, u);
   }
 
   /// Sums the loads at `time`; again only while one of them still grows.

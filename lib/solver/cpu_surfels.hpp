@@ -3,11 +3,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "phyxel/physics/surfel.hpp"
-#include "phyxel/physics/weight.hpp"
 #include "phyxel/state.hpp"
+#include "solver/carrier_weights.hpp"
 #include "solver/cpu_layout.hpp"
 #include "solver/pack.hpp"
 
@@ -88,24 +87,16 @@ class CpuSurfels {
   }
 
  private:
-  /// Weights over the surfel's largest: only ratios matter, and full weights of a small body leave
-  /// the range of float. Lanes with fewer carriers repeat their first, with weight zero.
+  /// Lanes with fewer carriers repeat their first, with weight zero.
   void set_carriers(const Layout& layout, Index s) {
     const auto carriers = model_.surfels.carriers.row(s);
-    std::vector<double> full;
-    for (const Index i : carriers) {
-      full.push_back(weight(norm(model_.surfels.position[s] - model_.position[i]),
-                            model_.neighbourhood.support[i]));
-    }
-    const double largest = *std::max_element(full.begin(), full.end());
+    const std::vector<double> weights = carrier_weights(model_, s);
     const Index p = s / W, lane = s % W;
     const auto longest = static_cast<std::size_t>((start_[p + 1] - start_[p]) / W);
     for (std::size_t k = 0; k < longest; ++k) {
       const auto at = static_cast<std::size_t>(start_[p]) + k * W + static_cast<std::size_t>(lane);
       carrier_[at] = layout.slot(carriers[k < carriers.size() ? k : 0]);
-      if (k >= carriers.size()) continue;
-      // A lone carrier may be out of reach (h too small).
-      weight_[at] = static_cast<Real>(largest > 0 ? full[k] / largest : 1);
+      if (k < carriers.size()) weight_[at] = static_cast<Real>(weights[k]);
     }
   }
 

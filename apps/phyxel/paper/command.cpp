@@ -29,8 +29,9 @@ struct PaperOptions {
 const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
                                           paper_table::memory, paper_table::stiffness};
 
-fs::path file_of(const fs::path& folder, const std::string& table) {
-  return folder / (table + ".csv");
+template <class T, class U>
+bool contains(const std::vector<T>& list, const U& value) {
+  return std::find(list.begin(), list.end(), value) != list.end();
 }
 
 /// Figures and page are made anew whenever a table is; what stands there under their names must
@@ -54,7 +55,7 @@ void paper_command(PaperOptions& options) {
   if (request.bodies.empty()) request.bodies = paper::body_names();
   for (const std::string& body : request.bodies) paper::body_scene(body);  // is there such a body?
   for (const std::string& table : options.tables) {
-    if (std::find(all_tables.begin(), all_tables.end(), table) == all_tables.end()) {
+    if (!contains(all_tables, table)) {
       throw InputError(fmt::format("--table {}: unknown{}; allowed: {}", table,
                                    did_you_mean(table, all_tables), fmt::join(all_tables, ", ")));
     }
@@ -63,7 +64,7 @@ void paper_command(PaperOptions& options) {
     std::vector<std::string> tables = all_tables;
     tables.push_back(paper_table::frames);
     if (std::none_of(tables.begin(), tables.end(), [&](const std::string& table) {
-          return fs::exists(file_of(request.out, table));
+          return fs::exists(table_file(request.out, table));
         })) {
       throw InputError(
           fmt::format("{}: none of the tables is there ({}.csv); allowed: --out with a "
@@ -91,22 +92,19 @@ void paper_command(PaperOptions& options) {
       }
     };
     refuse_foreign_files(request.out, options.force);
-    const bool pictures =
-        std::find(options.figures.begin(), options.figures.end(), 1) != options.figures.end();
+    const bool pictures = contains(options.figures, 1);
     if (pictures) {
       for (const std::string& body : request.bodies) {
         refuse_if_there(figure_1_file(request.out, body));
       }
     }
-    if (!rates.empty()) refuse_if_there(file_of(request.out, paper_table::frames));
-    for (const std::string& table : options.tables) refuse_if_there(file_of(request.out, table));
+    if (!rates.empty()) refuse_if_there(table_file(request.out, paper_table::frames));
+    for (const std::string& table : options.tables) refuse_if_there(table_file(request.out, table));
     make_writable_folder(request.out);
 
     if (!request.gpu) {
       say("left out, for " + request.why_no_gpu + ":");
-      const auto has = [&](int f) {
-        return std::find(rates.begin(), rates.end(), f) != rates.end();
-      };
+      const auto has = [&](int figure) { return contains(rates, figure); };
       if (has(2)) say("  figure 2 (GPU frame rates, phyxels)");
       if (has(3)) say("  figure 3 (GPU frame rates, surfels)");
       if (has(4) || has(5) || has(6)) say("  the GPU's part of figures 4, 5 and 6");
@@ -120,7 +118,7 @@ void paper_command(PaperOptions& options) {
 
     if (pictures) draw_figure_1(request);
     if (!rates.empty()) {
-      write_csv(file_of(request.out, paper_table::frames), measure_frames(request, rates));
+      write_csv(table_file(request.out, paper_table::frames), measure_frames(request, rates));
     }
     const struct {
       const char* name;
@@ -131,11 +129,8 @@ void paper_command(PaperOptions& options) {
                         {paper_table::memory, measure_memory, true},
                         {paper_table::stiffness, measure_stiffness, false}};
     for (const auto& m : measurements) {
-      if (std::find(options.tables.begin(), options.tables.end(), m.name) == options.tables.end()) {
-        continue;
-      }
-      if (m.needs_gpu && !request.gpu) continue;
-      write_csv(file_of(request.out, m.name), m.measure(request));
+      if (!contains(options.tables, m.name) || (m.needs_gpu && !request.gpu)) continue;
+      write_csv(table_file(request.out, m.name), m.measure(request));
     }
   }
   if (can_plot()) {

@@ -200,11 +200,6 @@ std::vector<fs::path> figure_files(const fs::path& folder) {
 
 std::vector<fs::path> draw_figures(const fs::path& folder) {
   std::vector<fs::path> files;
-  const auto table_of = [&](const char* name) -> std::optional<CsvTable> {
-    const fs::path file = folder / (std::string(name) + ".csv");
-    if (!fs::exists(file)) return std::nullopt;
-    return read_csv(file);
-  };
   const auto draw = [&](const char* name, const auto& chart, bool any) {
     const fs::path file = folder / (std::string(name) + ".svg");
     if (!any) {
@@ -220,17 +215,17 @@ std::vector<fs::path> draw_figures(const fs::path& folder) {
   const auto draw_bars = [&](const char* name, const BarChart& chart) {
     draw(name, chart, !chart.series.empty());
   };
-  if (const auto frames = table_of(paper_table::frames)) {
+  if (const auto frames = read_table(folder, paper_table::frames)) {
     draw_lines("figure2", rates(*frames, "Figure 2: phyxels only, kernels of 2008", "no"));
     draw_lines("figure3", rates(*frames, "Figure 3: phyxels and surfels, kernels of 2008", "yes"));
     draw_bars("figure4", comparison(*frames, "Figure 4: CPU and GPU, phyxels only", "no"));
     draw_bars("figure5", comparison(*frames, "Figure 5: CPU and GPU, phyxels and surfels", "yes"));
     draw_lines("figure6", absolute_times(*frames));
   }
-  if (const auto memory = table_of(paper_table::memory)) {
+  if (const auto memory = read_table(folder, paper_table::memory)) {
     draw_lines("memory", memory_chart(*memory));
   }
-  if (const auto stiffness = table_of(paper_table::stiffness)) {
+  if (const auto stiffness = read_table(folder, paper_table::stiffness)) {
     draw_lines("stiffness", stiffness_chart(*stiffness));
   }
   return files;

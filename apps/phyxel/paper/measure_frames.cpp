@@ -79,9 +79,7 @@ class Objects {
 class FrameTable {
  public:
   explicit FrameTable(const PaperRequest& request) : request_(request) {
-    table_.facts = machine_facts();
-    table_.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
-    table_.facts.emplace_back("cuda", cuda_version());
+    table_.facts = paper_facts(request);
     table_.facts.emplace_back("repeats", std::to_string(request.repeat));
     table_.columns = {"body",   "phyxels",      "surfels",      "program",
                       "cores",  "threads",      "objects",      "with_surfels",

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "paper.hpp"
 #include "paper/paper_backend.hpp"
@@ -70,9 +69,7 @@ std::size_t bytes_of(const Backend& backend) {
 
 CsvTable measure_memory(const PaperRequest& request) {
   CsvTable table;
-  table.facts = machine_facts();
-  table.facts.emplace_back("gpu", request.gpu->describe());
-  table.facts.emplace_back("cuda", cuda_version());
+  table.facts = paper_facts(request);
   table.columns = {"phyxels",     "bodies",         "numbers_a_pair", "program",
                    "array_bytes", "measured_bytes", "steps_per_s",    "answer"};
   const auto add = [&](Index n, int bodies, int numbers, const char* program, std::size_t arrays,
@@ -221,9 +218,7 @@ struct SpinCase {
 
 CsvTable measure_stiffness(const PaperRequest& request) {
   CsvTable table;
-  table.facts = machine_facts();
-  table.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
-  table.facts.emplace_back("cuda", cuda_version());
+  table.facts = paper_facts(request);
   table.columns = {
       "young_pa",           "step_of_limit", "step_s",           "steps", "program", "precision",
       "displacement_error", "stress_error",  "largest_stress_pa"};
@@ -248,34 +243,20 @@ CsvTable measure_stiffness(const PaperRequest& request) {
     c.exact = spin(*paper::make_sequential_backend<long double>(c.bar.model), c.bar,
                    above ? c.dt / 2 : c.dt, above ? 2 * c.steps : c.steps);
   }
-  struct Arithmetic {
-    const char *program, *precision;
-    std::function<std::unique_ptr<PaperBackend>(const Model&)> make;
-  };
-  std::vector<Arithmetic> arithmetics;
-  if (request.gpu) {
-    for (const Precision precision : {Precision::single, Precision::double_}) {
-      arithmetics.push_back(
-          {"kernels of 2008", precision_name(precision), [=, &request](const Model& model) {
-             return paper::make_gpu_backend(model,
-                                            {.precision = precision, .device = request.gpu->index});
-           }});
-    }
-  } else {
-    arithmetics = {{"sequential of 2008", "float", paper::make_sequential_backend<float>},
-                   {"sequential of 2008", "double", paper::make_sequential_backend<double>}};
-  }
+  const char* measured = request.gpu ? "kernels of 2008" : "sequential of 2008";
+  std::vector<PaperProgram> programs = paper_programs(request);
+  std::erase_if(programs, [&](const PaperProgram& p) { return p.name != measured; });
   for (const SpinCase& c : cases) {
-    for (const Arithmetic& a : arithmetics) {
-      const SpinErrors e = errors_of(spin(*a.make(c.bar.model), c.bar, c.dt, c.steps), c.exact);
+    for (const PaperProgram& p : programs) {
+      const SpinErrors e = errors_of(spin(*p.make(c.bar.model), c.bar, c.dt, c.steps), c.exact);
       table.rows.push_back({fmt::format("{:g}", c.young), fmt::format("{:g}", c.fraction),
-                            fmt::format("{:.4g}", c.dt), std::to_string(c.steps), a.program,
-                            a.precision, fmt::format("{:.2e}", e.displacement),
+                            fmt::format("{:.4g}", c.dt), std::to_string(c.steps), p.name,
+                            p.precision, fmt::format("{:.2e}", e.displacement),
                             fmt::format("{:.2e}", e.stress),
                             fmt::format("{:.4g}", e.largest_stress)});
       say(fmt::format(
           "E = {:g} Pa, {:g} of the largest step, {:6}: displacement {:.1e}, stress {:.1e}",
-          c.young, c.fraction, a.precision, e.displacement, e.stress));
+          c.young, c.fraction, p.precision, e.displacement, e.stress));
     }
   }
   return table;

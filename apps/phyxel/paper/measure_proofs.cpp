@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <functional>
 
 #include "paper.hpp"
 #include "paper/paper_backend.hpp"
@@ -14,29 +13,6 @@ namespace phyxel::app {
 namespace {
 
 using paper::PaperBackend;
-
-struct Program {
-  std::string name, precision;
-  std::function<std::unique_ptr<PaperBackend>(const Model&)> make;
-};
-
-std::vector<Program> programs(const PaperRequest& request) {
-  std::vector<Program> list{
-      {"sequential of 2008", "float", paper::make_sequential_backend<float>},
-      {"sequential of 2008", "double", paper::make_sequential_backend<double>}};
-  if (!request.gpu) return list;
-  for (const Precision precision : {Precision::single, Precision::double_}) {
-    for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
-      list.push_back({store == paper::ForceStore::dense ? "kernels of 2008" : "CSR gather",
-                      precision_name(precision), [=, &request](const Model& model) {
-                        return paper::make_gpu_backend(
-                            model,
-                            {.precision = precision, .store = store, .device = request.gpu->index});
-                      }});
-    }
-  }
-  return list;
-}
 
 double size_of(double a) { return std::abs(a); }
 double size_of(Vec3d a) { return norm(a); }
@@ -96,9 +72,7 @@ Results results_of(PaperBackend& backend, const State& state) {
 
 CsvTable new_table(const PaperRequest& request, std::vector<std::string> columns) {
   CsvTable table;
-  table.facts = machine_facts();
-  table.facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
-  table.facts.emplace_back("cuda", cuda_version());
+  table.facts = paper_facts(request);
   table.columns = std::move(columns);
   return table;
 }
@@ -112,7 +86,7 @@ CsvTable measure_kernels(const PaperRequest& request) {
     const Model model = paper::paper_model(paper::body_scene(name));
     const State state = deformed(model);
     const Results exact = results_of(*paper::make_sequential_backend<long double>(model), state);
-    for (const Program& program : programs(request)) {
+    for (const PaperProgram& program : paper_programs(request)) {
       const Results r = results_of(*program.make(model), state);
       const auto add = [&](const char* kernel, const char* quantity, double error) {
         table.rows.push_back({name, program.name, program.precision, kernel, quantity,
@@ -156,7 +130,7 @@ CsvTable measure_trajectories(const PaperRequest& request) {
       return stops;
     };
     const auto exact = follow(*paper::make_sequential_backend<long double>(model));
-    for (const Program& program : programs(request)) {
+    for (const PaperProgram& program : paper_programs(request)) {
       const auto found = follow(*program.make(model));
       for (std::size_t k = 0; k < exact.size(); ++k) {
         const double error = distance(found[k].displacement, exact[k].displacement);

@@ -67,11 +67,8 @@ class Page {
 
  private:
   void with(const char* name, const std::function<void(const CsvTable&)>& section) {
-    const fs::path file = folder_ / (std::string(name) + ".csv");
-    if (fs::exists(file)) {
-      const CsvTable table = read_csv(file);
-      if (!table.rows.empty()) section(table);
-    }
+    const auto table = read_table(folder_, name);
+    if (table && !table->rows.empty()) section(*table);
   }
 
   void measured_by(const CsvTable& t) {

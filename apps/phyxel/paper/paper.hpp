@@ -3,13 +3,15 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "csv.hpp"
 #include "device.hpp"
-#include "phyxel/types.hpp"
+#include "paper/paper_backend.hpp"
 
 namespace phyxel::app {
 
@@ -31,6 +33,23 @@ inline constexpr const char* trajectory = "trajectory";  ///< Errors over a seco
 inline constexpr const char* memory = "memory";          ///< The n×n matrix.
 inline constexpr const char* stiffness = "stiffness";    ///< Young's modulus against error.
 }  // namespace paper_table
+
+std::filesystem::path table_file(const std::filesystem::path& folder, const std::string& table);
+
+/// The table, if it is in the folder. @throws InputError if it cannot be read.
+std::optional<CsvTable> read_table(const std::filesystem::path& folder, const std::string& table);
+
+/// What every measurement is labelled with.
+Facts paper_facts(const PaperRequest& request);
+
+/// One way to run the program of 2008.
+struct PaperProgram {
+  std::string name, precision;
+  std::function<std::unique_ptr<paper::PaperBackend>(const Model&)> make;
+};
+/// The sequential one, and with a GPU its kernels with either store, in float and double. The
+/// request must outlive them.
+std::vector<PaperProgram> paper_programs(const PaperRequest& request);
 
 /// Frame rates. @param figures which of 2 to 6
 CsvTable measure_frames(const PaperRequest& request, const std::vector<int>& figures);

@@ -1,0 +1,43 @@
+/// What the measurements of `phyxel paper` share.
+#include "paper.hpp"
+
+namespace phyxel::app {
+
+namespace fs = std::filesystem;
+
+fs::path table_file(const fs::path& folder, const std::string& table) {
+  return folder / (table + ".csv");
+}
+
+std::optional<CsvTable> read_table(const fs::path& folder, const std::string& table) {
+  const fs::path file = table_file(folder, table);
+  if (!fs::exists(file)) return std::nullopt;
+  return read_csv(file);
+}
+
+Facts paper_facts(const PaperRequest& request) {
+  Facts facts = machine_facts();
+  facts.emplace_back("gpu", request.gpu ? request.gpu->describe() : "none");
+  facts.emplace_back("cuda", cuda_version());
+  return facts;
+}
+
+std::vector<PaperProgram> paper_programs(const PaperRequest& request) {
+  std::vector<PaperProgram> list{
+      {"sequential of 2008", "float", paper::make_sequential_backend<float>},
+      {"sequential of 2008", "double", paper::make_sequential_backend<double>}};
+  if (!request.gpu) return list;
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
+      list.push_back({store == paper::ForceStore::dense ? "kernels of 2008" : "CSR gather",
+                      precision_name(precision), [=, &request](const Model& model) {
+                        return paper::make_gpu_backend(
+                            model,
+                            {.precision = precision, .store = store, .device = request.gpu->index});
+                      }});
+    }
+  }
+  return list;
+}
+
+}  // namespace phyxel::app
