@@ -7,6 +7,7 @@
 #include "device.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/surfel.hpp"
+#include "solver/carrier_weights.hpp"
 #include "solver/cuda_backend.hpp"
 #include "solver/diagnose.cuh"
 #include "solver/kernels.cuh"
@@ -84,14 +85,9 @@ __global__ void advect(Fields<Real, StateReal> f, const Real* gradient,
 class Event {
  public:
   Event() { PHYXEL_CUDA(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming)); }
-  Event(Event&& other) noexcept { std::swap(event_, other.event_); }
-  Event& operator=(Event&& other) noexcept {
-    std::swap(event_, other.event_);
-    return *this;
-  }
-  ~Event() {
-    if (event_) cudaEventDestroy(event_);
-  }
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+  ~Event() { cudaEventDestroy(event_); }
   cudaEvent_t get() const { return event_; }
 
  private:
@@ -156,7 +152,7 @@ class CudaBackend final : public Backend {
 
   void stress() override {
     use_device();
-    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(run, run.kernel, nullptr);
+    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(run, nullptr);
   }
 
   void advance(double time, double dt) override {
@@ -164,21 +160,15 @@ class CudaBackend final : public Backend {
     if (dt != dt_) send_constants(dt);
     sum_loads(time);
     for (const Run<Pass2>& run : advance_runs_) {
-      launch_pass_2(run, run.kernel, static_cast<StateReal>(dt), nullptr);
+      launch_pass_2(run, static_cast<StateReal>(dt), nullptr);
     }
     for (const Following& motion : motions_) {
       const Vec3d after = motion.of->displacement_at(time + dt);
       const Vec3d velocity = (after - motion.of->displacement_at(time)) / dt;
-      const auto count = static_cast<int>(motion.places.size());
-      follow<<<blocks_for(count), tile_size>>>(fields_, motion.places.data(), count,
-                                               to<StateReal>(after), to<StateReal>(velocity));
-      launched("follow", blocks_for(count), tile_size);
+      set_phyxels(motion.places, after, velocity);
     }
     if (fresh_ && held_places_.size() > 0) {  // they stay where their motion says: at rest
-      const auto count = static_cast<int>(held_places_.size());
-      follow<<<blocks_for(count), tile_size>>>(fields_, held_places_.data(), count,
-                                               Vec3<StateReal>{}, Vec3<StateReal>{});
-      launched("follow", blocks_for(count), tile_size);
+      set_phyxels(held_places_, {}, {});
     }
     fresh_ = false;
     bound_queue();
@@ -360,8 +350,7 @@ class CudaBackend final : public Backend {
   }
   /// @throws InputError if a tile does not fit what one block may have
   void check_shared_memory(const TileLists& lists) const {
-    const int bytes = (Stresses<Real>::bytes + static_cast<int>(own_supports_ ? sizeof(Real) : 0)) *
-                      lists.slots();
+    const int bytes = pass_2_bytes(lists.slots());
     if (bytes <= most_shared_memory_) return;
     throw InputError(device_.name + ": " + std::to_string(tile_size) +
                      " phyxels side by side and their " + std::to_string(lists.halo_stride) +
@@ -607,16 +596,12 @@ class CudaBackend final : public Backend {
       while (static_cast<Index>(s) >= model_.parts[part].surfel_end) ++part;
       position.push_back(to<Real>(surfels.position[s] - origin_of(part)));
       normal.push_back(to<Real>(surfels.normal[s]));
-      // Only ratios matter, and full weights of a small body leave the range of float.
-      std::vector<double> full;
       for (const Index i : surfels.carriers.row(static_cast<Index>(s))) {
-        full.push_back(weight(norm(surfels.position[s] - model_.position[i]),
-                              model_.neighbourhood.support[i]));
         carriers.push_back(tiling_.place[i]);
       }
-      const double largest = *std::max_element(full.begin(), full.end());
-      for (const double w : full)
-        weights.push_back(static_cast<Real>(largest > 0 ? w / largest : 1));
+      for (const double w : carrier_weights(model_, static_cast<Index>(s))) {
+        weights.push_back(static_cast<Real>(w));
+      }
     }
     const std::string of = " of " + std::to_string(count) + " surfels";
     const auto send = [&](auto& array, const auto& values, const char* what) {
@@ -635,9 +620,8 @@ class CudaBackend final : public Backend {
   // --- launches ---------------------------------------------------------------------------------
 
   /// Terms chosen at run time become kernels: the one place.
-  Pass1 pass_1_of(const Material& m, bool only_gradient) const {
-    const bool volume = m.volume_stiffness > 0 && !only_gradient;
-    if (only_gradient) return pass_1<Real, StateReal, true, false, true>;
+  static Pass1 pass_1_of(const Material& m) {
+    const bool volume = m.volume_stiffness > 0;
     if (m.strain == Strain::green) {
       return volume ? pass_1<Real, StateReal, true, true, false>
                     : pass_1<Real, StateReal, true, false, false>;
@@ -666,30 +650,27 @@ class CudaBackend final : public Backend {
     };
     for (Index tile = 0; tile < tiling_.tiles(); ++tile) {
       const Material& m = model_.parts[tiling_.part[tile]].material;
-      add(stress_runs_, pass_1_of(m, false), tile);
+      add(stress_runs_, pass_1_of(m), tile);
       add(advance_runs_, own_supports_ ? pass_2_of<true>(m) : pass_2_of<false>(m), tile);
     }
   }
 
-  static constexpr int pass_1_bytes(const DeviceLists& lists) {
-    return Points<Real>::bytes * lists.slots;
-  }
-  int pass_2_bytes(const DeviceLists& lists) const {
-    return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0)) *
-           lists.slots;
+  /// Shared memory of a block of pass 2, which takes more than pass 1.
+  int pass_2_bytes(int slots) const {
+    return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0)) * slots;
   }
   const DeviceLists& second_lists() const { return inverse_lists_ ? *inverse_lists_ : lists_; }
 
-  void launch_pass_1(const Run<Pass1>& run, Pass1 kernel, Real* gradient) {
-    const int bytes = pass_1_bytes(lists_);
-    allow_shared_memory(reinterpret_cast<const void*>(kernel));
-    kernel<<<run.tiles, tile_size, bytes>>>(fields_, lists_, run.first_tile, gradient);
+  void launch_pass_1(const Run<Pass1>& run, Real* gradient) {
+    const int bytes = Points<Real>::bytes * lists_.slots;
+    allow_shared_memory(reinterpret_cast<const void*>(run.kernel));
+    run.kernel<<<run.tiles, tile_size, bytes>>>(fields_, lists_, run.first_tile, gradient);
     launched("pass_1", run.tiles, tile_size);
   }
-  void launch_pass_2(const Run<Pass2>& run, Pass2 kernel, StateReal dt, Real* force) {
-    const int bytes = pass_2_bytes(second_lists());
-    allow_shared_memory(reinterpret_cast<const void*>(kernel));
-    kernel<<<run.tiles, tile_size, bytes>>>(fields_, second_lists(), run.first_tile, dt, force);
+  void launch_pass_2(const Run<Pass2>& run, StateReal dt, Real* force) {
+    const int bytes = pass_2_bytes(second_lists().slots);
+    allow_shared_memory(reinterpret_cast<const void*>(run.kernel));
+    run.kernel<<<run.tiles, tile_size, bytes>>>(fields_, second_lists(), run.first_tile, dt, force);
     launched("pass_2", run.tiles, tile_size);
   }
   /// Beyond 48 KiB a kernel has to ask. It asks for all there is: the answer is the kernel's, not
@@ -708,27 +689,31 @@ class CudaBackend final : public Backend {
     const auto ahead = static_cast<int>(std::clamp<std::size_t>(50'000'000 / places(), 1, 128));
     if (++steps_since_mark_ < ahead) return;
     steps_since_mark_ = 0;
-    PHYXEL_CUDA(cudaEventSynchronize(marks_[0].get()));  // of the batch before; at once if none
-    std::swap(marks_[0], marks_[1]);
-    PHYXEL_CUDA(cudaEventRecord(marks_[1].get()));
+    const Event& mark = marks_[batches_++ % 2];
+    PHYXEL_CUDA(cudaEventSynchronize(mark.get()));  // of the last batch but one; at once if none
+    PHYXEL_CUDA(cudaEventRecord(mark.get()));
+  }
+
+  void set_phyxels(const DeviceArray<Index>& at, Vec3d displacement, Vec3d velocity) {
+    const auto count = static_cast<int>(at.size());
+    follow<<<blocks_for(count), tile_size>>>(fields_, at.data(), count, to<StateReal>(displacement),
+                                             to<StateReal>(velocity));
+    launched("follow", blocks_for(count), tile_size);
   }
 
   DeviceArray<Real> forces_now() {
     stress();
     DeviceArray<Real> forces(3 * places(), "forces of " + subject_);
-    for (const Run<Pass2>& run : advance_runs_) {
-      launch_pass_2(run,
-                    own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
-                                  : pass_2<Real, StateReal, false, false, false, true>,
-                    StateReal(0), forces.data());
-    }
+    launch_pass_2({own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
+                                 : pass_2<Real, StateReal, false, false, false, true>,
+                   0, tiling_.tiles()},
+                  StateReal(0), forces.data());
     return forces;
   }
   DeviceArray<Real> gradients_now() {
     DeviceArray<Real> gradients(9 * places(), "displacement gradients of " + subject_);
-    for (const Run<Pass1>& run : stress_runs_) {
-      launch_pass_1(run, pass_1_of({}, true), gradients.data());
-    }
+    launch_pass_1({pass_1<Real, StateReal, true, false, true>, 0, tiling_.tiles()},
+                  gradients.data());
     return gradients;
   }
 
@@ -742,6 +727,7 @@ class CudaBackend final : public Backend {
     if (last_launch_.subject.empty()) last_launch_.subject = subject_;
     check_launch(last_launch_);
   }
+
   // --- values -----------------------------------------------------------------------------------
 
   template <class To, class From>
@@ -790,6 +776,7 @@ class CudaBackend final : public Backend {
   bool fresh_ = true;  // no step has been taken since the last upload
   Event marks_[2];
   int steps_since_mark_ = 0;
+  unsigned batches_ = 0;
   std::vector<Run<Pass1>> stress_runs_;
   std::vector<Run<Pass2>> advance_runs_;
   std::vector<const void*> allowed_;

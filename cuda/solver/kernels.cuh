@@ -99,6 +99,7 @@ __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Ind
   constexpr int batch = 3;  // indices under way at once
   const int thread = static_cast<int>(threadIdx.x);
   const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride + thread;
+  records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
 #pragma unroll 1
   for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
     Index place[batch];
@@ -107,9 +108,6 @@ __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Ind
       place[k] = begin + k * tile_size < lists.halo_stride ? __ldg(halo + k * tile_size) : -1;
     }
     halo += batch * tile_size;
-    if (begin == thread) {
-      records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
-    }
 #pragma unroll
     for (int k = 0; k < batch; ++k) {
       if (place[k] >= 0) {
@@ -117,17 +115,18 @@ __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Ind
       }
     }
   }
-  if (lists.halo_stride <= thread) {  // nothing for this thread to bring but its own
-    records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
-  }
   if (thread < far_slots) Records::set_far(image, lists.slots, tile_size + thread);
+}
+
+/// Where this lane's list begins.
+__device__ inline const uint4* list_of(const DeviceLists& lists, TileLists::Row row) {
+  return lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
 }
 
 /// Calls visit(offset, offset) with two entries at a time of this lane's list, in its order.
 template <class Visit>
 __device__ void walk(const DeviceLists& lists, TileLists::Row row, uint4 first, Visit&& visit) {
-  const uint4* at =
-      lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
+  const uint4* at = list_of(lists, row);
   const auto visit_both = [&](unsigned two) { visit(two & 0xFFFF, two >> 16); };
   uint4 next = first;
   int left = row.length;
@@ -149,9 +148,7 @@ __device__ void walk(const DeviceLists& lists, TileLists::Row row, uint4 first, 
 
 /// The first entries of this lane's list.
 __device__ inline uint4 first_entries(const DeviceLists& lists, TileLists::Row row) {
-  const uint4* at =
-      lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
-  return row.length > 0 ? __ldcs(at) : uint4{0, 0, 0, 0};
+  return row.length > 0 ? __ldcs(list_of(lists, row)) : uint4{0, 0, 0, 0};
 }
 
 template <class Real>
