@@ -3,6 +3,7 @@
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
+#include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 
 namespace phyxel {
@@ -30,7 +31,14 @@ double cuda_copy_bandwidth() { return 0; }
 
 std::string cuda_version() { return "no CUDA"; }
 
-std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device) {
+Surveyor cuda_surveyor(int device) {
+  use_cuda_device(device);
+  return {};
+}
+
+bool can_survey_on_cuda(const Scene&) { return false; }
+
+std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device, CudaPath) {
   use_cuda_device(device);
   return nullptr;
 }

@@ -30,7 +30,7 @@ say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
 check() {
   local program=$1 filter=$2 tool log
   for tool in memcheck racecheck initcheck synccheck; do
-    log=$logs/${program}_$tool.log
+    log=$logs/${program}_${filter//[^A-Za-z]/}_$tool.log
     compute-sanitizer --tool "$tool" --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" \
       >"$log" 2>&1 || failed=1
     say "compute-sanitizer $tool, $program, $(grep -E '^\[==========\] [0-9]+ tests? from .* ran' "$log" |
@@ -39,6 +39,8 @@ check() {
 }
 check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
 check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
+check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive'
+check setup_test '*Overlapping*'
 check physics_device_test '*'
 
 if [[ -n ${1-} ]]; then

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <functional>
@@ -13,6 +14,7 @@
 #include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
+#include "setup/survey.hpp"
 #include "stopwatch.hpp"
 #include "version.hpp"
 
@@ -24,8 +26,9 @@ struct BenchOptions {
   std::vector<int> threads;
   std::vector<std::string> precisions = {"float", "double", "mixed"};
   std::vector<std::string> terms;
-  std::string device = "cpu", csv;
-  int repeats = 5;
+  std::string device = "cpu", csv, shape = "cube";
+  int repeats = 5, bodies = 1;
+  std::vector<double> factors = {NeighbourhoodRule{}.factor};
   double seconds = 0.3;
   bool force = false;
 };
@@ -78,7 +81,13 @@ Cloud cube(Index n) {
                      .surface = false});
 }
 
-Scene cube_scene(const std::string& terms) {
+/// A cube, or one of the bodies of the 2008 paper, without surfels.
+Cloud bench_cloud(const std::string& shape, Index n) {
+  return shape == "cube" ? cube(n) : make_shape({.name = shape, .surface = false});
+}
+
+Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
+                  int bodies = 1) {
   Scene scene;
   scene.gravity = {0, 0, -9.81};
   BodyRequest body;
@@ -89,15 +98,15 @@ Scene cube_scene(const std::string& terms) {
   if (terms == "damping") body.material.damping = 0.1;
   if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
   if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
-  scene.bodies.push_back(body);
+  body.neighbourhood.factor = factor;
+  scene.bodies.assign(static_cast<std::size_t>(bodies), body);
   return scene;
 }
 const std::vector<std::string> all_terms = {"green",   "cauchy", "volume",
                                             "damping", "load",   "adaptive"};
 
-/// Largest difference of internal forces from those in double, over the largest force, after a
-/// deformation of 10%.
-double force_error(const Model& model, Backend& backend) {
+/// A deformation of 10%.
+State deformed(const Model& model) {
   std::mt19937_64 engine(3);
   State state;
   for (const Vec3d& x : model.position) {
@@ -108,18 +117,34 @@ double force_error(const Model& model, Backend& backend) {
         {0.1 * x.y + noise(), -0.05 * x.z + noise(), 0.02 * x.x + noise()});
   }
   state.velocity.resize(state.displacement.size());
-  std::vector<Vec3d> force, exact;
+  return state;
+}
+
+std::vector<Vec3d> forces_of(Backend& backend, const State& state) {
+  std::vector<Vec3d> force;
   backend.upload(state);
   backend.internal_forces(force);
-  const auto reference = make_cpu_backend(model, Precision::double_);
-  reference->upload(state);
-  reference->internal_forces(exact);
+  return force;
+}
+
+/// Forces in double to compare with, on the same device; none of bodies for which a second backend
+/// may not fit.
+std::vector<Vec3d> exact_forces(const Model& model, const ChosenDevice& device) {
+  constexpr Index most = 50'000'000;
+  if (model.size() > most) return {};
+  return forces_of(*make_backend(model, Precision::double_, device, 0), deformed(model));
+}
+
+/// Largest difference of internal forces from the exact ones, over the largest of those.
+std::string force_error(const Model& model, Backend& backend, const std::vector<Vec3d>& exact) {
+  if (exact.empty()) return "";
+  const std::vector<Vec3d> force = forces_of(backend, deformed(model));
   double worst = 0, largest = 0;
   for (std::size_t i = 0; i < force.size(); ++i) {
     worst = std::max(worst, norm(force[i] - exact[i]));
     largest = std::max(largest, norm(exact[i]));
   }
-  return worst / largest;
+  return fmt::format("{:.2e}", worst / largest);
 }
 
 /// Rows go to the terminal as they come; the CSV file is written whole after each.
@@ -149,6 +174,33 @@ class Table {
   CsvTable table_;
 };
 
+/// How a backend steps: what follows its precision in its name.
+std::string path_of(const Backend& backend) {
+  std::string name = backend.name();
+  for (int parts = 0; parts < 2; ++parts) name = name.substr(name.find(", ") + 2);
+  std::replace(name.begin(), name.end(), ',', ':');
+  return name;
+}
+
+/// What one row of `bench step` measures.
+struct StepCase {
+  std::string terms;
+  Index size;
+  double factor;  ///< Of the support.
+};
+
+std::vector<StepCase> step_cases(const BenchOptions& options) {
+  // The paper's bodies have one size each.
+  const std::vector<Index> sizes = options.shape == "cube" ? options.sizes : std::vector<Index>{0};
+  std::vector<StepCase> cases;
+  for (const std::string& terms : options.terms) {
+    for (const Index size : sizes) {
+      for (const double factor : options.factors) cases.push_back({terms, size, factor});
+    }
+  }
+  return cases;
+}
+
 void bench_step(const BenchOptions& options) {
   const ChosenDevice device = choose_device(options.device);
   for (const std::string& terms : options.terms) {
@@ -159,9 +211,10 @@ void bench_step(const BenchOptions& options) {
   }
   Table table(
       options,
-      {"terms", "precision", "threads", "phyxels", "neighbours", "steps_per_s",
-       "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step", "bytes_per_s",
-       "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
+      {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels", "neighbours",
+       "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step",
+       "bytes_per_s", "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error",
+       "core_round_trip_ns"},
       device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{});
   // A GPU has no thread counts: 0 stands for it.
   const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
@@ -169,52 +222,52 @@ void bench_step(const BenchOptions& options) {
   for (const int threads : all_threads) {
     copy.push_back(device.gpu ? cuda_copy_bandwidth() : copy_bandwidth(threads));
   }
-  for (const std::string& terms : options.terms) {
-    for (const Index size : options.sizes) {
-      const Scene scene = cube_scene(terms);
-      const Cloud cloud = cube(size);
-      const Model model = build_model(scene, std::span(&cloud, 1));
-      const double pairs = static_cast<double>(model.neighbourhood.neighbours.entries());
-      for (const std::string& precision : options.precisions) {
-        for (std::size_t t = 0; t < all_threads.size(); ++t) {
-          const int threads = all_threads[t];
-          const auto backend = make_backend(model, precision_option(precision), device, threads);
-          const double error = force_error(model, *backend);
-          // A tenth of the sound step: any speed, no risk.
-          const double dt =
-              0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
-          Solver solver(*backend, initial_state(model, scene, dt));
-          const auto warm = Clock::now();
-          int steps = 0;
-          while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {
-            solver.step();
-            ++steps;
-            if (steps % 16 == 0) backend->wait();
-          }
-          backend->wait();
-          steps = std::max(2, static_cast<int>(steps * options.seconds / seconds_since(warm)));
-          std::vector<double> rate;
-          for (int repeat = 0; repeat < options.repeats; ++repeat) {
-            const auto start = Clock::now();
-            for (int s = 0; s < steps; ++s) solver.step();
-            backend->wait();
-            rate.push_back(steps / seconds_since(start));
-          }
-          const Median median = median_of(rate);
-          const double n = model.size();
-          std::size_t memory = 0;
-          for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
-          const double traffic = static_cast<double>(backend->step_traffic());
-          const bool shared = threads > 1 && omp_get_num_procs() > 1;
-          table.row(
-              {terms, precision, std::to_string(threads), std::to_string(model.size()),
-               fmt::format("{:.1f}", pairs / n), fmt::format("{:.5g}", median.value),
-               fmt::format("{:.5g}", median.value * n), fmt::format("{:.3f}", median.spread),
-               fmt::format("{:.5g}", median.value * 2 * pairs), fmt::format("{:.1f}", traffic / n),
-               fmt::format("{:.4g}", median.value * traffic), fmt::format("{:.4g}", copy[t]),
-               fmt::format("{:.1f}", static_cast<double>(memory) / n), fmt::format("{:.2e}", error),
-               fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
+  for (const auto& [terms, size, factor] : step_cases(options)) {
+    const Scene scene = bench_scene(terms, factor, options.bodies);
+    const std::vector<Cloud> clouds(scene.bodies.size(), bench_cloud(options.shape, size));
+    const Model model = make_model(scene, clouds, device);
+    const std::vector<Vec3d> exact = exact_forces(model, device);
+    const double pairs = static_cast<double>(model.pairs());
+    for (const std::string& precision : options.precisions) {
+      for (std::size_t t = 0; t < all_threads.size(); ++t) {
+        const int threads = all_threads[t];
+        const auto backend = make_backend(model, precision_option(precision), device, threads);
+        const std::string error = force_error(model, *backend, exact);
+        // A tenth of the sound step: any speed, no risk.
+        const double dt =
+            0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
+        Solver solver(*backend, initial_state(model, scene, dt));
+        const auto warm = Clock::now();
+        int steps = 0;
+        while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {
+          solver.step();
+          ++steps;
+          if (steps % 16 == 0) backend->wait();
         }
+        backend->wait();
+        steps = std::max(2, static_cast<int>(steps * options.seconds / seconds_since(warm)));
+        std::vector<double> rate;
+        for (int repeat = 0; repeat < options.repeats; ++repeat) {
+          const auto start = Clock::now();
+          for (int s = 0; s < steps; ++s) solver.step();
+          backend->wait();
+          rate.push_back(steps / seconds_since(start));
+        }
+        const Median median = median_of(rate);
+        const double n = model.size();
+        std::size_t memory = 0;
+        for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
+        const double traffic = static_cast<double>(backend->step_traffic());
+        const bool shared = threads > 1 && omp_get_num_procs() > 1;
+        table.row({options.shape, std::to_string(options.bodies), terms, precision,
+                   path_of(*backend), std::to_string(threads), std::to_string(model.size()),
+                   fmt::format("{:.1f}", pairs / n), fmt::format("{:.5g}", median.value),
+                   fmt::format("{:.5g}", median.value * n), fmt::format("{:.3f}", median.spread),
+                   fmt::format("{:.5g}", median.value * 2 * pairs),
+                   fmt::format("{:.1f}", traffic / n),
+                   fmt::format("{:.4g}", median.value * traffic), fmt::format("{:.4g}", copy[t]),
+                   fmt::format("{:.1f}", static_cast<double>(memory) / n), error,
+                   fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
       }
     }
   }
@@ -253,6 +306,57 @@ void bench_neighbours(const BenchOptions& options) {
   }
 }
 
+/// From a cloud to the first step: what the survey takes, the rest of the model, the backend with
+/// its lists, the step limit. Without a survey, on the CPU, the model has the lists.
+void bench_setup(const BenchOptions& options) {
+  const ChosenDevice device = choose_device(options.device);
+  Table table(
+      options,
+      {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s", "backend_s",
+       "limit_s", "omega_max", "iterations"},
+      device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{});
+  for (const Index size : options.sizes) {
+    const Scene scene = bench_scene("green");
+    const Cloud cloud = cube(size);
+    for (const std::string& precision : options.precisions) {
+      std::vector<double> survey_time, model_time, backend_time, limit_time;
+      StepLimit limit;
+      double neighbours = 0;
+      int threads = 0;
+      for (int repeat = 0; repeat < options.repeats; ++repeat) {
+        const Surveyor surveyor = [&](auto&&... cloud_and_rule) {
+          const auto start = Clock::now();
+          Survey survey = cuda_surveyor(device.gpu->index)(cloud_and_rule...);
+          survey_time.push_back(seconds_since(start));
+          return survey;
+        };
+        auto start = Clock::now();
+        const Model model = device.gpu ? build_model(scene, std::span(&cloud, 1), surveyor)
+                                       : build_model(scene, std::span(&cloud, 1));
+        if (!device.gpu) survey_time.push_back(0);
+        model_time.push_back(seconds_since(start) - survey_time.back());
+        start = Clock::now();
+        const auto backend =
+            make_backend(model, precision_option(precision), device, omp_get_max_threads());
+        backend->wait();
+        backend_time.push_back(seconds_since(start));
+        start = Clock::now();
+        limit = step_limit(model, *backend);
+        limit_time.push_back(seconds_since(start));
+        neighbours = static_cast<double>(model.pairs()) / model.size();
+        threads = backend->threads();
+      }
+      const auto seconds = [](const std::vector<double>& times) {
+        return fmt::format("{:.4g}", median_of(times).value);
+      };
+      table.row({precision, std::to_string(threads), std::to_string(cloud.position.size()),
+                 fmt::format("{:.1f}", neighbours), seconds(survey_time), seconds(model_time),
+                 seconds(backend_time), seconds(limit_time), fmt::format("{:.8g}", limit.omega_max),
+                 std::to_string(limit.iterations)});
+    }
+  }
+}
+
 CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
                        std::vector<Index> sizes, void (*body)(const BenchOptions&)) {
   CLI::App* command = bench.add_subcommand(name, what);
@@ -262,7 +366,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   options->terms = all_terms;
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
       ->delimiter(',')
-      ->check(CLI::Range(8, 100'000'000));
+      ->check(CLI::Range(8, 2'000'000'000));
   command->add_option("--threads", options->threads, "Thread counts, comma separated")
       ->delimiter(',')
       ->check(CLI::Range(1, 4096));
@@ -270,13 +374,24 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the CSV file");
-  if (std::string(name) == "step") {
+  if (std::string(name) != "neighbours") {
     command->add_option("--device", options->device, device_help)->capture_default_str();
     command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
+  }
+  if (std::string(name) == "step") {
     command
         ->add_option("--terms", options->terms,
                      "Term sets: green, cauchy, volume, damping, load, adaptive")
         ->delimiter(',');
+    command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
+        ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
+    command
+        ->add_option("--factor", options->factors,
+                     "Supports, as multiples of the mean distance to the 10 nearest")
+        ->delimiter(',')
+        ->check(CLI::Range(1.0, 4.0));
+    command->add_option("--bodies", options->bodies, "How many of them, side by side")
+        ->check(CLI::Range(1, 100'000));
     command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
         ->check(CLI::Range(0.01, 60.0));
   }
@@ -291,6 +406,8 @@ void add_bench(CLI::App& program) {
   bench->require_subcommand(1);
   add_bench_of(*bench, "step", "Time steps per second of a jittered cube, per term and precision",
                {1000, 10648, 103823, 1000000}, bench_step);
+  add_bench_of(*bench, "setup", "From a cloud to the first step: neighbours, moments, step limit",
+               {10648, 103823, 1000000}, bench_setup);
   add_bench_of(*bench, "neighbours",
                "Neighbour search: time per phyxel against the number of phyxels",
                {10648, 103823, 1000000, 9938375}, bench_neighbours);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "phyxel/error.hpp"
+#include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 
 namespace phyxel::app {
@@ -44,6 +45,18 @@ ChosenDevice choose_device(const std::string& name, const std::string& where) {
     }
   }
   return chosen;
+}
+
+Model make_model(const Scene& scene, const ChosenDevice& device) {
+  return device.gpu && can_survey_on_cuda(scene)
+             ? build_model(scene, cuda_surveyor(device.gpu->index))
+             : build_model(scene);
+}
+
+Model make_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device) {
+  return device.gpu && can_survey_on_cuda(scene)
+             ? build_model(scene, clouds, cuda_surveyor(device.gpu->index))
+             : build_model(scene, clouds);
 }
 
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,

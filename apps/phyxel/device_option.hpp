@@ -24,6 +24,11 @@ void check_device_name(const std::string& name, const std::string& where);
 /// @throws InputError for another name; DeviceError if a GPU is asked for and cannot be used.
 ChosenDevice choose_device(const std::string& name, const std::string& where = "--device");
 
+/// The model of a scene, its neighbours sought on the device that will step it.
+Model make_model(const Scene& scene, const ChosenDevice& device);
+/// The same from clouds in place.
+Model make_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device);
+
 /// @param threads of the CPU
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
                                       const ChosenDevice& device, int threads);

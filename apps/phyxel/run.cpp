@@ -34,9 +34,9 @@ class Run {
         scene_(scene_with(options.overrides)),
         device_(choose_device(scene_.solver.device, "device")),
         begin_(find_checkpoint()),
-        model_(build_model(scene_)),
-        plan_(plan_steps(scene_, model_, options.overrides.unsafe_step)),
+        model_(make_model(scene_, device_)),
         backend_(make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads)),
+        plan_(plan_steps(scene_, model_, *backend_, options.overrides.unsafe_step)),
         solver_(*backend_, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt)),
         first_step_(solver_.steps()),
         start_diagnostics_(diagnose(model_, *backend_, solver_.steps(), solver_.dt())),
@@ -260,8 +260,8 @@ class Run {
           {"device", backend_->name()},
           {"phyxels", model_.size()},
           {"surfels", model_.surfels.position.size()},
-          {"neighbours_per_phyxel", static_cast<double>(model_.neighbourhood.neighbours.entries()) /
-                                        std::max(1, model_.size())},
+          {"neighbours_per_phyxel",
+           static_cast<double>(model_.pairs()) / std::max(1, model_.size())},
           {"time_s", now.time},
           {"steps", solver_.steps()},
           {"time_step_s", plan_.dt},
@@ -326,8 +326,8 @@ class Run {
   ChosenDevice device_;
   std::optional<Checkpoint> begin_;
   Model model_;
-  StepPlan plan_;
   std::unique_ptr<Backend> backend_;
+  StepPlan plan_;
   Solver solver_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_;
@@ -346,9 +346,9 @@ void run(const RunOptions& options) { Run(options).execute(); }
 void check(const Overrides& overrides) {
   const Scene scene = scene_with(overrides);
   const ChosenDevice device = choose_device(scene.solver.device, "device");
-  const Model model = build_model(scene);
-  const StepPlan plan = plan_steps(scene, model, overrides.unsafe_step);
+  const Model model = make_model(scene, device);
   const auto backend = make_backend(model, scene.solver.precision, device, scene.solver.threads);
+  const StepPlan plan = plan_steps(scene, model, *backend, overrides.unsafe_step);
   fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model));
   fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
   fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps,

@@ -19,16 +19,16 @@ std::string terms_of(const Material& m) {
   return terms;
 }
 
-std::string neighbours_of(const Model& model, const Part& part) {
-  Index fewest = model.size(), most = 0;
-  for (Index i = part.begin; i < part.end; ++i) {
-    fewest = std::min(fewest, model.neighbourhood.neighbours.length(i));
-    most = std::max(most, model.neighbourhood.neighbours.length(i));
-  }
-  const Offset pairs = model.neighbourhood.neighbours.offsets[part.end] -
-                       model.neighbourhood.neighbours.offsets[part.begin];
+std::string neighbours_of(const Part& part) {
   return fmt::format("{:.1f} neighbours ({} to {})",
-                     static_cast<double>(pairs) / std::max(part.end - part.begin, 1), fewest, most);
+                     static_cast<double>(part.lists.pairs) / std::max(part.end - part.begin, 1),
+                     part.lists.fewest, part.lists.most);
+}
+
+/// Limits found on different devices differ in their last digits, the steps taken shall not.
+double three_digits_below(double step) {
+  const double unit = std::pow(10, std::floor(std::log10(step)) - 2);
+  return std::floor(step / unit) * unit;
 }
 
 }  // namespace
@@ -77,9 +77,9 @@ Scene scene_with(const Overrides& o) {
   return scene;
 }
 
-StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step) {
+StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
   StepPlan plan;
-  plan.limit = step_limit(model, scene.solver.threads);
+  plan.limit = step_limit(model, backend);
   const double largest = plan.limit.largest_step;
   if (scene.time.step && *scene.time.step >= largest && !unsafe_step) {
     throw InputError(fmt::format(
@@ -88,7 +88,8 @@ StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step) {
         "all the same",
         *scene.time.step, largest, plan.limit.omega_max));
   }
-  const double wanted = scene.time.step ? *scene.time.step : scene.time.safety * largest;
+  const double wanted =
+      scene.time.step ? *scene.time.step : three_digits_below(scene.time.safety * largest);
   const double interval = scene.output.frames_per_second > 0
                               ? std::min(1 / scene.output.frames_per_second, scene.time.end)
                               : scene.time.end;
@@ -121,7 +122,7 @@ std::string describe_model(const Scene& scene, const Model& model) {
         "  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n", part.name,
         part.end - part.begin, part.surfel_end - part.surfel_begin, mass, volume,
         part.kernel_volumes ? "kernel" : "geometric");
-    text += fmt::format("              {}; {}\n", neighbours_of(model, part), part.neighbourhood);
+    text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
     text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
                         m.poisson, m.density, terms_of(m));
   }

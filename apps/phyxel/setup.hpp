@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "phyxel/model.hpp"
+#include "phyxel/backend.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"
 
@@ -33,10 +33,11 @@ struct StepPlan {
   std::string why;                   ///< One line for the summary.
 };
 
-/// Chooses the step: the scene's, or the safety factor times the largest stable one; slightly
-/// shortened so that frames and the end fall on whole steps.
+/// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
+/// digits are kept; slightly shortened so that frames and the end fall on whole steps. Uses the
+/// arrays of the backend.
 /// @throws InputError for a step above the largest stable one unless `unsafe_step`.
-StepPlan plan_steps(const Scene& scene, const Model& model, bool unsafe_step);
+StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step);
 
 /// Bodies, materials, terms, neighbours and warnings, one per line.
 std::string describe_model(const Scene& scene, const Model& model);

@@ -134,7 +134,7 @@ __global__ void calcStrainStressA(CuBody<Real> body, CuGather<Real> gather, CuTe
     if (j == no_neighbor) break;
     const Vec3<Real> x_ij = xyz<Real>(Fetch::fetch(textures.positions_masses, j)) - x_i;
     const Vec3<Real> u_ij = xyz<Real>(Fetch::fetch(textures.displacements_volume, j)) - u_i;
-    sum += gradient_term(u_ij, x_ij, Fetch::fetch1(textures.omega, slot));
+    add_gradient_term(sum, u_ij, Fetch::fetch1(textures.omega, slot) * x_ij);
   }
   const Mat3<Real> inverse_moment = load9(body.d_momentMatrices, i);
   const Mat3<Real> grad_u = sum * inverse_moment;

@@ -102,7 +102,7 @@ void check_paper_model(const Model& model) {
   if (model.parts.size() != 1) {
     refuse(fmt::format("{} bodies in one model; allowed: one body per launch", model.parts.size()));
   }
-  const Part& part = model.parts[0];
+  const Part& part = model.with_lists().parts[0];
   if (model.size() > most_phyxels) {
     refuse(
         fmt::format("body \"{}\" has {} phyxels, but its neighbours are named by 16-bit numbers "

@@ -216,8 +216,8 @@ class SequentialBackend final : public PaperBackend {
     M sum;
     for (Offset k = csr.offsets[i]; k < csr.offsets[i + 1]; ++k) {
       const Index j = csr.indices[k];
-      sum += gradient_term(displacement_[j] - displacement_[i], position_[j] - position_[i],
-                           omega_[k]);
+      add_gradient_term(sum, displacement_[j] - displacement_[i],
+                        omega_[k] * (position_[j] - position_[i]));
     }
     return displacement_gradient(sum, inverse_moment_[i]);
   }

@@ -7,11 +7,15 @@
 #include "device.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/surfel.hpp"
+#include "setup/device_tiling.hpp"
+#include "setup/primitives.cuh"
 #include "solver/carrier_weights.hpp"
+#include "solver/crossings.cuh"
 #include "solver/cuda_backend.hpp"
 #include "solver/diagnose.cuh"
 #include "solver/kernels.cuh"
-#include "solver/tiling.hpp"
+#include "solver/resident.cuh"
+#include "solver/vibration.cuh"
 
 namespace phyxel {
 namespace {
@@ -30,8 +34,7 @@ __global__ void follow(Fields<Real, StateReal> f, const Index* place, int count,
     set_column3(f.displacement, f.places, at, displacement);
   }
   auto point = f.points.get(at);
-  point.u = {static_cast<Real>(displacement.x), static_cast<Real>(displacement.y),
-             static_cast<Real>(displacement.z)};
+  point.u = to<Real>(displacement);
   f.points.set(at, point);
 }
 
@@ -62,21 +65,17 @@ __global__ void advect(Fields<Real, StateReal> f, const Real* gradient,
                        DeviceSurfels<Real, StateReal> surfels) {
   const int s = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (s >= surfels.count) return;
-  const auto wide = [](Vec3<Real> v) {
-    return Vec3<StateReal>{static_cast<StateReal>(v.x), static_cast<StateReal>(v.y),
-                           static_cast<StateReal>(v.z)};
-  };
   SurfelBlend<StateReal> blend;
   for (Offset k = surfels.offsets[s]; k < surfels.offsets[s + 1]; ++k) {
     const Index place = surfels.carriers[k];
     const auto point = f.points.get(place);
-    Vec3<StateReal> u = wide(point.u);
+    Vec3<StateReal> u = to<StateReal>(point.u);
     if constexpr (!std::is_same_v<Real, StateReal>) u = column3(f.displacement, f.places, place);
     Mat3<StateReal> grad_u;
     for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient[e * f.places + place];
-    blend.add(surfels.weight[k], u, grad_u, wide(surfels.position[s] - point.x));
+    blend.add(surfels.weight[k], u, grad_u, to<StateReal>(surfels.position[s] - point.x));
   }
-  const Vec3<StateReal> normal = blend.surfel_normal(wide(surfels.normal[s]));
+  const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(surfels.normal[s]));
   surfels.displacement[s] = blend.surfel_displacement();
   surfels.moved_normal[s] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
@@ -97,14 +96,14 @@ class Event {
 template <class Real, class StateReal>
 class CudaBackend final : public Backend {
   static constexpr bool mixed = !std::is_same_v<Real, StateReal>;
-  using Constants = TileConstants<Real, StateReal>;
+  using BodyConstants = TileConstants<Real, StateReal>;
   using AllFields = Fields<Real, StateReal>;
   using Pass1 = void (*)(AllFields, DeviceLists, Index, Real*);
   using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*);
 
  public:
-  CudaBackend(const Model& model, int device)
-      : model_(model), device_(use_cuda_device(device)), tiling_(make_tiling(model)) {
+  CudaBackend(const Model& model, int device, CudaPath path)
+      : model_(model), device_(use_cuda_device(device)), tiling_(make_device_tiling(model)) {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
@@ -114,11 +113,14 @@ class CudaBackend final : public Backend {
     make_motions();
     make_loads();
     make_runs();
+    if (path == CudaPath::automatic) make_resident();
   }
 
   std::string name() const override {
     const char* precision = mixed ? "mixed" : sizeof(Real) == 4 ? "float" : "double";
-    return device_.name + ", " + precision + ", tiles of " + std::to_string(tile_size);
+    const std::string path =
+        resident_ ? resident_->describe() : "tiles of " + std::to_string(tile_size);
+    return device_.name + ", " + precision + ", " + path;
   }
   Index size() const override { return model_.size(); }
   int threads() const override { return 0; }
@@ -127,35 +129,42 @@ class CudaBackend final : public Backend {
     wait();
     dt_ = -1;  // whatever depends on it is sent with the next step
     fresh_ = true;
-    std::vector<Vec3d> u(places()), v(places());
-    for (Index i = 0; i < size(); ++i) {
-      u[tiling_.place[i]] = state.displacement[i];
-      v[tiling_.place[i]] = state.velocity[i];
-    }
-    velocity_.upload(columns<StateReal>(v).data());
-    if constexpr (mixed) displacement_.upload(columns<StateReal>(u).data());
-    upload_points(u);
+    const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
+                             v = sent(state.velocity, "velocities of " + subject_);
+    const auto tiles = static_cast<unsigned>(tiling_.tiles());
+    put_state<<<tiles, tile_size>>>(fields_, tiling_.phyxel_at.data(), u.data(), v.data());
+    launched("put_state", tiles, tile_size);
+    wait();
   }
 
   void download(State& state) const override {
     wait();
-    const std::vector<Vec3d> v = from_columns(copy_of(velocity_));
-    std::vector<Vec3d> u;
-    if constexpr (mixed) {
-      u = from_columns(copy_of(displacement_));
-    } else {
-      u = points_displacement();
-    }
-    state.displacement = by_phyxel(u);
-    state.velocity = by_phyxel(v);
+    const auto n = static_cast<std::size_t>(size());
+    const DeviceArray<Vec3d> u(n, "displacements of " + subject_),
+        v(n, "velocities of " + subject_);
+    const auto tiles = static_cast<unsigned>(tiling_.tiles());
+    take_state<<<tiles, tile_size>>>(fields_, tiling_.phyxel_at.data(), u.data(), v.data());
+    launched("take_state", tiles, tile_size);
+    state.displacement = fetched(u);
+    state.velocity = fetched(v);
   }
 
   void stress() override {
-    use_device();
-    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(run, nullptr);
+    if (!stays_resident()) stress_now();
   }
 
   void advance(double time, double dt) override {
+    if (stays_resident()) {
+      if (dt != dt_) {
+        settle();
+        send_constants(dt);
+      }
+      if (++pending_ == most_pending) {
+        settle();
+        bound_queue(most_pending);
+      }
+      return;
+    }
     use_device();
     if (dt != dt_) send_constants(dt);
     sum_loads(time);
@@ -171,16 +180,16 @@ class CudaBackend final : public Backend {
       set_phyxels(held_places_, {}, {});
     }
     fresh_ = false;
-    bound_queue();
+    bound_queue(1);
   }
 
   void wait() const override {
-    use_device();
+    settle();
     wait_for_device(last_launch_);
   }
 
   std::optional<Diagnostics> diagnostics(double time, double dt) override {
-    use_device();
+    settle();
     sum_loads(time);
     const DeviceArray<Real> forces = forces_now(), gradients = gradients_now();
     const auto tiles = static_cast<unsigned>(tiling_.tiles());
@@ -191,7 +200,7 @@ class CudaBackend final : public Backend {
     add_tiles<<<1, diagnose_threads>>>(each.data(), tiling_.tiles(), all.data());
     launched("add_tiles", 1, diagnose_threads);
     wait();
-    const Totals t = copy_of(all)[0];
+    const Totals t = fetched(all)[0];
     const auto vector = [&](int first) {
       return Vec3d{t.sum[first], t.sum[first + 1], t.sum[first + 2]};
     };
@@ -219,14 +228,19 @@ class CudaBackend final : public Backend {
   void internal_forces(std::vector<Vec3d>& force) override {
     const DeviceArray<Real> forces = forces_now();
     wait();
-    force = by_phyxel(from_columns(copy_of(forces)));
+    force = by_phyxel(from_columns(fetched(forces)));
+  }
+
+  std::unique_ptr<Vibration> vibration() override {
+    settle();
+    return std::make_unique<CudaVibration>(*this);
   }
 
   void displacement_gradients(std::vector<Mat3d>& gradient) override {
-    use_device();
+    settle();
     const DeviceArray<Real> gradients = gradients_now();
     wait();
-    const std::vector<Real> values = copy_of(gradients);
+    const std::vector<Real> values = fetched(gradients);
     gradient.resize(static_cast<std::size_t>(size()));
     for (Index i = 0; i < size(); ++i) {
       for (int e = 0; e < 9; ++e) {
@@ -241,7 +255,7 @@ class CudaBackend final : public Backend {
     out.position.resize(count);
     out.normal.resize(count);
     if (count == 0) return;
-    use_device();
+    settle();
     if (surfel_moved_normal_.size() == 0) make_surfels();  // the array made last
     const DeviceArray<Real> gradients = gradients_now();
     const DeviceSurfels<Real, StateReal> surfels{
@@ -252,8 +266,8 @@ class CudaBackend final : public Backend {
     advect<<<blocks, tile_size>>>(fields_, gradients.data(), surfels);
     launched("advect", blocks, tile_size);
     wait();
-    const std::vector<Vec3<StateReal>> moved = copy_of(surfel_displacement_),
-                                       normal = copy_of(surfel_moved_normal_);
+    const std::vector<Vec3<StateReal>> moved = fetched(surfel_displacement_),
+                                       normal = fetched(surfel_moved_normal_);
     for (std::size_t s = 0; s < count; ++s) {
       out.position[s] = model_.surfels.position[s] + to<double>(moved[s]);
       out.normal[s] = normalised(to<double>(normal[s]));
@@ -267,9 +281,13 @@ class CudaBackend final : public Backend {
         {"constants", moment_constants_.bytes() + force_constants_.bytes() + tiles_.bytes() +
                           materials_.bytes()},
         {"velocities", velocity_.bytes()},
-        {"neighbour lists", list_bytes(lists_)}};
-    if (inverse_lists_) list.push_back({"inverse neighbour lists", list_bytes(*inverse_lists_)});
+        {"neighbour lists", tiling_.neighbours.bytes()},
+        {"places", tiling_.phyxel_at.bytes()}};
+    if (tiling_.inverse) list.push_back({"inverse neighbour lists", tiling_.inverse->bytes()});
     if (own_supports_) list.push_back({"supports", supports_.bytes()});
+    if (resident_) {
+      list.push_back({"what stays in shared memory", resident_->held()});
+    }
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
     if (load_.size()) list.push_back({"loads", load_.bytes()});
     list.push_back({"while energies are summed", 12 * sizeof(Real) * places()});
@@ -283,7 +301,7 @@ class CudaBackend final : public Backend {
   }
 
   std::size_t step_traffic() const override {
-    const std::size_t lists = list_bytes(lists_) + list_bytes(inverse_lists_.value_or(lists_));
+    const std::size_t lists = tiling_.neighbours.bytes() + tiling_.second().bytes();
     std::size_t each = 2 * Points<Real>::bytes + Points<Real>::bytes + 2 * Stresses<Real>::bytes;
     each += (7 + 4) * sizeof(Real) + 6 * sizeof(StateReal);
     if (mixed) each += 6 * sizeof(StateReal);
@@ -292,16 +310,70 @@ class CudaBackend final : public Backend {
   }
 
  private:
+  /// M^-1/2 K M^-1/2 at rest, by the linear law that every material has there: Cauchy's strain,
+  /// with the volume's stiffness added to λ.
+  class CudaVibration final : public Vibration {
+   public:
+    explicit CudaVibration(CudaBackend& backend) : b_(backend), tiles_(b_.rest_constants()) {
+      const std::string what = "vectors of " + b_.subject_;
+      const std::size_t count = 3 * b_.places();
+      previous_ = {count, what};
+      current_ = {count, what};
+      next_ = {count, what};
+      force_ = {count, what};
+      PHYXEL_CUDA(cudaMemset(previous_.data(), 0, previous_.bytes()));
+      launch("start_vector", start_vector<Real>, current_.data(), b_.places(),
+             static_cast<const Index*>(b_.tiling_.phyxel_at.data()));
+      scale(current_, 1 / std::sqrt(product(current_, current_)));
+    }
+    double apply(double beta) override {
+      launch("bend", bend<Real, StateReal>, b_.fields_, current_.data());
+      AllFields at_rest = b_.fields_;
+      at_rest.tiles = tiles_.data();
+      b_.launch_pass_1(at_rest, {pass_1<Real, StateReal, false, false, false>, 0, b_.tiles()},
+                       nullptr);
+      b_.launch_pass_2(b_.only_forces(), StateReal(0), force_.data());
+      launch("stiffness_times", stiffness_times<Real, StateReal>, b_.fields_, force_.data(),
+             previous_.data(), static_cast<Real>(beta), next_.data());
+      return product(next_, current_);
+    }
+    double subtract(double alpha) override {
+      launch("subtract", subtract_multiple<Real>, next_.data(), current_.data(),
+             static_cast<Real>(alpha));
+      return std::sqrt(product(next_, next_));
+    }
+    void advance(double norm) override {
+      std::swap(previous_, current_);
+      std::swap(current_, next_);
+      scale(current_, 1 / norm);
+    }
+
+   private:
+    static double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) {
+      const thrust::transform_iterator products(thrust::counting_iterator<std::int64_t>(0),
+                                                Product<Real>{a.data(), b.data()});
+      return reduce(products, static_cast<std::int64_t>(a.size()), 0.0, Plus{});
+    }
+    void scale(DeviceArray<Real>& a, double factor) {
+      launch("scale", scale_vector<Real>, a.data(), static_cast<Real>(factor));
+    }
+    /// A thread a place.
+    template <class... Parameters, class... Arguments>
+    void launch(const char* name, void (*kernel)(Parameters...), Arguments... arguments) {
+      const auto tiles = static_cast<unsigned>(b_.tiles());
+      kernel<<<tiles, tile_size>>>(arguments...);
+      b_.launched(name, tiles, tile_size);
+    }
+    CudaBackend& b_;
+    DeviceArray<BodyConstants> tiles_;
+    DeviceArray<Real> previous_, current_, next_, force_;
+  };
+
   /// Tiles side by side that one launch serves.
   template <class Kernel>
   struct Run {
     Kernel kernel;
     Index first_tile, tiles;
-  };
-  struct ListArrays {
-    DeviceArray<Index> halo;
-    DeviceArray<TileLists::Row> rows;
-    DeviceArray<std::uint16_t> entries;
   };
   /// Phyxels on a path that moves, and not taken over by a later motion.
   struct Following {
@@ -315,6 +387,7 @@ class CudaBackend final : public Backend {
   };
 
   std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
+  Index tiles() const { return tiling_.tiles(); }
 
   // --- set-up ---------------------------------------------------------------------------------
 
@@ -329,27 +402,17 @@ class CudaBackend final : public Backend {
     return true;
   }
 
-  DeviceLists send_lists(const TileLists& lists, ListArrays& arrays) {
-    const std::string what = "neighbour lists of " + subject_;
-    arrays.halo = {lists.halo.size(), what};
-    arrays.halo.upload(lists.halo.data());
-    arrays.rows = {lists.rows.size(), what};
-    arrays.rows.upload(lists.rows.data());
-    arrays.entries = {lists.entries.size(), what};
-    arrays.entries.upload(lists.entries.data());
+  DeviceLists view_of(const DeviceTileLists& lists) const {
     check_shared_memory(lists);
-    return {arrays.halo.data(), lists.halo_stride, lists.slots(), arrays.rows.data(),
-            reinterpret_cast<const uint4*>(arrays.entries.data())};
+    return {lists.halo.data(), lists.halo_stride, lists.slots(), lists.rows.data(),
+            reinterpret_cast<const uint4*>(lists.entries.data())};
   }
   void make_lists() {
-    lists_ = send_lists(tiling_.neighbours, list_arrays_);
-    if (!tiling_.inverse.rows.empty()) {
-      inverse_lists_ = send_lists(tiling_.inverse, inverse_arrays_);
-    }
-    tiling_.neighbours = tiling_.inverse = {};  // the device has them now
+    lists_ = view_of(tiling_.neighbours);
+    second_lists_ = view_of(tiling_.second());
   }
   /// @throws InputError if a tile does not fit what one block may have
-  void check_shared_memory(const TileLists& lists) const {
+  void check_shared_memory(const DeviceTileLists& lists) const {
     const int bytes = pass_2_bytes(lists.slots());
     if (bytes <= most_shared_memory_) return;
     throw InputError(device_.name + ": " + std::to_string(tile_size) +
@@ -358,23 +421,6 @@ class CudaBackend final : public Backend {
                      " bytes of shared memory, of which a block may have " +
                      std::to_string(most_shared_memory_) +
                      ": allowed are a smaller support, precision \"float\" or the CPU");
-  }
-  std::size_t list_bytes(const DeviceLists& lists) const {
-    const ListArrays& a = lists.rows == lists_.rows ? list_arrays_ : inverse_arrays_;
-    return a.halo.bytes() + a.rows.bytes() + a.entries.bytes();
-  }
-
-  /// Zero at places without a phyxel.
-  template <class Value>
-  std::vector<Real> per_place(int rows, Value&& value) const {
-    std::vector<Real> out(static_cast<std::size_t>(rows) * places(), Real(0));
-    for (Index i = 0; i < size(); ++i) {
-      for (int r = 0; r < rows; ++r) {
-        out[static_cast<std::size_t>(r) * places() + tiling_.place[i]] =
-            static_cast<Real>(value(i, r));
-      }
-    }
-    return out;
   }
 
   void make_fields() {
@@ -393,37 +439,9 @@ class CudaBackend final : public Backend {
       stress_words_ = {6 * places(), "stresses" + of};
       for (int k = 0; k < 6; ++k) fields_.stresses.word[k] = stress_words_.data() + k * places();
     }
-    const auto moments = per_place(7, [&](Index i, int r) {
-      const Sym3d& a = model_.inverse_moment[i];
-      const double values[] = {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz, model_.volume[i]};
-      return values[r];
-    });
-    moment_constants_ = {moments.size(), "inverse moments" + of};
-    moment_constants_.upload(moments.data());
-
-    const std::vector<char> held = held_phyxels();
-    std::vector<Index> held_places;
-    for (Index i = 0; i < size(); ++i) {
-      if (held[i]) held_places.push_back(tiling_.place[i]);
-    }
-    held_places_ = {held_places.size(), "held phyxels"};
-    held_places_.upload(held_places.data());
-    const auto forces = per_place(4, [&](Index i, int r) {
-      const Vec3d& b = model_.moment_offset[i];
-      const double values[] = {b.x, b.y, b.z, (held[i] ? -1 : 1) / model_.mass[i]};
-      return values[r];
-    });
-    force_constants_ = {forces.size(), "masses" + of};
-    force_constants_.upload(forces.data());
-
-    if (own_supports_) {
-      const auto supports = per_place(1, [&](Index i, int) {
-        const double h = model_.neighbourhood.support[i];
-        return h > 0 ? 1 / (h * h) : 0;
-      });
-      supports_ = {supports.size(), "supports" + of};
-      supports_.upload(supports.data());
-    }
+    moment_constants_ = {7 * places(), "inverse moments" + of};
+    force_constants_ = {4 * places(), "masses" + of};
+    if (own_supports_) supports_ = {places(), "supports" + of};
     velocity_ = {3 * places(), "velocities" + of};
     if (mixed) displacement_ = {3 * places(), "displacements" + of};
     tiles_ = {tiling_.part.size(), "tiles" + of};
@@ -445,75 +463,76 @@ class CudaBackend final : public Backend {
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
     send_constants(0);
-    const std::vector<Vec3d> rest(places());
-    velocity_.upload(columns<StateReal>(rest).data());
-    if constexpr (mixed) displacement_.upload(columns<StateReal>(rest).data());
-    upload_points(rest);
+    put_all_constants();
+    PHYXEL_CUDA(cudaMemset(velocity_.data(), 0, velocity_.bytes()));
+    if constexpr (mixed) PHYXEL_CUDA(cudaMemset(displacement_.data(), 0, displacement_.bytes()));
+  }
+
+  void put_all_constants() {
+    const DeviceArray<Vec3d> position = sent(model_.position, "rest positions");
+    const DeviceArray<double> volume = sent(model_.volume, "volumes"),
+                              mass = sent(model_.mass, "masses"),
+                              support = sent(model_.neighbourhood.support, "supports");
+    std::vector<Vec3d> origins;
+    for (const Index part : tiling_.part) origins.push_back(origin_of(part));
+    const DeviceArray<Vec3d> origin = sent(origins, "tiles");
+    std::vector<Index> held_places;
+    DeviceArray<char> held_on_device;
+    if (!model_.motions.empty()) {
+      const std::vector<char> held = held_phyxels();
+      for (Index i = 0; i < size(); ++i) {
+        if (held[i]) held_places.push_back(tiling_.place[i]);
+      }
+      held_on_device = sent(held, "held phyxels");
+    }
+    held_places_ = sent(held_places, "held phyxels");
+    const auto tiles = static_cast<unsigned>(tiling_.tiles());
+    put_constants<<<tiles, tile_size>>>(
+        fields_,
+        {tiling_.phyxel_at.data(), position.data(), volume.data(), mass.data(), support.data(),
+         held_on_device.data(), tiling_.inverse_moment.data(), tiling_.moment_offset.data(),
+         origin.data()},
+        moment_constants_.data(), force_constants_.data(), supports_.data());
+    launched("put_constants", tiles, tile_size);
+    wait();
+    tiling_.inverse_moment = {};
+    tiling_.moment_offset = {};
   }
 
   void send_constants(double dt) {
     dt_ = dt;
-    std::vector<Constants> tiles;
+    std::vector<BodyConstants> tiles;
+    for (const Index p : tiling_.part) tiles.push_back(constants_of(model_.parts[p], dt));
+    tiles_.upload(tiles.data());
+  }
+  BodyConstants constants_of(const Part& part, double dt) const {
+    const Material& m = part.material;
+    const double half = m.damping * dt / 2;
+    const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
+    return {static_cast<Real>(m.lame_lambda()),
+            static_cast<Real>(m.lame_mu()),
+            static_cast<Real>(m.volume_stiffness),
+            static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
+            static_cast<StateReal>((1 - half) / (1 + half)),
+            static_cast<StateReal>(dt / (1 + half)),
+            m.strain == Strain::green,
+            m.damping > 0};
+  }
+  /// For small displacements, whatever the law.
+  DeviceArray<BodyConstants> rest_constants() const {
+    std::vector<BodyConstants> constants;
     for (const Index p : tiling_.part) {
       const Part& part = model_.parts[p];
-      const Material& m = part.material;
-      const double half = m.damping * dt / 2;
-      const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
-      tiles.push_back({static_cast<Real>(m.lame_lambda()), static_cast<Real>(m.lame_mu()),
-                       static_cast<Real>(m.volume_stiffness),
-                       static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
-                       static_cast<StateReal>((1 - half) / (1 + half)),
-                       static_cast<StateReal>(dt / (1 + half))});
+      constants.push_back(constants_of(part, 0));
+      constants.back().lambda =
+          static_cast<Real>(part.material.lame_lambda() + part.material.volume_stiffness);
     }
-    tiles_.upload(tiles.data());
+    return sent(constants, "tiles of " + subject_);
   }
 
   /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
   /// digits in float.
   Vec3d origin_of(Index part) const { return model_.position[model_.parts[part].begin]; }
-
-  void upload_points(const std::vector<Vec3d>& u) {
-    std::vector<Vec3<Real>> x(places());
-    for (Index place = 0; place < tiling_.places(); ++place) {
-      const Index i = tiling_.phyxel[place];
-      if (i >= 0)
-        x[place] = to<Real>(model_.position[i] - origin_of(tiling_.part[place / tile_size]));
-    }
-    if constexpr (sizeof(Real) == 4) {
-      std::vector<float4> quads(places());
-      std::vector<float2> pairs(places());
-      for (std::size_t k = 0; k < places(); ++k) {
-        const Vec3<Real> d = to<Real>(u[k]);
-        quads[k] = {x[k].x, x[k].y, x[k].z, d.x};
-        pairs[k] = {d.y, d.z};
-      }
-      quads_.upload(quads.data());
-      pairs_.upload(pairs.data());
-    } else {
-      std::vector<double2> words(3 * places());
-      for (std::size_t k = 0; k < places(); ++k) {
-        words[k] = {x[k].x, x[k].y};
-        words[places() + k] = {x[k].z, u[k].x};
-        words[2 * places() + k] = {u[k].y, u[k].z};
-      }
-      point_words_.upload(words.data());
-    }
-  }
-
-  std::vector<Vec3d> points_displacement() const {
-    std::vector<Vec3d> u(places());
-    if constexpr (sizeof(Real) == 4) {
-      const std::vector<float4> quads = copy_of(quads_);
-      const std::vector<float2> pairs = copy_of(pairs_);
-      for (std::size_t k = 0; k < places(); ++k) u[k] = {quads[k].w, pairs[k].x, pairs[k].y};
-    } else {
-      const std::vector<double2> words = copy_of(point_words_);
-      for (std::size_t k = 0; k < places(); ++k) {
-        u[k] = {words[places() + k].y, words[2 * places() + k].x, words[2 * places() + k].y};
-      }
-    }
-    return u;
-  }
 
   /// The motion that has the last word on each phyxel.
   std::vector<const Motion*> last_motions() const {
@@ -659,18 +678,17 @@ class CudaBackend final : public Backend {
   int pass_2_bytes(int slots) const {
     return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0)) * slots;
   }
-  const DeviceLists& second_lists() const { return inverse_lists_ ? *inverse_lists_ : lists_; }
 
-  void launch_pass_1(const Run<Pass1>& run, Real* gradient) {
+  void launch_pass_1(const AllFields& fields, const Run<Pass1>& run, Real* gradient) {
     const int bytes = Points<Real>::bytes * lists_.slots;
     allow_shared_memory(reinterpret_cast<const void*>(run.kernel));
-    run.kernel<<<run.tiles, tile_size, bytes>>>(fields_, lists_, run.first_tile, gradient);
+    run.kernel<<<run.tiles, tile_size, bytes>>>(fields, lists_, run.first_tile, gradient);
     launched("pass_1", run.tiles, tile_size);
   }
   void launch_pass_2(const Run<Pass2>& run, StateReal dt, Real* force) {
-    const int bytes = pass_2_bytes(second_lists().slots);
+    const int bytes = pass_2_bytes(second_lists_.slots);
     allow_shared_memory(reinterpret_cast<const void*>(run.kernel));
-    run.kernel<<<run.tiles, tile_size, bytes>>>(fields_, second_lists(), run.first_tile, dt, force);
+    run.kernel<<<run.tiles, tile_size, bytes>>>(fields_, second_lists_, run.first_tile, dt, force);
     launched("pass_2", run.tiles, tile_size);
   }
   /// Beyond 48 KiB a kernel has to ask. It asks for all there is: the answer is the kernel's, not
@@ -681,13 +699,177 @@ class CudaBackend final : public Backend {
                                      most_shared_memory_));
     allowed_.push_back(kernel);
   }
+  void stress_now() {
+    use_device();
+    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(fields_, run, nullptr);
+  }
+
+  // --- steps in residence -----------------------------------------------------------------------
+
+  struct Resident {
+    const void* kernel;
+    int slices, cluster;  // cluster: blocks of one; 0: by mail
+    unsigned blocks, threads;
+    int bytes;
+    DeviceArray<Slice> all_slices;
+    DeviceArray<int> slice_of_block;
+    DeviceArray<Index> place;
+    DeviceArray<std::uint16_t> entries;
+    DeviceArray<std::uint32_t> destinations;
+    DeviceArray<Letter> displacements, stresses;
+    ResidentView<Real> view;
+
+    std::string describe() const {
+      return cluster ? "resident, clusters of " + std::to_string(cluster)
+                     : "resident, " + std::to_string(slices) + " blocks";
+    }
+    std::size_t held() const {
+      return all_slices.bytes() + slice_of_block.bytes() + place.bytes() + entries.bytes() +
+             destinations.bytes() + displacements.bytes() + stresses.bytes();
+    }
+  };
+  /// Steps that may wait to be launched together.
+  static constexpr int most_pending = 256;
+
+  /// Where nothing changes from step to step but the state, and a body fits a cluster, or all fit
+  /// at once.
+  void make_resident() {
+    constexpr Index most_places = 1 << 18;  // far more than fit any GPU of today
+    const bool ramped = std::any_of(model_.loads.begin(), model_.loads.end(),
+                                    [](const Load& load) { return load.ramp > 0; });
+    if (size() == 0 || tiling_.places() > most_places || ramped || !motions_.empty()) return;
+    Tiling tiling;
+    tiling.phyxel = tiling_.phyxel;
+    tiling.part = tiling_.part;
+    const auto lists = [](const DeviceTileLists& on_device) {
+      return TileLists{fetched(on_device.halo), on_device.halo_stride, fetched(on_device.rows),
+                       fetched(on_device.entries)};
+    };
+    tiling.neighbours = lists(tiling_.neighbours);
+    if (tiling_.inverse) tiling.inverse = lists(*tiling_.inverse);
+    const ResidentPlan plan = make_resident_plan(tiling);
+
+    Resident r{};
+    if (!fits_clusters(plan, r) && !fits_at_once(plan, r)) return;
+    const std::string what = "what stays in shared memory of " + subject_;
+    r.slices = static_cast<int>(plan.slices.size());
+    r.all_slices = sent(plan.slices, what);
+    r.place = sent(plan.place, what);
+    r.entries = sent(plan.entries, what);
+    r.destinations = sent(plan.destinations, what);
+    std::vector<int> slice_of_block(r.blocks, -1);
+    for (int s = 0; s < r.slices; ++s) {
+      slice_of_block[r.cluster ? plan.slices[s].body * r.cluster + plan.slices[s].rank : s] = s;
+    }
+    r.slice_of_block = sent(slice_of_block, what);
+    if (!r.cluster) {
+      r.displacements = {displacement_letters<Real> * places(), what};
+      r.stresses = {stress_letters<Real> * places(), what};
+    }
+    r.view = {r.all_slices.data(),     r.place.data(),
+              r.entries.data(),        r.destinations.data(),
+              r.slice_of_block.data(), r.displacements.data(),
+              r.stresses.data(),       plan.most_slots,
+              plan.most_destinations,  {plan.longest[0], second_longest(plan)}};
+    resident_ = std::move(r);
+    clear_mail();
+  }
+  int second_longest(const ResidentPlan& plan) const {
+    return tiling_.inverse ? plan.longest[1] : 0;
+  }
+  template <class Post>
+  void use_post(const ResidentPlan& plan, Resident& r) {
+    r.kernel = reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post>);
+    r.threads = Post::threads;
+    r.bytes = ResidentMemory<Real>::bytes(plan.most_slots, plan.longest[0], second_longest(plan),
+                                          Post::bytes(plan.most_slots, plan.most_destinations));
+  }
+  /// One cluster a body, as many blocks each as the largest has slices.
+  bool fits_clusters(const ResidentPlan& plan, Resident& r) {
+    constexpr int most_blocks = 16;  // of a cluster, on GPUs that have them
+    use_post<ClusterPost<Real>>(plan, r);
+    const auto blocks = static_cast<std::size_t>(plan.bodies) * plan.most_slices;
+    // Bodies of very different sizes would leave most blocks idle.
+    if (plan.most_slices > most_blocks || blocks > 2 * plan.slices.size() ||
+        r.bytes > most_shared_memory_) {
+      return false;
+    }
+    r.cluster = plan.most_slices;
+    r.blocks = static_cast<unsigned>(blocks);
+    allow_shared_memory(r.kernel);
+    PHYXEL_CUDA(cudaFuncSetAttribute(r.kernel, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+    cudaLaunchAttribute attribute;
+    const cudaLaunchConfig_t config = launch_of(r, attribute);
+    int clusters = 0;
+    const cudaError_t error = cudaOccupancyMaxActiveClusters(&clusters, r.kernel, &config);
+    if (error != cudaSuccess) cudaGetLastError();  // an answer: too large for this GPU
+    return error == cudaSuccess && clusters > 0;
+  }
+  bool fits_at_once(const ResidentPlan& plan, Resident& r) {
+    use_post<MailPost<Real>>(plan, r);
+    r.cluster = 0;
+    r.blocks = static_cast<unsigned>(plan.slices.size());
+    if (r.bytes > most_shared_memory_) return false;
+    allow_shared_memory(r.kernel);
+    int blocks_each = 0;
+    PHYXEL_CUDA(cudaOccupancyMaxActiveBlocksPerMultiprocessor(
+        &blocks_each, r.kernel, static_cast<int>(r.threads), r.bytes));
+    return r.blocks <= static_cast<unsigned>(blocks_each * device_.multiprocessors);
+  }
+  static cudaLaunchConfig_t launch_of(const Resident& r, cudaLaunchAttribute& attribute) {
+    if (r.cluster) {
+      attribute.id = cudaLaunchAttributeClusterDimension;
+      attribute.val.clusterDim = {static_cast<unsigned>(r.cluster), 1, 1};
+    } else {
+      attribute.id = cudaLaunchAttributeCooperative;
+      attribute.val.cooperative = 1;
+    }
+    cudaLaunchConfig_t config{};
+    config.gridDim = r.blocks;
+    config.blockDim = r.threads;
+    config.dynamicSmemBytes = static_cast<std::size_t>(r.bytes);
+    config.attrs = &attribute;
+    config.numAttrs = 1;
+    return config;
+  }
+  void clear_mail() const {
+    next_tag_ = 1;
+    if (resident_->cluster) return;
+    PHYXEL_CUDA(
+        cudaMemsetAsync(resident_->displacements.data(), 0, resident_->displacements.bytes()));
+    PHYXEL_CUDA(cudaMemsetAsync(resident_->stresses.data(), 0, resident_->stresses.bytes()));
+  }
+  /// The first step after an upload goes by launches, which see held phyxels where they were put.
+  bool stays_resident() const { return resident_ && !fresh_; }
+
+  /// Makes this the current device and launches the steps that wait for it.
+  void settle() const {
+    use_device();
+    if (pending_ == 0) return;
+    if (next_tag_ > 0xF000'0000U) clear_mail();
+    auto dt = static_cast<StateReal>(dt_);
+    int steps = pending_;
+    AllFields fields = fields_;
+    ResidentView<Real> view = resident_->view;
+    unsigned tag = next_tag_;
+    void* arguments[] = {&fields, &view, &dt, &steps, &tag};
+    cudaLaunchAttribute attribute;
+    const cudaLaunchConfig_t config = launch_of(*resident_, attribute);
+    PHYXEL_CUDA(cudaLaunchKernelExC(&config, resident_->kernel, arguments));
+    launched("resident_steps", resident_->blocks, resident_->threads);
+    next_tag_ += 2 * static_cast<unsigned>(pending_);
+    pending_ = 0;
+  }
+
   void use_device() const { PHYXEL_CUDA(cudaSetDevice(device_.index)); }
 
   /// Lets the host run ahead by some ten milliseconds of steps, not by the hundreds that the queue
   /// takes: a signal would wait for them all.
-  void bound_queue() {
-    const auto ahead = static_cast<int>(std::clamp<std::size_t>(50'000'000 / places(), 1, 128));
-    if (++steps_since_mark_ < ahead) return;
+  void bound_queue(int steps) {
+    const int most = resident_ ? 2 * most_pending : 128;
+    const auto ahead = static_cast<int>(
+        std::clamp<std::size_t>(50'000'000 / places(), 1, static_cast<std::size_t>(most)));
+    if ((steps_since_mark_ += steps) < ahead) return;
     steps_since_mark_ = 0;
     const Event& mark = marks_[batches_++ % 2];
     PHYXEL_CUDA(cudaEventSynchronize(mark.get()));  // of the last batch but one; at once if none
@@ -701,18 +883,21 @@ class CudaBackend final : public Backend {
     launched("follow", blocks_for(count), tile_size);
   }
 
+  Run<Pass2> only_forces() const {
+    return {own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
+                          : pass_2<Real, StateReal, false, false, false, true>,
+            0, tiles()};
+  }
   DeviceArray<Real> forces_now() {
-    stress();
+    settle();
+    stress_now();
     DeviceArray<Real> forces(3 * places(), "forces of " + subject_);
-    launch_pass_2({own_supports_ ? pass_2<Real, StateReal, true, false, false, true>
-                                 : pass_2<Real, StateReal, false, false, false, true>,
-                   0, tiling_.tiles()},
-                  StateReal(0), forces.data());
+    launch_pass_2(only_forces(), StateReal(0), forces.data());
     return forces;
   }
   DeviceArray<Real> gradients_now() {
     DeviceArray<Real> gradients(9 * places(), "displacement gradients of " + subject_);
-    launch_pass_1({pass_1<Real, StateReal, true, false, true>, 0, tiling_.tiles()},
+    launch_pass_1(fields_, {pass_1<Real, StateReal, true, false, true>, 0, tiles()},
                   gradients.data());
     return gradients;
   }
@@ -720,7 +905,7 @@ class CudaBackend final : public Backend {
   static unsigned blocks_for(int count) {
     return static_cast<unsigned>((count + tile_size - 1) / tile_size);
   }
-  void launched(const char* kernel, unsigned blocks, unsigned threads) {
+  void launched(const char* kernel, unsigned blocks, unsigned threads) const {
     last_launch_.kernel = kernel;
     last_launch_.blocks = blocks;
     last_launch_.threads = threads;
@@ -730,26 +915,6 @@ class CudaBackend final : public Backend {
 
   // --- values -----------------------------------------------------------------------------------
 
-  template <class To, class From>
-  static Vec3<To> to(Vec3<From> v) {
-    return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
-  }
-  template <class T>
-  static std::vector<T> copy_of(const DeviceArray<T>& array) {
-    std::vector<T> values(array.size());
-    array.download(values.data());
-    return values;
-  }
-  template <class T>
-  std::vector<T> columns(const std::vector<Vec3d>& values) const {
-    std::vector<T> out(3 * places());
-    for (std::size_t k = 0; k < places(); ++k) {
-      out[k] = static_cast<T>(values[k].x);
-      out[places() + k] = static_cast<T>(values[k].y);
-      out[2 * places() + k] = static_cast<T>(values[k].z);
-    }
-    return out;
-  }
   template <class T>
   std::vector<Vec3d> from_columns(const std::vector<T>& values) const {
     std::vector<Vec3d> out(places());
@@ -768,7 +933,7 @@ class CudaBackend final : public Backend {
 
   const Model& model_;
   Device device_;
-  Tiling tiling_;
+  DeviceTiling tiling_;
   int most_shared_memory_ = 0;  // of one block, in bytes
   bool own_supports_ = false;
   std::string subject_;
@@ -780,12 +945,13 @@ class CudaBackend final : public Backend {
   std::vector<Run<Pass1>> stress_runs_;
   std::vector<Run<Pass2>> advance_runs_;
   std::vector<const void*> allowed_;
-  Launch last_launch_;
+  mutable Launch last_launch_;
+  std::optional<Resident> resident_;
+  mutable int pending_ = 0;        // steps that wait to be launched
+  mutable unsigned next_tag_ = 1;  // of the mail
 
   AllFields fields_{};
-  DeviceLists lists_{};
-  std::optional<DeviceLists> inverse_lists_;
-  ListArrays list_arrays_, inverse_arrays_;
+  DeviceLists lists_{}, second_lists_{};
   std::vector<Following> motions_;
   std::vector<Loading> loads_;
 
@@ -795,7 +961,7 @@ class CudaBackend final : public Backend {
   DeviceArray<Word> stress_words_;
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_;
   DeviceArray<StateReal> velocity_, displacement_;
-  DeviceArray<Constants> tiles_;
+  DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;
   DeviceArray<Index> held_places_;
   DeviceArray<char> moved_;  // empty unless phyxels follow a path
@@ -808,16 +974,17 @@ class CudaBackend final : public Backend {
 
 }  // namespace
 
-std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device) {
+std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
+                                           CudaPath path) {
   switch (precision) {
     case Precision::single:
-      return std::make_unique<CudaBackend<float, float>>(model, device);
+      return std::make_unique<CudaBackend<float, float>>(model, device, path);
     case Precision::mixed:
-      return std::make_unique<CudaBackend<float, double>>(model, device);
+      return std::make_unique<CudaBackend<float, double>>(model, device, path);
     case Precision::double_:
       break;
   }
-  return std::make_unique<CudaBackend<double, double>>(model, device);
+  return std::make_unique<CudaBackend<double, double>>(model, device, path);
 }
 
 }  // namespace phyxel

@@ -66,11 +66,6 @@ __device__ void put3(double* sum, Vec3<T> v) {
   sum[1] = v.y;
   sum[2] = v.z;
 }
-template <class T>
-__device__ Vec3<double> to_double(Vec3<T> v) {
-  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-
 inline constexpr int diagnose_threads = 128;
 
 /// @param force,gradient of the present displacements
@@ -94,14 +89,14 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       const double mass = 1 / fabs(static_cast<double>(inverse_mass));
       const auto point = f.points.get(place);
       const Vec3<double> u = std::is_same_v<Real, StateReal>
-                                 ? to_double(point.u)
-                                 : to_double(column3(f.displacement, f.places, place));
-      const Vec3<double> x = m.origin + to_double(point.x) + u;
-      const Vec3<double> internal = to_double(column3(force, f.places, place));
+                                 ? to<double>(point.u)
+                                 : to<double>(column3(f.displacement, f.places, place));
+      const Vec3<double> x = m.origin + to<double>(point.x) + u;
+      const Vec3<double> internal = to<double>(column3(force, f.places, place));
       const Vec3<double> load =
-          f.load ? to_double(column3(f.load, f.places, place)) : Vec3<double>{};
-      const Vec3<double> half_step_velocity = to_double(column3(f.velocity, f.places, place));
-      const Vec3<double> gravity = to_double(f.gravity);
+          f.load ? to<double>(column3(f.load, f.places, place)) : Vec3<double>{};
+      const Vec3<double> half_step_velocity = to<double>(column3(f.velocity, f.places, place));
+      const Vec3<double> gravity = to<double>(f.gravity);
       Mat3<double> grad_u;
       double trace_of_all = 0;
       for (int e = 0; e < 9; ++e) {

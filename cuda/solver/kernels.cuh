@@ -23,6 +23,7 @@ struct TileConstants {
   Real lambda, mu, volume_stiffness;  ///< [Pa]
   Real inverse_h_squared;             ///< [1/m²], where the body has one support.
   StateReal keep, gain;               ///< Damped Verlet's factors; gain is the step where undamped.
+  bool green, damped;                 ///< For kernels that serve bodies of any law.
 };
 
 /// `TileLists` in device memory.
@@ -57,6 +58,31 @@ __device__ auto law_of(const Constants& body) {
     return SumOf<Elastic, VolumeConservation<Real>>{Elastic{hooke}, {body.volume_stiffness}};
   } else {
     return Elastic{hooke};
+  }
+}
+
+/// The stress of a tile's body, whatever its law.
+template <class Real, class Constants>
+__device__ Mat3<Real> first_piola_stress_of(const Constants& body, const Mat3<Real>& grad_u) {
+  const bool volume = body.volume_stiffness > Real(0);
+  if (body.green) {
+    return volume ? law_of<Real, true, true>(body).first_piola_stress(grad_u)
+                  : law_of<Real, true, false>(body).first_piola_stress(grad_u);
+  }
+  return volume ? law_of<Real, false, true>(body).first_piola_stress(grad_u)
+                : law_of<Real, false, false>(body).first_piola_stress(grad_u);
+}
+
+/// The velocity after a step. `force` is all but gravity; damping by the body's factors.
+template <class Real, class StateReal, bool damped, class Constants>
+__device__ Vec3<StateReal> next_velocity(Vec3<StateReal> velocity, Vec3<Real> force,
+                                         Real inverse_mass, Vec3<StateReal> gravity, StateReal dt,
+                                         const Constants& body) {
+  const Vec3<StateReal> acceleration = to<StateReal>(inverse_mass * force) + gravity;
+  if constexpr (damped) {
+    return verlet_velocity_damped(velocity, acceleration, body.keep, body.gain);
+  } else {
+    return verlet_velocity(velocity, acceleration, dt);
   }
 }
 
@@ -181,8 +207,10 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     const auto p = Points<Real>::at(image, lists.slots, a);
     const auto q = Points<Real>::at(image, lists.slots, b);
     const Vec3<Real> x_p = p.x - own.x, x_q = q.x - own.x;
-    sum += gradient_term(p.u - own.u, x_p, weight_shape_anywhere(dot(x_p, x_p), inverse_h_squared));
-    sum += gradient_term(q.u - own.u, x_q, weight_shape_anywhere(dot(x_q, x_q), inverse_h_squared));
+    add_gradient_term(sum, p.u - own.u,
+                      weight_shape_anywhere(dot(x_p, x_p), inverse_h_squared) * x_p);
+    add_gradient_term(sum, q.u - own.u,
+                      weight_shape_anywhere(dot(x_q, x_q), inverse_h_squared) * x_q);
   });
 
   const Real* c = f.moment_constants + place;
@@ -250,25 +278,16 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
   const Real inverse_mass = f.force_constants[3 * f.places + place];
   if (inverse_mass <= Real(0)) return;
   if constexpr (loaded) sum += column3(f.load, f.places, place);
-  const Vec3<Real> f_over_m = inverse_mass * sum;
-  const Vec3<StateReal> acceleration =
-      Vec3<StateReal>{static_cast<StateReal>(f_over_m.x), static_cast<StateReal>(f_over_m.y),
-                      static_cast<StateReal>(f_over_m.z)} +
-      f.gravity;
-  Vec3<StateReal> velocity = column3(f.velocity, f.places, place);
-  if constexpr (damped) {
-    velocity = verlet_velocity_damped(velocity, acceleration, body.keep, body.gain);
-  } else {
-    velocity = verlet_velocity(velocity, acceleration, dt);
-  }
+  const Vec3<StateReal> velocity = next_velocity<Real, StateReal, damped>(
+      column3(f.velocity, f.places, place), sum, inverse_mass, f.gravity, dt, body);
   set_column3(f.velocity, f.places, place, velocity);
   auto point = f.points.get(place);
   if constexpr (std::is_same_v<Real, StateReal>) {
-    point.u += dt * velocity;
+    point.u = fused(dt, velocity, point.u);
   } else {
-    const Vec3<StateReal> u = column3(f.displacement, f.places, place) + dt * velocity;
+    const Vec3<StateReal> u = fused(dt, velocity, column3(f.displacement, f.places, place));
     set_column3(f.displacement, f.places, place, u);
-    point.u = {static_cast<Real>(u.x), static_cast<Real>(u.y), static_cast<Real>(u.z)};
+    point.u = to<Real>(u);
   }
   f.points.set(place, point);
 }

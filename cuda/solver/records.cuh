@@ -6,7 +6,7 @@
 #include <cuda_runtime.h>
 
 #include "phyxel/types.hpp"
-#include "solver/tiling.hpp"
+#include "setup/tiling.hpp"
 
 namespace phyxel::cuda {
 

@@ -35,60 +35,64 @@ void place(Cloud& cloud, const BodyRequest& request) {
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
 }
 
-/// Mean distance between neighbours to volume: what one body needs beside its cloud.
 struct Masses {
   std::vector<double> mass, volume;
   bool kernel = false;
 };
 
-/// The 2004 rule: m_i = s r̄_i³ ρ with s such that the mean kernel density Σ_j m_j w_ij is ρ
-/// (the phyxel itself included), v_i = m_i / ρ_i. Source: Mueller et al. 2004, section 4.2.
-Masses kernel_masses(const Cloud& cloud, const Neighbourhood& hood,
-                     const std::vector<double>& spacing, double density) {
-  const std::size_t n = cloud.position.size();
-  Masses result{std::vector<double>(n), std::vector<double>(n), true};
-  std::vector<double> relative(n);  // kernel density over ρ, for s = 1
-  for (std::size_t i = 0; i < n; ++i)
-    result.mass[i] = spacing[i] * spacing[i] * spacing[i] * density;
-#pragma omp parallel for
-  for (std::size_t i = 0; i < n; ++i) {
-    const double h = hood.support[i];
-    double sum = h > 0 ? result.mass[i] * weight(0, h) : 0;
-    for (const Index j : hood.neighbours.row(static_cast<Index>(i))) {
-      sum += result.mass[j] * weight(norm(cloud.position[j] - cloud.position[i]), h);
-    }
-    relative[i] = sum / density;
-  }
-  const double mean =
-      std::accumulate(relative.begin(), relative.end(), 0.0) / static_cast<double>(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    result.mass[i] /= mean;
-    result.volume[i] = result.mass[i] / (relative[i] / mean * density);
-  }
-  return result;
-}
-
-Masses masses_of(const Cloud& cloud, const Neighbourhood& hood, const std::vector<double>& spacing,
-                 const BodyRequest& request) {
+bool wants_kernel_volumes(const Cloud& cloud, const BodyRequest& request) {
   const bool kernel = request.volume_rule == VolumeRule::kernel ||
                       (request.volume_rule == VolumeRule::automatic && cloud.volume.empty());
-  if (kernel) {
-    if (cloud.position.size() < 2) {
-      throw InputError(
-          fmt::format("{}: body \"{}\" has a single phyxel: the kernel rule cannot tell its volume",
-                      request.where, request.name));
-    }
-    return kernel_masses(cloud, hood, spacing, request.material.density);
+  if (kernel && cloud.position.size() < 2) {
+    throw InputError(
+        fmt::format("{}: body \"{}\" has a single phyxel: the kernel rule cannot tell its volume",
+                    request.where, request.name));
   }
-  if (cloud.volume.empty()) {
+  if (!kernel && cloud.volume.empty()) {
     throw InputError(fmt::format(
         "{}: body \"{}\" carries no volumes, so volumes = \"geometry\" is impossible: allowed "
         "\"kernel\" or \"automatic\"",
         request.where, request.name));
   }
+  return kernel;
+}
+
+/// r̄_i³ w_ii + Σ_j r̄_j³ w_ij.
+std::vector<double> kernel_sums(const Cloud& cloud, const Neighbourhood& hood,
+                                const std::vector<double>& spacing) {
+  const auto cube = [&](std::size_t i) { return spacing[i] * spacing[i] * spacing[i]; };
+  std::vector<double> sums(cloud.position.size());
+#pragma omp parallel for
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double h = hood.support[i];
+    sums[i] = h > 0 ? cube(i) * weight(0, h) : 0;
+    for (const Index j : hood.neighbours.row(static_cast<Index>(i))) {
+      sums[i] += cube(j) * weight(norm(cloud.position[j] - cloud.position[i]), h);
+    }
+  }
+  return sums;
+}
+
+/// The 2004 rule: m_i = s r̄_i³ ρ with s such that the mean kernel density Σ_j m_j w_ij is ρ
+/// (the phyxel itself included), v_i = m_i / ρ_i. Source: Mueller et al. 2004, section 4.2.
+Masses kernel_masses(const Survey& survey, double density) {
+  const std::size_t n = survey.spacing.size();
+  const std::vector<double>& relative = survey.kernel_sum;  // kernel density over ρ, for s = 1
+  const double mean =
+      std::accumulate(relative.begin(), relative.end(), 0.0) / static_cast<double>(n);
+  Masses result{std::vector<double>(n), std::vector<double>(n), true};
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = survey.spacing[i];
+    result.mass[i] = r * r * r * density / mean;
+    result.volume[i] = result.mass[i] / (relative[i] / mean * density);
+  }
+  return result;
+}
+
+Masses geometric_masses(const Cloud& cloud, double density) {
   Masses result{std::vector<double>(cloud.volume.size()), cloud.volume, false};
   std::transform(cloud.volume.begin(), cloud.volume.end(), result.mass.begin(),
-                 [&](double v) { return v * request.material.density; });
+                 [&](double v) { return v * density; });
   return result;
 }
 
@@ -121,6 +125,7 @@ void append(std::vector<T>& to, const std::vector<T>& values) {
 
 /// Moments A_i, their pseudo-inverses and the offsets b_i; notes what is degenerate.
 void find_moments(Model& model) {
+  if (!model.has_lists()) return;
   const Index n = model.size();
   model.inverse_moment.resize(static_cast<std::size_t>(n));
   model.moment_offset.resize(static_cast<std::size_t>(n));
@@ -160,6 +165,8 @@ std::vector<Index> shifted(std::vector<Index> indices, Index shift) {
 Load make_load(const LoadRequest& request, const Model& model, const std::vector<Index>& phyxels) {
   Load load;
   load.phyxels = phyxels;
+  load.total = request.force;
+  load.density = request.force_density;
   load.ramp = request.ramp;
   double total_mass = 0;
   for (const Index i : phyxels) total_mass += model.mass[i];
@@ -200,30 +207,70 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& cloud, 
   }
 }
 
-void add_body(Model& model, const BodyRequest& request, const Cloud& cloud) {
-  const Index shift = model.size();
-  const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
-  const std::vector<double> spacing = mean_spacing(cloud.position, request.neighbourhood.nearest);
-  const Neighbourhood hood = find_neighbours(cloud.position, spacing, request.neighbourhood);
-  const Masses masses = masses_of(cloud, hood, spacing, request);
+/// What a survey tells, found here along with the lists.
+Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool kernel_volumes,
+                         Neighbourhood& hood) {
+  Survey survey;
+  survey.spacing = mean_spacing(cloud.position, request.neighbourhood.nearest);
+  hood = find_neighbours(cloud.position, survey.spacing, request.neighbourhood);
+  if (kernel_volumes) survey.kernel_sum = kernel_sums(cloud, hood, survey.spacing);
+  survey.support = hood.support;
+  survey.lists.pairs = hood.neighbours.entries();
+  const Index rows = hood.neighbours.rows();
+  if (rows > 0) survey.lists.fewest = survey.lists.most = hood.neighbours.length(0);
+  for (Index i = 1; i < rows; ++i) {
+    survey.lists.fewest = std::min(survey.lists.fewest, hood.neighbours.length(i));
+    survey.lists.most = std::max(survey.lists.most, hood.neighbours.length(i));
+  }
+  return survey;
+}
 
-  // Inverse lists are stored for all bodies as soon as one body needs them.
-  Neighbourhood& all = model.neighbourhood;
+/// Inverse lists are stored for all bodies as soon as one body needs them.
+void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift) {
   if (all.symmetric && !hood.symmetric) {
     all.inverse_lists = all.neighbours;
     all.symmetric = false;
   }
   append(all.neighbours, hood.neighbours, shift);
   if (!all.symmetric) append(all.inverse_lists, hood.inverse(), shift);
-  append(all.support, hood.support);
+}
+
+void append(Degenerate& to, const Degenerate& found, Index shift) {
+  append(to.isolated, shifted(found.isolated, shift));
+  append(to.collinear, shifted(found.collinear, shift));
+  append(to.coplanar, shifted(found.coplanar, shift));
+  append(to.coincident, shifted(found.coincident, shift));
+}
+
+/// @param surveyor null: lists and moments are made here.
+void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
+              const Surveyor* surveyor) {
+  const Index shift = model.size();
+  const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
+  const bool kernel_volumes = wants_kernel_volumes(cloud, request);
+  Survey survey;
+  if (surveyor) {
+    survey = (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
+    if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
+    append(model.degenerate, survey.degenerate, shift);
+  } else {
+    Neighbourhood hood;
+    survey = survey_with_lists(cloud, request, kernel_volumes, hood);
+    append_lists(model.neighbourhood, hood, shift);
+  }
+  const Masses masses = kernel_volumes ? kernel_masses(survey, request.material.density)
+                                       : geometric_masses(cloud, request.material.density);
+  append(model.neighbourhood.support, survey.support);
   append(model.position, cloud.position);
   append(model.mass, masses.mass);
   append(model.volume, masses.volume);
 
   Surfels& surfels = model.surfels;
   Index unreached = 0;
-  append(surfels.carriers,
-         phyxels_near(cloud.surface.position, cloud.position, hood.support, &unreached), shift);
+  if (!cloud.surface.position.empty()) {
+    append(surfels.carriers,
+           phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached), shift);
+  }
   surfels.unreached += unreached;
   append(surfels.position, cloud.surface.position);
   append(surfels.normal, cloud.surface.normal);
@@ -237,6 +284,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud) {
                          .surfel_end = static_cast<Index>(surfels.position.size()),
                          .material = request.material,
                          .neighbourhood = in_words(request.neighbourhood),
+                         .lists = survey.lists,
                          .kernel_volumes = masses.kernel});
   add_boundary(model, request, cloud, shift);
 }
@@ -318,7 +366,9 @@ Cloud make_cloud(const BodyRequest& request) {
   return cloud;
 }
 
-Model build_model(const Scene& scene) {
+namespace {
+
+Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
   Model model;
   model.gravity = scene.gravity;
   // Copies of a body follow one another; filling a mesh once serves them all.
@@ -329,22 +379,53 @@ Model build_model(const Scene& scene) {
     made = &request.source;
     Cloud cloud = rest;
     place(cloud, request);
-    add_body(model, request, cloud);
+    add_body(model, request, cloud, surveyor);
   }
   finish(model);
   return model;
 }
 
-Model build_model(const Scene& scene, std::span<const Cloud> clouds) {
+Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
+                        const Surveyor* surveyor) {
   if (clouds.size() != scene.bodies.size()) {
     throw InputError(fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
                                  clouds.size(), scene.bodies.size()));
   }
   Model model;
   model.gravity = scene.gravity;
-  for (std::size_t b = 0; b < clouds.size(); ++b) add_body(model, scene.bodies[b], clouds[b]);
+  for (std::size_t b = 0; b < clouds.size(); ++b) {
+    add_body(model, scene.bodies[b], clouds[b], surveyor);
+  }
   finish(model);
   return model;
+}
+
+}  // namespace
+
+const Model& Model::with_lists() const {
+  if (!has_lists()) {
+    throw InputError(
+        "the neighbour lists of this model were left to the device that surveyed it: allowed is a "
+        "backend on that device, or a model built without a surveyor");
+  }
+  return *this;
+}
+
+Offset Model::pairs() const {
+  Offset sum = 0;
+  for (const Part& part : parts) sum += part.lists.pairs;
+  return sum;
+}
+
+Model build_model(const Scene& scene) { return model_from_sources(scene, nullptr); }
+Model build_model(const Scene& scene, std::span<const Cloud> clouds) {
+  return model_from_clouds(scene, clouds, nullptr);
+}
+Model build_model(const Scene& scene, const Surveyor& survey) {
+  return model_from_sources(scene, &survey);
+}
+Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey) {
+  return model_from_clouds(scene, clouds, &survey);
 }
 
 }  // namespace phyxel

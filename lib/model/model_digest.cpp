@@ -20,12 +20,15 @@ std::uint64_t model_digest(const Model& model) {
                                                                        &XXH3_freeState);
   XXH3_64bits_reset(state.get());
   add(state.get(), model.position);
-  add(state.get(), model.mass);
-  add(state.get(), model.volume);
-  add(state.get(), model.neighbourhood.neighbours.offsets);
-  add(state.get(), model.neighbourhood.neighbours.indices);
+  add(state.get(), model.neighbourhood.support);
   for (const Part& part : model.parts) {
     const Material& m = part.material;
+    // Kernel volumes are sums, whose last bits depend on who summed.
+    if (!part.kernel_volumes) {
+      add(state.get(),
+          std::vector<double>(model.volume.begin() + part.begin, model.volume.begin() + part.end));
+    }
+    add(state.get(), std::vector<char>(part.neighbourhood.begin(), part.neighbourhood.end()));
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0});
   }
@@ -37,7 +40,7 @@ std::uint64_t model_digest(const Model& model) {
   }
   for (const Load& load : model.loads) {
     add(state.get(), load.phyxels);
-    add(state.get(), load.force);
+    add(state.get(), std::vector<Vec3d>{load.total, load.density});
     add(state.get(), std::vector<double>{load.ramp});
   }
   return XXH3_64bits_digest(state.get());

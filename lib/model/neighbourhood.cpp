@@ -53,12 +53,7 @@ SpatialHash roomy_hash(std::span<const Vec3d> position) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
-  const Vec3d extent = high - low;
-  const double widest = std::max({extent.x, extent.y, extent.z});
-  const double floor_width = widest / 100;  // a sheet or thread has no volume
-  const double box = std::max(extent.x, floor_width) * std::max(extent.y, floor_width) *
-                     std::max(extent.z, floor_width);
-  double cell = std::cbrt(4 * box / static_cast<double>(position.size()));
+  double cell = roomy_cell_size(low, high, position.size());
   for (int attempt = 0;; ++attempt) {
     SpatialHash hash(position, cell);
     if (hash.mean_occupancy() <= 8 || attempt == 4) return hash;
@@ -162,7 +157,6 @@ Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const d
   result.support = support_radii(spacing, rule);
   if (n == 0) return result;
 
-  const bool uniform = rule.radius || rule.support == NeighbourhoodRule::Support::uniform;
   std::vector<double> sorted = result.support;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::nth_element(sorted.begin(), middle, sorted.end());
@@ -193,7 +187,7 @@ Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const d
                       candidates.end());
     for (std::size_t k = 0; k < kept; ++k) row.push_back(candidates[k].second);
   });
-  result.symmetric = uniform && !rule.max_neighbours;
+  result.symmetric = !rule.one_sided();
   if (!result.symmetric) result.inverse_lists = transpose(result.neighbours, n);
   return result;
 }

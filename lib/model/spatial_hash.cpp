@@ -7,31 +7,28 @@ namespace phyxel {
 
 SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
   const std::size_t n = position.size();
-  if (n > 0) low_ = high_ = position[0];
+  if (n > 0) grid_.low = high_ = position[0];
   for (const Vec3d& p : position) {
-    low_ = {std::min(low_.x, p.x), std::min(low_.y, p.y), std::min(low_.z, p.z)};
+    grid_.low = {std::min(grid_.low.x, p.x), std::min(grid_.low.y, p.y),
+                 std::min(grid_.low.z, p.z)};
     high_ = {std::max(high_.x, p.x), std::max(high_.y, p.y), std::max(high_.z, p.z)};
   }
-  // 21 bits a coordinate: a cell may not be smaller than a millionth of the cloud.
-  const Vec3d extent = high_ - low_;
-  const double widest = std::max({extent.x, extent.y, extent.z});
-  cell_size_ = std::max(cell_size, widest / 1e6);
-  if (!(cell_size_ > 0)) cell_size_ = 1;
-  inverse_cell_size_ = 1 / cell_size_;
+  cell_size_ = cell_size_for(grid_.low, high_, cell_size);
+  grid_.inverse_cell_size = 1 / cell_size_;
 
   const std::size_t table_size = std::bit_ceil(std::max<std::size_t>(n, 8));
-  table_mask_ = table_size - 1;
+  grid_.table_mask = table_size - 1;
   bucket_start_.assign(table_size + 1, 0);
   std::vector<std::uint64_t> cell(n);
   for (std::size_t i = 0; i < n; ++i) {
-    cell[i] = name(cell_of(position[i]));
-    ++bucket_start_[bucket_of(cell[i]) + 1];
+    cell[i] = CellGrid::name(grid_.cell_of(position[i]));
+    ++bucket_start_[grid_.bucket_of(cell[i]) + 1];
   }
   for (std::size_t b = 0; b < table_size; ++b) bucket_start_[b + 1] += bucket_start_[b];
   std::vector<std::uint32_t> next(bucket_start_.begin(), bucket_start_.end() - 1);
   entries_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    entries_[next[bucket_of(cell[i])]++] = {position[i], cell[i], static_cast<Index>(i)};
+    entries_[next[grid_.bucket_of(cell[i])]++] = {position[i], cell[i], static_cast<Index>(i)};
   }
   // Within a bucket the points of one cell need not be adjacent; counting changes of cell
   // overestimates a little, which is good enough for an estimate.
@@ -42,13 +39,6 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
     }
   }
   mean_occupancy_ = occupied ? static_cast<double>(n) / static_cast<double>(occupied) : 0;
-}
-
-int SpatialHash::farthest_ring(Vec3d place) const {
-  const Cell c = cell_of(place), a = cell_of(low_), b = cell_of(high_);
-  return static_cast<int>(
-      std::max({std::abs(c.x - a.x), std::abs(b.x - c.x), std::abs(c.y - a.y), std::abs(b.y - c.y),
-                std::abs(c.z - a.z), std::abs(b.z - c.z)}));
 }
 
 }  // namespace phyxel

@@ -1,4 +1,4 @@
-/// The spatial hash of Teschner et al. 2003 (reference 30 of Farias et al. 2008).
+/// The spatial hash of Teschner et al. 2003 on the CPU.
 #pragma once
 
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "phyxel/types.hpp"
+#include "model/cell_grid.hpp"
 
 namespace phyxel {
 
@@ -43,7 +43,7 @@ class SpatialHash {
       visit_all(visit);
       return;
     }
-    const Cell c = cell_of(place);
+    const Cell c = grid_.cell_of(place);
     for (std::int64_t z = c.z - rings; z <= c.z + rings; ++z) {
       for (std::int64_t y = c.y - rings; y <= c.y + rings; ++y) {
         for (std::int64_t x = c.x - rings; x <= c.x + rings; ++x) visit_cell({x, y, z}, visit);
@@ -54,7 +54,7 @@ class SpatialHash {
   /// The same for the cells exactly `ring` cells away.
   template <class Visit>
   void visit_ring(Vec3d place, int ring, Visit&& visit) const {
-    const Cell c = cell_of(place);
+    const Cell c = grid_.cell_of(place);
     for (std::int64_t dz = -ring; dz <= ring; ++dz) {
       for (std::int64_t dy = -ring; dy <= ring; ++dy) {
         const bool face = std::abs(dz) == ring || std::abs(dy) == ring;
@@ -67,45 +67,23 @@ class SpatialHash {
   }
 
   /// Rings of cells around `place` beyond which there is no point.
-  int farthest_ring(Vec3d place) const;
+  int farthest_ring(Vec3d place) const { return grid_.farthest_ring(place, high_); }
 
  private:
-  struct Cell {
-    std::int64_t x, y, z;
-  };
+  using Cell = CellGrid::Cell;
 
-  Cell cell_of(Vec3d p) const {
-    return {static_cast<std::int64_t>(std::floor((p.x - low_.x) * inverse_cell_size_)),
-            static_cast<std::int64_t>(std::floor((p.y - low_.y) * inverse_cell_size_)),
-            static_cast<std::int64_t>(std::floor((p.z - low_.z) * inverse_cell_size_))};
-  }
-  /// A cell's name: 21 bits a coordinate. Cells outside the cloud may share the name of one
-  /// inside only if they are two million cells away, and then the distance tells.
-  static std::uint64_t name(Cell c) {
-    constexpr std::uint64_t mask = 0x1fffff;
-    return (static_cast<std::uint64_t>(c.x) & mask) |
-           (static_cast<std::uint64_t>(c.y) & mask) << 21 |
-           (static_cast<std::uint64_t>(c.z) & mask) << 42;
-  }
-  /// hash(x, y, z) = (x p1 xor y p2 xor z p3) mod table size, with the paper's primes.
-  std::size_t bucket_of(std::uint64_t cell) const {
-    constexpr std::uint64_t mask = 0x1fffff;
-    const std::uint64_t h = ((cell & mask) * 73856093u) ^ ((cell >> 21 & mask) * 19349663u) ^
-                            ((cell >> 42 & mask) * 83492791u);
-    return h & table_mask_;
-  }
   template <class Visit>
   void visit_cell(Cell c, Visit&& visit) const {
-    const std::uint64_t cell = name(c);
-    const std::size_t bucket = bucket_of(cell);
+    const std::uint64_t cell = CellGrid::name(c);
+    const std::size_t bucket = grid_.bucket_of(cell);
     for (std::uint32_t k = bucket_start_[bucket]; k < bucket_start_[bucket + 1]; ++k) {
       if (entries_[k].cell == cell) visit(entries_[k]);
     }
   }
 
-  Vec3d low_, high_;
-  double cell_size_ = 1, inverse_cell_size_ = 1, mean_occupancy_ = 0;
-  std::size_t table_mask_ = 0;
+  CellGrid grid_;
+  Vec3d high_;
+  double cell_size_ = 1, mean_occupancy_ = 0;
   std::vector<std::uint32_t> bucket_start_;
   std::vector<Entry> entries_;
 };

@@ -86,7 +86,8 @@ std::vector<SceneKey> run_keys() {
       {.section = "time", .name = "step", .type = KeyType::number_or_auto, .unit = "s",
        .fallback = "\"auto\"", .range = above(0),
        .meaning = "Time step. \"auto\": `safety` times the largest stable step, which is found "
-           "from the stiffness of the bodies. A given step above that is refused."},
+           "from the stiffness of the bodies; three digits of it. A given step above the largest "
+           "is refused."},
       {.section = "time", .name = "safety", .fallback = "0.8", .range = strictly_between(0, 1),
        .meaning = "Fraction of the largest stable step; not with a given `step`."},
 

@@ -44,7 +44,7 @@ class CpuBackend final : public Backend {
 
  public:
   CpuBackend(const Model& model, int threads)
-      : model_(model),
+      : model_(model.with_lists()),
         threads_(threads > 0 ? threads : omp_get_max_threads()),
         layout_(model, W),
         runs_(find_runs()),
@@ -214,7 +214,7 @@ class CpuBackend final : public Backend {
       load_records<PointRecord::size>(points_.data(), j, point);
       const Vec3<P> x_ij = vec3_at(point, PointRecord::position) - x_i;
       const Vec3<P> u_ij = vec3_at(point, PointRecord::displacement) - u_i;
-      sum += gradient_term(u_ij, x_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared));
+      add_gradient_term(sum, u_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared) * x_ij);
     }
     return displacement_gradient(sum, inverse_moment_of(p));
   }

@@ -144,6 +144,72 @@ TEST_P(CudaBackend, TwoRunsAndARestartAreBitwiseEqual) {
   }
 }
 
+/// Bodies that stay in shared memory for many steps a launch.
+struct ResidentCase {
+  const char* name;
+  const char* path;  ///< A part of the backend's name in float.
+  Case terms;
+  std::vector<Cloud> clouds;
+};
+void PrintTo(const ResidentCase& c, std::ostream* out) { *out << c.name; }
+
+const std::vector<Cloud>& large_clouds() {
+  static const std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3),
+                                         lattice(9, 14, 8, 0.12, 0.1, 4)};
+  return clouds;
+}
+/// Bodies of a cluster each.
+const std::vector<Cloud>& small_clouds() {
+  static const std::vector<Cloud> clouds{lattice(15, 5, 7, 0.1, 0.2, 3),
+                                         lattice(9, 5, 8, 0.12, 0.1, 4)};
+  return clouds;
+}
+/// Many, of which one takes fewer blocks than the others.
+std::vector<Cloud> many_clouds() {
+  std::vector<Cloud> clouds(20, lattice(7, 5, 6, 0.1, 0.2, 5));
+  clouds[7] = lattice(5, 4, 3, 0.1, 0.2, 6);
+  return clouds;
+}
+
+class CudaResidence : public ::testing::TestWithParam<ResidentCase> {};
+
+TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
+  Scene scene = scene_of(GetParam().terms);
+  if (GetParam().terms.everything) {  // but what changes from step to step
+    scene.bodies[0].loads[0].ramp = 0;
+    scene.bodies[1].motions.clear();
+  }
+  scene.bodies.resize(GetParam().clouds.size(), scene.bodies[0]);
+  const Model model = build_model(scene, GetParam().clouds);
+  const double dt = 0.5 * step_limit(model).largest_step;
+  for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
+    const auto resident = make_cuda_backend(model, precision),
+               launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
+    if (precision == Precision::single) {
+      EXPECT_NE(resident->name().find(GetParam().path), std::string::npos) << resident->name();
+    }
+    EXPECT_EQ(launched->name().find("resident"), std::string::npos);
+    for (const int steps : {2, 300}) {  // within a launch, and more than one
+      const State a = after(*resident, model, scene, dt, steps),
+                  b = after(*launched, model, scene, dt, steps);
+      EXPECT_TRUE(a.displacement == b.displacement) << resident->name() << ' ' << steps;
+      EXPECT_TRUE(a.velocity == b.velocity) << resident->name() << ' ' << steps;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, CudaResidence,
+    ::testing::Values(
+        ResidentCase{"Mail", "blocks", {"", false, false, false}, large_clouds()},
+        ResidentCase{"MailAdaptive", "blocks", {"", true, false, false}, large_clouds()},
+        ResidentCase{"MailEverything", "blocks", {"", false, false, true}, large_clouds()},
+        ResidentCase{"Cluster", "clusters", {"", false, false, false}, small_clouds()},
+        ResidentCase{"ClusterAdaptive", "clusters", {"", true, false, false}, small_clouds()},
+        ResidentCase{"ClusterEverything", "clusters", {"", false, false, true}, small_clouds()},
+        ResidentCase{"ManyClusters", "clusters", {"", false, false, false}, many_clouds()}),
+    [](const auto& test) { return std::string(test.param.name); });
+
 TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
   const Scene scene = scene_of(GetParam());
   const Model model = model_of_case(GetParam());

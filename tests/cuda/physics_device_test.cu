@@ -72,7 +72,9 @@ PHYXEL_HD void evaluate_formulas(const Inputs<Real>& in, Outputs<Real>& out) {
   out.start();
   out.add(weight_shape(in.r_squared, Real(1.25)));
   out.add(moment_term(in.x_ij, in.w));
-  out.add(gradient_term(in.u_ij, in.x_ij, in.w));
+  Mat3<Real> gradient_sum{};
+  add_gradient_term(gradient_sum, in.u_ij, in.w * in.x_ij);
+  out.add(gradient_sum);
   out.add(displacement_gradient(g, in.moment));
   out.add(green_strain(g));
   out.add(cauchy_strain(g));

@@ -1,5 +1,5 @@
 /// The layout for a GPU: everyone placed once, lists complete, shared memory never waited for.
-#include "solver/tiling.hpp"
+#include "setup/tiling.hpp"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -9,6 +9,7 @@
 
 #include "model/space_filling_curve.hpp"
 #include "phyxel/error.hpp"
+#include "solver/resident_plan.hpp"
 #include "support/clouds.hpp"
 
 namespace phyxel::cuda {
@@ -145,6 +146,47 @@ TEST_P(Tiling, EightLanesNeverWaitForAColumn) {
       }
     }
   }
+}
+
+/// Slices of a tile walk the same neighbours in the same order, in slots of the same columns.
+TEST_P(Tiling, SlicesKeepItsOrder) {
+  const Model model = GetParam().make();
+  const cuda::Tiling tiling = make_tiling(model);
+  const ResidentPlan plan = make_resident_plan(tiling);
+  Index seen = 0;
+  for (const Slice& slice : plan.slices) {
+    const Index tile = slice.first_place / tile_size;
+    EXPECT_EQ(slice.slots % 8, 0);
+    EXPECT_LE(slice.slots, plan.most_slots);
+    const auto place_in = [&](int slot) { return plan.place[slice.first_slot + slot]; };
+    for (int p = 0; p < slice_size; ++p) {
+      const Index place = slice.first_place + p;
+      EXPECT_EQ(place_in(p), tiling.phyxel[place] < 0 ? -1 : place);
+      seen += tiling.phyxel[place] >= 0;
+      for (int pass = 0; pass < 2; ++pass) {
+        const TileLists& lists = pass == 0 ? tiling.neighbours : tiling.second();
+        const std::vector<int> slots = slots_at(lists, place);
+        const Slice::Rows& rows = slice.rows[pass];
+        ASSERT_EQ(rows.length[p / warp_size], static_cast<int>(slots.size()));
+        EXPECT_LE(rows.longest, plan.longest[pass]);
+        for (std::size_t e = 0; e < slots.size(); ++e) {
+          const std::uint16_t entry = plan.entries[rows.first_entry + e * slice_size + p];
+          const int slot = slots[e];
+          if (slot >= tile_size && slot < tile_size + far_slots) {
+            EXPECT_EQ(entry, far_entry | p);
+          } else {
+            const Index expected =
+                slot < tile_size ? tile * tile_size + slot
+                                 : lists.halo[static_cast<std::size_t>(tile) * lists.halo_stride +
+                                              slot - tile_size - far_slots];
+            EXPECT_EQ(place_in(entry), expected);
+            EXPECT_EQ(entry % 8, slot % 8);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(seen, model.size());
 }
 
 TEST_P(Tiling, IsTheSameOnAnyNumberOfThreads) {

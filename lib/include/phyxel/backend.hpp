@@ -17,6 +17,20 @@ struct ArrayBytes {
   std::size_t bytes = 0;
 };
 
+/// A model at rest as Lanczos' iteration sees it: three vectors of three numbers a phyxel, on one
+/// device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared eigenfrequencies. `current`
+/// starts as a unit vector, `previous` as zero.
+class Vibration {
+ public:
+  virtual ~Vibration() = default;
+  /// next = S current - beta previous. @returns next · current [1/s²]
+  virtual double apply(double beta) = 0;
+  /// next -= alpha current. @returns |next|
+  virtual double subtract(double alpha) = 0;
+  /// previous = current, current = next / norm
+  virtual void advance(double norm) = 0;
+};
+
 /// Owns the live arrays of one device and the kernels over them. `upload` and `download` are the
 /// only ways in and out.
 class Backend {
@@ -53,6 +67,10 @@ class Backend {
   }
   /// Passive surfel advection, equation (6).
   virtual void advect_surfels(SurfelState& surfels) = 0;
+
+  /// For the step limit; nothing where that is left to the host. It may use the arrays of this
+  /// backend: a state is to be uploaded after.
+  virtual std::unique_ptr<Vibration> vibration() { return nullptr; }
 
   virtual std::vector<ArrayBytes> memory() const = 0;
   /// Bytes one step must move at the least: each array once for every pass that reads or writes it.

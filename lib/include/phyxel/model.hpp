@@ -1,6 +1,7 @@
 /// Everything about a scene that does not change while it runs.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,13 +12,20 @@
 
 namespace phyxel {
 
+/// How long the lists of neighbours are.
+struct ListLengths {
+  Offset pairs = 0;  ///< Entries of all lists.
+  Index fewest = 0, most = 0;
+};
+
 /// One body's share of the model: phyxels [begin, end), surfels [surfel_begin, surfel_end).
 struct Part {
   std::string name;
   Index begin = 0, end = 0;
   Index surfel_begin = 0, surfel_end = 0;
   Material material;
-  std::string neighbourhood;    ///< The rule in words, for summaries.
+  std::string neighbourhood;  ///< The rule in words, for summaries.
+  ListLengths lists;
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
 };
 
@@ -46,6 +54,7 @@ struct Motion {
 struct Load {
   std::vector<Index> phyxels;
   std::vector<Vec3d> force;  ///< [N], shape [phyxels]
+  Vec3d total, density;      ///< What the scene asks, shared by mass [N] and by volume [N/m³].
   double ramp = 0;           ///< [s]
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
@@ -60,7 +69,8 @@ struct Surfels {
 };
 
 /// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never
-/// neighbour each other. Immutable after `build_model`; host memory, double precision.
+/// neighbour each other. Immutable after `build_model`; host memory, double precision. Neighbour
+/// lists and moments are empty where a `Surveyor` left them to its device.
 struct Model {
   std::vector<Part> parts;
   std::vector<Vec3d> position;  ///< Rest positions X [m], shape [n, 3].
@@ -78,9 +88,15 @@ struct Model {
   std::vector<std::string> warnings;  ///< For the summary.
 
   Index size() const { return static_cast<Index>(position.size()); }
+  bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
+  /// This model, for whoever needs the lists. @throws InputError if they were left to a device.
+  const Model& with_lists() const;
+  /// Entries of all lists, whoever has them.
+  Offset pairs() const;
 };
 
-/// A number that tells two models apart: rest positions, masses, materials and neighbour lists. A
+/// A number that tells two models apart: rest positions, supports, geometric volumes, materials,
+/// motions and loads, from which all else follows; so it is the same whatever device built them. A
 /// checkpoint carries it, so that a state never continues on another body.
 std::uint64_t model_digest(const Model& model);
 
@@ -95,5 +111,21 @@ Model build_model(const Scene& scene);
 /// The same from clouds already in place, one for each body of the scene (whose source, scale,
 /// rotation and translation are then unused).
 Model build_model(const Scene& scene, std::span<const Cloud> clouds);
+
+/// What a device has found out about the neighbourhoods of one body, phyxels counted from 0. The
+/// lists themselves stay there, or are found again when they are needed.
+struct Survey {
+  std::vector<double> support;     ///< h_i [m], shape [n].
+  std::vector<double> spacing;     ///< r̄_i [m], shape [n], where kernel volumes are wanted.
+  std::vector<double> kernel_sum;  ///< r̄_i³ w_ii + Σ_j r̄_j³ w_ij, shape [n], likewise.
+  ListLengths lists;
+  Degenerate degenerate;
+};
+using Surveyor = std::function<Survey(std::span<const Vec3d> position,
+                                      const NeighbourhoodRule& rule, bool kernel_volumes)>;
+
+/// Leaves neighbours and moments to the device behind `survey`, whose backend finds them.
+Model build_model(const Scene& scene, const Surveyor& survey);
+Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey);
 
 }  // namespace phyxel

@@ -40,9 +40,13 @@ struct NeighbourhoodRule {
   std::optional<double> radius;  ///< [m]: h itself, instead of the rule.
   std::optional<int>
       max_neighbours;  ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
+
+  /// Whether i may be a neighbour of j without j being one of i.
+  bool one_sided() const { return max_neighbours || (!radius && support == Support::adaptive); }
 };
 
-/// Neighbours of every phyxel (itself excluded): j in N(i) if |x_j - x_i| < h_i.
+/// Neighbours of every phyxel (itself excluded): j in N(i) if |x_j - x_i| < h_i. The lists may be
+/// left to the device that needs them; `support` is always there.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.

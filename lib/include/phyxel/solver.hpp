@@ -16,10 +16,14 @@ struct StepLimit {
 };
 
 /// Largest eigenvalue of M⁻¹K at the reference state, by Lanczos iteration on the force function
-/// itself (in double, differenced about rest), so that every term in use counts. Fixed phyxels are
-/// taken as free, which can only lower the limit; damping does not change it.
+/// itself, so that every term in use counts. Fixed phyxels are taken as free, which can only lower
+/// the limit; damping does not change it. On the CPU, in double.
 /// @throws InputError if nothing in the model resists deformation.
 StepLimit step_limit(const Model& model, int threads = 0);
+
+/// The same on the backend's device, in its working precision: equal to the limit found on the CPU
+/// to rounding. It uses the backend's arrays: a state is to be uploaded after.
+StepLimit step_limit(const Model& model, Backend& backend);
 
 /// The state at t = 0: initial velocities of the bodies, motions at their start.
 State initial_state(const Model& model, const Scene& scene, double dt);

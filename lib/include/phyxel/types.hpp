@@ -37,11 +37,29 @@ struct Sym3 {
   Real xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
 };
 
+/// The same vector in another precision.
+template <class To, class From>
+PHYXEL_HD Vec3<To> to(const Vec3<From>& v) {
+  return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
+}
+
 using Vec3d = Vec3<double>;
 using Mat3d = Mat3<double>;
 using Sym3d = Sym3<double>;
 using Index = std::int32_t;   ///< index of a phyxel, surfel or triangle on one rank
 using Offset = std::int64_t;  ///< offset into a list of pairs; never 32-bit
+
+/// a b + c. On a GPU rounded once, always: left to the compiler, it would depend on what surrounds
+/// the expression, and two kernels would not agree to the last bit. With PHYXEL_UNFUSED rounded
+/// twice, as a CPU without such an instruction does.
+template <class R>
+PHYXEL_HD R fused(R a, R b, R c) {
+#if defined(__CUDA_ARCH__) && !defined(PHYXEL_UNFUSED)
+  return fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
 
 // --- Vec3 ---------------------------------------------------------------------------------------
 template <class R>
@@ -82,7 +100,12 @@ PHYXEL_HD bool operator==(const Vec3<R>& a, const Vec3<R>& b) {
 }
 template <class R>
 PHYXEL_HD R dot(Vec3<R> a, Vec3<R> b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
+  return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x));
+}
+/// s a + b.
+template <class R>
+PHYXEL_HD Vec3<R> fused(R s, Vec3<R> a, Vec3<R> b) {
+  return {fused(s, a.x, b.x), fused(s, a.y, b.y), fused(s, a.z, b.z)};
 }
 template <class R>
 PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
@@ -134,14 +157,30 @@ template <class R>
 PHYXEL_HD Mat3<R> operator*(const Mat3<R>& p, const Mat3<R>& q) {
   Mat3<R> m;
   for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) m(r, c) = p(r, 0) * q(0, c) + p(r, 1) * q(1, c) + p(r, 2) * q(2, c);
+    for (int c = 0; c < 3; ++c)
+      m(r, c) = fused(p(r, 2), q(2, c), fused(p(r, 1), q(1, c), p(r, 0) * q(0, c)));
   return m;
 }
 template <class R>
 PHYXEL_HD Vec3<R> operator*(const Mat3<R>& m, Vec3<R> v) {
-  return {m(0, 0) * v.x + m(0, 1) * v.y + m(0, 2) * v.z,
-          m(1, 0) * v.x + m(1, 1) * v.y + m(1, 2) * v.z,
-          m(2, 0) * v.x + m(2, 1) * v.y + m(2, 2) * v.z};
+  const auto row = [&](int r) { return fused(m(r, 2), v.z, fused(m(r, 1), v.y, m(r, 0) * v.x)); };
+  return {row(0), row(1), row(2)};
+}
+/// s p + q.
+template <class R>
+PHYXEL_HD Mat3<R> fused(R s, const Mat3<R>& p, const Mat3<R>& q) {
+  Mat3<R> m;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) m(r, c) = fused(s, p(r, c), q(r, c));
+  return m;
+}
+/// p q + m.
+template <class R>
+PHYXEL_HD Mat3<R> fused(const Mat3<R>& p, const Mat3<R>& q, Mat3<R> m) {
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c)
+      m(r, c) = fused(p(r, 2), q(2, c), fused(p(r, 1), q(1, c), fused(p(r, 0), q(0, c), m(r, c))));
+  return m;
 }
 template <class R>
 PHYXEL_HD Mat3<R> transpose(const Mat3<R>& q) {
@@ -153,38 +192,54 @@ PHYXEL_HD Mat3<R> transpose(const Mat3<R>& q) {
 /// Tensor product a bᵀ.
 template <class R>
 PHYXEL_HD Mat3<R> outer(Vec3<R> a, Vec3<R> b) {
-  Mat3<R> m;
-  m(0, 0) = a.x * b.x;
-  m(0, 1) = a.x * b.y;
-  m(0, 2) = a.x * b.z;
-  m(1, 0) = a.y * b.x;
-  m(1, 1) = a.y * b.y;
-  m(1, 2) = a.y * b.z;
-  m(2, 0) = a.z * b.x;
-  m(2, 1) = a.z * b.y;
-  m(2, 2) = a.z * b.z;
+  return {{{a.x * b.x, a.x * b.y, a.x * b.z},
+           {a.y * b.x, a.y * b.y, a.y * b.z},
+           {a.z * b.x, a.z * b.y, a.z * b.z}}};
+}
+/// a bᵀ + m.
+template <class R>
+PHYXEL_HD Mat3<R> fused_outer(Vec3<R> a, Vec3<R> b, Mat3<R> m) {
+  m(0, 0) = fused(a.x, b.x, m(0, 0));
+  m(0, 1) = fused(a.x, b.y, m(0, 1));
+  m(0, 2) = fused(a.x, b.z, m(0, 2));
+  m(1, 0) = fused(a.y, b.x, m(1, 0));
+  m(1, 1) = fused(a.y, b.y, m(1, 1));
+  m(1, 2) = fused(a.y, b.z, m(1, 2));
+  m(2, 0) = fused(a.z, b.x, m(2, 0));
+  m(2, 1) = fused(a.z, b.y, m(2, 1));
+  m(2, 2) = fused(a.z, b.z, m(2, 2));
   return m;
 }
+namespace detail {
+/// a b - c d.
 template <class R>
-PHYXEL_HD R determinant(const Mat3<R>& m) {
-  return m(0, 0) * (m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1)) -
-         m(0, 1) * (m(1, 0) * m(2, 2) - m(1, 2) * m(2, 0)) +
-         m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
+PHYXEL_HD R minor(R a, R b, R c, R d) {
+  return fused(a, b, -(c * d));
 }
+}  // namespace detail
 /// Cofactor matrix, det(m) m⁻ᵀ: the derivative of the determinant.
 template <class R>
 PHYXEL_HD Mat3<R> cofactor(const Mat3<R>& m) {
+  using detail::minor;
   Mat3<R> c;
-  c(0, 0) = m(1, 1) * m(2, 2) - m(1, 2) * m(2, 1);
-  c(0, 1) = m(1, 2) * m(2, 0) - m(1, 0) * m(2, 2);
-  c(0, 2) = m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0);
-  c(1, 0) = m(2, 1) * m(0, 2) - m(2, 2) * m(0, 1);
-  c(1, 1) = m(2, 2) * m(0, 0) - m(2, 0) * m(0, 2);
-  c(1, 2) = m(2, 0) * m(0, 1) - m(2, 1) * m(0, 0);
-  c(2, 0) = m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1);
-  c(2, 1) = m(0, 2) * m(1, 0) - m(0, 0) * m(1, 2);
-  c(2, 2) = m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0);
+  c(0, 0) = minor(m(1, 1), m(2, 2), m(1, 2), m(2, 1));
+  c(0, 1) = minor(m(1, 2), m(2, 0), m(1, 0), m(2, 2));
+  c(0, 2) = minor(m(1, 0), m(2, 1), m(1, 1), m(2, 0));
+  c(1, 0) = minor(m(2, 1), m(0, 2), m(2, 2), m(0, 1));
+  c(1, 1) = minor(m(2, 2), m(0, 0), m(2, 0), m(0, 2));
+  c(1, 2) = minor(m(2, 0), m(0, 1), m(2, 1), m(0, 0));
+  c(2, 0) = minor(m(0, 1), m(1, 2), m(0, 2), m(1, 1));
+  c(2, 1) = minor(m(0, 2), m(1, 0), m(0, 0), m(1, 2));
+  c(2, 2) = minor(m(0, 0), m(1, 1), m(0, 1), m(1, 0));
   return c;
+}
+template <class R>
+PHYXEL_HD R determinant(const Mat3<R>& m) {
+  using detail::minor;
+  const R a = minor(m(1, 1), m(2, 2), m(1, 2), m(2, 1)),
+          b = minor(m(1, 2), m(2, 0), m(1, 0), m(2, 2)),
+          c = minor(m(1, 0), m(2, 1), m(1, 1), m(2, 0));
+  return fused(m(0, 2), c, fused(m(0, 1), b, m(0, 0) * a));
 }
 
 // --- Sym3 ---------------------------------------------------------------------------------------
@@ -207,7 +262,9 @@ PHYXEL_HD R trace(const Sym3<R>& s) {
 /// Double contraction p : q.
 template <class R>
 PHYXEL_HD R contract(const Sym3<R>& p, const Sym3<R>& q) {
-  return p.xx * q.xx + p.yy * q.yy + p.zz * q.zz + R(2) * (p.xy * q.xy + p.xz * q.xz + p.yz * q.yz);
+  const R off_diagonal = fused(p.yz, q.yz, fused(p.xz, q.xz, p.xy * q.xy));
+  const R diagonal = fused(p.zz, q.zz, fused(p.yy, q.yy, p.xx * q.xx));
+  return fused(R(2), off_diagonal, diagonal);
 }
 template <class R>
 PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
@@ -225,8 +282,7 @@ PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
 }
 template <class R>
 PHYXEL_HD Vec3<R> operator*(const Sym3<R>& s, Vec3<R> v) {
-  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
-          s.xz * v.x + s.yz * v.y + s.zz * v.z};
+  return full(s) * v;
 }
 template <class R>
 PHYXEL_HD Mat3<R> operator*(const Mat3<R>& m, const Sym3<R>& s) {

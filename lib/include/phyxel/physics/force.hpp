@@ -24,20 +24,24 @@ PHYXEL_HD Vec3<Real> own_force(const Mat3<Real>& q_i, Vec3<Real> moment_offset) 
 }
 
 /// Adds to `force` that on phyxel i from the stress of phyxel j, which has i as a neighbour [N].
-/// Products go one by one into the sum, so that each can be fused with it.
+/// Products go one by one into the sum, so that each can be fused with it. `wx` is w_ji x_ij.
+template <class Real>
+PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> wx) {
+  force.x = fused(q_j(0, 0), wx.x, force.x);
+  force.y = fused(q_j(1, 0), wx.x, force.y);
+  force.z = fused(q_j(2, 0), wx.x, force.z);
+  force.x = fused(q_j(0, 1), wx.y, force.x);
+  force.y = fused(q_j(1, 1), wx.y, force.y);
+  force.z = fused(q_j(2, 1), wx.y, force.z);
+  force.x = fused(q_j(0, 2), wx.z, force.x);
+  force.y = fused(q_j(1, 2), wx.z, force.y);
+  force.z = fused(q_j(2, 2), wx.z, force.z);
+}
+
 template <class Real>
 PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> x_ij,
                                    Real w_ji) {
-  const Vec3<Real> wx = w_ji * x_ij;
-  force.x = force.x + q_j(0, 0) * wx.x;
-  force.y = force.y + q_j(1, 0) * wx.x;
-  force.z = force.z + q_j(2, 0) * wx.x;
-  force.x = force.x + q_j(0, 1) * wx.y;
-  force.y = force.y + q_j(1, 1) * wx.y;
-  force.z = force.z + q_j(2, 1) * wx.y;
-  force.x = force.x + q_j(0, 2) * wx.z;
-  force.y = force.y + q_j(1, 2) * wx.z;
-  force.z = force.z + q_j(2, 2) * wx.z;
+  add_neighbour_force(force, q_j, w_ji * x_ij);
 }
 
 /// That force alone.

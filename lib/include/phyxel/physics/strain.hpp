@@ -6,10 +6,10 @@
 
 namespace phyxel {
 
-/// One neighbour's share of Σ_j (u_j - u_i) (w_ij x_ij)ᵀ.
+/// Adds one neighbour's share of Σ_j (u_j - u_i) (w_ij x_ij)ᵀ. `wx` is w_ij x_ij.
 template <class Real>
-PHYXEL_HD Mat3<Real> gradient_term(Vec3<Real> u_ij, Vec3<Real> x_ij, Real w_ij) {
-  return outer(u_ij, w_ij * x_ij);
+PHYXEL_HD void add_gradient_term(Mat3<Real>& sum, Vec3<Real> u_ij, Vec3<Real> wx) {
+  sum = fused_outer(u_ij, wx, sum);
 }
 
 /// ∇u_i = (Σ_j (u_j - u_i) (w_ij x_ij)ᵀ) A_i⁻¹; row a, column b is ∂u_a/∂X_b. Exact for linear
@@ -25,12 +25,14 @@ PHYXEL_HD Mat3<Real> displacement_gradient(const Mat3<Real>& sum,
 template <class Real>
 PHYXEL_HD Sym3<Real> green_strain(const Mat3<Real>& g) {
   const Real half = Real(0.5);
-  return {g(0, 0) + half * (g(0, 0) * g(0, 0) + g(1, 0) * g(1, 0) + g(2, 0) * g(2, 0)),
-          half * (g(0, 1) + g(1, 0) + g(0, 0) * g(0, 1) + g(1, 0) * g(1, 1) + g(2, 0) * g(2, 1)),
-          half * (g(0, 2) + g(2, 0) + g(0, 0) * g(0, 2) + g(1, 0) * g(1, 2) + g(2, 0) * g(2, 2)),
-          g(1, 1) + half * (g(0, 1) * g(0, 1) + g(1, 1) * g(1, 1) + g(2, 1) * g(2, 1)),
-          half * (g(1, 2) + g(2, 1) + g(0, 1) * g(0, 2) + g(1, 1) * g(1, 2) + g(2, 1) * g(2, 2)),
-          g(2, 2) + half * (g(0, 2) * g(0, 2) + g(1, 2) * g(1, 2) + g(2, 2) * g(2, 2))};
+  // Σ_k g(k, a) g(k, b) + sum
+  const auto products = [&](int a, int b, Real sum) {
+    return fused(g(2, a), g(2, b), fused(g(1, a), g(1, b), fused(g(0, a), g(0, b), sum)));
+  };
+  const auto diagonal = [&](int a) { return fused(half, products(a, a, Real(0)), g(a, a)); };
+  const auto off_diagonal = [&](int a, int b) { return half * products(a, b, g(a, b) + g(b, a)); };
+  return {diagonal(0), off_diagonal(0, 1), off_diagonal(0, 2),
+          diagonal(1), off_diagonal(1, 2), diagonal(2)};
 }
 
 /// Cauchy's strain ½(∇u + ∇uᵀ): equation (3) of Farias et al. 2008.

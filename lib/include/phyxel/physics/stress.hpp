@@ -16,11 +16,10 @@ struct Hooke {
 
   PHYXEL_HD Sym3<Real> stress(const Sym3<Real>& strain) const {
     const Real pressure = lambda * trace(strain);
-    Sym3<Real> s = (Real(2) * mu) * strain;
-    s.xx = s.xx + pressure;
-    s.yy = s.yy + pressure;
-    s.zz = s.zz + pressure;
-    return s;
+    const Real two_mu = Real(2) * mu;
+    return {
+        fused(two_mu, strain.xx, pressure), two_mu * strain.xy, two_mu * strain.xz,
+        fused(two_mu, strain.yy, pressure), two_mu * strain.yz, fused(two_mu, strain.zz, pressure)};
   }
   /// ½ ε : S [J/m³].
   PHYXEL_HD Real energy(const Sym3<Real>& strain) const {
@@ -38,7 +37,7 @@ struct GreenHooke {
   /// First Piola–Kirchhoff stress [Pa].
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     const Sym3<Real> s = hooke.stress(green_strain(grad_u));
-    return full(s) + grad_u * s;
+    return fused(grad_u, full(s), full(s));
   }
 };
 
@@ -61,8 +60,9 @@ struct VolumeConservation {
 
   /// det F - 1 from ∇u, without cancellation: tr G + ½(tr² G - tr G²) + det G.
   PHYXEL_HD static Real volume_change(const Mat3<Real>& g) {
-    const Real minors = g(0, 0) * g(1, 1) - g(0, 1) * g(1, 0) + g(0, 0) * g(2, 2) -
-                        g(0, 2) * g(2, 0) + g(1, 1) * g(2, 2) - g(1, 2) * g(2, 1);
+    const Real minors = detail::minor(g(0, 0), g(1, 1), g(0, 1), g(1, 0)) +
+                        detail::minor(g(0, 0), g(2, 2), g(0, 2), g(2, 0)) +
+                        detail::minor(g(1, 1), g(2, 2), g(1, 2), g(2, 1));
     return g(0, 0) + g(1, 1) + g(2, 2) + minors + determinant(g);
   }
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {

@@ -13,8 +13,8 @@ struct SurfelBlend {
   Real weight{};            ///< Σ w
 
   PHYXEL_HD void add(Real w, Vec3<Real> u_i, const Mat3<Real>& grad_u_i, Vec3<Real> x_is) {
-    displacement += w * (u_i + grad_u_i * x_is);
-    gradient += w * grad_u_i;
+    displacement = fused(w, u_i + grad_u_i * x_is, displacement);
+    gradient = fused(w, grad_u_i, gradient);
     weight = weight + w;
   }
   /// u_s [m]

@@ -10,8 +10,7 @@ namespace phyxel {
 /// equal displacements is never taken, so float loses fewer digits.
 template <class Real>
 PHYXEL_HD Vec3<Real> verlet_velocity(Vec3<Real> velocity, Vec3<Real> acceleration, Real dt) {
-  return {velocity.x + dt * acceleration.x, velocity.y + dt * acceleration.y,
-          velocity.z + dt * acceleration.z};
+  return fused(dt, acceleration, velocity);
 }
 
 /// The same with mass-proportional damping c [1/s], by central differences:
@@ -19,7 +18,7 @@ PHYXEL_HD Vec3<Real> verlet_velocity(Vec3<Real> velocity, Vec3<Real> acceleratio
 template <class Real>
 PHYXEL_HD Vec3<Real> verlet_velocity_damped(Vec3<Real> velocity, Vec3<Real> acceleration, Real keep,
                                             Real gain) {
-  return keep * velocity + gain * acceleration;
+  return fused(keep, velocity, gain * acceleration);
 }
 
 }  // namespace phyxel

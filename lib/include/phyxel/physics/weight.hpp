@@ -11,20 +11,20 @@ namespace phyxel {
 /// so the step uses the shape alone. For r < h only: lists hold no other neighbours.
 template <class Real>
 PHYXEL_HD Real weight_shape(Real r_squared, Real inverse_h_squared) {
-  const Real t = Real(1) - r_squared * inverse_h_squared;
+  const Real t = fused(-r_squared, inverse_h_squared, Real(1));
   return t * t * t;
 }
 
 /// The same at any distance: zero from r = h on.
 template <class Real>
 PHYXEL_HD Real weight_shape_anywhere(Real r_squared, Real inverse_h_squared) {
-  const Real t = Real(1) - r_squared * inverse_h_squared;
+  const Real t = fused(-r_squared, inverse_h_squared, Real(1));
   const Real inside = t > Real(0) ? t : Real(0);
   return inside * inside * inside;
 }
 
 /// Full weight [1/m³], zero at r >= h. Used for densities.
-inline double weight(double r, double h) {
+PHYXEL_HD double weight(double r, double h) {
   if (r >= h) return 0;
   constexpr double factor = 315.0 / (64.0 * 3.14159265358979323846);
   return factor / (h * h * h) * weight_shape(r * r, 1 / (h * h));

@@ -1,4 +1,4 @@
-#include "solver/tiling.hpp"
+#include "setup/tiling.hpp"
 
 #include <fmt/format.h>
 
@@ -10,12 +10,10 @@
 
 #include "model/space_filling_curve.hpp"
 #include "phyxel/error.hpp"
+#include "setup/wait_free.hpp"
 
 namespace phyxel::cuda {
 namespace {
-
-/// Lanes that shared memory answers together, and the 16-byte columns it has for them.
-constexpr int team = 8, columns = 8;
 
 /// Phyxels of one body along the curve.
 std::vector<Index> curve_order(const Model& model, const Part& part) {
@@ -70,58 +68,6 @@ void place_phyxels(const Model& model, Tiling& tiling) {
   }
 }
 
-/// Puts the slots of eight lanes into an order in which each step's slots are the same or in
-/// different columns; a lane for which there is none takes a far slot. Lanes end up equally long.
-///
-/// Step by step, the lane with the most left to do chooses first: a slot that another lane has just
-/// chosen if it has that too, otherwise one from the column with the most left.
-/// @param lists of each lane, ascending; emptied
-void make_wait_free(std::array<std::vector<std::uint16_t>, team>& lists,
-                    std::array<std::vector<std::uint16_t>, team>& ordered) {
-  std::array<int, columns> waiting{};  // entries left in each column
-  std::size_t left = 0;
-  for (const auto& list : lists) {
-    for (const std::uint16_t slot : list) ++waiting[slot % columns];
-    left += list.size();
-  }
-  while (left > 0) {
-    std::array<int, columns> chosen;
-    chosen.fill(-1);
-    std::array<int, team> by_need{0, 1, 2, 3, 4, 5, 6, 7};
-    std::stable_sort(by_need.begin(), by_need.end(),
-                     [&](int a, int b) { return lists[a].size() > lists[b].size(); });
-    std::array<int, team> idle{};
-    int idle_count = 0;
-    for (const int lane : by_need) {
-      auto& list = lists[lane];
-      int best = -1, best_worth = -1;
-      for (std::size_t k = 0; k < list.size(); ++k) {
-        const int column = list[k] % columns;
-        if (chosen[column] >= 0 && chosen[column] != list[k]) continue;
-        const int worth = waiting[column] + (chosen[column] == list[k] ? 1 << 20 : 0);
-        if (worth > best_worth) {
-          best_worth = worth;
-          best = static_cast<int>(k);
-        }
-      }
-      if (best < 0) {
-        idle[idle_count++] = lane;
-        continue;
-      }
-      const std::uint16_t slot = list[static_cast<std::size_t>(best)];
-      chosen[slot % columns] = slot;
-      ordered[lane].push_back(slot);
-      list.erase(list.begin() + best);
-      --waiting[slot % columns];
-      --left;
-    }
-    const auto free_column = std::find(chosen.begin(), chosen.end(), -1);
-    const auto far = static_cast<std::uint16_t>(
-        tile_size + (free_column == chosen.end() ? 0 : free_column - chosen.begin()));
-    for (int k = 0; k < idle_count; ++k) ordered[idle[k]].push_back(far);
-  }
-}
-
 /// One tile's halo and lists.
 struct TileRows {
   std::vector<Index> halo;
@@ -141,28 +87,36 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
   }
   std::sort(rows.halo.begin(), rows.halo.end());
   rows.halo.erase(std::unique(rows.halo.begin(), rows.halo.end()), rows.halo.end());
-  if (tile_size + far_slots + rows.halo.size() > most_slots) {
-    throw InputError(
-        fmt::format("{} phyxels side by side have {} others as neighbours; a GPU tile holds at "
-                    "most {}: allowed "
-                    "are a smaller support or the CPU",
-                    tile_size, rows.halo.size(), most_slots - tile_size - far_slots));
-  }
+  if (rows.halo.size() > most_halo) refuse_halo(static_cast<int>(rows.halo.size()));
   const auto slot_of = [&](Index place) {
     if (place >= begin && place < end) return static_cast<std::uint16_t>(place - begin);
     const auto at = std::lower_bound(rows.halo.begin(), rows.halo.end(), place);
     return static_cast<std::uint16_t>(tile_size + far_slots + (at - rows.halo.begin()));
   };
   for (int first = 0; first < tile_size; first += team) {
-    std::array<std::vector<std::uint16_t>, team> given, ordered;
+    int length[team], longest = 0;
     for (int lane = 0; lane < team; ++lane) {
       const Index i = tiling.phyxel[begin + first + lane];
-      if (i < 0) continue;
-      for (const Index j : lists.row(i)) given[lane].push_back(slot_of(tiling.place[j]));
-      std::sort(given[lane].begin(), given[lane].end());
+      length[lane] = i < 0 ? 0 : lists.length(i);
+      longest = std::max(longest, length[lane]);
     }
-    make_wait_free(given, ordered);
-    for (int lane = 0; lane < team; ++lane) rows.slots[first + lane] = std::move(ordered[lane]);
+    std::vector<std::uint16_t> given(static_cast<std::size_t>(team) * longest),
+        ordered(static_cast<std::size_t>(team) * team * longest);
+    for (int lane = 0; lane < team; ++lane) {
+      if (length[lane] == 0) continue;
+      std::uint16_t* at = given.data() + lane * longest;
+      for (const Index j : lists.row(tiling.phyxel[begin + first + lane])) {
+        *at++ = slot_of(tiling.place[j]);
+      }
+      std::sort(at - length[lane], at, earlier_slot);
+    }
+    const int capacity = team * longest;
+    const int steps =
+        order_wait_free(given.data(), longest, length, tile_size, ordered.data(), capacity);
+    for (int lane = 0; lane < team; ++lane) {
+      const std::uint16_t* from = ordered.data() + lane * capacity;
+      rows.slots[first + lane].assign(from, from + steps);
+    }
   }
   for (int first = 0; first < tile_size; first += warp_size) {
     std::size_t longest = 0;
@@ -233,6 +187,13 @@ TileLists make_lists(const Csr& lists, const Tiling& tiling) {
 }
 
 }  // namespace
+
+void refuse_halo(int points) {
+  throw InputError(
+      fmt::format("{} phyxels side by side have {} others as neighbours; a GPU tile holds at most "
+                  "{}: allowed are a smaller support or the CPU",
+                  tile_size, points, most_halo));
+}
 
 Tiling make_tiling(const Model& model) {
   Tiling tiling;

@@ -3,9 +3,9 @@
 ///
 /// A warp takes 32 neighbouring phyxels and walks their lists in step, one lane a phyxel. Shared
 /// memory answers eight lanes at a time, 16 bytes each, at once if their slots differ modulo 8 or
-/// are the same; so the entries of a list are put into an order in which they do (`wait_free`).
-/// That order is also the one in which sums run, whatever kernel walks the list: results do not
-/// depend on the way of launching.
+/// are the same; so the entries of a list are put into an order in which they do (see
+/// wait_free.hpp). That order is also the one in which sums run, whatever kernel walks the list:
+/// results do not depend on the way of launching.
 ///
 /// A lane with nothing to do takes a far point, which costs a comparison in every weight. Its own
 /// phyxel, with a share of exactly zero, would do without, but too often meets others in a column.
@@ -26,6 +26,9 @@ inline constexpr int far_slots = 8;  ///< Slots of points beyond every support, 
 inline constexpr int chunk = 8;      ///< Entries that a lane loads at once.
 /// A slot's number times its 16 bytes must fit 16 bits.
 inline constexpr int most_slots = 4096;
+inline constexpr int most_halo = most_slots - tile_size - far_slots;
+/// @throws InputError: a tile has that many neighbours outside.
+[[noreturn]] void refuse_halo(int points);
 
 /// Lists of neighbours, tile by tile. Slots of a tile: its own places in order, `far_slots`
 /// far points, then its halo.

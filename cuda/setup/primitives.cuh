@@ -1,0 +1,145 @@
+/// Sorting, scanning and adding up on the device, with memory that runs out in our own words.
+#pragma once
+
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/iterator/transform_iterator.h>
+
+#include <cstdint>
+#include <cub/cub.cuh>
+#include <string>
+#include <vector>
+
+#include "check.hpp"
+
+namespace phyxel::cuda {
+
+inline constexpr int setup_threads = 256;
+
+/// Calls body(i) for i in [0, count), a thread each.
+template <class Body>
+__global__ void for_each_kernel(std::int64_t count, Body body) {
+  const std::int64_t i = static_cast<std::int64_t>(blockIdx.x) * setup_threads +
+                         static_cast<std::int64_t>(threadIdx.x);
+  if (i < count) body(i);
+}
+template <class Body>
+void for_each(const char* kernel, std::int64_t count, const Body& body) {
+  if (count <= 0) return;
+  const auto blocks = static_cast<unsigned>((count + setup_threads - 1) / setup_threads);
+  for_each_kernel<<<blocks, setup_threads>>>(count, body);
+  check_launch({kernel, blocks, setup_threads, std::to_string(count) + " at once"});
+}
+
+/// Runs a CUB algorithm: once to learn how much memory it needs, once for real.
+template <class Algorithm>
+void with_temporary(Algorithm&& algorithm) {
+  std::size_t bytes = 0;
+  PHYXEL_CUDA(algorithm(nullptr, bytes));
+  const DeviceArray<char> temporary(std::max<std::size_t>(bytes, 1), "set-up");
+  PHYXEL_CUDA(algorithm(static_cast<void*>(temporary.data()), bytes));
+}
+
+/// Sorts by key, equal keys staying in order; the sorted pairs replace the arrays.
+template <class Key, class Value>
+void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values) {
+  const auto count = static_cast<std::int64_t>(keys.size());
+  DeviceArray<Key> sorted_keys(keys.size(), "set-up");
+  DeviceArray<Value> sorted_values(values.size(), "set-up");
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceRadixSort::SortPairs(memory, bytes, keys.data(), sorted_keys.data(),
+                                           values.data(), sorted_values.data(), count);
+  });
+  keys = std::move(sorted_keys);
+  values = std::move(sorted_values);
+}
+
+template <class T>
+void sort_values(DeviceArray<T>& values) {
+  DeviceArray<T> sorted(values.size(), "set-up");
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceRadixSort::SortKeys(memory, bytes, values.data(), sorted.data(),
+                                          static_cast<std::int64_t>(values.size()));
+  });
+  values = std::move(sorted);
+}
+
+/// Combines `values` from the left in some order: for operations to which order means nothing.
+template <class In, class T, class Combine>
+T reduce(In values, std::int64_t count, T start, Combine combine) {
+  const DeviceArray<T> result(1, "set-up");
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceReduce::Reduce(memory, bytes, values, result.data(), count, combine, start);
+  });
+  T out;
+  result.download(&out);
+  return out;
+}
+
+struct Plus {
+  template <class T>
+  __host__ __device__ T operator()(T a, T b) const {
+    return a + b;
+  }
+};
+struct Larger {
+  template <class T>
+  __host__ __device__ T operator()(T a, T b) const {
+    return a > b ? a : b;
+  }
+};
+struct Smaller {
+  template <class T>
+  __host__ __device__ T operator()(T a, T b) const {
+    return a < b ? a : b;
+  }
+};
+
+/// sums[k] = values[0] + ... + values[k-1], one more than there are values.
+template <class T>
+DeviceArray<T> running_sums(const DeviceArray<T>& values) {
+  DeviceArray<T> sums(values.size() + 1, "set-up");
+  PHYXEL_CUDA(cudaMemset(sums.data(), 0, sizeof(T)));
+  if (values.size() == 0) return sums;
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceScan::InclusiveSum(memory, bytes, values.data(), sums.data() + 1,
+                                         static_cast<std::int64_t>(values.size()));
+  });
+  return sums;
+}
+
+template <class T>
+T last_of(const DeviceArray<T>& array) {
+  T value;
+  PHYXEL_CUDA(
+      cudaMemcpy(&value, array.data() + array.size() - 1, sizeof(T), cudaMemcpyDeviceToHost));
+  return value;
+}
+
+template <class T>
+DeviceArray<T> sent(const std::vector<T>& values, const std::string& what) {
+  DeviceArray<T> array(values.size(), what);
+  array.upload(values.data());
+  return array;
+}
+template <class T>
+std::vector<T> fetched(const DeviceArray<T>& array) {
+  std::vector<T> values(array.size());
+  array.download(values.data());
+  return values;
+}
+
+/// A box around points.
+struct Box {
+  Vec3<double> low, high;
+};
+struct AroundBoth {
+  __host__ __device__ Box operator()(const Box& a, const Box& b) const {
+    return {{fmin(a.low.x, b.low.x), fmin(a.low.y, b.low.y), fmin(a.low.z, b.low.z)},
+            {fmax(a.high.x, b.high.x), fmax(a.high.y, b.high.y), fmax(a.high.z, b.high.z)}};
+  }
+};
+struct AroundPoint {
+  __host__ __device__ Box operator()(const Vec3<double>& p) const { return {p, p}; }
+};
+
+}  // namespace phyxel::cuda

@@ -1,0 +1,225 @@
+// Compiled without fused multiplications: whoever is a neighbour on the CPU shall be one here.
+#include <bit>
+
+#include "device.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/weight.hpp"
+#include "setup/device_hash.cuh"
+#include "setup/survey.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace cuda;
+
+constexpr int most_nearest = 256;
+
+/// The smallest squared distances, ascending.
+template <int capacity>
+struct Nearest {
+  double squared[capacity];
+  int wanted, found = 0;
+  __device__ bool full() const { return found == wanted; }
+  __device__ double largest() const { return squared[found - 1]; }
+  __device__ void offer(double d2) {
+    if (full() && d2 >= largest()) return;
+    int k = full() ? found - 1 : found++;
+    for (; k > 0 && squared[k - 1] > d2; --k) squared[k] = squared[k - 1];
+    squared[k] = d2;
+  }
+  __device__ double mean_distance() const {
+    double sum = 0;
+    for (int k = 0; k < found; ++k) sum += sqrt(squared[k]);
+    return found ? sum / found : 0;
+  }
+};
+
+/// `mean_spacing` of the CPU, entry by entry of the hash so that neighbours in space are
+/// neighbours in a warp.
+template <int capacity>
+void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spacing) {
+  const HashView hash = table.view();
+  for_each("mean_spacing", hash.points,
+           [hash, nearest, spacing = spacing.data()] __device__(std::int64_t at) {
+             const auto self = static_cast<std::uint32_t>(at);
+             const Vec3d here = hash.entries[self].position;
+             const HashView::Body& body = hash.bodies[0];
+             Nearest<capacity> found;
+             found.wanted = nearest < hash.points - 1 ? nearest : hash.points - 1;
+             const auto offer = [&](std::uint32_t k, Vec3d p) {
+               if (k != self) found.offer(dot(p - here, p - here));
+             };
+             const CellGrid::Cell c = body.grid.cell_of(here);
+             const int last = body.grid.farthest_ring(here, body.high);
+             for (int ring = 0; ring <= last; ++ring) {
+               if (ring == 12) {  // far from everything: looking at every point is cheaper
+                 found.found = 0;
+                 hash.visit_all(0, offer);
+                 break;
+               }
+               // Rings 0 to ring - 1 hold every point nearer than (ring - 1) cells.
+               const double reached = (ring - 1) * body.cell_size;
+               if (ring > 0 && found.full() && found.largest() <= reached * reached) break;
+               for (int dz = -ring; dz <= ring; ++dz) {
+                 for (int dy = -ring; dy <= ring; ++dy) {
+                   const bool face = abs(dz) == ring || abs(dy) == ring;
+                   const int stride = face || ring == 0 ? 1 : 2 * ring;
+                   for (int dx = -ring; dx <= ring; dx += stride) {
+                     hash.visit_cell(0, {c.x + dx, c.y + dy, c.z + dz}, offer);
+                   }
+                 }
+               }
+             }
+             spacing[hash.index[self]] = found.mean_distance();
+           });
+}
+
+DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int nearest) {
+  const auto n = static_cast<Index>(position.size());
+  DeviceArray<double> spacing(position.size(), "mean spacings");
+  PHYXEL_CUDA(cudaMemset(spacing.data(), 0, spacing.bytes()));
+  if (n < 2) return spacing;
+  const Box box = box_around(position, 0, n);
+  double cell = roomy_cell_size(box.low, box.high, position.size());
+  for (int attempt = 0;; ++attempt) {
+    const DeviceHash hash(position, {{0, n, cell}});
+    const double occupancy = hash.mean_occupancy();
+    if (occupancy <= 8 || attempt == 4) {
+      if (nearest <= 16) {
+        find_spacing<16>(hash, nearest, spacing);
+      } else {
+        find_spacing<most_nearest>(hash, nearest, spacing);
+      }
+      return spacing;
+    }
+    cell *= std::cbrt(3 / occupancy);
+  }
+}
+
+/// h of every phyxel. `middle` becomes the median.
+DeviceArray<double> supports(const DeviceArray<double>& spacing, std::size_t n,
+                             const NeighbourhoodRule& rule, double* middle) {
+  const auto median = [](const DeviceArray<double>& values) {
+    DeviceArray<double> sorted(values.size(), "set-up");
+    PHYXEL_CUDA(cudaMemcpy(sorted.data(), values.data(), values.bytes(), cudaMemcpyDeviceToDevice));
+    sort_values(sorted);
+    double value;
+    PHYXEL_CUDA(cudaMemcpy(&value, sorted.data() + sorted.size() / 2, sizeof value,
+                           cudaMemcpyDeviceToHost));
+    return value;
+  };
+  DeviceArray<double> support(n, "supports");
+  const bool adaptive = !rule.radius && rule.support == NeighbourhoodRule::Support::adaptive;
+  *middle = rule.radius ? *rule.radius : rule.factor * median(spacing);
+  for_each("support", static_cast<std::int64_t>(n),
+           [support = support.data(), spacing = spacing.data(), adaptive, all = *middle,
+            factor = rule.factor] __device__(std::int64_t i) {
+             support[i] = adaptive ? factor * spacing[i] : all;
+           });
+  return support;
+}
+
+/// What one phyxel's neighbours amount to.
+struct Finding {
+  Index length;
+  signed char rank;
+  char coincident;
+};
+struct Lengths {
+  Offset pairs;
+  Index fewest, most;
+  Index degenerate;
+};
+struct AsLengths {
+  __device__ Lengths operator()(const Finding& f) const {
+    return {f.length, f.length, f.length, f.rank < 3 || f.coincident};
+  }
+};
+struct AddLengths {
+  __device__ Lengths operator()(const Lengths& a, const Lengths& b) const {
+    return {a.pairs + b.pairs, a.fewest < b.fewest ? a.fewest : b.fewest,
+            a.most > b.most ? a.most : b.most, a.degenerate + b.degenerate};
+  }
+};
+
+Survey survey_on_device(std::span<const Vec3d> host_position, const NeighbourhoodRule& rule,
+                        bool kernel_volumes) {
+  Survey survey;
+  const std::size_t n = host_position.size();
+  if (n == 0) return survey;
+  const std::string of = " of " + std::to_string(n) + " phyxels";
+  DeviceArray<Vec3d> position(n, "rest positions" + of);
+  position.upload(host_position.data());
+  DeviceArray<double> spacing, kernel_sum;
+  if (!rule.radius || kernel_volumes) spacing = mean_spacing_of(position, rule.nearest);
+  double middle = 0;
+  const DeviceArray<double> support = supports(spacing, n, rule, &middle);
+  if (kernel_volumes) kernel_sum = {n, "kernel sums" + of};
+  DeviceArray<Finding> findings(n, "survey" + of);
+  {
+    const DeviceHash table(position, {{0, static_cast<Index>(n), middle}});
+    const HashView hash = table.view();
+    for_each("survey", static_cast<std::int64_t>(n),
+             [hash, findings = findings.data(), support = support.data(), spacing = spacing.data(),
+              kernel_sum = kernel_sum.data()] __device__(std::int64_t at) {
+               const auto self = static_cast<std::uint32_t>(at);
+               const Index i = hash.index[self];
+               const Vec3d here = hash.entries[self].position;
+               const double h = support[i], inverse_h_squared = 1 / (h * h);
+               const auto cube = [&](Index j) { return spacing[j] * spacing[j] * spacing[j]; };
+               Sym3d moment;
+               double sum = kernel_sum && h > 0 ? cube(i) * weight(0, h) : 0;
+               Finding f{};
+               hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
+                 const Vec3d x = p - here;
+                 const double d2 = dot(x, x);
+                 if (k == self || !(d2 < h * h)) return;
+                 ++f.length;
+                 moment += moment_term(x, weight_shape(d2, inverse_h_squared));
+                 if (d2 <= 1e-20 * h * h) f.coincident = 1;
+                 if (kernel_sum) sum += cube(hash.index[k]) * weight(sqrt(d2), h);
+               });
+               f.rank = static_cast<signed char>(pseudo_inverse(moment).rank);
+               findings[i] = f;
+               if (kernel_sum) kernel_sum[i] = sum;
+             });
+  }
+  const thrust::transform_iterator lengths(findings.data(), AsLengths{});
+  const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),
+                             Lengths{0, static_cast<Index>(n), 0, 0}, AddLengths{});
+  survey.lists = {all.pairs, all.fewest, all.most};
+  survey.support = fetched(support);
+  if (kernel_volumes) {
+    survey.spacing = fetched(spacing);
+    survey.kernel_sum = fetched(kernel_sum);
+  }
+  if (all.degenerate > 0) {
+    const std::vector<Finding> each = fetched(findings);
+    for (Index i = 0; i < static_cast<Index>(n); ++i) {
+      Degenerate& d = survey.degenerate;
+      if (each[i].coincident) d.coincident.push_back(i);
+      if (each[i].rank == 0) d.isolated.push_back(i);
+      if (each[i].rank == 1) d.collinear.push_back(i);
+      if (each[i].rank == 2) d.coplanar.push_back(i);
+    }
+  }
+  return survey;
+}
+
+}  // namespace
+
+Surveyor cuda_surveyor(int device) {
+  return [device](std::span<const Vec3d> position, const NeighbourhoodRule& rule,
+                  bool kernel_volumes) {
+    use_cuda_device(device);
+    return survey_on_device(position, rule, kernel_volumes);
+  };
+}
+
+bool can_survey_on_cuda(const Scene& scene) {
+  return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
+    return body.neighbourhood.max_neighbours || body.neighbourhood.nearest > most_nearest;
+  });
+}
+
+}  // namespace phyxel

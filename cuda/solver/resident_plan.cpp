@@ -1,0 +1,135 @@
+#include "solver/resident_plan.hpp"
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "setup/wait_free.hpp"
+
+namespace phyxel::cuda {
+namespace {
+
+/// The image of one slice: which place stands in which slot.
+class Image {
+ public:
+  /// Own phyxels first: their columns are those of their places.
+  Image(const Tiling& tiling, Index first_place) {
+    place_.assign(slice_size, -1);
+    for (int p = 0; p < slice_size; ++p) {
+      if (tiling.phyxel[first_place + p] >= 0) place_[p] = first_place + p;
+    }
+  }
+  /// The slot of a place, which gets the next free one of `column` if it has none.
+  std::uint16_t slot_of(Index place, int column) {
+    std::size_t slot = static_cast<std::size_t>(column);
+    for (; slot < place_.size(); slot += columns) {
+      if (place_[slot] == place) return static_cast<std::uint16_t>(slot);
+      if (place_[slot] < 0 && slot >= slice_size) break;
+    }
+    if (slot >= place_.size()) place_.resize((slot / columns + 1) * columns, -1);
+    place_[slot] = place;
+    return static_cast<std::uint16_t>(slot);
+  }
+  const std::vector<Index>& places() const { return place_; }
+
+ private:
+  std::vector<Index> place_;
+};
+
+/// Tells every slice who else needs its phyxels.
+void find_destinations(ResidentPlan& plan) {
+  std::unordered_map<Index, std::size_t> slice_at;  // by first place
+  for (std::size_t s = 0; s < plan.slices.size(); ++s) slice_at[plan.slices[s].first_place] = s;
+  std::vector<std::array<std::vector<std::uint32_t>, slice_size>> of_slice(plan.slices.size());
+  for (Slice& slice : plan.slices) {
+    for (int slot = slice_size; slot < slice.slots; ++slot) {
+      const Index place = plan.place[slice.first_slot + slot];
+      if (place < 0) continue;
+      ++slice.halo;
+      const Index p = place % slice_size;
+      of_slice[slice_at.at(place - p)][p].push_back(static_cast<std::uint32_t>(slice.rank) << 16 |
+                                                    static_cast<std::uint32_t>(slot));
+    }
+  }
+  for (std::size_t s = 0; s < plan.slices.size(); ++s) {
+    Slice& slice = plan.slices[s];
+    for (const auto& of_phyxel : of_slice[s]) {
+      slice.destinations = std::max(slice.destinations, static_cast<int>(of_phyxel.size()));
+    }
+    slice.first_destination = static_cast<int>(plan.destinations.size());
+    for (int k = 0; k < slice.destinations; ++k) {
+      for (const auto& of_phyxel : of_slice[s]) {
+        plan.destinations.push_back(k < static_cast<int>(of_phyxel.size()) ? of_phyxel[k] : nobody);
+      }
+    }
+    plan.most_destinations = std::max(plan.most_destinations, slice.destinations);
+  }
+}
+
+}  // namespace
+
+ResidentPlan make_resident_plan(const Tiling& tiling) {
+  ResidentPlan plan;
+  const std::array<const TileLists*, 2> lists{&tiling.neighbours, &tiling.second()};
+  for (Index first = 0; first < tiling.places(); first += slice_size) {
+    // Phyxels stand first in their tile.
+    if (tiling.phyxel[first] < 0) continue;
+    const Index tile = first / tile_size, begin = tile * tile_size;
+    Image image(tiling, first);
+    Slice slice;
+    slice.first_place = first;
+    const bool same_body =
+        !plan.slices.empty() &&
+        tiling.part[tile] == tiling.part[plan.slices.back().first_place / tile_size];
+    if (!same_body) ++plan.bodies;
+    slice.body = plan.bodies - 1;
+    slice.rank = same_body ? plan.slices.back().rank + 1 : 0;
+    plan.most_slices = std::max(plan.most_slices, slice.rank + 1);
+    for (int pass = 0; pass < 2; ++pass) {
+      const TileLists& list = *lists[pass];
+      Slice::Rows& rows = slice.rows[pass];
+      if (pass == 1 && lists[0] == lists[1]) {
+        rows = slice.rows[0];
+        continue;
+      }
+      for (int w = 0; w < slice_warps; ++w) {
+        rows.length[w] = list.rows[first / warp_size + w].length;
+        rows.longest = std::max(rows.longest, rows.length[w]);
+      }
+      rows.first_entry = static_cast<int>(plan.entries.size());
+      plan.entries.resize(plan.entries.size() + static_cast<std::size_t>(rows.longest) * slice_size,
+                          0);
+      for (int p = 0; p < slice_size; ++p) {
+        const TileLists::Row row = list.rows[(first + p) / warp_size];
+        for (int e = 0; e < rows.length[p / warp_size]; ++e) {
+          const std::size_t at =
+              (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + p % warp_size) *
+                  chunk +
+              e % chunk;
+          const int slot = list.entries[at] / 16;
+          std::uint16_t& entry =
+              plan.entries[rows.first_entry + static_cast<std::size_t>(e) * slice_size + p];
+          if (slot >= tile_size && slot < tile_size + far_slots) {
+            entry = static_cast<std::uint16_t>(far_entry | p);
+          } else if (slot < tile_size) {
+            entry = image.slot_of(begin + slot, slot % columns);
+          } else {
+            entry = image.slot_of(list.halo[static_cast<std::size_t>(tile) * list.halo_stride +
+                                            slot - tile_size - far_slots],
+                                  slot % columns);
+          }
+        }
+      }
+      plan.longest[pass] = std::max(plan.longest[pass], rows.longest);
+    }
+    if (lists[0] == lists[1]) plan.longest[1] = plan.longest[0];
+    slice.slots = static_cast<int>(image.places().size());
+    slice.first_slot = static_cast<int>(plan.place.size());
+    plan.place.insert(plan.place.end(), image.places().begin(), image.places().end());
+    plan.most_slots = std::max(plan.most_slots, slice.slots);
+    plan.slices.push_back(slice);
+  }
+  find_destinations(plan);
+  return plan;
+}
+
+}  // namespace phyxel::cuda

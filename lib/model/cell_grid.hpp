@@ -1,0 +1,75 @@
+/// The cells of the spatial hash of Teschner et al. 2003 (reference 30 of Farias et al. 2008):
+/// which one a place lies in, its name, its bucket. Shared by the searches on the CPU and on the
+/// GPU.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+struct CellGrid {
+  struct Cell {
+    std::int64_t x, y, z;
+  };
+
+  Vec3d low;                     ///< A corner of the cloud [m].
+  double inverse_cell_size = 1;  ///< [1/m]
+  std::uint64_t table_mask = 0;  ///< Buckets are a power of two; this is one less.
+
+  PHYXEL_HD Cell cell_of(Vec3d p) const {
+    using std::floor;
+    return {static_cast<std::int64_t>(floor((p.x - low.x) * inverse_cell_size)),
+            static_cast<std::int64_t>(floor((p.y - low.y) * inverse_cell_size)),
+            static_cast<std::int64_t>(floor((p.z - low.z) * inverse_cell_size))};
+  }
+  /// A cell's name: 21 bits a coordinate. Cells outside the cloud may share the name of one
+  /// inside only if they are two million cells away, and then the distance tells.
+  PHYXEL_HD static std::uint64_t name(Cell c) {
+    constexpr std::uint64_t mask = 0x1fffff;
+    return (static_cast<std::uint64_t>(c.x) & mask) |
+           (static_cast<std::uint64_t>(c.y) & mask) << 21 |
+           (static_cast<std::uint64_t>(c.z) & mask) << 42;
+  }
+  /// hash(x, y, z) = (x p1 xor y p2 xor z p3) mod table size, with the paper's primes.
+  PHYXEL_HD std::uint64_t bucket_of(std::uint64_t cell) const {
+    constexpr std::uint64_t mask = 0x1fffff;
+    const std::uint64_t h = ((cell & mask) * 73856093u) ^ ((cell >> 21 & mask) * 19349663u) ^
+                            ((cell >> 42 & mask) * 83492791u);
+    return h & table_mask;
+  }
+  /// Rings of cells around `place` beyond which there is no point of a cloud from `low` to `high`.
+  PHYXEL_HD int farthest_ring(Vec3d place, Vec3d high) const {
+    const Cell c = cell_of(place), a = cell_of(low), b = cell_of(high);
+    std::int64_t most = 0;
+    const std::int64_t apart[] = {c.x - a.x, b.x - c.x, c.y - a.y, b.y - c.y, c.z - a.z, b.z - c.z};
+    for (const std::int64_t d : apart) {
+      if (d > most) most = d;
+      if (-d > most) most = -d;
+    }
+    return static_cast<int>(most);
+  }
+};
+
+/// The smallest cell that 21 bits a coordinate allow for a cloud that wide, or `wanted`.
+PHYXEL_HD double cell_size_for(Vec3d low, Vec3d high, double wanted) {
+  const Vec3d extent = high - low;
+  double widest = extent.x > extent.y ? extent.x : extent.y;
+  widest = extent.z > widest ? extent.z : widest;
+  const double size = wanted > widest / 1e6 ? wanted : widest / 1e6;
+  return size > 0 ? size : 1;
+}
+
+/// Cells that hold some four points each if the cloud fills its box.
+inline double roomy_cell_size(Vec3d low, Vec3d high, std::size_t points) {
+  const Vec3d extent = high - low;
+  const double widest = std::fmax(extent.x, std::fmax(extent.y, extent.z));
+  const double floor_width = widest / 100;  // a sheet or thread has no volume
+  const double box = std::fmax(extent.x, floor_width) * std::fmax(extent.y, floor_width) *
+                     std::fmax(extent.z, floor_width);
+  return std::cbrt(4 * box / static_cast<double>(points));
+}
+
+}  // namespace phyxel

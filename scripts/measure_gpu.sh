@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# On a machine with a GPU: the measurements behind docs/performance.md, into a folder of CSV files.
+#
+#   scripts/measure_gpu.sh [folder]     after cmake --preset cuda && cmake --build --preset cuda
+#
+# The largest body takes about 80 GB of the GPU's memory, and as much of the host's.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+out=${1:-docs/results}
+mkdir -p "$out"
+step() {
+  local name=$1
+  shift
+  echo "== $name"
+  build/cuda/bin/phyxel bench "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
+}
+small=125,343,1000,2197,4096,8000,15625,27000
+medium=50653,103823,250047,512000,1000000
+large=2097152,4096000,8000000,16974593
+
+step gpu_sizes step --phyxels "$small,$medium,$large" --terms green --seconds 0.2
+step gpu_terms step --phyxels 2097152
+step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
+for body in dino alien_head horn_bug; do
+  for count in 1 10 100; do
+    step "gpu_${body}_$count" step --shape $body --bodies $count --terms green --precision float
+  done
+done
+step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
+step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3

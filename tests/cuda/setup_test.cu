@@ -1,0 +1,234 @@
+/// Neighbours, tiles and moments found on the GPU against those found on the CPU.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "phyxel/error.hpp"
+#include "phyxel/solver.hpp"
+#include "setup/device_tiling.hpp"
+#include "setup/primitives.cuh"
+#include "setup/survey.hpp"
+#include "solver/cuda_backend.hpp"
+#include "support/backend.hpp"
+#include "support/clouds.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+
+/// A scene and its clouds, which both set-ups are given.
+struct Bodies {
+  Scene scene;
+  std::vector<Cloud> clouds;
+};
+
+Bodies jittered() { return {one_body(), {lattice(23, 17, 19, 0.1, 0.2)}}; }
+/// Distances that are equal up to rounding: ties are decided alike.
+Bodies regular() {
+  Bodies b{one_body(), {lattice(16, 16, 16, 0.1)}};
+  b.scene.bodies[0].neighbourhood.radius = 0.2;
+  return b;
+}
+Bodies adaptive() {
+  Bodies b{one_body(), {lattice(13, 12, 14, 0.1, 0.4)}};
+  b.scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  return b;
+}
+/// Bodies inside one another, of different spacings, which must not see each other.
+Bodies overlapping() {
+  Bodies b{one_body(), {lattice(9, 9, 9, 0.1, 0.2), lattice(14, 5, 6, 0.05, 0.1)}};
+  b.scene.bodies.push_back(b.scene.bodies[0]);
+  b.clouds.push_back(lattice(3, 3, 3, 0.1, 0.1));
+  b.scene.bodies.push_back(b.scene.bodies[0]);
+  b.scene.bodies[2].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  return b;
+}
+Bodies kernel_volumes() {
+  Bodies b{one_body(), {lattice(12, 11, 10, 0.1, 0.3)}};
+  b.scene.bodies[0].volume_rule = VolumeRule::kernel;
+  return b;
+}
+/// A sheet, a thread, two at one place and a lone one, far apart.
+Bodies degenerate() {
+  Cloud cloud;
+  for (int x = 0; x < 20; ++x) {
+    for (int y = 0; y < 20; ++y) cloud.position.push_back({0.1 * x, 0.1 * y, 0});
+  }
+  for (int x = 0; x < 20; ++x) cloud.position.push_back({0.1 * x, 50, 0});
+  cloud.position.push_back({100, 100, 100});
+  cloud.position.push_back(cloud.position.front());
+  cloud.volume.assign(cloud.position.size(), 1e-3);
+  return {one_body(), {cloud}};
+}
+/// Two clumps so far apart that most cells are empty and the search takes its detours.
+Bodies clumps() {
+  Cloud cloud = lattice(8, 8, 8, 0.1, 0.3);
+  Cloud far = lattice(3, 2, 2, 0.1, 0.3);
+  for (const Vec3d& x : far.position) cloud.position.push_back(x + Vec3d{4000, 1, 2});
+  cloud.volume.assign(cloud.position.size(), 1e-3);
+  return {one_body(), {cloud}};
+}
+
+struct Case {
+  const char* name;
+  Bodies (*make)();
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+class Setup : public ::testing::TestWithParam<Case> {
+ protected:
+  const Bodies bodies_ = GetParam().make();
+  const Model host_ = build_model(bodies_.scene, bodies_.clouds);
+  const Model device_ = build_model(bodies_.scene, bodies_.clouds, cuda_surveyor());
+};
+
+TEST_P(Setup, SurveyEqualsTheCpus) {
+  EXPECT_TRUE(host_.has_lists());
+  EXPECT_FALSE(device_.has_lists());
+  EXPECT_EQ(device_.neighbourhood.support, host_.neighbourhood.support);  // to the last bit
+  EXPECT_EQ(device_.neighbourhood.symmetric, host_.neighbourhood.symmetric);
+  for (std::size_t p = 0; p < host_.parts.size(); ++p) {
+    EXPECT_EQ(device_.parts[p].lists.pairs, host_.parts[p].lists.pairs);
+    EXPECT_EQ(device_.parts[p].lists.fewest, host_.parts[p].lists.fewest);
+    EXPECT_EQ(device_.parts[p].lists.most, host_.parts[p].lists.most);
+  }
+  EXPECT_EQ(device_.degenerate.describe(), host_.degenerate.describe());
+  EXPECT_EQ(device_.warnings, host_.warnings);
+  EXPECT_EQ(model_digest(device_), model_digest(host_));
+  for (Index i = 0; i < host_.size(); ++i) {  // sums of some 30 terms in another order
+    ASSERT_NEAR(device_.mass[i], host_.mass[i], 1e-14 * host_.mass[i]);
+    ASSERT_NEAR(device_.volume[i], host_.volume[i], 1e-13 * host_.volume[i]);
+  }
+}
+
+void expect_same(const cuda::DeviceTileLists& found, const cuda::DeviceTileLists& expected) {
+  ASSERT_EQ(found.halo_stride, expected.halo_stride);
+  EXPECT_EQ(cuda::fetched(found.halo), cuda::fetched(expected.halo));
+  EXPECT_EQ(cuda::fetched(found.entries), cuda::fetched(expected.entries));
+  const auto a = cuda::fetched(found.rows), b = cuda::fetched(expected.rows);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    ASSERT_EQ(a[k].chunk, b[k].chunk);
+    ASSERT_EQ(a[k].length, b[k].length);
+  }
+}
+
+TEST_P(Setup, TilesEqualTheCpusToTheLastEntry) {
+  const cuda::DeviceTiling found = cuda::make_device_tiling(device_),
+                           expected = cuda::make_device_tiling(host_);
+  EXPECT_EQ(found.phyxel, expected.phyxel);
+  EXPECT_EQ(found.place, expected.place);
+  EXPECT_EQ(found.part, expected.part);
+  expect_same(found.neighbours, expected.neighbours);
+  ASSERT_EQ(found.inverse.has_value(), expected.inverse.has_value());
+  if (found.inverse) expect_same(*found.inverse, *expected.inverse);
+}
+
+TEST_P(Setup, MomentsEqualTheCpus) {
+  const cuda::DeviceTiling found = cuda::make_device_tiling(device_),
+                           expected = cuda::make_device_tiling(host_);
+  const auto a = cuda::fetched(found.inverse_moment), b = cuda::fetched(expected.inverse_moment);
+  const auto c = cuda::fetched(found.moment_offset), d = cuda::fetched(expected.moment_offset);
+  double largest = 0, largest_offset = 0;
+  for (std::size_t k = 0; k < b.size(); ++k) {
+    largest = std::max({largest, std::abs(b[k].xx), std::abs(b[k].yy), std::abs(b[k].zz)});
+    largest_offset = std::max(largest_offset, norm(d[k]));
+  }
+  // Sums in another order: some tens of roundings, which an inverse magnifies by the condition.
+  for (std::size_t k = 0; k < b.size(); ++k) {
+    const double apart[] = {a[k].xx - b[k].xx, a[k].xy - b[k].xy, a[k].xz - b[k].xz,
+                            a[k].yy - b[k].yy, a[k].yz - b[k].yz, a[k].zz - b[k].zz};
+    for (const double difference : apart) ASSERT_NEAR(difference, 0, 1e-12 * largest) << k;
+    ASSERT_NEAR(norm(c[k] - d[k]), 0, 1e-13 * std::max(largest_offset, 1e-3)) << k;
+  }
+}
+
+TEST_P(Setup, IsTheSameTwice) {
+  const cuda::DeviceTiling one = cuda::make_device_tiling(device_),
+                           two = cuda::make_device_tiling(device_);
+  EXPECT_EQ(cuda::fetched(one.neighbours.entries), cuda::fetched(two.neighbours.entries));
+  const auto a = cuda::fetched(one.inverse_moment), b = cuda::fetched(two.inverse_moment);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    ASSERT_TRUE(a[k].xx == b[k].xx && a[k].yz == b[k].yz) << k;  // to the last bit
+  }
+  const Model again = build_model(bodies_.scene, bodies_.clouds, cuda_surveyor());
+  EXPECT_EQ(again.mass, device_.mass);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, Setup,
+                         ::testing::Values(Case{"Jittered", jittered}, Case{"Regular", regular},
+                                           Case{"Adaptive", adaptive},
+                                           Case{"Overlapping", overlapping},
+                                           Case{"KernelVolumes", kernel_volumes},
+                                           Case{"Degenerate", degenerate}, Case{"Clumps", clumps}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(SetupOnGpu, TooManyNeighboursAreRefused) {
+  Scene scene = one_body();
+  scene.bodies[0].neighbourhood.radius = 1.2;
+  const std::vector<Cloud> clouds{lattice(18, 18, 18, 0.1)};
+  const Model model = build_model(scene, clouds, cuda_surveyor());
+  try {
+    cuda::make_device_tiling(model);
+    FAIL() << "a halo larger than 16-bit slots was accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos);
+  }
+}
+
+TEST(SetupOnGpu, ListsLeftThereAreMissedOnTheCpu) {
+  const Bodies b = jittered();
+  const Model model = build_model(b.scene, b.clouds, cuda_surveyor());
+  EXPECT_THROW(make_cpu_backend(model, Precision::double_), InputError);
+}
+
+/// The limit found on the GPU, by a linear law in working precision, is that of the CPU, which
+/// differences the forces in double.
+TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
+  for (const bool volume : {false, true}) {
+    for (const Strain strain : {Strain::green, Strain::cauchy}) {
+      Bodies b = overlapping();
+      b.scene.bodies[1].material.strain = strain;
+      if (volume) b.scene.bodies[1].material.volume_stiffness = 3e6;
+      const Model model = build_model(b.scene, b.clouds);
+      const StepLimit expected = step_limit(model);
+      const std::pair<Precision, double> precisions[] = {
+          {Precision::single, 1e-5}, {Precision::mixed, 1e-5}, {Precision::double_, 1e-7}};
+      for (const auto& [precision, tolerance] : precisions) {  // some 100 roundings; differences
+        const auto backend = make_cuda_backend(model, precision);
+        const StepLimit found = step_limit(model, *backend);
+        EXPECT_EQ(found.iterations, expected.iterations);
+        EXPECT_NEAR(found.omega_max, expected.omega_max, tolerance * expected.omega_max);
+        EXPECT_EQ(found.sound_step, expected.sound_step);
+      }
+    }
+  }
+}
+
+/// 100 steps from either set-up end at the same place, to the rounding of the moments' last bits.
+TEST(SetupOnGpu, StepsFromEitherSetUpAgree) {
+  Bodies b = jittered();
+  b.scene.gravity = {0, 0, -9.81};
+  b.scene.bodies[0].spin = {1, 2, 3};
+  std::vector<State> ends;
+  for (const bool on_device : {false, true}) {
+    const Model model = on_device ? build_model(b.scene, b.clouds, cuda_surveyor())
+                                  : build_model(b.scene, b.clouds);
+    const auto backend = make_cuda_backend(model, Precision::double_);
+    const double dt = 0.5 * step_limit(model, *backend).largest_step;
+    Solver solver(*backend, initial_state(model, b.scene, dt));
+    for (int s = 0; s < 100; ++s) solver.step();
+    ends.push_back(solver.state());
+  }
+  double largest = 0, apart = 0;
+  for (std::size_t i = 0; i < ends[0].displacement.size(); ++i) {
+    largest = std::max(largest, norm(ends[0].displacement[i]));
+    apart = std::max(apart, norm(ends[0].displacement[i] - ends[1].displacement[i]));
+  }
+  EXPECT_GT(largest, 0);
+  EXPECT_LT(apart, 1e-10 * largest);  // limits agree to 1e-13, a spin's path magnifies them little
+}
+
+}  // namespace
+}  // namespace phyxel
