@@ -224,7 +224,9 @@ void bench_step(const BenchOptions& options) {
   }
   for (const auto& [terms, size, factor] : step_cases(options)) {
     const Scene scene = bench_scene(terms, factor, options.bodies);
-    const std::vector<Cloud> clouds(scene.bodies.size(), bench_cloud(options.shape, size));
+    std::vector<Cloud> clouds;
+    clouds.push_back(bench_cloud(options.shape, size));
+    clouds.resize(scene.bodies.size(), clouds[0]);
     const Model model = make_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);
     const double pairs = static_cast<double>(model.pairs());

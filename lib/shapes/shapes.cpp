@@ -1,13 +1,11 @@
 #include "phyxel/shapes.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <limits>
 
+#include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "shapes/paper_bodies.hpp"
@@ -45,32 +43,10 @@ void check_size(const ShapeRequest& request) {
   }
 }
 
-/// A limit in bytes from a file of one number; infinite if there is none.
-double limit_in(const char* file) {
-  double bytes = 0;
-  return std::ifstream(file) >> bytes ? bytes : HUGE_VAL;
-}
-
-/// Memory this process may use [bytes]: the machine's, or less inside a container.
-double usable_memory() {
-  const double machine =
-      static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
-  return std::min({machine, limit_in("/sys/fs/cgroup/memory.max"),
-                   limit_in("/sys/fs/cgroup/memory/memory.limit_in_bytes")});
-}
-
-void refuse_too_many(const std::string& shape, double phyxels) {
-  // The most that a phyxel with its neighbour lists and solver arrays takes at any time: measured
-  // while the time step is found, in `phyxel check` of a block of two million.
-  constexpr double bytes_per_phyxel = 950;
-  const double most_index = std::numeric_limits<Index>::max();
-  const double memory = usable_memory();
-  if (phyxels <= most_index && phyxels * bytes_per_phyxel <= memory) return;
-  throw InputError(fmt::format(
-      "shape \"{}\": {:.0f} phyxels need about {:.3g} GiB of memory, but {:.3g} GiB are available: "
-      "at most {:.0f} phyxels are allowed",
-      shape, phyxels, phyxels * bytes_per_phyxel / 0x1p30, memory / 0x1p30,
-      std::floor(std::min(most_index, memory / bytes_per_phyxel))));
+/// What filling a shape takes at any time: positions, volumes, their order, a copy of each.
+void require_memory_for_cloud(const std::string& shape, double phyxels) {
+  constexpr double bytes_per_phyxel = 120;
+  require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel);
 }
 
 void check_lattice(const ShapeRequest& request) {
@@ -109,7 +85,7 @@ double spacing_for(const ShapeRequest& request, Index phyxels) {
     throw InputError(fmt::format("shape \"{}\": {} phyxels asked for; at least 1 is needed",
                                  request.name, phyxels));
   }
-  refuse_too_many(request.name, phyxels);
+  require_memory_for_cloud(request.name, phyxels);
   const Lattice unit = make_lattice(request, 1);
   const double longest = std::max({unit.extent.x, unit.extent.y, unit.extent.z});
   const auto count = [&](double spacing) { return make_lattice(request, spacing).phyxels(); };
@@ -133,7 +109,7 @@ Cloud make_shape(const ShapeRequest& request) {
   }
   check_lattice(request);
   const Lattice lattice = make_lattice(request, request.spacing);
-  refuse_too_many(request.name, lattice.phyxels());
+  require_memory_for_cloud(request.name, lattice.phyxels());
   Cloud cloud = fill_lattice(lattice, request.jitter, request.seed);
   if (request.surface) cloud.surface = lattice_surface(lattice, request.spacing);
   return cloud;
