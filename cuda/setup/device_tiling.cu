@@ -444,7 +444,7 @@ DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_fo
       if (fewest >= 0) break;
     }
 
-    // Rows of a warp are as long as its longest team's, and even.
+    // Rows of a warp are as long as its longest team's.
     constexpr int teams_a_warp = warp_size / team;
     const std::size_t warps = places / warp_size;
     DeviceArray<std::int64_t> warp_chunks(warps, what);
@@ -456,7 +456,6 @@ DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_fo
                for (int t = 0; t < teams_a_warp; ++t) {
                  length = max(length, steps[w * teams_a_warp + t]);
                }
-               length = (length + 1) / 2 * 2;
                rows[w].length = length;
                warp_chunks[w] = (length + chunk - 1) / chunk;
              });

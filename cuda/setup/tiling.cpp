@@ -121,7 +121,6 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
   for (int first = 0; first < tile_size; first += warp_size) {
     std::size_t longest = 0;
     for (int l = 0; l < warp_size; ++l) longest = std::max(longest, rows.slots[first + l].size());
-    longest = (longest + 1) / 2 * 2;
     for (int l = 0; l < warp_size; ++l) {
       rows.slots[first + l].resize(longest, static_cast<std::uint16_t>(tile_size + l % columns));
     }

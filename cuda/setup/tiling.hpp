@@ -37,7 +37,7 @@ struct TileLists {
   /// halo_stride].
   std::vector<Index> halo;
   int halo_stride = 0;
-  /// Of each warp: where its entries begin, in chunks, and how many entries a lane has (even).
+  /// Of each warp: where its entries begin, in chunks, and how many entries a lane has.
   struct Row {
     std::int32_t chunk = 0, length = 0;
   };

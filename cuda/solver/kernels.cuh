@@ -149,11 +149,14 @@ __device__ inline const uint4* list_of(const DeviceLists& lists, TileLists::Row 
   return lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
 }
 
-/// Calls visit(offset, offset) with two entries at a time of this lane's list, in its order.
+/// Calls visit(offset) with each entry of this lane's list, in its order.
 template <class Visit>
 __device__ void walk(const DeviceLists& lists, TileLists::Row row, uint4 first, Visit&& visit) {
   const uint4* at = list_of(lists, row);
-  const auto visit_both = [&](unsigned two) { visit(two & 0xFFFF, two >> 16); };
+  const auto visit_both = [&](unsigned two) {
+    visit(two & 0xFFFF);
+    visit(two >> 16);
+  };
   uint4 next = first;
   int left = row.length;
   for (; left >= chunk; left -= chunk) {
@@ -165,11 +168,13 @@ __device__ void walk(const DeviceLists& lists, TileLists::Row row, uint4 first, 
     visit_both(now.z);
     visit_both(now.w);
   }
-  for (; left > 0; left -= 2) {
+  for (; left > 1; left -= 2) {
     visit_both(next.x);
     next.x = next.y;
     next.y = next.z;
+    next.z = next.w;
   }
+  if (left > 0) visit(next.x & 0xFFFF);
 }
 
 /// The first entries of this lane's list.
@@ -203,14 +208,10 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
 
   const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
   Mat3<Real> sum;
-  walk(lists, row, first, [&](unsigned a, unsigned b) {
-    const auto p = Points<Real>::at(image, lists.slots, a);
-    const auto q = Points<Real>::at(image, lists.slots, b);
-    const Vec3<Real> x_p = p.x - own.x, x_q = q.x - own.x;
-    add_gradient_term(sum, p.u - own.u,
-                      weight_shape_anywhere(dot(x_p, x_p), inverse_h_squared) * x_p);
-    add_gradient_term(sum, q.u - own.u,
-                      weight_shape_anywhere(dot(x_q, x_q), inverse_h_squared) * x_q);
+  walk(lists, row, first, [&](unsigned offset) {
+    const auto p = Points<Real>::at(image, lists.slots, offset);
+    const Vec3<Real> x = p.x - own.x;
+    add_gradient_term(sum, p.u - own.u, weight_shape_anywhere(dot(x, x), inverse_h_squared) * x);
   });
 
   const Real* c = f.moment_constants + place;
@@ -261,12 +262,10 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
     return weight_shape_anywhere(dot(x, x), inverse_h_squared);
   };
   Vec3<Real> sum;
-  walk(lists, row, first, [&](unsigned a, unsigned b) {
-    const auto p = Stresses<Real>::at(image, lists.slots, a);
-    const auto q = Stresses<Real>::at(image, lists.slots, b);
-    const Vec3<Real> x_p = p.x - x_i, x_q = q.x - x_i;
-    add_neighbour_force(sum, p.q, x_p, weight_of(x_p, a));
-    add_neighbour_force(sum, q.q, x_q, weight_of(x_q, b));
+  walk(lists, row, first, [&](unsigned offset) {
+    const auto p = Stresses<Real>::at(image, lists.slots, offset);
+    const Vec3<Real> x = p.x - x_i;
+    add_neighbour_force(sum, p.q, x, weight_of(x, offset));
   });
   const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;
   sum += own_force(q_i, column3(f.force_constants, f.places, place));
