@@ -3,16 +3,17 @@
 #
 #   scripts/measure_gpu.sh [folder]     after cmake --preset cuda && cmake --build --preset cuda
 #
-# The largest body takes about 80 GB of the GPU's memory, and as much of the host's.
+# PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes about 80 GB of the GPU's memory, and as much of the host's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results}
+program=${PHYXEL:-build/cuda/bin/phyxel}
 mkdir -p "$out"
 step() {
   local name=$1
   shift
   echo "== $name"
-  build/cuda/bin/phyxel bench "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
+  "$program" bench "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
 }
 small=125,343,1000,2197,4096,8000,15625,27000
 medium=50653,103823,250047,512000,1000000
