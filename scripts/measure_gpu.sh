@@ -3,7 +3,8 @@
 #
 #   scripts/measure_gpu.sh [folder]     after cmake --preset cuda && cmake --build --preset cuda
 #
-# PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes about 80 GB of the GPU's memory, and as much of the host's.
+# PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes some 100 GB of the
+# GPU's memory while it is set up, and half as much of the host's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results}
@@ -24,8 +25,15 @@ step gpu_terms step --phyxels 2097152
 step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
 for body in dino alien_head horn_bug; do
   for count in 1 10 100; do
-    step "gpu_${body}_$count" step --shape $body --bodies $count --terms green --precision float
+    step "gpu_small_${body}_$count" step --shape $body --bodies $count --terms green \
+      --precision float
   done
+done
+# One table of them all.
+sed '$d' "$out/gpu_small_dino_1.csv" >"$out/gpu_small.csv"
+for table in "$out"/gpu_small_*.csv; do
+  tail -n 1 "$table" >>"$out/gpu_small.csv"
+  rm "$table"
 done
 step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
 step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3

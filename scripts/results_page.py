@@ -140,7 +140,8 @@ def readme_block():
 def main():
     page = "# Measurements\n\nMade by `scripts/results_page.py` from the CSV files in this folder, which the "
     page += "`bench` commands write. [The 2008 paper, run again](paper/paper.md) is a page of its own, made "
-    page += "by `phyxel paper`.\n\n"
+    page += "by `phyxel paper`; so is [the GPU solver's performance](../performance.md), by `phyxel bench "
+    page += "page`.\n\n"
     page += step_section() + neighbours_section() + peer_section()
     (FOLDER / "README.md").write_text(page)
     readme = (ROOT / "README.md").read_text()

@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "bench_page.hpp"
 #include "command.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
@@ -413,6 +414,13 @@ void add_bench(CLI::App& program) {
   add_bench_of(*bench, "neighbours",
                "Neighbour search: time per phyxel against the number of phyxels",
                {10648, 103823, 1000000, 9938375}, bench_neighbours);
+
+  CLI::App* page = bench->add_subcommand("page", "Write the page about the GPU from its tables");
+  auto results = std::make_shared<std::string>("docs/results");
+  auto out = std::make_shared<std::string>("docs/performance.md");
+  page->add_option("--results", *results, "Folder of gpu_*.csv")->capture_default_str();
+  page->add_option("--out", *out, "The page")->capture_default_str();
+  page->callback([results, out] { write_bench_page(*results, *out); });
 }
 
 }  // namespace phyxel::app

@@ -730,6 +730,7 @@ class CudaBackend final : public Backend {
   };
   /// Steps that may wait to be launched together.
   static constexpr int most_pending = 256;
+  static constexpr int most_cluster_blocks = 16;  // on GPUs that have clusters
 
   /// Where nothing changes from step to step but the state, and a body fits a cluster, or all fit
   /// at once.
@@ -738,6 +739,7 @@ class CudaBackend final : public Backend {
     const bool ramped = std::any_of(model_.loads.begin(), model_.loads.end(),
                                     [](const Load& load) { return load.ramp > 0; });
     if (size() == 0 || tiling_.places() > most_places || ramped || !motions_.empty()) return;
+    if (!may_fit()) return;
     Tiling tiling;
     tiling.phyxel = tiling_.phyxel;
     tiling.part = tiling_.part;
@@ -774,6 +776,15 @@ class CudaBackend final : public Backend {
     resident_ = std::move(r);
     clear_mail();
   }
+  /// Before a plan is made, which takes its time.
+  bool may_fit() const {
+    const bool in_clusters = std::all_of(
+        model_.parts.begin(), model_.parts.end(),
+        [](const Part& part) { return part.end - part.begin <= most_cluster_blocks * slice_size; });
+    const std::size_t shared = static_cast<std::size_t>(device_.multiprocessors) *
+                               static_cast<std::size_t>(most_shared_memory_);
+    return in_clusters || static_cast<std::size_t>(model_.pairs()) * sizeof(Pair<Real>) <= shared;
+  }
   int second_longest(const ResidentPlan& plan) const {
     return tiling_.inverse ? plan.longest[1] : 0;
   }
@@ -786,11 +797,10 @@ class CudaBackend final : public Backend {
   }
   /// One cluster a body, as many blocks each as the largest has slices.
   bool fits_clusters(const ResidentPlan& plan, Resident& r) {
-    constexpr int most_blocks = 16;  // of a cluster, on GPUs that have them
     use_post<ClusterPost<Real>>(plan, r);
     const auto blocks = static_cast<std::size_t>(plan.bodies) * plan.most_slices;
     // Bodies of very different sizes would leave most blocks idle.
-    if (plan.most_slices > most_blocks || blocks > 2 * plan.slices.size() ||
+    if (plan.most_slices > most_cluster_blocks || blocks > 2 * plan.slices.size() ||
         r.bytes > most_shared_memory_) {
       return false;
     }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "files/atomic_file.hpp"
+#include "markdown.hpp"
 #include "paper.hpp"
 #include "paper/paper_model.hpp"
 
@@ -27,21 +28,6 @@ struct Printed {
 constexpr Printed printed[] = {{"horn_bug", 10.05}, {"dino", 20.57}, {"alien_head", 24.76}};
 constexpr const char* printed_hardware =
     "Athlon 64 X2 4800+ (one core) and GeForce 8800 GTX (128 scalar processors, 768 MB)";
-
-std::string table_text(const std::vector<std::string>& head,
-                       const std::vector<std::vector<std::string>>& rows) {
-  std::string text = fmt::format("| {} |\n|", fmt::join(head, " | "));
-  for (std::size_t k = 0; k < head.size(); ++k) text += " --- |";
-  text += "\n";
-  for (const auto& row : rows) text += fmt::format("| {} |\n", fmt::join(row, " | "));
-  return text + "\n";
-}
-
-/// The cell of the row that matches, or a dash.
-std::string cell(const CsvTable& table, const std::string& column, const Match& match) {
-  const auto row = table.find(match);
-  return row && !table.text(*row, column).empty() ? table.text(*row, column) : "–";
-}
 
 class Page {
  public:
