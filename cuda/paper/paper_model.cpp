@@ -119,10 +119,7 @@ void check_paper_model(const Model& model) {
   }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {
-    if (!(motion.displacement == Vec3d{} && motion.velocity == Vec3d{} &&
-          motion.amplitude == Vec3d{})) {
-      refuse("phyxels that are moved; allowed: phyxels that are held");
-    }
+    if (!motion.stands_still()) refuse("phyxels that are moved; allowed: phyxels that are held");
   }
 }
 

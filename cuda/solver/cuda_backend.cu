@@ -542,20 +542,17 @@ class CudaBackend final : public Backend {
     }
     return last;
   }
-  static bool stands_still(const Motion& m) {
-    return m.displacement == Vec3d{} && m.velocity == Vec3d{} && m.amplitude == Vec3d{};
-  }
   std::vector<char> held_phyxels() const {
     std::vector<char> held(static_cast<std::size_t>(size()), 0);
     const auto last = last_motions();
-    for (Index i = 0; i < size(); ++i) held[i] = last[i] && stands_still(*last[i]);
+    for (Index i = 0; i < size(); ++i) held[i] = last[i] && last[i]->stands_still();
     return held;
   }
   void make_motions() {
     const auto last = last_motions();
     std::vector<char> moved;
     for (const Motion& motion : model_.motions) {
-      if (stands_still(motion)) continue;
+      if (motion.stands_still()) continue;
       std::vector<Index> at;
       for (const Index i : motion.phyxels) {
         if (last[i] == &motion) at.push_back(tiling_.place[i]);

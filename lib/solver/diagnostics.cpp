@@ -124,8 +124,7 @@ bool is_conservative(const Model& model) {
     if (load.ramp > 0) return false;
   }
   for (const Motion& motion : model.motions) {
-    const Vec3d drive = motion.displacement + motion.velocity + motion.amplitude;
-    if (!(drive == Vec3d{})) return false;
+    if (!motion.stands_still()) return false;
   }
   return true;
 }

@@ -48,6 +48,9 @@ struct Motion {
   Vec3d amplitude{};
   double frequency = 0;
   Vec3d displacement_at(double time) const;  ///< [m]
+  bool stands_still() const {
+    return displacement == Vec3d{} && velocity == Vec3d{} && amplitude == Vec3d{};
+  }
 };
 
 /// Constant forces on some phyxels, grown over `ramp` seconds.

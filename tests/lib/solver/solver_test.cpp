@@ -338,6 +338,19 @@ TEST(Watch, NamesThePhyxelAndTheTimeOfABlowUp) {
   }
 }
 
+/// A motion whose parts cancel in a sum still moves.
+TEST(Watch, OnlyModelsThatKeepTheirEnergyAreConservative) {
+  Scene scene = one_body();
+  EXPECT_TRUE(is_conservative(model_of(scene, lattice(3, 3, 3, 0.1))));
+  MotionRequest motion;
+  motion.select.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}};
+  motion.velocity = {1, 0, 0};
+  motion.amplitude = {-1, 0, 0};
+  motion.frequency = 2;
+  scene.bodies[0].motions.push_back(motion);
+  EXPECT_FALSE(is_conservative(model_of(scene, lattice(3, 3, 3, 0.1))));
+}
+
 TEST(Watch, LetsAStableFallPass) {
   const Scene scene = busy_scene();
   const Model model = busy_model();
