@@ -4,7 +4,7 @@
 #   scripts/measure_gpu.sh [folder]     after cmake --preset cuda && cmake --build --preset cuda
 #
 # PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes some 100 GB of the
-# GPU's memory while it is set up, and half as much of the host's.
+# GPU's memory while it is set up, and nearly as much of the host's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results}

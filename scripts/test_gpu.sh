@@ -34,6 +34,7 @@ check() {
     log=$logs/${program}_${filter//[^A-Za-z]/}_$tool.log
     compute-sanitizer --tool "$tool" --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" \
       >"$log" 2>&1 || failed=1
+    grep -qE '^\[==========\] [1-9][0-9]* tests? from .* ran' "$log" || failed=1  # or none ran
     say "compute-sanitizer $tool, $program, $(grep -E '^\[==========\] [0-9]+ tests? from .* ran' "$log" |
       sed -E 's/.*\] ([0-9]+ tests?) .*/\1/'): $(grep SUMMARY "$log" | tail -1 | sed 's/^=* //')"
   done

@@ -60,7 +60,14 @@ class Page {
 
  private:
   void with(const char* name, const std::function<void(const CsvTable&)>& section) {
-    if (fs::exists(results_ / name)) section(read_csv(results_ / name));
+    if (!fs::exists(results_ / name)) return;
+    const CsvTable table = read_csv(results_ / name);
+    if (table.rows.empty()) {
+      throw InputError(
+          fmt::format("{}: has no rows; allowed: a table of a bench that ended, or none",
+                      (results_ / name).string()));
+    }
+    section(table);
   }
   void measured_by(const CsvTable& t) {
     text_ += fmt::format("Measured by {} on {}; {}; {}.\n\n", t.fact("program"), t.fact("gpu"),

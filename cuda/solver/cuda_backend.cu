@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "check.hpp"
 #include "device.hpp"
@@ -159,7 +160,7 @@ class CudaBackend final : public Backend {
         settle();
         send_constants(dt);
       }
-      if (++pending_ == most_pending) {
+      if (++pending_ >= most_pending) {
         settle();
         bound_queue(most_pending);
       }
@@ -314,7 +315,8 @@ class CudaBackend final : public Backend {
   /// with the volume's stiffness added to λ.
   class CudaVibration final : public Vibration {
    public:
-    explicit CudaVibration(CudaBackend& backend) : b_(backend), tiles_(b_.rest_constants()) {
+    explicit CudaVibration(CudaBackend& backend)
+        : b_(backend), amplitude_(b_.amplitude_at_rest()), tiles_(b_.rest_constants()) {
       const std::string what = "vectors of " + b_.subject_;
       const std::size_t count = 3 * b_.places();
       previous_ = {count, what};
@@ -327,14 +329,14 @@ class CudaBackend final : public Backend {
       scale(current_, 1 / std::sqrt(product(current_, current_)));
     }
     double apply(double beta) override {
-      launch("bend", bend<Real, StateReal>, b_.fields_, current_.data());
+      launch("bend", bend<Real, StateReal>, b_.fields_, current_.data(), amplitude_);
       AllFields at_rest = b_.fields_;
       at_rest.tiles = tiles_.data();
       b_.launch_pass_1(at_rest, {pass_1<Real, StateReal, false, false, false>, 0, b_.tiles()},
                        nullptr);
       b_.launch_pass_2(b_.only_forces(), StateReal(0), force_.data());
       launch("stiffness_times", stiffness_times<Real, StateReal>, b_.fields_, force_.data(),
-             previous_.data(), static_cast<Real>(beta), next_.data());
+             previous_.data(), static_cast<Real>(beta), amplitude_, next_.data());
       return product(next_, current_);
     }
     double subtract(double alpha) override {
@@ -365,6 +367,7 @@ class CudaBackend final : public Backend {
       b_.launched(name, tiles, tile_size);
     }
     CudaBackend& b_;
+    Real amplitude_;  ///< Makes displacements of a vector's ones the size of a support.
     DeviceArray<BodyConstants> tiles_;
     DeviceArray<Real> previous_, current_, next_, force_;
   };
@@ -517,6 +520,17 @@ class CudaBackend final : public Backend {
             static_cast<StateReal>(dt / (1 + half)),
             m.strain == Strain::green,
             m.damping > 0};
+  }
+  /// Smallest support times the root of the smallest mass: with it, forces of a unit vector stay as
+  /// far from the ends of float as those of a step.
+  Real amplitude_at_rest() const {
+    double support = 0, mass = 0;
+    for (Index i = 0; i < size(); ++i) {
+      const double h = model_.neighbourhood.support[i], m = model_.mass[i];
+      if (h > 0 && (support == 0 || h < support)) support = h;
+      if (m > 0 && (mass == 0 || m < mass)) mass = m;
+    }
+    return support > 0 && mass > 0 ? static_cast<Real>(support * std::sqrt(mass)) : Real(1);
   }
   /// For small displacements, whatever the law.
   DeviceArray<BodyConstants> rest_constants() const {
@@ -794,6 +808,7 @@ class CudaBackend final : public Backend {
   }
   /// One cluster a body, as many blocks each as the largest has slices.
   bool fits_clusters(const ResidentPlan& plan, Resident& r) {
+    if (device_.major < 9) return false;
     use_post<ClusterPost<Real>>(plan, r);
     const auto blocks = static_cast<std::size_t>(plan.bodies) * plan.most_slices;
     // Bodies of very different sizes would leave most blocks idle.
@@ -855,17 +870,15 @@ class CudaBackend final : public Backend {
     if (pending_ == 0) return;
     if (next_tag_ > 0xF000'0000U) clear_mail();
     auto dt = static_cast<StateReal>(dt_);
-    int steps = pending_;
+    int steps = std::exchange(pending_, 0);  // once, whatever happens
     AllFields fields = fields_;
     ResidentView<Real> view = resident_->view;
-    unsigned tag = next_tag_;
+    unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps));
     void* arguments[] = {&fields, &view, &dt, &steps, &tag};
     cudaLaunchAttribute attribute;
     const cudaLaunchConfig_t config = launch_of(*resident_, attribute);
     PHYXEL_CUDA(cudaLaunchKernelExC(&config, resident_->kernel, arguments));
     launched("resident_steps", resident_->blocks, resident_->threads);
-    next_tag_ += 2 * static_cast<unsigned>(pending_);
-    pending_ = 0;
   }
 
   void use_device() const { PHYXEL_CUDA(cudaSetDevice(device_.index)); }

@@ -232,6 +232,13 @@ struct MailPost {
   __device__ void finish() {}
 };
 
+// Clusters came with compute capability 9; `fits_clusters` asks for it.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 900
+#define PHYXEL_CLUSTER_ASM(...) __trap()
+#else
+#define PHYXEL_CLUSTER_ASM(...) asm volatile(__VA_ARGS__)
+#endif
+
 /// Straight into the shared memory of the other blocks of a cluster, which is a body.
 template <class Real>
 struct ClusterPost {
@@ -259,7 +266,8 @@ struct ClusterPost {
     return static_cast<unsigned>(__cvta_generic_to_shared(shared));
   }
   __device__ static void meet_cluster() {
-    asm volatile("barrier.cluster.arrive.aligned; barrier.cluster.wait.aligned;" ::: "memory");
+    PHYXEL_CLUSTER_ASM("barrier.cluster.arrive.aligned; barrier.cluster.wait.aligned;" ::
+                           : "memory");
   }
 
   __device__ ClusterPost(const ResidentView<Real>& r, const Slice& slice,
@@ -279,9 +287,10 @@ struct ClusterPost {
       memory.destinations[k] = all[near * slice_size + k];
     }
     if (threadIdx.x == 0) {
-      asm volatile("mbarrier.init.shared::cta.b64 [%0], %1;" ::"r"(barriers), "n"(threads));
-      asm volatile("mbarrier.init.shared::cta.b64 [%0], %1;" ::"r"(barriers + 8), "n"(threads));
-      asm volatile("fence.mbarrier_init.release.cluster;" ::: "memory");
+      PHYXEL_CLUSTER_ASM("mbarrier.init.shared::cta.b64 [%0], %1;" ::"r"(barriers), "n"(threads));
+      PHYXEL_CLUSTER_ASM("mbarrier.init.shared::cta.b64 [%0], %1;" ::"r"(barriers + 8),
+                         "n"(threads));
+      PHYXEL_CLUSTER_ASM("fence.mbarrier_init.release.cluster;" ::: "memory");
     }
     __syncthreads();
     meet_cluster();
@@ -290,10 +299,12 @@ struct ClusterPost {
   __device__ Destination resolve(std::uint32_t to) const {
     if (to == nobody) return {0, 0};
     Destination d;
-    asm("mapa.shared::cluster.u32 %0, %1, %2;"
-        : "=r"(d.slot)
-        : "r"(image + 16 * (to & 0xFFFF)), "r"(to >> 16));
-    asm("mapa.shared::cluster.u32 %0, %1, %2;" : "=r"(d.bells) : "r"(barriers), "r"(to >> 16));
+    PHYXEL_CLUSTER_ASM("mapa.shared::cluster.u32 %0, %1, %2;"
+                       : "=r"(d.slot)
+                       : "r"(image + 16 * (to & 0xFFFF)), "r"(to >> 16));
+    PHYXEL_CLUSTER_ASM("mapa.shared::cluster.u32 %0, %1, %2;"
+                       : "=r"(d.bells)
+                       : "r"(barriers), "r"(to >> 16));
     return d;
   }
   template <int letters>
@@ -302,7 +313,7 @@ struct ClusterPost {
 #pragma unroll
     for (int k = 0; k < letters; ++k) {
       const auto words = reinterpret_cast<const uint4&>(letter[k]);
-      asm volatile(
+      PHYXEL_CLUSTER_ASM(
           "st.async.shared::cluster.mbarrier::complete_tx::bytes.v4.b32 [%0], {%1, %2, %3, %4}, "
           "[%5];" ::"r"(d.slot + image_offset + 16 * static_cast<unsigned>(k * slots)),
           "r"(words.x), "r"(words.y), "r"(words.z), "r"(words.w),
@@ -335,11 +346,11 @@ struct ClusterPost {
       for (int k = 0; k < letters; ++k) to.letters[k * to.slots + threadIdx.x] = letter[k];
     }
     if (threadIdx.x == 0) {
-      asm volatile("mbarrier.arrive.expect_tx.shared::cta.b64 _, [%0], %1;" ::"r"(barrier),
-                   "r"(16 * letters * halo)
-                   : "memory");
+      PHYXEL_CLUSTER_ASM("mbarrier.arrive.expect_tx.shared::cta.b64 _, [%0], %1;" ::"r"(barrier),
+                         "r"(16 * letters * halo)
+                         : "memory");
     } else {
-      asm volatile("mbarrier.arrive.shared::cta.b64 _, [%0];" ::"r"(barrier) : "memory");
+      PHYXEL_CLUSTER_ASM("mbarrier.arrive.shared::cta.b64 _, [%0];" ::"r"(barrier) : "memory");
     }
   }
   template <int letters>
@@ -347,7 +358,7 @@ struct ClusterPost {
     const unsigned barrier = barriers + 8 * static_cast<unsigned>(kind);
     unsigned done;
     do {
-      asm volatile(
+      PHYXEL_CLUSTER_ASM(
           "{ .reg .pred p; mbarrier.try_wait.parity.acquire.cluster.shared::cta.b64 p, [%1], %2; "
           "selp.u32 %0, 1, 0, p; }"
           : "=r"(done)

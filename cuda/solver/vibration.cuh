@@ -20,21 +20,22 @@ __device__ Real root_of_inverse_mass(const Real* force_constants, std::size_t pl
   return sqrt(signed_inverse < Real(0) ? -signed_inverse : signed_inverse);  // held: taken as free
 }
 
-/// u = M^-1/2 x
+/// u = a M^-1/2 x
 template <class Real, class StateReal>
-__global__ void bend(Fields<Real, StateReal> f, const Real* x) {
+__global__ void bend(Fields<Real, StateReal> f, const Real* x, Real amplitude) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
   auto point = f.points.get(place);
-  point.u = root_of_inverse_mass(f.force_constants, f.places, place) * column3(x, f.places, place);
+  const Real scale = amplitude * root_of_inverse_mass(f.force_constants, f.places, place);
+  point.u = scale * column3(x, f.places, place);
   f.points.set(place, point);
 }
 
-/// y = -M^-1/2 f - beta x
+/// y = -M^-1/2 f / a - beta x
 template <class Real, class StateReal>
 __global__ void stiffness_times(Fields<Real, StateReal> f, const Real* force, const Real* x,
-                                Real beta, Real* y) {
+                                Real beta, Real amplitude, Real* y) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
-  const Real scale = -root_of_inverse_mass(f.force_constants, f.places, place);
+  const Real scale = -root_of_inverse_mass(f.force_constants, f.places, place) / amplitude;
   set_column3(y, f.places, place,
               scale * column3(force, f.places, place) - beta * column3(x, f.places, place));
 }

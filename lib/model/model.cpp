@@ -101,6 +101,10 @@ std::string in_words(const NeighbourhoodRule& rule) {
   std::string words;
   if (rule.radius) {
     words = fmt::format("support radius {:g} m", *rule.radius);
+    // Kernel volumes still follow from the nearest.
+    if (rule.nearest != NeighbourhoodRule{}.nearest) {
+      words += fmt::format(", {} nearest", rule.nearest);
+    }
   } else {
     words =
         fmt::format("{} support, {:g} x the mean distance to the {} nearest",

@@ -118,7 +118,10 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     const double alpha = vibration.apply(beta);
     diagonal.push_back(alpha);
     beta = vibration.subtract(alpha);
-    if (!std::isfinite(alpha) || !std::isfinite(beta)) break;  // nothing can be said
+    if (!std::isfinite(alpha) || !std::isfinite(beta)) {
+      limit.omega_max = std::numeric_limits<double>::quiet_NaN();  // earlier ones say nothing
+      break;
+    }
     const auto [value, residual] = largest_eigenvalue(diagonal, off_diagonal, beta);
     limit.omega_max = std::sqrt(std::max(0.0, value + residual));
     limit.iterations = static_cast<int>(k) + 1;
