@@ -175,6 +175,11 @@ class Table {
   CsvTable table_;
 };
 
+/// What a table says of the GPU it was measured on.
+Facts gpu_facts(const ChosenDevice& device) {
+  return device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{};
+}
+
 /// How a backend steps: what follows its precision in its name.
 std::string path_of(const Backend& backend) {
   std::string name = backend.name();
@@ -210,13 +215,12 @@ void bench_step(const BenchOptions& options) {
                                    did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
     }
   }
-  Table table(
-      options,
-      {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels", "neighbours",
-       "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s", "bytes_per_phyxel_step",
-       "bytes_per_s", "copy_bytes_per_s", "memory_bytes_per_phyxel", "force_error",
-       "core_round_trip_ns"},
-      device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{});
+  Table table(options,
+              {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels", "neighbours",
+               "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s",
+               "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
+               "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
+              gpu_facts(device));
   // A GPU has no thread counts: 0 stands for it.
   const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
   std::vector<double> copy;
@@ -313,11 +317,10 @@ void bench_neighbours(const BenchOptions& options) {
 /// its lists, the step limit. Without a survey, on the CPU, the model has the lists.
 void bench_setup(const BenchOptions& options) {
   const ChosenDevice device = choose_device(options.device);
-  Table table(
-      options,
-      {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s", "backend_s",
-       "limit_s", "omega_max", "iterations"},
-      device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{});
+  Table table(options,
+              {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s", "backend_s",
+               "limit_s", "omega_max", "iterations"},
+              gpu_facts(device));
   for (const Index size : options.sizes) {
     const Scene scene = bench_scene("green");
     const Cloud cloud = cube(size);

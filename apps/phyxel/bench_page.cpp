@@ -35,8 +35,8 @@ std::string against(double reached, double asked) {
 
 class Page {
  public:
-  Page(fs::path results, fs::path figures, std::string link)
-      : results_(std::move(results)), figures_(std::move(figures)), link_(std::move(link)) {}
+  /// @param link from the page to `results`, where figures lie too
+  Page(fs::path results, std::string link) : results_(std::move(results)), link_(std::move(link)) {}
 
   std::string write() {
     text_ =
@@ -73,25 +73,30 @@ class Page {
     text_ += fmt::format("Measured by {} on {}; {}; {}.\n\n", t.fact("program"), t.fact("gpu"),
                          t.fact("cuda"), t.fact("date"));
   }
-  void chart(const std::string& name, const LineChart& chart) {
-    if (can_plot()) draw_svg(script_of(chart), figures_ / (name + ".svg"));
-    if (fs::exists(figures_ / (name + ".svg"))) {
-      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_, name);
-    }
-  }
   /// Billions a second.
   static std::string rate(const CsvTable& t, std::size_t r) {
     return fmt::format("{:.3g}", t.number(r, "phyxel_steps_per_s") * 1e-9);
   }
-  static Curve curve(const CsvTable& t, const std::string& precision, const std::string& x,
-                     const std::string& y, double scale) {
-    Curve c{precision, {}, {}};
-    for (std::size_t r = 0; r < t.rows.size(); ++r) {
-      if (t.text(r, "precision") != precision) continue;
-      c.x.push_back(t.number(r, x));
-      c.y.push_back(t.number(r, y) * scale);
+  /// A curve for each precision, drawn where gnuplot is.
+  void speeds(const CsvTable& t, const std::string& name, const std::string& title,
+              const std::string& x, const std::string& x_label, bool logarithmic) {
+    LineChart chart{.title = title,
+                    .x_label = x_label,
+                    .y_label = "10⁹ phyxel-steps/s",
+                    .log_x = logarithmic,
+                    .log_y = logarithmic,
+                    .curves = {}};
+    for (const std::string& precision : t.values("precision")) {
+      Curve& curve = chart.curves.emplace_back(Curve{precision, {}, {}});
+      for (std::size_t r = 0; r < t.rows.size(); ++r) {
+        if (t.text(r, "precision") != precision) continue;
+        curve.x.push_back(t.number(r, x));
+        curve.y.push_back(t.number(r, "phyxel_steps_per_s") * 1e-9);
+      }
     }
-    return c;
+    const fs::path file = results_ / (name + ".svg");
+    if (can_plot()) draw_svg(script_of(chart), file);
+    if (fs::exists(file)) text_ += fmt::format("![{}]({}{}.svg)\n\n", title, link_, name);
   }
 
   void sizes(CsvTable t) {
@@ -131,16 +136,7 @@ class Page {
           against(fastest, asked_large), slowest_double * 1e-9,
           against(slowest_double, asked_double), largest * 1e-6);
     }
-    LineChart chart_{.title = "Steps of a cube on one GPU",
-                     .x_label = "phyxels",
-                     .y_label = "10⁹ phyxel-steps/s",
-                     .log_x = true,
-                     .log_y = true,
-                     .curves = {}};
-    for (const std::string& precision : t.values("precision")) {
-      chart_.curves.push_back(curve(t, precision, "phyxels", "phyxel_steps_per_s", 1e-9));
-    }
-    chart("gpu_sizes", chart_);
+    speeds(t, "gpu_sizes", "Steps of a cube on one GPU", "phyxels", "phyxels", true);
     text_ +=
         "*Path*: `tiles` are two launches a step; what is resident stays in shared memory for "
         "many steps a launch, in a cluster of blocks a body or in blocks that send each other "
@@ -182,16 +178,7 @@ class Page {
   void neighbours(const CsvTable& t) {
     text_ += "## Against neighbours\n\n";
     measured_by(t);
-    LineChart chart_{.title = "Two million phyxels",
-                     .x_label = "neighbours a phyxel",
-                     .y_label = "10⁹ phyxel-steps/s",
-                     .log_x = false,
-                     .log_y = false,
-                     .curves = {}};
-    for (const std::string& precision : t.values("precision")) {
-      chart_.curves.push_back(curve(t, precision, "neighbours", "phyxel_steps_per_s", 1e-9));
-    }
-    chart("gpu_neighbours", chart_);
+    speeds(t, "gpu_neighbours", "Two million phyxels", "neighbours", "neighbours a phyxel", false);
     std::vector<std::vector<std::string>> rows;
     for (std::size_t r = 0; r < t.rows.size(); ++r) {
       rows.push_back({t.text(r, "neighbours"), t.text(r, "precision"), rate(t, r),
@@ -308,7 +295,7 @@ class Page {
         "instructions).\n";
   }
 
-  fs::path results_, figures_;
+  fs::path results_;
   std::string link_, text_;
 };
 
@@ -323,7 +310,7 @@ void write_bench_page(const fs::path& results, const fs::path& page) {
   }
   const fs::path folder = page.has_parent_path() ? page.parent_path() : fs::path(".");
   const std::string link = fs::relative(results, folder).generic_string() + "/";
-  write_whole_file(page, Page(results, results, link).write(), Durable::no);
+  write_whole_file(page, Page(results, link).write(), Durable::no);
 }
 
 }  // namespace phyxel::app

@@ -45,8 +45,8 @@ struct HashView {
     return static_cast<std::uint32_t>((h ^ static_cast<std::uint32_t>(body) * 2654435761U) & mask);
   }
 
-  /// Calls visit(index, position) for every point of the body in a cell; where another body's cell
-  /// has the same name and bucket, for its points too.
+  /// Calls visit(k, position) for every entry k of the body in a cell; where another body's cell
+  /// has the same name and bucket, for its entries too.
   template <class Visit>
   __device__ void visit_cell(int body, CellGrid::Cell c, Visit&& visit) const {
     const std::uint64_t cell = CellGrid::name(c);

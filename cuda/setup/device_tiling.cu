@@ -11,10 +11,9 @@
 namespace phyxel::cuda {
 namespace {
 
-// --- lists that the host has
-// ----------------------------------------------------------------------
+// --- lists that the host has ---------------------------------------------------------------
 
-DeviceTileLists send(TileLists lists, const std::string& what) {
+DeviceTileLists send(const TileLists& lists, const std::string& what) {
   return {sent(lists.halo, what), lists.halo_stride, sent(lists.rows, what),
           sent(lists.entries, what)};
 }
@@ -23,8 +22,8 @@ DeviceTiling send_tiling(const Model& model) {
   Tiling tiling = make_tiling(model);
   const std::string what = "neighbour lists of " + std::to_string(model.size()) + " phyxels";
   DeviceTiling out;
-  out.neighbours = send(std::move(tiling.neighbours), what);
-  if (!tiling.inverse.rows.empty()) out.inverse = send(std::move(tiling.inverse), what);
+  out.neighbours = send(tiling.neighbours, what);
+  if (!tiling.inverse.rows.empty()) out.inverse = send(tiling.inverse, what);
   std::vector<Sym3d> inverse_moment(tiling.phyxel.size());
   std::vector<Vec3d> moment_offset(tiling.phyxel.size());
   for (Index i = 0; i < model.size(); ++i) {
@@ -40,8 +39,7 @@ DeviceTiling send_tiling(const Model& model) {
   return out;
 }
 
-// --- lists found here
-// -----------------------------------------------------------------------------
+// --- lists found here ----------------------------------------------------------------------
 
 /// What the search needs of a model.
 struct SearchCloud {
@@ -70,12 +68,6 @@ SearchCloud send_cloud(const Model& model) {
   }
   return cloud;
 }
-
-/// Where a body's cells of Hilbert's curve begin, and how many there are a metre.
-struct Frame {
-  Vec3d low;
-  double scale;
-};
 
 /// Calls visit(j, x_j - x_i) for every neighbour j of the phyxel, or, with the largest support of
 /// each body as `inverse_reach`, for every phyxel whose neighbour it is.
@@ -137,7 +129,7 @@ class Finder {
     const DeviceArray<Index> length = count(nullptr);
     most_neighbours_ = largest(length);
     const DeviceArray<Index> order = curve_order();
-    std::vector<Index> tile_begin;  // where the phyxels of a tile begin in the order
+    std::vector<Index> tile_begin;  // in the order, and where the last tile ends
     for (std::size_t p = 0; p < model_.parts.size(); ++p) {
       const Part& part = model_.parts[p];
       for (Index begin = part.begin; begin < part.end; begin += tile_size) {
@@ -146,13 +138,11 @@ class Finder {
       }
     }
     tile_begin.push_back(n);
-    const DeviceArray<Index> part_end = sent(ends_of_parts(), "set-up");
-    part_ = sent(out_.part, "tiles");
     const DeviceArray<Index> begins = sent(tile_begin, "tiles");
     const auto places = out_.part.size() * tile_size;
     out_.phyxel_at = {places, "places"};
     place_of_ = {static_cast<std::size_t>(n), "places"};
-    sort_tiles(begins, part_end, order, length);
+    sort_tiles(begins, order, length);
     out_.phyxel = fetched(out_.phyxel_at);
     out_.place = fetched(place_of_);
   }
@@ -185,27 +175,19 @@ class Finder {
 
   DeviceArray<Index> curve_order() {
     const Index n = model_.size();
-    const double cells = static_cast<double>((1 << hilbert_bits) - 1);
-    std::vector<Frame> frames;
+    std::vector<HilbertFrame> frames;
     for (const Part& part : model_.parts) {
       const Box box = box_around(cloud_.position, part.begin, part.end);
-      const double extent =
-          std::max({box.high.x - box.low.x, box.high.y - box.low.y, box.high.z - box.low.z});
-      frames.push_back({box.low, extent > 0 ? cells / extent : 0});
+      frames.push_back(HilbertFrame::around(box.low, box.high));
     }
-    const DeviceArray<Frame> frame = sent(frames, "set-up");
+    const DeviceArray<HilbertFrame> frame = sent(frames, "set-up");
     DeviceArray<std::uint64_t> key(static_cast<std::size_t>(n), "places along a curve");
     DeviceArray<Index> order(static_cast<std::size_t>(n), "places along a curve");
     const HashView hash = table_.view();
     for_each("hilbert_keys", n,
-             [hash, frame = frame.data(), key = key.data(), order = order.data(), cells,
+             [hash, frame = frame.data(), key = key.data(), order = order.data(),
               position = cloud_.position.data()] __device__(std::int64_t i) {
-               const Frame f = frame[hash.body_of(static_cast<Index>(i))];
-               const auto cell = [&](double x, double from) {
-                 return static_cast<std::uint32_t>(fmin(fmax((x - from) * f.scale, 0.0), cells));
-               };
-               const Vec3d x = position[i];
-               key[i] = hilbert_key(cell(x.x, f.low.x), cell(x.y, f.low.y), cell(x.z, f.low.z));
+               key[i] = frame[hash.body_of(static_cast<Index>(i))].key_of(position[i]);
                order[i] = static_cast<Index>(i);
              });
     sort_pairs(key, order);
@@ -220,14 +202,8 @@ class Finder {
     return order;
   }
 
-  std::vector<Index> ends_of_parts() const {
-    std::vector<Index> ends;
-    for (const Part& part : model_.parts) ends.push_back(part.end);
-    return ends;
-  }
-
-  void sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& part_end,
-                  const DeviceArray<Index>& order, const DeviceArray<Index>& length);
+  void sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& order,
+                  const DeviceArray<Index>& length);
   DeviceTileLists make_lists(const double* inverse_reach, Index longest);
 
   static Index largest(const DeviceArray<Index>& values) {
@@ -240,19 +216,18 @@ class Finder {
   DeviceHash table_;
   DeviceArray<double> largest_support_;
   Index most_neighbours_ = 0;
-  DeviceArray<Index> part_, place_of_;
+  DeviceArray<Index> place_of_;
   DeviceTiling out_;
 };
 
 /// One block a tile.
-__global__ void sort_tile(const Index* begins, const Index* part, const Index* part_end,
-                          const Index* order, const Index* length, Index* phyxel_at,
-                          Index* place_of) {
+__global__ void sort_tile(const Index* begins, const Index* order, const Index* length,
+                          Index* phyxel_at, Index* place_of) {
   __shared__ Index lengths[tile_size];
   const int thread = static_cast<int>(threadIdx.x);
   const Index tile = static_cast<Index>(blockIdx.x);
   const Index begin = begins[tile];
-  const int count = min(tile_size, part_end[part[tile]] - begin);
+  const int count = begins[tile + 1] - begin;
   Index* places = phyxel_at + static_cast<std::size_t>(tile) * tile_size;
   const Index i = thread < count ? order[begin + thread] : -1;
   lengths[thread] = i >= 0 ? length[i] : -1;
@@ -270,12 +245,12 @@ __global__ void sort_tile(const Index* begins, const Index* part, const Index* p
   place_of[i] = tile * tile_size + rank;
 }
 
-void Finder::sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& part_end,
-                        const DeviceArray<Index>& order, const DeviceArray<Index>& length) {
+void Finder::sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& order,
+                        const DeviceArray<Index>& length) {
   const auto tiles = static_cast<unsigned>(out_.part.size());
   if (tiles == 0) return;
-  sort_tile<<<tiles, tile_size>>>(begins.data(), part_.data(), part_end.data(), order.data(),
-                                  length.data(), out_.phyxel_at.data(), place_of_.data());
+  sort_tile<<<tiles, tile_size>>>(begins.data(), order.data(), length.data(), out_.phyxel_at.data(),
+                                  place_of_.data());
   check_launch({"sort_tile", tiles, tile_size, "tiles"});
 }
 

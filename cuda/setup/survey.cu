@@ -2,6 +2,7 @@
 #include <bit>
 
 #include "device.hpp"
+#include "model/nearest_distances.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "setup/device_hash.cuh"
@@ -14,26 +15,6 @@ using namespace cuda;
 
 constexpr int most_nearest = 256;
 
-/// The smallest squared distances, ascending.
-template <int capacity>
-struct Nearest {
-  double squared[capacity];
-  int wanted, found = 0;
-  __device__ bool full() const { return found == wanted; }
-  __device__ double largest() const { return squared[found - 1]; }
-  __device__ void offer(double d2) {
-    if (full() && d2 >= largest()) return;
-    int k = full() ? found - 1 : found++;
-    for (; k > 0 && squared[k - 1] > d2; --k) squared[k] = squared[k - 1];
-    squared[k] = d2;
-  }
-  __device__ double mean_distance() const {
-    double sum = 0;
-    for (int k = 0; k < found; ++k) sum += sqrt(squared[k]);
-    return found ? sum / found : 0;
-  }
-};
-
 /// `mean_spacing` of the CPU, entry by entry of the hash so that neighbours in space are
 /// neighbours in a warp.
 template <int capacity>
@@ -44,22 +25,13 @@ void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spa
              const auto self = static_cast<std::uint32_t>(at);
              const Vec3d here = hash.entries[self].position;
              const HashView::Body& body = hash.bodies[0];
-             Nearest<capacity> found;
-             found.wanted = nearest < hash.points - 1 ? nearest : hash.points - 1;
+             double room[capacity];
+             NearestDistances found(room, nearest < hash.points - 1 ? nearest : hash.points - 1);
              const auto offer = [&](std::uint32_t k, Vec3d p) {
                if (k != self) found.offer(dot(p - here, p - here));
              };
              const CellGrid::Cell c = body.grid.cell_of(here);
-             const int last = body.grid.farthest_ring(here, body.high);
-             for (int ring = 0; ring <= last; ++ring) {
-               if (ring == 12) {  // far from everything: looking at every point is cheaper
-                 found.found = 0;
-                 hash.visit_all(0, offer);
-                 break;
-               }
-               // Rings 0 to ring - 1 hold every point nearer than (ring - 1) cells.
-               const double reached = (ring - 1) * body.cell_size;
-               if (ring > 0 && found.full() && found.largest() <= reached * reached) break;
+             const auto offer_ring = [&](int ring) {
                for (int dz = -ring; dz <= ring; ++dz) {
                  for (int dy = -ring; dy <= ring; ++dy) {
                    const bool face = abs(dz) == ring || abs(dy) == ring;
@@ -69,7 +41,9 @@ void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spa
                    }
                  }
                }
-             }
+             };
+             search_nearest(found, body.grid.farthest_ring(here, body.high), body.cell_size,
+                            offer_ring, [&] { hash.visit_all(0, offer); });
              spacing[hash.index[self]] = found.mean_distance();
            });
 }

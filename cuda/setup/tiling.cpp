@@ -24,19 +24,12 @@ std::vector<Index> curve_order(const Model& model, const Part& part) {
     low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
     high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
   }
-  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-  const double cells = static_cast<double>((1 << hilbert_bits) - 1);
-  const double scale = extent > 0 ? cells / extent : 0;
-  const auto cell = [&](double x, double from) {
-    return static_cast<std::uint32_t>(std::clamp((x - from) * scale, 0.0, cells));
-  };
+  const HilbertFrame frame = HilbertFrame::around(low, high);
   std::vector<std::pair<std::uint64_t, Index>> keys(
       static_cast<std::size_t>(part.end - part.begin));
 #pragma omp parallel for schedule(static)
   for (Index i = part.begin; i < part.end; ++i) {
-    const Vec3d x = model.position[i];
-    keys[static_cast<std::size_t>(i - part.begin)] = {
-        hilbert_key(cell(x.x, low.x), cell(x.y, low.y), cell(x.z, low.z)), i};
+    keys[static_cast<std::size_t>(i - part.begin)] = {frame.key_of(model.position[i]), i};
   }
   std::sort(keys.begin(), keys.end());
   std::vector<Index> order;

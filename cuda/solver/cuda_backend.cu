@@ -238,7 +238,6 @@ class CudaBackend final : public Backend {
   }
 
   void displacement_gradients(std::vector<Mat3d>& gradient) override {
-    settle();
     const DeviceArray<Real> gradients = gradients_now();
     wait();
     const std::vector<Real> values = fetched(gradients);
@@ -256,9 +255,8 @@ class CudaBackend final : public Backend {
     out.position.resize(count);
     out.normal.resize(count);
     if (count == 0) return;
-    settle();
-    if (surfel_moved_normal_.size() == 0) make_surfels();  // the array made last
     const DeviceArray<Real> gradients = gradients_now();
+    if (surfel_moved_normal_.size() == 0) make_surfels();  // the array made last
     const DeviceSurfels<Real, StateReal> surfels{
         surfel_position_.data(),     surfel_normal_.data(),  surfel_offsets_.data(),
         surfel_carriers_.data(),     surfel_weight_.data(),  surfel_displacement_.data(),
@@ -916,6 +914,7 @@ class CudaBackend final : public Backend {
     return forces;
   }
   DeviceArray<Real> gradients_now() {
+    settle();
     DeviceArray<Real> gradients(9 * places(), "displacement gradients of " + subject_);
     launch_pass_1(fields_, {pass_1<Real, StateReal, true, false, true>, 0, tiles()},
                   gradients.data());

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "model/nearest_distances.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
@@ -61,30 +62,6 @@ SpatialHash roomy_hash(std::span<const Vec3d> position) {
   }
 }
 
-/// The `count` smallest squared distances from a place to other points, ascending.
-class NearestDistances {
- public:
-  explicit NearestDistances(int count) : squared_(static_cast<std::size_t>(count)) {}
-  void clear() { found_ = 0; }
-  bool full() const { return found_ == squared_.size(); }
-  double largest() const { return squared_[found_ - 1]; }
-  void offer(double d2) {
-    if (full() && d2 >= largest()) return;
-    std::size_t k = full() ? found_ - 1 : found_++;
-    for (; k > 0 && squared_[k - 1] > d2; --k) squared_[k] = squared_[k - 1];
-    squared_[k] = d2;
-  }
-  double mean_distance() const {
-    double sum = 0;
-    for (std::size_t k = 0; k < found_; ++k) sum += std::sqrt(squared_[k]);
-    return found_ ? sum / static_cast<double>(found_) : 0;
-  }
-
- private:
-  std::vector<double> squared_;
-  std::size_t found_ = 0;
-};
-
 /// Support radius of every phyxel by the rule [m].
 std::vector<double> support_radii(std::span<const double> spacing, const NeighbourhoodRule& rule) {
   std::vector<double> support(spacing.size());
@@ -124,26 +101,18 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
   const SpatialHash hash = roomy_hash(position);
 #pragma omp parallel
   {
-    NearestDistances found(std::min<int>(nearest, n - 1));
+    const int wanted = std::min<int>(nearest, n - 1);
+    std::vector<double> room(static_cast<std::size_t>(wanted));
 #pragma omp for schedule(dynamic, block_size)
     for (Index i = 0; i < n; ++i) {
-      found.clear();
+      NearestDistances found(room.data(), wanted);
       const Vec3d here = position[i];
       const auto offer = [&](const SpatialHash::Entry& e) {
         if (e.index != i) found.offer(dot(e.position - here, e.position - here));
       };
-      const int last = hash.farthest_ring(here);
-      for (int ring = 0; ring <= last; ++ring) {
-        if (ring == 12) {  // far from everything: looking at every point is cheaper
-          found.clear();
-          hash.visit_all(offer);
-          break;
-        }
-        // Rings 0 to ring - 1 hold every point nearer than (ring - 1) cells.
-        const double reached = (ring - 1) * hash.cell_size();
-        if (ring > 0 && found.full() && found.largest() <= reached * reached) break;
-        hash.visit_ring(here, ring, offer);
-      }
+      search_nearest(
+          found, hash.farthest_ring(here), hash.cell_size(),
+          [&](int ring) { hash.visit_ring(here, ring, offer); }, [&] { hash.visit_all(offer); });
       spacing[i] = found.mean_distance();
     }
   }

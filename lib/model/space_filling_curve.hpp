@@ -1,6 +1,7 @@
 /// Order along Hilbert's curve: places near each other on the curve are near each other in space.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "phyxel/types.hpp"
@@ -39,5 +40,26 @@ PHYXEL_HD std::uint64_t hilbert_key(std::uint32_t x, std::uint32_t y, std::uint3
   }
   return key;
 }
+
+/// The grid over a cloud's box.
+struct HilbertFrame {
+  Vec3d low;         ///< A corner of the box [m].
+  double scale = 0;  ///< Cells a metre.
+
+  static HilbertFrame around(Vec3d low, Vec3d high) {
+    const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    return {low, extent > 0 ? cells / extent : 0};
+  }
+  PHYXEL_HD std::uint64_t key_of(Vec3d x) const {
+    return hilbert_key(cell(x.x, low.x), cell(x.y, low.y), cell(x.z, low.z));
+  }
+
+ private:
+  static constexpr double cells = (1 << hilbert_bits) - 1;
+  PHYXEL_HD std::uint32_t cell(double x, double from) const {
+    const double at = (x - from) * scale;
+    return static_cast<std::uint32_t>(at < 0 ? 0 : at > cells ? cells : at);
+  }
+};
 
 }  // namespace phyxel
