@@ -72,19 +72,19 @@ double core_round_trip() {
   return best;
 }
 
-/// A cube of `n` phyxels, 0.1 m apart, jittered, without surfels.
-Cloud cube(Index n) {
+/// A cube of `n` phyxels, 0.1 m apart, jittered.
+Cloud cube(Index n, bool surfels = false) {
   const double side = std::round(std::cbrt(static_cast<double>(n))) * 0.1;
   return make_shape({.name = "block",
                      .size = {side, side, side},
                      .spacing = 0.1,
                      .jitter = 0.1,
-                     .surface = false});
+                     .surface = surfels});
 }
 
-/// A cube, or one of the bodies of the 2008 paper, without surfels.
-Cloud bench_cloud(const std::string& shape, Index n) {
-  return shape == "cube" ? cube(n) : make_shape({.name = shape, .surface = false});
+/// A cube, or one of the bodies of the 2008 paper.
+Cloud bench_cloud(const std::string& shape, Index n, bool surfels) {
+  return shape == "cube" ? cube(n, surfels) : make_shape({.name = shape, .surface = surfels});
 }
 
 Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
@@ -103,8 +103,9 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   scene.bodies.assign(static_cast<std::size_t>(bodies), body);
   return scene;
 }
-const std::vector<std::string> all_terms = {"green",   "cauchy", "volume",
-                                            "damping", "load",   "adaptive"};
+/// "surfels": moved after every step.
+const std::vector<std::string> all_terms = {"green", "cauchy",   "volume", "damping",
+                                            "load",  "adaptive", "surfels"};
 
 /// A deformation of 10%.
 State deformed(const Model& model) {
@@ -217,7 +218,7 @@ void bench_step(const BenchOptions& options) {
   }
   Table table(options,
               {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels", "neighbours",
-               "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s",
+               "surfels", "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s",
                "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
                "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
               gpu_facts(device));
@@ -230,7 +231,8 @@ void bench_step(const BenchOptions& options) {
   for (const auto& [terms, size, factor] : step_cases(options)) {
     const Scene scene = bench_scene(terms, factor, options.bodies);
     std::vector<Cloud> clouds;
-    clouds.push_back(bench_cloud(options.shape, size));
+    const bool surfels = terms == "surfels";
+    clouds.push_back(bench_cloud(options.shape, size, surfels));
     clouds.resize(scene.bodies.size(), clouds[0]);
     const Model model = make_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);
@@ -244,10 +246,14 @@ void bench_step(const BenchOptions& options) {
         const double dt =
             0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
         Solver solver(*backend, initial_state(model, scene, dt));
+        const auto step = [&] {
+          solver.step();
+          if (surfels) backend->update_surfels();
+        };
         const auto warm = Clock::now();
         int steps = 0;
         while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {
-          solver.step();
+          step();
           ++steps;
           if (steps % 16 == 0) backend->wait();
         }
@@ -256,7 +262,7 @@ void bench_step(const BenchOptions& options) {
         std::vector<double> rate;
         for (int repeat = 0; repeat < options.repeats; ++repeat) {
           const auto start = Clock::now();
-          for (int s = 0; s < steps; ++s) solver.step();
+          for (int s = 0; s < steps; ++s) step();
           backend->wait();
           rate.push_back(steps / seconds_since(start));
         }
@@ -266,15 +272,15 @@ void bench_step(const BenchOptions& options) {
         for (const ArrayBytes& array : backend->memory()) memory += array.bytes;
         const double traffic = static_cast<double>(backend->step_traffic());
         const bool shared = threads > 1 && omp_get_num_procs() > 1;
-        table.row({options.shape, std::to_string(options.bodies), terms, precision,
-                   path_of(*backend), std::to_string(threads), std::to_string(model.size()),
-                   fmt::format("{:.1f}", pairs / n), fmt::format("{:.5g}", median.value),
-                   fmt::format("{:.5g}", median.value * n), fmt::format("{:.3f}", median.spread),
-                   fmt::format("{:.5g}", median.value * 2 * pairs),
-                   fmt::format("{:.1f}", traffic / n),
-                   fmt::format("{:.4g}", median.value * traffic), fmt::format("{:.4g}", copy[t]),
-                   fmt::format("{:.1f}", static_cast<double>(memory) / n), error,
-                   fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
+        table.row(
+            {options.shape, std::to_string(options.bodies), terms, precision, path_of(*backend),
+             std::to_string(threads), std::to_string(model.size()),
+             fmt::format("{:.1f}", pairs / n), std::to_string(model.surfels.position.size()),
+             fmt::format("{:.5g}", median.value), fmt::format("{:.5g}", median.value * n),
+             fmt::format("{:.3f}", median.spread), fmt::format("{:.5g}", median.value * 2 * pairs),
+             fmt::format("{:.1f}", traffic / n), fmt::format("{:.4g}", median.value * traffic),
+             fmt::format("{:.4g}", copy[t]), fmt::format("{:.1f}", static_cast<double>(memory) / n),
+             error, fmt::format("{:.0f}", shared ? core_round_trip() : 0.0)});
       }
     }
   }
@@ -387,7 +393,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   if (std::string(name) == "step") {
     command
         ->add_option("--terms", options->terms,
-                     "Term sets: green, cauchy, volume, damping, load, adaptive")
+                     "Term sets: green, cauchy, volume, damping, load, adaptive, surfels")
         ->delimiter(',');
     command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
         ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));

@@ -30,7 +30,7 @@ class PaperBackend : public Backend {
 
   /// updateSurfels: fills the vertex buffer from the present displacements and the gradients of
   /// the last `stress()`. `advect_surfels` does both and copies the buffer to the host.
-  virtual void update_surfels() = 0;
+  void update_surfels() override = 0;
 };
 
 /// Most phyxels that `unsigned short` neighbour indices can name; 65,535 marks an empty slot.

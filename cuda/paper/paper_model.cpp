@@ -123,14 +123,6 @@ void check_paper_model(const Model& model) {
   }
 }
 
-std::vector<char> held_phyxels(const Model& model) {
-  std::vector<char> held(static_cast<std::size_t>(model.size()), 0);
-  for (const Motion& motion : model.motions) {
-    for (const Index i : motion.phyxels) held[i] = 1;
-  }
-  return held;
-}
-
 std::vector<double> surfel_weights(const Model& model) {
   const Csr& carriers = model.surfels.carriers;
   std::vector<double> weights;

@@ -33,9 +33,6 @@ Model paper_model(const Scene& scene, const Cloud& cloud);
 ///   no loads, damping or volume conservation.
 void check_paper_model(const Model& model);
 
-/// Held phyxels, shape [n].
-std::vector<char> held_phyxels(const Model& model);
-
 /// Weights ω(r) [1/m³] of each surfel's carriers, in the order of `model.surfels.carriers`; 1 for
 /// a lone carrier that is out of reach.
 std::vector<double> surfel_weights(const Model& model);

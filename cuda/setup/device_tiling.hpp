@@ -37,4 +37,7 @@ struct DeviceTiling {
 /// @throws DeviceError; InputError if a tile reaches more points than 16-bit slots can name.
 DeviceTiling make_device_tiling(const Model& model);
 
+/// The tiles and lists on the host, for plans made there.
+Tiling fetched_tiling(const DeviceTiling& on_device);
+
 }  // namespace phyxel::cuda

@@ -47,6 +47,21 @@ struct TileLists {
   std::vector<std::uint16_t> entries;
 
   int slots() const { return tile_size + far_slots + halo_stride; }
+  /// Entries of the list of a place, far ones included.
+  int length_of(Index place) const { return rows[place / warp_size].length; }
+  /// The slot that entry e of a place names.
+  int slot_of(Index of, int e) const {
+    const std::size_t lane =
+        static_cast<std::size_t>(rows[of / warp_size].chunk + e / chunk) * warp_size +
+        of % warp_size;
+    return entries[lane * chunk + e % chunk] / 16;
+  }
+  /// The place in a slot of a tile; -1: a far point.
+  Index place_in(Index tile, int slot) const {
+    if (slot < tile_size) return tile * tile_size + slot;
+    if (slot < tile_size + far_slots) return -1;
+    return halo[static_cast<std::size_t>(tile) * halo_stride + slot - tile_size - far_slots];
+  }
   std::size_t bytes() const {
     return halo.size() * sizeof(Index) + rows.size() * sizeof(Row) +
            entries.size() * sizeof(std::uint16_t);

@@ -118,28 +118,43 @@ __device__ void prefetch_rows(const T* first, std::size_t row_elements, unsigned
   }
 }
 
-/// Copies a tile and its halo into the image, fills the far slots; ends with all copies under way.
+/// A launch that may begin while the one before it ends (`Passes`) lets the next one begin likewise
+/// and waits until all that was written before is there. Lists and constants may be read sooner.
+__device__ inline void wait_for_last_launch() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.launch_dependents;");
+  asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+
+/// Waits for the last launch, copies a tile and its halo into the image, fills the far slots; ends
+/// with all copies under way.
 template <class Records>
 __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Index tile,
                            char* image) {
   constexpr int batch = 3;  // indices under way at once
   const int thread = static_cast<int>(threadIdx.x);
   const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride + thread;
-  records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
-#pragma unroll 1
-  for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
-    Index place[batch];
+  Index place[batch];
+  const auto look_up = [&](int begin) {
 #pragma unroll
     for (int k = 0; k < batch; ++k) {
       place[k] = begin + k * tile_size < lists.halo_stride ? __ldg(halo + k * tile_size) : -1;
     }
     halo += batch * tile_size;
+  };
+  look_up(thread);
+  wait_for_last_launch();
+  records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
+#pragma unroll 1
+  for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
 #pragma unroll
     for (int k = 0; k < batch; ++k) {
       if (place[k] >= 0) {
         records.fetch(image, lists.slots, tile_size + far_slots + begin + k * tile_size, place[k]);
       }
     }
+    look_up(begin + batch * tile_size);
   }
   if (thread < far_slots) Records::set_far(image, lists.slots, tile_size + thread);
 }

@@ -143,8 +143,7 @@ struct ResidentMemory {
   }
 };
 
-// --- two ways to send
-// -----------------------------------------------------------------------------
+// --- two ways to send ----------------------------------------------------------------------------
 
 /// Through global memory. All threads fetch, the first `slice_size` compute.
 template <class Real>
@@ -376,8 +375,7 @@ struct ClusterPost {
   }
 };
 
-// --- the steps
-// ------------------------------------------------------------------------------------
+// --- the steps -----------------------------------------------------------------------------------
 
 /// The table of one pass: weighted distances by the support of either end.
 /// @param of_neighbour whether the neighbour's support counts
@@ -462,6 +460,8 @@ __global__ void __launch_bounds__(Post::threads)
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   make_pairs(f, r, slice, 0, false, body.inverse_h_squared, memory.pairs);
   if (r.longest[1]) make_pairs(f, r, slice, 1, true, body.inverse_h_squared, memory.second_pairs);
+
+  wait_for_last_launch();  // rest positions, read until here, do not change
 
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);

@@ -73,7 +73,7 @@ ResidentPlan make_resident_plan(const Tiling& tiling) {
   for (Index first = 0; first < tiling.places(); first += slice_size) {
     // Phyxels stand first in their tile.
     if (tiling.phyxel[first] < 0) continue;
-    const Index tile = first / tile_size, begin = tile * tile_size;
+    const Index tile = first / tile_size;
     Image image(tiling, first);
     Slice slice;
     slice.first_place = first;
@@ -92,31 +92,19 @@ ResidentPlan make_resident_plan(const Tiling& tiling) {
         continue;
       }
       for (int w = 0; w < slice_warps; ++w) {
-        rows.length[w] = list.rows[first / warp_size + w].length;
+        rows.length[w] = list.length_of(first + w * warp_size);
         rows.longest = std::max(rows.longest, rows.length[w]);
       }
       rows.first_entry = static_cast<int>(plan.entries.size());
       plan.entries.resize(plan.entries.size() + static_cast<std::size_t>(rows.longest) * slice_size,
                           0);
       for (int p = 0; p < slice_size; ++p) {
-        const TileLists::Row row = list.rows[(first + p) / warp_size];
         for (int e = 0; e < rows.length[p / warp_size]; ++e) {
-          const std::size_t at =
-              (static_cast<std::size_t>(row.chunk + e / chunk) * warp_size + p % warp_size) *
-                  chunk +
-              e % chunk;
-          const int slot = list.entries[at] / 16;
-          std::uint16_t& entry =
-              plan.entries[rows.first_entry + static_cast<std::size_t>(e) * slice_size + p];
-          if (slot >= tile_size && slot < tile_size + far_slots) {
-            entry = static_cast<std::uint16_t>(far_entry | p);
-          } else if (slot < tile_size) {
-            entry = image.slot_of(begin + slot, slot % columns);
-          } else {
-            entry = image.slot_of(list.halo[static_cast<std::size_t>(tile) * list.halo_stride +
-                                            slot - tile_size - far_slots],
-                                  slot % columns);
-          }
+          const int slot = list.slot_of(first + p, e);
+          const Index place = list.place_in(tile, slot);
+          plan.entries[rows.first_entry + static_cast<std::size_t>(e) * slice_size + p] =
+              place < 0 ? static_cast<std::uint16_t>(far_entry | p)
+                        : image.slot_of(place, slot % columns);
         }
       }
       plan.longest[pass] = std::max(plan.longest[pass], rows.longest);

@@ -1,7 +1,7 @@
 /// Vectors of three numbers a place, for the largest eigenfrequency. One thread a place.
 #pragma once
 
-#include "solver/crossings.cuh"
+#include "solver/passes.cuh"
 #include "solver/start_vector.hpp"
 
 namespace phyxel::cuda {
@@ -60,6 +60,74 @@ struct Product {
   __device__ double operator()(std::int64_t k) const {
     return static_cast<double>(a[k]) * static_cast<double>(b[k]);
   }
+};
+
+/// M^-1/2 K M^-1/2 at rest, by the linear law that every material has there.
+template <class Real, class StateReal>
+class CudaVibration final : public Vibration {
+ public:
+  CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes)
+      : m_(model),
+        passes_(passes),
+        amplitude_(amplitude_at_rest(model.model())),
+        tiles_(model.rest_constants()) {
+    const std::string what = "vectors of " + m_.subject();
+    const std::size_t count = 3 * m_.places();
+    previous_ = {count, what};
+    current_ = {count, what};
+    next_ = {count, what};
+    force_ = {count, what};
+    PHYXEL_CUDA(cudaMemset(previous_.data(), 0, previous_.bytes()));
+    m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), m_.places(),
+                    m_.tiling().phyxel_at.data());
+    scale(current_, 1 / std::sqrt(product(current_, current_)));
+  }
+  double apply(double beta) override {
+    m_.launch_tiles("bend", bend<Real, StateReal>, m_.fields(), current_.data(), amplitude_);
+    passes_.linear_stress(tiles_.data());
+    passes_.gather(force_.data());
+    m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
+                    previous_.data(), static_cast<Real>(beta), amplitude_, next_.data());
+    return product(next_, current_);
+  }
+  double subtract(double alpha) override {
+    m_.launch_tiles("subtract", subtract_multiple<Real>, next_.data(), current_.data(),
+                    static_cast<Real>(alpha));
+    return std::sqrt(product(next_, next_));
+  }
+  void advance(double norm) override {
+    std::swap(previous_, current_);
+    std::swap(current_, next_);
+    scale(current_, 1 / norm);
+  }
+
+ private:
+  /// Makes displacements of a vector's ones the size of a support: smallest support times the root
+  /// of the smallest mass. Forces of a unit vector then stay as far from the ends of float as those
+  /// of a step.
+  static Real amplitude_at_rest(const Model& model) {
+    double support = 0, mass = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      const double h = model.neighbourhood.support[i], m = model.mass[i];
+      if (h > 0 && (support == 0 || h < support)) support = h;
+      if (m > 0 && (mass == 0 || m < mass)) mass = m;
+    }
+    return support > 0 && mass > 0 ? static_cast<Real>(support * std::sqrt(mass)) : Real(1);
+  }
+  static double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) {
+    const thrust::transform_iterator products(thrust::counting_iterator<std::int64_t>(0),
+                                              Product<Real>{a.data(), b.data()});
+    return reduce(products, static_cast<std::int64_t>(a.size()), 0.0, Plus{});
+  }
+  void scale(DeviceArray<Real>& a, double factor) {
+    m_.launch_tiles("scale", scale_vector<Real>, a.data(), static_cast<Real>(factor));
+  }
+
+  const DeviceModel<Real, StateReal>& m_;
+  const Passes<Real, StateReal>& passes_;
+  Real amplitude_;
+  DeviceArray<TileConstants<Real, StateReal>> tiles_;
+  DeviceArray<Real> previous_, current_, next_, force_;
 };
 
 }  // namespace phyxel::cuda

@@ -147,6 +147,7 @@ class CpuBackend final : public Backend {
     for (Index i = 0; i < model_.size(); ++i) gradient[i] = by_slot[layout_.slot(i)];
   }
 
+  void update_surfels() override { advect_surfels(moved_surfels_); }
   void advect_surfels(SurfelState& out) override {
     if (!surfels_) surfels_.emplace(model_, layout_);
     AlignedVector<StateReal> records(static_cast<std::size_t>(layout_.slots()) *
@@ -463,6 +464,7 @@ class CpuBackend final : public Backend {
   AlignedVector<Real> load_;  // empty unless the scene has loads
   double load_scales_ = -1;
   std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
+  SurfelState moved_surfels_;                     // of `update_surfels`
 };
 
 }  // namespace

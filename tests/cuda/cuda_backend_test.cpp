@@ -198,6 +198,39 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
   }
 }
 
+TEST(CudaResidenceOf, BodiesWithListsOfTheirOwnForEachPassInEveryPrecision) {
+  const Case terms{"", true, true, true};
+  Scene scene = scene_of(terms);
+  scene.bodies.resize(1);
+  scene.bodies[0].loads[0].ramp = 0;
+  scene.bodies[0].fixed[0].select = {.indices = {{0, 1, 2}}};
+  scene.bodies[0].loads[0].select = {.all = true};
+  const std::vector<Cloud> clouds{lattice(7, 5, 5, 0.1, 0.3, 8)};
+  const Model model = build_model(scene, clouds);
+  const double dt = 0.2 * step_limit(model).largest_step;
+  for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
+    const auto resident = make_cuda_backend(model, precision),
+               launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
+    EXPECT_NE(resident->name().find("resident"), std::string::npos) << resident->name();
+    for (Backend* backend : {resident.get(), launched.get()}) {
+      backend->upload(initial_state(model, scene, dt));
+      double time = 0;
+      for (int s = 0; s < 30; ++s) {
+        const double step = s < 13 ? dt : 2 * dt;  // changes while steps wait to be launched
+        backend->stress();
+        backend->advance(time, step);
+        time += step;
+      }
+    }
+    State a, b;
+    resident->download(a);
+    launched->download(b);
+    EXPECT_TRUE(a.displacement == b.displacement) << resident->name();
+    EXPECT_TRUE(a.velocity == b.velocity) << resident->name();
+    EXPECT_GT(largest(a.displacement), 0);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Bodies, CudaResidence,
     ::testing::Values(
@@ -256,7 +289,7 @@ INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
                                            Case{"AdaptiveEverything", true, false, true}),
                          [](const auto& test) { return std::string(test.param.name); });
 
-TEST(CudaSurfels, EqualTheCpus) {
+Model model_with_surfels() {
   Scene scene;
   for (const char* shape : {"dino", "alien_head"}) {
     BodyRequest body;
@@ -267,7 +300,11 @@ TEST(CudaSurfels, EqualTheCpus) {
     body.material = rubber();
     scene.bodies.push_back(body);
   }
-  const Model model = build_model(scene);
+  return build_model(scene);
+}
+
+TEST(CudaSurfels, EqualTheCpus) {
+  const Model model = model_with_surfels();
   const State state = state_of(random_deformation(model, 0.001));
   const auto cpu = make_cpu_backend(model, Precision::double_);
   cpu->upload(state);
@@ -287,6 +324,30 @@ TEST(CudaSurfels, EqualTheCpus) {
     }
     EXPECT_LT(off, tolerance);
     EXPECT_LT(turned, 30 * tolerance);  // normals come from gradients
+  }
+}
+
+TEST(CudaSurfels, FollowEveryStepOnEveryPath) {
+  const Model model = model_with_surfels();
+  for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
+    const auto resident = make_cuda_backend(model, precision),
+               launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
+    SurfelState a, b;
+    for (const auto& [backend, out] : {std::pair{&resident, &a}, std::pair{&launched, &b}}) {
+      Solver solver(**backend, state_of(random_deformation(model, 0.001)));
+      for (int s = 0; s < 20; ++s) {
+        solver.step();
+        (*backend)->update_surfels();
+      }
+      (*backend)->advect_surfels(*out);
+    }
+    EXPECT_TRUE(a.position == b.position);
+    EXPECT_TRUE(a.normal == b.normal);
+    std::vector<Vec3d> moved;
+    for (std::size_t s = 0; s < a.position.size(); ++s) {
+      moved.push_back(a.position[s] - model.surfels.position[s]);
+    }
+    EXPECT_GT(largest(moved), 0);
   }
 }
 

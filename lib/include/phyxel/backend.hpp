@@ -65,7 +65,10 @@ class Backend {
                                                  [[maybe_unused]] double dt) {
     return std::nullopt;
   }
-  /// Passive surfel advection, equation (6).
+  /// Passive surfel advection, equation (6): brings the surfels to the present displacements. They
+  /// stay on the device, and may be under way when it returns.
+  virtual void update_surfels() = 0;
+  /// Brings them to the host, too.
   virtual void advect_surfels(SurfelState& surfels) = 0;
 
   /// For the step limit; nothing where that is left to the host. It may use the arrays of this

@@ -98,6 +98,9 @@ struct Model {
   Offset pairs() const;
 };
 
+/// Whether each phyxel is held in place by a motion that stands still, shape [n].
+std::vector<char> held_phyxels(const Model& model);
+
 /// A number that tells two models apart: rest positions, supports, geometric volumes, materials,
 /// motions and loads, from which all else follows; so it is the same whatever device built them. A
 /// checkpoint carries it, so that a state never continues on another body.

@@ -37,10 +37,17 @@ struct Sym3 {
   Real xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
 };
 
-/// The same vector in another precision.
+/// The same in another precision.
 template <class To, class From>
 PHYXEL_HD Vec3<To> to(const Vec3<From>& v) {
   return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
+}
+
+template <class To, class From>
+PHYXEL_HD Mat3<To> to(const Mat3<From>& m) {
+  Mat3<To> out;
+  for (int e = 0; e < 9; ++e) out(e / 3, e % 3) = static_cast<To>(m(e / 3, e % 3));
+  return out;
 }
 
 using Vec3d = Vec3<double>;

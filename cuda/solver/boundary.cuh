@@ -1,0 +1,131 @@
+/// Phyxels that follow a path, and loads: what a step adds for scenes that have them.
+#pragma once
+
+#include "solver/device_model.cuh"
+
+namespace phyxel::cuda {
+
+/// Phyxels that are set after each step.
+template <class Real, class StateReal>
+__global__ void follow(Fields<Real, StateReal> f, const Index* place, int count,
+                       Vec3<StateReal> displacement, Vec3<StateReal> velocity) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  const Index at = place[k];
+  set_column3(f.velocity, f.places, at, velocity);
+  if constexpr (!std::is_same_v<Real, StateReal>) {
+    set_column3(f.displacement, f.places, at, displacement);
+  }
+  auto point = f.points.get(at);
+  point.u = to<Real>(displacement);
+  f.points.set(at, point);
+}
+
+/// load[place] += scale · force; every place once.
+template <class Real>
+__global__ void add_load(Real* load, std::size_t places, const Index* place,
+                         const Vec3<Real>* force, int count, Real scale) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  set_column3(load, places, place[k], column3(load, places, place[k]) + scale * force[k]);
+}
+
+template <class Real, class StateReal>
+class Boundary {
+ public:
+  explicit Boundary(DeviceModel<Real, StateReal>& model) : m_(model) {
+    make_motions();
+    make_loads();
+  }
+
+  /// Whether anything but the state changes from step to step.
+  bool changes() const {
+    return !paths_.empty() ||
+           std::any_of(loads_.begin(), loads_.end(), [](const auto& l) { return l.of->ramp > 0; });
+  }
+  /// Sets the loads of a time [s]; again only while one of them still grows.
+  void sum_loads(double time) {
+    if (loads_.empty()) return;
+    double scales = 0;
+    for (const Loading& load : loads_) scales += load.of->scale_at(time);
+    if (scales == load_scales_) return;
+    load_scales_ = scales;
+    PHYXEL_CUDA(cudaMemsetAsync(m_.loads(), 0, 3 * m_.places() * sizeof(Real), m_.stream()));
+    for (const Loading& load : loads_) {
+      m_.launch_each("add_load", add_load<Real>, static_cast<int>(load.places.size()), m_.loads(),
+                     m_.places(), load.places.data(), load.force.data(),
+                     static_cast<int>(load.places.size()),
+                     static_cast<Real>(load.of->scale_at(time)));
+    }
+  }
+  /// Moves phyxels to where their paths are after a step from `time` [s].
+  void follow_paths(double time, double dt) const {
+    for (const Path& path : paths_) {
+      const Vec3d after = path.of->displacement_at(time + dt);
+      set(path.places, after, (after - path.of->displacement_at(time)) / dt);
+    }
+  }
+  /// Held phyxels stay where their motion says, at rest, wherever a state has put them.
+  void put_held_at_rest() const {
+    if (held_.size() > 0) set(held_, {}, {});
+  }
+  /// [places], null where no phyxel follows a path.
+  const char* moved() const { return moved_.data(); }
+
+ private:
+  struct Path {
+    const Motion* of;
+    DeviceArray<Index> places;
+  };
+  struct Loading {
+    const Load* of;
+    DeviceArray<Index> places;
+    DeviceArray<Vec3<Real>> force;
+  };
+
+  std::vector<Index> places_of(const std::vector<Index>& phyxels) const {
+    std::vector<Index> places;
+    for (const Index i : phyxels) places.push_back(m_.tiling().place[i]);
+    return places;
+  }
+  void make_motions() {
+    std::vector<char> moved;
+    std::vector<Index> held;
+    for (const Motion& motion : m_.model().motions) {
+      const std::vector<Index> at = places_of(motion.phyxels);
+      if (motion.stands_still()) {
+        held.insert(held.end(), at.begin(), at.end());
+        continue;
+      }
+      paths_.push_back({&motion, sent(at, "moved phyxels")});
+      moved.resize(m_.places(), 0);
+      for (const Index place : at) moved[place] = 1;
+    }
+    held_ = sent(held, "held phyxels");
+    moved_ = sent(moved, "moved phyxels");
+  }
+  void make_loads() {
+    if (m_.model().loads.empty()) return;
+    m_.make_loads();
+    for (const Load& load : m_.model().loads) {
+      std::vector<Vec3<Real>> force;
+      for (const Vec3d& f : load.force) force.push_back(to<Real>(f));
+      loads_.push_back(
+          {&load, sent(places_of(load.phyxels), "loaded phyxels"), sent(force, "loads")});
+    }
+  }
+  void set(const DeviceArray<Index>& at, Vec3d displacement, Vec3d velocity) const {
+    const auto count = static_cast<int>(at.size());
+    m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), count,
+                   to<StateReal>(displacement), to<StateReal>(velocity));
+  }
+
+  DeviceModel<Real, StateReal>& m_;
+  std::vector<Path> paths_;
+  std::vector<Loading> loads_;
+  double load_scales_ = -1;
+  DeviceArray<Index> held_;
+  DeviceArray<char> moved_;
+};
+
+}  // namespace phyxel::cuda

@@ -1,0 +1,364 @@
+/// A model in device memory: what stays and the state, by place.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "check.hpp"
+#include "device.hpp"
+#include "phyxel/backend.hpp"
+#include "phyxel/error.hpp"
+#include "setup/device_tiling.hpp"
+#include "setup/primitives.cuh"
+#include "solver/crossings.cuh"
+#include "solver/diagnose.cuh"
+#include "solver/kernels.cuh"
+
+namespace phyxel::cuda {
+
+/// The queue of a model's launches. It waits for what goes through CUDA's default queue, copies
+/// above all, and that waits for it.
+class Stream {
+ public:
+  Stream() { PHYXEL_CUDA(cudaStreamCreate(&stream_)); }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+  ~Stream() { cudaStreamDestroy(stream_); }
+  cudaStream_t get() const { return stream_; }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+};
+
+/// A point in a queue of launches that can be waited for.
+class Event {
+ public:
+  Event() { PHYXEL_CUDA(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming)); }
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+  ~Event() { cudaEventDestroy(event_); }
+  cudaEvent_t get() const { return event_; }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+inline unsigned blocks_for(int count) {
+  return static_cast<unsigned>((count + tile_size - 1) / tile_size);
+}
+
+template <class Real, class StateReal>
+class DeviceModel {
+ public:
+  static constexpr bool mixed = !std::is_same_v<Real, StateReal>;
+  using BodyConstants = TileConstants<Real, StateReal>;
+  using AllFields = Fields<Real, StateReal>;
+
+  /// @throws DeviceError; InputError if a tile does not fit what one block may have
+  DeviceModel(const Model& model, int device)
+      : model_(model), device_(use_cuda_device(device)), tiling_(make_device_tiling(model)) {
+    PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
+                                       cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
+    own_supports_ = !one_support_each();
+    last_launch_.subject = subject_ = std::to_string(model.size()) + " phyxels";
+    lists_ = view_of(tiling_.neighbours);
+    second_lists_ = view_of(tiling_.second());
+    make_fields();
+  }
+  DeviceModel(const DeviceModel&) = delete;
+  DeviceModel& operator=(const DeviceModel&) = delete;
+
+  const Model& model() const { return model_; }
+  const Device& device() const { return device_; }
+  const DeviceTiling& tiling() const { return tiling_; }
+  Index size() const { return model_.size(); }
+  std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
+  Index tiles() const { return tiling_.tiles(); }
+  const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
+  bool own_supports() const { return own_supports_; }
+  int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
+
+  const AllFields& fields() const { return fields_; }
+  const DeviceLists& lists() const { return lists_; }
+  const DeviceLists& second_lists() const { return second_lists_; }
+  const TileMaterial* materials() const { return materials_.data(); }
+
+  /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
+  /// digits in float.
+  Vec3d origin_of(Index part) const { return model_.position[model_.parts[part].begin]; }
+
+  /// The step size that the constants are for [s].
+  double dt() const { return dt_; }
+  void send_constants(double dt) {
+    dt_ = dt;
+    std::vector<BodyConstants> tiles;
+    for (const Index p : tiling_.part) tiles.push_back(constants_of(model_.parts[p], dt));
+    tiles_.upload(tiles.data());
+  }
+  /// For small displacements, whatever the law: Cauchy's strain, with the volume's stiffness added
+  /// to λ.
+  DeviceArray<BodyConstants> rest_constants() const {
+    std::vector<BodyConstants> constants;
+    for (const Index p : tiling_.part) {
+      const Part& part = model_.parts[p];
+      constants.push_back(constants_of(part, 0));
+      constants.back().lambda =
+          static_cast<Real>(part.material.lame_lambda() + part.material.volume_stiffness);
+    }
+    return sent(constants, "tiles of " + subject_);
+  }
+  void make_loads() {
+    load_ = {3 * places(), "loads of " + subject_};
+    fields_.load = load_.data();
+  }
+  Real* loads() const { return load_.data(); }  ///< [3, places], or null.
+
+  void put(const State& state) {
+    const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
+                             v = sent(state.velocity, "velocities of " + subject_);
+    launch_tiles("put_state", put_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
+                 u.data(), v.data());
+    wait();
+  }
+  void take(State& state) const {
+    const auto n = static_cast<std::size_t>(size());
+    const DeviceArray<Vec3d> u(n, "displacements of " + subject_),
+        v(n, "velocities of " + subject_);
+    launch_tiles("take_state", take_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
+                 u.data(), v.data());
+    state.displacement = fetched(u);
+    state.velocity = fetched(v);
+  }
+
+  // --- launches ---------------------------------------------------------------------------------
+
+  void use_device() const { PHYXEL_CUDA(cudaSetDevice(device_.index)); }
+  cudaStream_t stream() const { return stream_.get(); }
+  /// To be called right after a launch.
+  void launched(const char* kernel, unsigned blocks, unsigned threads) const {
+    last_launch_.kernel = kernel;
+    last_launch_.blocks = blocks;
+    last_launch_.threads = threads;
+    check_launch(last_launch_);
+  }
+  /// A thread a place.
+  template <class... Parameters, class... Arguments>
+  void launch_tiles(const char* name, void (*kernel)(Parameters...), Arguments... arguments) const {
+    launch(name, kernel, static_cast<unsigned>(tiles()), arguments...);
+  }
+  /// A thread each of `count`.
+  template <class... Parameters, class... Arguments>
+  void launch_each(const char* name, void (*kernel)(Parameters...), int count,
+                   Arguments... arguments) const {
+    launch(name, kernel, blocks_for(count), arguments...);
+  }
+  /// A kernel that may begin while the launch before it ends: it waits inside
+  /// (`wait_for_last_launch`).
+  template <class... Parameters, class... Arguments>
+  void launch_overlapping(const char* name, void (*kernel)(Parameters...), unsigned blocks,
+                          int shared_bytes, Arguments... arguments) const {
+    allow_shared_memory(reinterpret_cast<const void*>(kernel));
+    cudaLaunchAttribute overlap = overlapping();
+    cudaLaunchConfig_t config{};
+    config.gridDim = blocks;
+    config.blockDim = tile_size;
+    config.dynamicSmemBytes = static_cast<std::size_t>(shared_bytes);
+    config.stream = stream();
+    config.attrs = &overlap;
+    config.numAttrs = device_.major >= 9 ? 1 : 0;
+    PHYXEL_CUDA(cudaLaunchKernelEx(&config, kernel, arguments...));
+    launched(name, blocks, tile_size);
+  }
+  static cudaLaunchAttribute overlapping() {
+    cudaLaunchAttribute overlap;
+    overlap.id = cudaLaunchAttributeProgrammaticStreamSerialization;
+    overlap.val.programmaticStreamSerializationAllowed = 1;
+    return overlap;
+  }
+  void wait() const { wait_for_device(last_launch_); }
+  /// Beyond 48 KiB a kernel has to ask. It asks for all there is: the answer is the kernel's, not
+  /// this object's, and other models may need more.
+  void allow_shared_memory(const void* kernel) const {
+    if (std::find(allowed_.begin(), allowed_.end(), kernel) != allowed_.end()) return;
+    PHYXEL_CUDA(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                     most_shared_memory_));
+    allowed_.push_back(kernel);
+  }
+  /// Shared memory of a block of pass 2, which takes more than pass 1.
+  int pass_2_bytes(int slots) const {
+    return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0)) * slots;
+  }
+
+  // --- accounts ---------------------------------------------------------------------------------
+
+  void add_memory(std::vector<ArrayBytes>& list) const {
+    list.insert(list.end(), {{"points", Points<Real>::bytes * places()},
+                             {"stresses", Stresses<Real>::bytes * places()},
+                             {"constants", moment_constants_.bytes() + force_constants_.bytes() +
+                                               tiles_.bytes() + materials_.bytes()},
+                             {"velocities", velocity_.bytes()},
+                             {"neighbour lists", tiling_.neighbours.bytes()},
+                             {"places", tiling_.phyxel_at.bytes()}});
+    if (tiling_.inverse) list.push_back({"inverse neighbour lists", tiling_.inverse->bytes()});
+    if (own_supports_) list.push_back({"supports", supports_.bytes()});
+    if (mixed) list.push_back({"displacements", displacement_.bytes()});
+    if (load_.size()) list.push_back({"loads", load_.bytes()});
+  }
+  std::size_t step_traffic() const {
+    const std::size_t lists = tiling_.neighbours.bytes() + tiling_.second().bytes();
+    std::size_t each = 2 * Points<Real>::bytes + Points<Real>::bytes + 2 * Stresses<Real>::bytes;
+    each += (7 + 4) * sizeof(Real) + 6 * sizeof(StateReal);
+    if (mixed) each += 6 * sizeof(StateReal);
+    if (load_.size()) each += 3 * sizeof(Real);
+    return lists + each * places();
+  }
+
+ private:
+  template <class... Parameters, class... Arguments>
+  void launch(const char* name, void (*kernel)(Parameters...), unsigned blocks,
+              Arguments... arguments) const {
+    kernel<<<blocks, tile_size, 0, stream()>>>(arguments...);
+    launched(name, blocks, tile_size);
+  }
+
+  bool one_support_each() const {
+    for (const Part& part : model_.parts) {
+      for (Index i = part.begin; i < part.end; ++i) {
+        if (model_.neighbourhood.support[i] != model_.neighbourhood.support[part.begin]) {
+          return false;
+        }
+      }
+    }
+    return true;
+  }
+  DeviceLists view_of(const DeviceTileLists& lists) const {
+    check_shared_memory(lists);
+    return {lists.halo.data(), lists.halo_stride, lists.slots(), lists.rows.data(),
+            reinterpret_cast<const uint4*>(lists.entries.data())};
+  }
+  void check_shared_memory(const DeviceTileLists& lists) const {
+    const int bytes = pass_2_bytes(lists.slots());
+    if (bytes <= most_shared_memory_) return;
+    throw InputError(device_.name + ": " + std::to_string(tile_size) +
+                     " phyxels side by side and their " + std::to_string(lists.halo_stride) +
+                     " neighbours take " + std::to_string(bytes) +
+                     " bytes of shared memory, of which a block may have " +
+                     std::to_string(most_shared_memory_) +
+                     ": allowed are a smaller support, precision \"float\" or the CPU");
+  }
+
+  void make_fields() {
+    const std::string of = " of " + subject_;
+    if constexpr (sizeof(Real) == 4) {
+      quads_ = {places(), "points" + of};
+      pairs_ = {places(), "points" + of};
+      fields_.points = {quads_.data(), pairs_.data()};
+      stress_words_ = {3 * places(), "stresses" + of};
+      fields_.stresses = {stress_words_.data(), stress_words_.data() + places(),
+                          stress_words_.data() + 2 * places()};
+    } else {
+      point_words_ = {3 * places(), "points" + of};
+      fields_.points = {point_words_.data(), point_words_.data() + places(),
+                        point_words_.data() + 2 * places()};
+      stress_words_ = {6 * places(), "stresses" + of};
+      for (int k = 0; k < 6; ++k) fields_.stresses.word[k] = stress_words_.data() + k * places();
+    }
+    moment_constants_ = {7 * places(), "inverse moments" + of};
+    force_constants_ = {4 * places(), "masses" + of};
+    if (own_supports_) supports_ = {places(), "supports" + of};
+    velocity_ = {3 * places(), "velocities" + of};
+    if (mixed) displacement_ = {3 * places(), "displacements" + of};
+    tiles_ = {tiling_.part.size(), "tiles" + of};
+    std::vector<TileMaterial> materials;
+    for (const Index part : tiling_.part) {
+      const Material& m = model_.parts[part].material;
+      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness, m.damping,
+                           origin_of(part), m.strain == Strain::green});
+    }
+    materials_ = {materials.size(), "tiles" + of};
+    materials_.upload(materials.data());
+
+    fields_.inverse_h_squared = supports_.data();
+    fields_.moment_constants = moment_constants_.data();
+    fields_.force_constants = force_constants_.data();
+    fields_.velocity = velocity_.data();
+    fields_.displacement = displacement_.data();
+    fields_.tiles = tiles_.data();
+    fields_.gravity = to<StateReal>(model_.gravity);
+    fields_.places = places();
+    send_constants(0);
+    put_all_constants();
+    PHYXEL_CUDA(cudaMemset(velocity_.data(), 0, velocity_.bytes()));
+    if constexpr (mixed) PHYXEL_CUDA(cudaMemset(displacement_.data(), 0, displacement_.bytes()));
+  }
+
+  void put_all_constants() {
+    const DeviceArray<Vec3d> position = sent(model_.position, "rest positions");
+    const DeviceArray<double> volume = sent(model_.volume, "volumes"),
+                              mass = sent(model_.mass, "masses"),
+                              support = sent(model_.neighbourhood.support, "supports");
+    std::vector<Vec3d> origins;
+    for (const Index part : tiling_.part) origins.push_back(origin_of(part));
+    const DeviceArray<Vec3d> origin = sent(origins, "tiles");
+    DeviceArray<char> held;
+    if (!model_.motions.empty()) held = sent(held_phyxels(model_), "held phyxels");
+    const Constants constants{tiling_.phyxel_at.data(),
+                              position.data(),
+                              volume.data(),
+                              mass.data(),
+                              support.data(),
+                              held.data(),
+                              tiling_.inverse_moment.data(),
+                              tiling_.moment_offset.data(),
+                              origin.data()};
+    launch_tiles("put_constants", put_constants<Real, StateReal>, fields_, constants,
+                 moment_constants_.data(), force_constants_.data(), supports_.data());
+    wait();
+    tiling_.inverse_moment = {};
+    tiling_.moment_offset = {};
+  }
+
+  BodyConstants constants_of(const Part& part, double dt) const {
+    const Material& m = part.material;
+    const double half = m.damping * dt / 2;
+    const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
+    return {static_cast<Real>(m.lame_lambda()),
+            static_cast<Real>(m.lame_mu()),
+            static_cast<Real>(m.volume_stiffness),
+            static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
+            static_cast<StateReal>((1 - half) / (1 + half)),
+            static_cast<StateReal>(dt / (1 + half)),
+            m.strain == Strain::green,
+            m.damping > 0};
+  }
+
+  using Word = std::conditional_t<sizeof(Real) == 4, float4, double2>;
+
+  const Model& model_;
+  Device device_;
+  DeviceTiling tiling_;
+  Stream stream_;
+  int most_shared_memory_ = 0;
+  bool own_supports_ = false;
+  std::string subject_;
+  double dt_ = -1;
+  mutable Launch last_launch_;
+  mutable std::vector<const void*> allowed_;
+
+  AllFields fields_{};
+  DeviceLists lists_{}, second_lists_{};
+  DeviceArray<float4> quads_;  // points, where Real is float
+  DeviceArray<float2> pairs_;
+  DeviceArray<double2> point_words_;  // points, where it is double
+  DeviceArray<Word> stress_words_;
+  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_;
+  DeviceArray<StateReal> velocity_, displacement_;
+  DeviceArray<BodyConstants> tiles_;
+  DeviceArray<TileMaterial> materials_;
+};
+
+}  // namespace phyxel::cuda

@@ -1,0 +1,180 @@
+/// Bodies that stay in the shared memory of multiprocessors for many steps a launch.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "solver/device_model.cuh"
+#include "solver/resident.cuh"
+
+namespace phyxel::cuda {
+
+template <class Real, class StateReal>
+class Residence {
+ public:
+  /// Steps that may wait to be launched together.
+  static constexpr int most_steps = 256;
+
+  /// Nothing unless each body fits a cluster, or all bodies fit at once.
+  static std::unique_ptr<Residence> of(const DeviceModel<Real, StateReal>& model) {
+    std::unique_ptr<Residence> residence(new Residence(model));
+    return residence->make() ? std::move(residence) : nullptr;
+  }
+
+  std::string describe() const {
+    return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
+                    : "resident, " + std::to_string(slices_.size()) + " blocks";
+  }
+  std::size_t bytes() const {
+    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + entries_.bytes() +
+           destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
+  }
+
+  void launch(double dt, int steps) {
+    if (next_tag_ > 0xF000'0000U) clear_mail();
+    Fields<Real, StateReal> fields = m_.fields();
+    auto step = static_cast<StateReal>(dt);
+    unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps));
+    void* arguments[] = {&fields, &view_, &step, &steps, &tag};
+    const LaunchOf launch(*this);
+    PHYXEL_CUDA(cudaLaunchKernelExC(&launch.config, kernel_, arguments));
+    m_.launched("resident_steps", blocks_, threads_);
+  }
+
+ private:
+  static constexpr int most_cluster_blocks = 16;  // on GPUs that have clusters
+
+  explicit Residence(const DeviceModel<Real, StateReal>& model) : m_(model) {}
+
+  bool make() {
+    constexpr Index most_places = 1 << 18;  // far more than fit any GPU of today
+    const DeviceTiling& on_device = m_.tiling();
+    if (m_.size() == 0 || on_device.places() > most_places || !may_fit()) return false;
+    const ResidentPlan plan = make_resident_plan(fetched_tiling(on_device));
+    if (!fits_clusters(plan) && !fits_at_once(plan)) return false;
+
+    const std::string what = "what stays in shared memory of " + m_.subject();
+    slices_ = sent(plan.slices, what);
+    place_ = sent(plan.place, what);
+    entries_ = sent(plan.entries, what);
+    destinations_ = sent(plan.destinations, what);
+    std::vector<int> slice_of_block(blocks_, -1);
+    for (int s = 0; s < static_cast<int>(plan.slices.size()); ++s) {
+      slice_of_block[cluster_ ? plan.slices[s].body * cluster_ + plan.slices[s].rank : s] = s;
+    }
+    slice_of_block_ = sent(slice_of_block, what);
+    if (!cluster_) {
+      displacements_ = {displacement_letters<Real> * m_.places(), what};
+      stresses_ = {stress_letters<Real> * m_.places(), what};
+    }
+    view_ = {slices_.data(),         place_.data(),
+             entries_.data(),        destinations_.data(),
+             slice_of_block_.data(), displacements_.data(),
+             stresses_.data(),       plan.most_slots,
+             plan.most_destinations, {plan.longest[0], second_longest(plan)}};
+    clear_mail();
+    return true;
+  }
+  /// Before a plan is made, which takes its time.
+  bool may_fit() const {
+    const bool in_clusters = std::all_of(
+        m_.model().parts.begin(), m_.model().parts.end(),
+        [](const Part& part) { return part.end - part.begin <= most_cluster_blocks * slice_size; });
+    const std::size_t shared = static_cast<std::size_t>(m_.device().multiprocessors) *
+                               static_cast<std::size_t>(m_.most_shared_memory());
+    return in_clusters ||
+           static_cast<std::size_t>(m_.model().pairs()) * sizeof(Pair<Real>) <= shared;
+  }
+  int second_longest(const ResidentPlan& plan) const {
+    return m_.tiling().inverse ? plan.longest[1] : 0;
+  }
+  template <class Post>
+  void use_post(const ResidentPlan& plan) {
+    kernel_ = reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post>);
+    threads_ = Post::threads;
+    shared_bytes_ =
+        ResidentMemory<Real>::bytes(plan.most_slots, plan.longest[0], second_longest(plan),
+                                    Post::bytes(plan.most_slots, plan.most_destinations));
+  }
+  /// One cluster a body, as many blocks each as the largest has slices.
+  bool fits_clusters(const ResidentPlan& plan) {
+    if (m_.device().major < 9) return false;
+    use_post<ClusterPost<Real>>(plan);
+    const auto blocks = static_cast<std::size_t>(plan.bodies) * plan.most_slices;
+    // Bodies of very different sizes would leave most blocks idle.
+    if (plan.most_slices > most_cluster_blocks || blocks > 2 * plan.slices.size() ||
+        shared_bytes_ > m_.most_shared_memory()) {
+      return false;
+    }
+    cluster_ = plan.most_slices;
+    blocks_ = static_cast<unsigned>(blocks);
+    m_.allow_shared_memory(kernel_);
+    PHYXEL_CUDA(cudaFuncSetAttribute(kernel_, cudaFuncAttributeNonPortableClusterSizeAllowed, 1));
+    const LaunchOf launch(*this);
+    int clusters = 0;
+    const cudaError_t error = cudaOccupancyMaxActiveClusters(&clusters, kernel_, &launch.config);
+    if (error != cudaSuccess) cudaGetLastError();  // an answer: too large for this GPU
+    return error == cudaSuccess && clusters > 0;
+  }
+  bool fits_at_once(const ResidentPlan& plan) {
+    use_post<MailPost<Real>>(plan);
+    cluster_ = 0;
+    blocks_ = static_cast<unsigned>(plan.slices.size());
+    if (shared_bytes_ > m_.most_shared_memory()) return false;
+    m_.allow_shared_memory(kernel_);
+    int blocks_each = 0;
+    PHYXEL_CUDA(cudaOccupancyMaxActiveBlocksPerMultiprocessor(
+        &blocks_each, kernel_, static_cast<int>(threads_), shared_bytes_));
+    return blocks_ <= static_cast<unsigned>(blocks_each * m_.device().multiprocessors);
+  }
+
+  /// A launch of all blocks. CUDA reads the attributes from where they stand.
+  struct LaunchOf {
+    cudaLaunchAttribute attributes[2];
+    cudaLaunchConfig_t config{};
+
+    explicit LaunchOf(const Residence& r) {
+      config.gridDim = r.blocks_;
+      config.blockDim = r.threads_;
+      config.dynamicSmemBytes = static_cast<std::size_t>(r.shared_bytes_);
+      config.stream = r.m_.stream();
+      config.attrs = attributes;
+      config.numAttrs = 1;
+      if (r.cluster_) {
+        attributes[0].id = cudaLaunchAttributeClusterDimension;
+        attributes[0].val.clusterDim = {static_cast<unsigned>(r.cluster_), 1, 1};
+        attributes[1] = r.m_.overlapping();
+        config.numAttrs = 2;
+      } else {
+        attributes[0].id = cudaLaunchAttributeCooperative;
+        attributes[0].val.cooperative = 1;
+      }
+    }
+    LaunchOf(const LaunchOf&) = delete;
+    LaunchOf& operator=(const LaunchOf&) = delete;
+  };
+
+  void clear_mail() {
+    next_tag_ = 1;
+    for (const DeviceArray<Letter>* mail : {&displacements_, &stresses_}) {
+      if (mail->bytes() == 0) continue;
+      PHYXEL_CUDA(cudaMemsetAsync(mail->data(), 0, mail->bytes(), m_.stream()));
+    }
+  }
+
+  const DeviceModel<Real, StateReal>& m_;
+  const void* kernel_ = nullptr;
+  int cluster_ = 0;  // blocks of one; 0: by mail
+  unsigned blocks_ = 0, threads_ = 0;
+  int shared_bytes_ = 0;
+  unsigned next_tag_ = 1;  // of the mail
+  DeviceArray<Slice> slices_;
+  DeviceArray<int> slice_of_block_;
+  DeviceArray<Index> place_;
+  DeviceArray<std::uint16_t> entries_;
+  DeviceArray<std::uint32_t> destinations_;
+  DeviceArray<Letter> displacements_, stresses_;
+  ResidentView<Real> view_{};
+};
+
+}  // namespace phyxel::cuda
