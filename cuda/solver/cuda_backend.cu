@@ -8,6 +8,7 @@
 #include "solver/device_model.cuh"
 #include "solver/passes.cuh"
 #include "solver/residence.cuh"
+#include "solver/step_graph.cuh"
 #include "solver/surfels.cuh"
 #include "solver/vibration.cuh"
 
@@ -23,6 +24,7 @@ class CudaBackend final : public Backend {
       : m_(model, device), boundary_(m_), passes_(m_) {
     if (path == CudaPath::automatic && !boundary_.changes()) {
       residence_ = Residence<Real, StateReal>::of(m_);
+      recorded_ = !residence_ && m_.size() <= most_recorded;
     }
   }
 
@@ -46,7 +48,7 @@ class CudaBackend final : public Backend {
   }
 
   void stress() override {
-    if (stays_resident()) return;
+    if (steps_may_wait()) return;
     m_.use_device();
     passes_.stress();
   }
@@ -54,12 +56,12 @@ class CudaBackend final : public Backend {
   void advance(double time, double dt) override {
     if (dt != m_.dt()) {
       settle();
+      for (StepGraph& graph : graphs_) graph.forget();
       m_.send_constants(dt);
     }
-    if (stays_resident()) {
-      if (++pending_ < residence_->most_steps) return;
-      settle();
-      bound_queue(residence_->most_steps);
+    if (steps_may_wait()) {
+      if (open_) close_step(Then::nothing);
+      open_ = true;
       return;
     }
     m_.use_device();
@@ -147,9 +149,19 @@ class CudaBackend final : public Backend {
 
   void update_surfels() override {
     if (m_.model().surfels.position.empty()) return;
-    settle();
-    if (!surfels_) surfels_.emplace(m_);
-    surfels_->launch();
+    if (!surfels_) {
+      settle();
+      surfels_.emplace(m_, residence_ != nullptr);
+    }
+    if (open_) {
+      close_step(Then::surfels);
+    } else {
+      settle();
+      if (Real* all = surfels_->all_gradients()) {
+        passes_.put_gradients({all, m_.places(), nullptr}, m_.tiles());
+      }
+      surfels_->launch(passes_);
+    }
   }
   void advect_surfels(SurfelState& out) override {
     update_surfels();
@@ -172,19 +184,62 @@ class CudaBackend final : public Backend {
   std::size_t step_traffic() const override { return m_.step_traffic(); }
 
  private:
-  /// The first step after an upload goes by launches, which see held phyxels where they were put.
-  bool stays_resident() const { return residence_ && !fresh_; }
+  /// Steps that a graph repeats, and bodies for which that is worth while: a step of more phyxels
+  /// takes longer than its launches.
+  static constexpr int graph_steps = 16;
+  static constexpr Index most_recorded = 4'000'000;
+  /// What follows a step, before the next.
+  enum class Then { nothing, surfels };
 
+  /// Whether steps are launched many at a time. The first step after an upload is not: it sees held
+  /// phyxels where they were put.
+  bool steps_may_wait() const { return (residence_ || recorded_) && !fresh_; }
+
+  /// The last step is now known whole. Steps that wait together are alike.
+  void close_step(Then then) const {
+    open_ = false;
+    if (pending_ > 0 && then != pending_then_) launch_pending();
+    pending_then_ = then;
+    const bool resident = residence_ && then == Then::nothing;
+    const int most = resident ? residence_->most_steps : graph_steps;
+    if (++pending_ < most) return;
+    launch_pending();
+    bound_queue(most);
+  }
+  void launch_pending() const {
+    m_.use_device();
+    const int steps = std::exchange(pending_, 0);  // once, whatever happens
+    if (residence_ && pending_then_ == Then::nothing) {
+      residence_->launch(m_.dt(), steps);
+      return;
+    }
+    const auto launch = [&] {
+      for (int s = 0; s < steps; ++s) {
+        if (residence_) {
+          residence_->launch(m_.dt(), 1, surfels_->all_gradients());
+        } else {
+          passes_.stress();
+          passes_.advance(m_.dt());
+        }
+        if (pending_then_ == Then::surfels) surfels_->launch(passes_);
+      }
+    };
+    if (steps == graph_steps && !(residence_ && residence_->by_mail())) {
+      graphs_[pending_then_ == Then::surfels].launch(m_.stream(), launch);
+    } else {
+      launch();
+    }
+  }
   /// Makes this device the current one and launches the steps that wait for it.
   void settle() const {
     m_.use_device();
-    if (pending_ == 0) return;
-    residence_->launch(m_.dt(), std::exchange(pending_, 0));  // once, whatever happens
+    if (open_) close_step(Then::nothing);
+    if (pending_ > 0) launch_pending();
   }
 
   /// Lets the host run ahead by some ten milliseconds of steps, not by the hundreds that the queue
   /// takes: a signal would wait for them all.
-  void bound_queue(int steps) {
+  void bound_queue(int steps) const {
     const int most = residence_ ? 2 * residence_->most_steps : 128;
     const auto ahead = static_cast<int>(
         std::clamp<std::size_t>(50'000'000 / m_.places(), 1, static_cast<std::size_t>(most)));
@@ -200,11 +255,16 @@ class CudaBackend final : public Backend {
   Passes<Real, StateReal> passes_;
   std::unique_ptr<Residence<Real, StateReal>> residence_;
   std::optional<SurfelAdvection<Real, StateReal>> surfels_;  // once they have been asked for
-  bool fresh_ = true;        // no step has been taken since the last upload
-  mutable int pending_ = 0;  // steps that wait to be launched
+  bool recorded_ = false;                                    // steps go through a graph
+  bool fresh_ = true;  // no step has been taken since the last upload
+  // Steps that wait to be launched: whole ones, and one of which it is not known what follows.
+  mutable int pending_ = 0;
+  mutable Then pending_then_ = Then::nothing;
+  mutable bool open_ = false;
+  mutable StepGraph graphs_[2];  // by what follows
   Event marks_[2];
-  int steps_since_mark_ = 0;
-  unsigned batches_ = 0;
+  mutable int steps_since_mark_ = 0;
+  mutable unsigned batches_ = 0;
 };
 
 }  // namespace

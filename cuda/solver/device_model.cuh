@@ -156,24 +156,25 @@ class DeviceModel {
                    Arguments... arguments) const {
     launch(name, kernel, blocks_for(count), arguments...);
   }
-  /// A kernel that may begin while the launch before it ends: it waits inside
-  /// (`wait_for_last_launch`).
+  /// Blocks of a tile's size with shared memory of their own choice.
+  /// @param overlapping the kernel may begin while the launch before it ends: it waits inside
+  ///   (`wait_for_last_launch`)
   template <class... Parameters, class... Arguments>
-  void launch_overlapping(const char* name, void (*kernel)(Parameters...), unsigned blocks,
-                          int shared_bytes, Arguments... arguments) const {
+  void launch_blocks(const char* name, void (*kernel)(Parameters...), unsigned blocks,
+                     int shared_bytes, bool overlapping, Arguments... arguments) const {
     allow_shared_memory(reinterpret_cast<const void*>(kernel));
-    cudaLaunchAttribute overlap = overlapping();
+    cudaLaunchAttribute overlap = overlap_attribute();
     cudaLaunchConfig_t config{};
     config.gridDim = blocks;
     config.blockDim = tile_size;
     config.dynamicSmemBytes = static_cast<std::size_t>(shared_bytes);
     config.stream = stream();
     config.attrs = &overlap;
-    config.numAttrs = device_.major >= 9 ? 1 : 0;
+    config.numAttrs = overlapping && device_.major >= 9 ? 1 : 0;
     PHYXEL_CUDA(cudaLaunchKernelEx(&config, kernel, arguments...));
     launched(name, blocks, tile_size);
   }
-  static cudaLaunchAttribute overlapping() {
+  static cudaLaunchAttribute overlap_attribute() {
     cudaLaunchAttribute overlap;
     overlap.id = cudaLaunchAttributeProgrammaticStreamSerialization;
     overlap.val.programmaticStreamSerializationAllowed = 1;

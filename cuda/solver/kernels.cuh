@@ -118,43 +118,28 @@ __device__ void prefetch_rows(const T* first, std::size_t row_elements, unsigned
   }
 }
 
-/// A launch that may begin while the one before it ends (`Passes`) lets the next one begin likewise
-/// and waits until all that was written before is there. Lists and constants may be read sooner.
-__device__ inline void wait_for_last_launch() {
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
-  asm volatile("griddepcontrol.launch_dependents;");
-  asm volatile("griddepcontrol.wait;" ::: "memory");
-#endif
-}
-
-/// Waits for the last launch, copies a tile and its halo into the image, fills the far slots; ends
-/// with all copies under way.
+/// Copies a tile and its halo into the image, fills the far slots; ends with all copies under way.
 template <class Records>
 __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Index tile,
                            char* image) {
   constexpr int batch = 3;  // indices under way at once
   const int thread = static_cast<int>(threadIdx.x);
   const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride + thread;
-  Index place[batch];
-  const auto look_up = [&](int begin) {
+  records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
+#pragma unroll 1
+  for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
+    Index place[batch];
 #pragma unroll
     for (int k = 0; k < batch; ++k) {
       place[k] = begin + k * tile_size < lists.halo_stride ? __ldg(halo + k * tile_size) : -1;
     }
     halo += batch * tile_size;
-  };
-  look_up(thread);
-  wait_for_last_launch();
-  records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
-#pragma unroll 1
-  for (int begin = thread; begin < lists.halo_stride; begin += batch * tile_size) {
 #pragma unroll
     for (int k = 0; k < batch; ++k) {
       if (place[k] >= 0) {
         records.fetch(image, lists.slots, tile_size + far_slots + begin + k * tile_size, place[k]);
       }
     }
-    look_up(begin + batch * tile_size);
   }
   if (thread < far_slots) Records::set_far(image, lists.slots, tile_size + thread);
 }
@@ -202,14 +187,26 @@ constexpr int pass_1_blocks = sizeof(Real) == 4 ? 6 : 3;
 template <class Real>
 constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
 
+/// Where displacement gradients go, those of all tiles or of some: entry e of thread t of block b
+/// to values[e * stride + b * tile_size + t].
+template <class Real>
+struct Gradients {
+  Real* values;
+  std::size_t stride;
+  const Index* tile_of_block;  ///< Null: all.
+};
+
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
-/// the gradients go to `gradient`, shape [9, places], and nothing else is written.
+/// the gradients are stored, and nothing else is written.
 template <class Real, class StateReal, bool green, bool volume, bool only_gradient>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
-           const __grid_constant__ DeviceLists lists, Index first_tile, Real* gradient) {
+           const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients) {
   extern __shared__ __align__(16) char image[];
-  const Index tile = first_tile + static_cast<Index>(blockIdx.x);
+  Index tile = first_tile + static_cast<Index>(blockIdx.x);
+  if constexpr (only_gradient) {
+    if (gradients.tile_of_block) tile = gradients.tile_of_block[blockIdx.x];
+  }
   const unsigned place = place_of(tile);
   const TileLists::Row row = lists.rows[place / warp_size];
   fetch_tile(f.points, lists, tile, image);
@@ -234,7 +231,8 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
       c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
   const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
   if constexpr (only_gradient) {
-    for (int e = 0; e < 9; ++e) gradient[e * f.places + place] = grad_u(e / 3, e % 3);
+    Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
+    for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
   } else {
     const auto law = law_of<Real, green, volume>(body);
     const Mat3<Real> q =

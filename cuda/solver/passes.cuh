@@ -8,7 +8,7 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Passes {
   using AllFields = Fields<Real, StateReal>;
-  using Pass1 = void (*)(AllFields, DeviceLists, Index, Real*);
+  using Pass1 = void (*)(AllFields, DeviceLists, Index, Gradients<Real>);
   using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*);
 
  public:
@@ -29,7 +29,7 @@ class Passes {
   }
 
   void stress() const {
-    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(m_.fields(), run, nullptr);
+    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(m_.fields(), run, {});
   }
   void advance(double dt) const {
     for (const Run<Pass2>& run : advance_runs_) {
@@ -40,7 +40,7 @@ class Passes {
   void linear_stress(const TileConstants<Real, StateReal>* constants) const {
     AllFields fields = m_.fields();
     fields.tiles = constants;
-    launch_pass_1(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, nullptr);
+    launch_pass_1(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, {});
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
   void gather(Real* forces) const {
@@ -57,9 +57,12 @@ class Passes {
   }
   DeviceArray<Real> gradients() const {
     DeviceArray<Real> gradients(9 * m_.places(), "displacement gradients of " + m_.subject());
-    launch_pass_1(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, m_.tiles()},
-                  gradients.data());
+    put_gradients({gradients.data(), m_.places(), nullptr}, m_.tiles());
     return gradients;
+  }
+  /// Those of `tiles` tiles.
+  void put_gradients(Gradients<Real> gradients, Index tiles) const {
+    launch_pass_1(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, tiles}, gradients);
   }
 
  private:
@@ -91,15 +94,16 @@ class Passes {
                   : pass_2<Real, StateReal, own_supports, false, false, false>;
   }
 
-  void launch_pass_1(const AllFields& fields, const Run<Pass1>& run, Real* gradient) const {
-    m_.launch_overlapping("pass_1", run.kernel, static_cast<unsigned>(run.tiles),
-                          Points<Real>::bytes * m_.lists().slots, fields, m_.lists(),
-                          run.first_tile, gradient);
+  void launch_pass_1(const AllFields& fields, const Run<Pass1>& run,
+                     Gradients<Real> gradients) const {
+    m_.launch_blocks("pass_1", run.kernel, static_cast<unsigned>(run.tiles),
+                     Points<Real>::bytes * m_.lists().slots, false, fields, m_.lists(),
+                     run.first_tile, gradients);
   }
   void launch_pass_2(const Run<Pass2>& run, StateReal dt, Real* force) const {
-    m_.launch_overlapping("pass_2", run.kernel, static_cast<unsigned>(run.tiles),
-                          m_.pass_2_bytes(m_.second_lists().slots), m_.fields(), m_.second_lists(),
-                          run.first_tile, dt, force);
+    m_.launch_blocks("pass_2", run.kernel, static_cast<unsigned>(run.tiles),
+                     m_.pass_2_bytes(m_.second_lists().slots), false, m_.fields(),
+                     m_.second_lists(), run.first_tile, dt, force);
   }
 
   const DeviceModel<Real, StateReal>& m_;

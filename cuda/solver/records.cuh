@@ -24,6 +24,20 @@ __device__ void copy_async(void* shared, const void* global) {
 }
 __device__ inline void wait_for_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
 
+/// Waits until all that was written before this launch is there. A launch that may begin while the
+/// one before it ends (`overlap_attribute`) reads what never changes sooner.
+__device__ inline void wait_for_last_launch() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.wait;" ::: "memory");
+#endif
+}
+/// Lets the next launch begin, if it may, once all blocks have come here.
+__device__ inline void let_next_launch_begin() {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  asm volatile("griddepcontrol.launch_dependents;");
+#endif
+}
+
 /// Position and displacement of each place.
 template <class Real>
 struct Points;
@@ -127,6 +141,10 @@ struct Stresses<float> {
     words[slot] = {far_away, far_away, far_away, 0};
     words[slots + slot] = words[2 * slots + slot] = {0, 0, 0, 0};
   }
+  __device__ static void put(char* image, int slots, int slot, const Value& v) {
+    auto* words = reinterpret_cast<float4*>(image);
+    Stresses{words, words + slots, words + 2 * slots}.set(static_cast<std::size_t>(slot), v);
+  }
   __device__ static Value at(const char* image, int slots, unsigned offset) {
     const char* word = image + offset;
     const auto x = *reinterpret_cast<const float4*>(word);
@@ -162,6 +180,12 @@ struct Stresses<double> {
     words[slot] = {far_away, far_away};
     words[slots + slot] = {far_away, 0};
     for (int k = 2; k < 6; ++k) words[k * slots + slot] = {0, 0};
+  }
+  __device__ static void put(char* image, int slots, int slot, const Value& v) {
+    auto* words = reinterpret_cast<double2*>(image);
+    Stresses stresses;
+    for (int k = 0; k < 6; ++k) stresses.word[k] = words + k * slots;
+    stresses.set(static_cast<std::size_t>(slot), v);
   }
   __device__ static Value at(const char* image, int slots, unsigned offset) {
     double2 w[6];

@@ -25,17 +25,20 @@ class Residence {
     return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
   }
+  /// Whether each launch needs tags of its own.
+  bool by_mail() const { return cluster_ == 0; }
   std::size_t bytes() const {
-    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + entries_.bytes() +
+    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() +
            destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
   }
 
-  void launch(double dt, int steps) {
+  /// @param gradients for those of the last displacements, shape [9, places], or null
+  void launch(double dt, int steps, Real* gradients = nullptr) {
     if (next_tag_ > 0xF000'0000U) clear_mail();
     Fields<Real, StateReal> fields = m_.fields();
     auto step = static_cast<StateReal>(dt);
-    unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps));
-    void* arguments[] = {&fields, &view_, &step, &steps, &tag};
+    unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps) + 1);
+    void* arguments[] = {&fields, &view_, &step, &steps, &gradients, &tag};
     const LaunchOf launch(*this);
     PHYXEL_CUDA(cudaLaunchKernelExC(&launch.config, kernel_, arguments));
     m_.launched("resident_steps", blocks_, threads_);
@@ -56,7 +59,7 @@ class Residence {
     const std::string what = "what stays in shared memory of " + m_.subject();
     slices_ = sent(plan.slices, what);
     place_ = sent(plan.place, what);
-    entries_ = sent(plan.entries, what);
+    weigh(plan, what);
     destinations_ = sent(plan.destinations, what);
     std::vector<int> slice_of_block(blocks_, -1);
     for (int s = 0; s < static_cast<int>(plan.slices.size()); ++s) {
@@ -68,12 +71,23 @@ class Residence {
       stresses_ = {stress_letters<Real> * m_.places(), what};
     }
     view_ = {slices_.data(),         place_.data(),
-             entries_.data(),        destinations_.data(),
+             pairs_.data(),          destinations_.data(),
              slice_of_block_.data(), displacements_.data(),
              stresses_.data(),       plan.most_slots,
              plan.most_destinations, {plan.longest[0], second_longest(plan)}};
     clear_mail();
     return true;
+  }
+  void weigh(const ResidentPlan& plan, const std::string& what) {
+    constexpr unsigned threads = 256;
+    const DeviceArray<std::uint16_t> entries = sent(plan.entries, what);
+    pairs_ = {plan.entries.size(), what};
+    const auto slices = static_cast<unsigned>(plan.slices.size());
+    weigh_pairs<<<slices, threads, 0, m_.stream()>>>(m_.fields(), slices_.data(), place_.data(),
+                                                     entries.data(), m_.tiling().inverse ? 2 : 1,
+                                                     pairs_.data());
+    m_.launched("weigh_pairs", slices, threads);
+    m_.wait();
   }
   /// Before a plan is made, which takes its time.
   bool may_fit() const {
@@ -143,7 +157,7 @@ class Residence {
       if (r.cluster_) {
         attributes[0].id = cudaLaunchAttributeClusterDimension;
         attributes[0].val.clusterDim = {static_cast<unsigned>(r.cluster_), 1, 1};
-        attributes[1] = r.m_.overlapping();
+        attributes[1] = r.m_.overlap_attribute();
         config.numAttrs = 2;
       } else {
         attributes[0].id = cudaLaunchAttributeCooperative;
@@ -171,7 +185,7 @@ class Residence {
   DeviceArray<Slice> slices_;
   DeviceArray<int> slice_of_block_;
   DeviceArray<Index> place_;
-  DeviceArray<std::uint16_t> entries_;
+  DeviceArray<Pair<Real>> pairs_;
   DeviceArray<std::uint32_t> destinations_;
   DeviceArray<Letter> displacements_, stresses_;
   ResidentView<Real> view_{};

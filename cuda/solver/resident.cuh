@@ -87,17 +87,12 @@ struct alignas(16) Pair {
   unsigned slot;
 };
 
-inline constexpr int pair_group = 4;  ///< Rows are filled up to a multiple of it.
-PHYXEL_HD int whole_groups(int length) {
-  return (length + pair_group - 1) / pair_group * pair_group;
-}
-
 /// `ResidentPlan` in device memory.
 template <class Real>
 struct ResidentView {
   const Slice* slices;
   const Index* place;
-  const std::uint16_t* entries;
+  const Pair<Real>* pairs;  ///< In the order of `ResidentPlan::entries`.
   const std::uint32_t* destinations;
   const int* slice_of_block;  ///< -1: none.
   Letter* displacements;      ///< [letters, places], for mail
@@ -126,9 +121,9 @@ struct ResidentMemory {
     displacements = {reinterpret_cast<Letter*>(shared), slots};
     stresses = {displacements.letters + displacement_letters<Real> * slots, slots};
     pairs = reinterpret_cast<Pair<Real>*>(stresses.letters + stress_letters<Real> * slots);
-    Pair<Real>* end = pairs + whole_groups(r.longest[0]) * slice_size;
+    Pair<Real>* end = pairs + r.longest[0] * slice_size;
     second_pairs = r.longest[1] ? end : pairs;
-    end += whole_groups(r.longest[1]) * slice_size;
+    end += r.longest[1] * slice_size;
     place_of_slot = reinterpret_cast<Index*>(end);
     barriers = reinterpret_cast<unsigned long long*>(end);
     destinations = reinterpret_cast<std::uint32_t*>(barriers + 2);
@@ -136,8 +131,7 @@ struct ResidentMemory {
   /// @param tail what the way of sending needs
   static int bytes(int most_slots, int longest, int second_longest, int tail) {
     return most_slots * static_cast<int>(sizeof(Letter)) *
-               (displacement_letters<Real> + stress_letters<Real>)+(whole_groups(longest) +
-                                                                    whole_groups(second_longest)) *
+               (displacement_letters<Real> + stress_letters<Real>)+(longest + second_longest) *
                slice_size * static_cast<int>(sizeof(Pair<Real>)) +
            tail;
   }
@@ -377,30 +371,43 @@ struct ClusterPost {
 
 // --- the steps -----------------------------------------------------------------------------------
 
-/// The table of one pass: weighted distances by the support of either end.
-/// @param of_neighbour whether the neighbour's support counts
+/// The weighted distances of all slices, one block each: for the first pass by the phyxel's
+/// support, for the second by the neighbour's.
 template <class Real, class StateReal>
-__device__ void make_pairs(const Fields<Real, StateReal>& f, const ResidentView<Real>& r,
-                           const Slice& slice, int pass, bool of_neighbour, Real body_support,
-                           Pair<Real>* pairs) {
-  const Slice::Rows& rows = slice.rows[pass];
-  const Index* place_of_slot = r.place + slice.first_slot;
-  for (int k = static_cast<int>(threadIdx.x); k < whole_groups(rows.longest) * slice_size;
-       k += static_cast<int>(blockDim.x)) {
-    const int p = k % slice_size, e = k / slice_size;
-    const std::size_t own = static_cast<std::size_t>(slice.first_place) + p;
-    Pair<Real> pair{{}, static_cast<unsigned>(p)};  // its own: zero from itself
-    const bool within = e < rows.length[p / warp_size];
-    const std::uint16_t entry = within ? r.entries[rows.first_entry + k] : far_entry;
-    if (!(entry & far_entry)) {
-      pair.slot = entry;
-      const std::size_t other = static_cast<std::size_t>(place_of_slot[entry]);
-      const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
-      const Real inverse_h_squared =
-          f.inverse_h_squared ? f.inverse_h_squared[of_neighbour ? other : own] : body_support;
-      pair.wx = weight_shape_anywhere(dot(x, x), inverse_h_squared) * x;
+__global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, const Slice* slices,
+                            const Index* place, const std::uint16_t* entries, int passes,
+                            Pair<Real>* pairs) {
+  const Slice& slice = slices[blockIdx.x];
+  const Real body_support = f.tiles[slice.first_place / tile_size].inverse_h_squared;
+  for (int pass = 0; pass < passes; ++pass) {
+    const Slice::Rows& rows = slice.rows[pass];
+    for (int k = static_cast<int>(threadIdx.x); k < rows.longest * slice_size;
+         k += static_cast<int>(blockDim.x)) {
+      const int p = k % slice_size;
+      const std::uint16_t entry = entries[rows.first_entry + k];
+      Pair<Real> pair{{}, static_cast<unsigned>(p)};  // its own: zero from itself
+      if (!(entry & far_entry)) {
+        const auto own = static_cast<std::size_t>(slice.first_place) + p;
+        const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
+        const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
+        const Real inverse_h_squared =
+            f.inverse_h_squared ? f.inverse_h_squared[pass == 0 ? own : other] : body_support;
+        pair = {weight_shape_anywhere(dot(x, x), inverse_h_squared) * x, entry};
+      }
+      pairs[rows.first_entry + k] = pair;
     }
-    pairs[k] = pair;
+  }
+}
+
+/// Starts to copy a slice's pairs for one pass into shared memory.
+template <class Real>
+__device__ void fetch_pairs(const ResidentView<Real>& r, const Slice::Rows& rows,
+                            Pair<Real>* pairs) {
+  constexpr int words = sizeof(Pair<Real>) / 16;
+  const auto* from = reinterpret_cast<const uint4*>(r.pairs + rows.first_entry);
+  for (int k = static_cast<int>(threadIdx.x); k < rows.longest * slice_size * words;
+       k += static_cast<int>(blockDim.x)) {
+    copy_async<16>(reinterpret_cast<uint4*>(pairs) + k, from + k);
   }
 }
 
@@ -439,12 +446,13 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
   }
 }
 
-/// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps
+/// @param gradients of the last displacements, shape [9, places], if they are wanted
+/// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
 template <class Real, class StateReal, class Post>
 __global__ void __launch_bounds__(Post::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
-                   unsigned first_tag) {
+                   Real* gradients, unsigned first_tag) {
   constexpr int u_letters = displacement_letters<Real>, q_letters = stress_letters<Real>;
   extern __shared__ __align__(16) char shared[];
   const int number = r.slice_of_block[blockIdx.x];
@@ -458,10 +466,10 @@ __global__ void __launch_bounds__(Post::threads)
   const int thread = static_cast<int>(threadIdx.x);
   const ResidentMemory<Real> memory(shared, r);
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
-  make_pairs(f, r, slice, 0, false, body.inverse_h_squared, memory.pairs);
-  if (r.longest[1]) make_pairs(f, r, slice, 1, true, body.inverse_h_squared, memory.second_pairs);
-
-  wait_for_last_launch();  // rest positions, read until here, do not change
+  fetch_pairs(r, slice.rows[0], memory.pairs);
+  if (r.longest[1]) fetch_pairs(r, slice.rows[1], memory.second_pairs);
+  let_next_launch_begin();
+  wait_for_last_launch();
 
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
@@ -490,22 +498,25 @@ __global__ void __launch_bounds__(Post::threads)
   const int warp = thread / warp_size;
   const int length = owner ? slice.rows[0].length[warp] : 0;
   const int second_length = owner ? slice.rows[1].length[warp] : 0;
-  Post post(r, slice, memory, f.places, first_tag);
+  wait_for_copies();
+  Post post(r, slice, memory, f.places, first_tag);  // all threads meet
 
-  for (int step = 0; step < steps; ++step) {
+  // The displacements of all, then this phyxel's gradient.
+  const auto find_gradient = [&] {
     const Real u[] = {point.u.x, point.u.y, point.u.z};
     post.template send<u_letters>(0, memory.displacements, place, somebody, u);
     post.template receive<u_letters>(0, memory.displacements);
+    Mat3<Real> sum;
+    walk_pairs<Real, u_letters>(
+        memory.pairs + thread, length, memory.displacements, [&](const Real* u_j, Vec3<Real> wx) {
+          add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
+        });
+    return displacement_gradient(sum, inverse_moment);
+  };
+  for (int step = 0; step < steps; ++step) {
+    const Mat3<Real> grad_u = find_gradient();
     Mat3<Real> q;
-    if (owner) {
-      Mat3<Real> sum;
-      walk_pairs<Real, u_letters>(
-          memory.pairs + thread, length, memory.displacements, [&](const Real* u_j, Vec3<Real> wx) {
-            add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
-          });
-      const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
-      q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
-    }
+    if (owner) q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1),
                             q(1, 2), q(2, 0), q(2, 1), q(2, 2)};
     post.template send<q_letters>(1, memory.stresses, place, somebody, numbers);
@@ -531,6 +542,10 @@ __global__ void __launch_bounds__(Post::threads)
     }
   }
 
+  if (gradients) {
+    const Mat3<Real> grad_u = find_gradient();
+    for (int e = 0; e < 9 && owner; ++e) gradients[e * f.places + place] = grad_u(e / 3, e % 3);
+  }
   post.finish();
   if (!somebody) return;
   f.points.set(place, point);

@@ -95,16 +95,19 @@ ResidentPlan make_resident_plan(const Tiling& tiling) {
         rows.length[w] = list.length_of(first + w * warp_size);
         rows.longest = std::max(rows.longest, rows.length[w]);
       }
+      rows.longest = (rows.longest + pair_group - 1) / pair_group * pair_group;
       rows.first_entry = static_cast<int>(plan.entries.size());
-      plan.entries.resize(plan.entries.size() + static_cast<std::size_t>(rows.longest) * slice_size,
-                          0);
+      plan.entries.resize(plan.entries.size() +
+                          static_cast<std::size_t>(rows.longest) * slice_size);
       for (int p = 0; p < slice_size; ++p) {
-        for (int e = 0; e < rows.length[p / warp_size]; ++e) {
+        for (int e = 0; e < rows.longest; ++e) {
+          std::uint16_t& entry =
+              plan.entries[rows.first_entry + static_cast<std::size_t>(e) * slice_size + p];
+          entry = static_cast<std::uint16_t>(far_entry | p);
+          if (e >= rows.length[p / warp_size]) continue;
           const int slot = list.slot_of(first + p, e);
           const Index place = list.place_in(tile, slot);
-          plan.entries[rows.first_entry + static_cast<std::size_t>(e) * slice_size + p] =
-              place < 0 ? static_cast<std::uint16_t>(far_entry | p)
-                        : image.slot_of(place, slot % columns);
+          if (place >= 0) entry = image.slot_of(place, slot % columns);
         }
       }
       plan.longest[pass] = std::max(plan.longest[pass], rows.longest);

@@ -11,6 +11,7 @@ namespace phyxel::cuda {
 
 inline constexpr int slice_size = 64;  ///< Phyxels a block.
 inline constexpr int slice_warps = slice_size / warp_size;
+inline constexpr int pair_group = 4;                ///< Entries that a lane takes at once.
 inline constexpr std::uint16_t far_entry = 0x8000;  ///< Added to an entry without a neighbour.
 inline constexpr std::uint32_t nobody = ~std::uint32_t{0};
 
@@ -24,7 +25,8 @@ struct Slice {
   int rank = 0;           ///< Among the slices of its body.
   /// Who else has a slot for phyxel p: destinations[first_destination + k * slice_size + p].
   int first_destination = 0, destinations = 0;
-  /// Entries of a lane, for either pass: the longest of the slice, and of each warp.
+  /// Entries of a lane, for either pass: the longest of the slice, filled up to whole groups, and
+  /// of each warp.
   struct Rows {
     int first_entry = 0, longest = 0;
     std::array<int, slice_warps> length{};
@@ -35,7 +37,7 @@ struct Slice {
 struct ResidentPlan {
   std::vector<Slice> slices;
   std::vector<Index> place;  ///< Of each slot of each slice; -1: empty. Its own come first.
-  /// Entry e of phyxel p of a slice, as a slot of its image:
+  /// Entry e of phyxel p of a slice, as a slot of its image, its own where there is no neighbour:
   /// [rows.first_entry + e * slice_size + p].
   std::vector<std::uint16_t> entries;
   /// Rank of a slice << 16 | its slot; `nobody`: no more.

@@ -1,7 +1,6 @@
 #include "solver/surfel_plan.hpp"
 
 #include <algorithm>
-#include <unordered_map>
 
 #include "model/space_filling_curve.hpp"
 #include "solver/carrier_weights.hpp"
@@ -27,104 +26,67 @@ std::vector<Index> curve_order(const Model& model, Index begin, Index end) {
   return order;
 }
 
-/// The slots of one block.
-class Slots {
- public:
-  std::uint16_t of(Index place) {
-    const auto [at, is_new] = slot_.emplace(place, static_cast<int>(place_.size()));
-    if (is_new) place_.push_back(place);
-    if (place_.size() > most_slots) refuse_halo(static_cast<int>(place_.size()));
-    return static_cast<std::uint16_t>(at->second);
-  }
-  const std::vector<Index>& places() const { return place_; }
+int filled_up(int count, int group) { return (count + group - 1) / group * group; }
 
- private:
-  std::unordered_map<Index, int> slot_;
-  std::vector<Index> place_;
-};
-
-void add_carriers(SurfelPlan& plan, SurfelBlock& block, const Model& model, const Tiling& tiling,
-                  Slots& slots) {
+void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place,
+               SurfelBlock block) {
   const Csr& carriers = model.surfels.carriers;
   const auto surfel = [&](int s) { return plan.order[block.first_surfel + s]; };
   std::vector<Index> places;
   for (int s = 0; s < block.surfels; ++s) {
+    block.centre += 1.0 / block.surfels * model.surfels.position[surfel(s)];
     const auto row = carriers.row(surfel(s));
-    block.most_carriers = std::max(block.most_carriers, static_cast<int>(row.size()));
-    for (const Index i : row) places.push_back(tiling.place[i]);
+    block.carriers = std::max(block.carriers, static_cast<int>(row.size()));
+    for (const Index i : row) places.push_back(place[i]);
   }
+  block.carriers = filled_up(block.carriers, carrier_group);
   // Ascending, so that surfels side by side name the same one at the same time.
   std::sort(places.begin(), places.end());
   places.erase(std::unique(places.begin(), places.end()), places.end());
-  for (const Index place : places) slots.of(place);
-  block.carriers = static_cast<int>(places.size());
+  block.slots = static_cast<int>(places.size());
+  block.tile = places.front() / tile_size;
+  block.first_slot = static_cast<Offset>(plan.place.size());
+  plan.place.insert(plan.place.end(), places.begin(), places.end());
+  plan.most_slots = std::max(plan.most_slots, block.slots);
+  for (const Index p : places) plan.tiles.push_back(p / tile_size);
 
   block.first_carrier = static_cast<Offset>(plan.carriers.size());
-  const std::size_t size = static_cast<std::size_t>(block.most_carriers) * surfel_block;
-  plan.carriers.resize(plan.carriers.size() + size, 0);
-  plan.weights.resize(plan.weights.size() + size, 0);
+  plan.carriers.resize(plan.carriers.size() +
+                       static_cast<std::size_t>(block.carriers) * surfel_block);
   for (int s = 0; s < block.surfels; ++s) {
     const auto row = carriers.row(surfel(s));
     const std::vector<double> weights = carrier_weights(model, surfel(s));
-    std::vector<std::pair<std::uint16_t, double>> entries;
+    std::vector<Carrier> own;
     for (std::size_t k = 0; k < row.size(); ++k) {
-      entries.emplace_back(slots.of(tiling.place[row[k]]), weights[k]);
+      const auto at = std::lower_bound(places.begin(), places.end(), place[row[k]]);
+      own.push_back({weights[k], static_cast<int>(at - places.begin())});
     }
-    std::sort(entries.begin(), entries.end());
-    for (std::size_t k = 0; k < entries.size(); ++k) {
-      const std::size_t at = block.first_carrier + k * surfel_block + s;
-      std::tie(plan.carriers[at], plan.weights[at]) = entries[k];
-    }
-  }
-}
-
-void add_neighbours(SurfelPlan& plan, SurfelBlock& block, const Tiling& tiling, Slots& slots) {
-  const TileLists& lists = tiling.neighbours;
-  for (int c = 0; c < block.carriers; ++c) {
-    block.longest = std::max(block.longest, lists.length_of(slots.places()[c]));
-  }
-  block.longest = (block.longest + list_lanes - 1) / list_lanes * list_lanes;
-  block.first_neighbour = static_cast<Offset>(plan.neighbours.size());
-  for (int c = 0; c < block.carriers; ++c) {
-    const Index place = slots.places()[c];
-    for (int e = 0; e < block.longest; ++e) {
-      Index neighbour = -1;
-      if (e < lists.length_of(place)) {
-        neighbour = lists.place_in(place / tile_size, lists.slot_of(place, e));
-      }
-      plan.neighbours.push_back(slots.of(neighbour < 0 ? place : neighbour));
+    std::sort(own.begin(), own.end(),
+              [](const Carrier& a, const Carrier& b) { return a.slot < b.slot; });
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      plan.carriers[block.first_carrier + k * surfel_block + s] = own[k];
     }
   }
+  plan.blocks.push_back(block);
 }
 
 }  // namespace
 
-SurfelPlan make_surfel_plan(const Model& model, const Tiling& tiling) {
+SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place) {
   SurfelPlan plan;
   for (const Part& part : model.parts) {
-    const Index begin = part.surfel_begin, end = part.surfel_end;
-    if (begin == end) continue;
-    const std::vector<Index> order = curve_order(model, begin, end);
+    if (part.surfel_begin == part.surfel_end) continue;
+    const std::vector<Index> order = curve_order(model, part.surfel_begin, part.surfel_end);
     plan.order.insert(plan.order.end(), order.begin(), order.end());
-    for (Index first = begin; first < end; first += surfel_block) {
+    for (Index first = part.surfel_begin; first < part.surfel_end; first += surfel_block) {
       SurfelBlock block;
       block.first_surfel = first;
-      block.surfels = std::min<int>(surfel_block, end - first);
-      for (int s = 0; s < block.surfels; ++s) {
-        block.centre += 1.0 / block.surfels * model.surfels.position[plan.order[first + s]];
-      }
-      Slots slots;
-      add_carriers(plan, block, model, tiling, slots);
-      add_neighbours(plan, block, tiling, slots);
-      block.tile = slots.places().front() / tile_size;
-      block.first_slot = static_cast<Offset>(plan.place.size());
-      block.slots = static_cast<int>(slots.places().size());
-      plan.place.insert(plan.place.end(), slots.places().begin(), slots.places().end());
-      plan.most_slots = std::max(plan.most_slots, block.slots);
-      plan.most_block_carriers = std::max(plan.most_block_carriers, block.carriers);
-      plan.blocks.push_back(block);
+      block.surfels = std::min<int>(surfel_block, part.surfel_end - first);
+      add_block(plan, model, place, block);
     }
   }
+  std::sort(plan.tiles.begin(), plan.tiles.end());
+  plan.tiles.erase(std::unique(plan.tiles.begin(), plan.tiles.end()), plan.tiles.end());
   return plan;
 }
 

@@ -1,9 +1,8 @@
-/// Surfels carried along with the phyxels: one launch, in which each block finds the gradients of
-/// its surfels' carriers itself.
+/// Surfels carried along with the phyxels, by the gradients of those that carry them.
 #pragma once
 
 #include "phyxel/physics/surfel.hpp"
-#include "solver/device_model.cuh"
+#include "solver/passes.cuh"
 #include "solver/surfel_plan.hpp"
 
 namespace phyxel::cuda {
@@ -15,83 +14,83 @@ struct DeviceSurfelBlock {
   Vec3<Real> centre;
 };
 
+/// A `Carrier`.
+template <class Real>
+struct alignas(2 * sizeof(Real)) DeviceCarrier {
+  Real weight;
+  unsigned offset;  ///< 16 × slot
+};
+
 /// Surfels in device memory, in the order of their plan.
 template <class Real, class StateReal>
 struct DeviceSurfels {
   const DeviceSurfelBlock<Real>* blocks;
-  const Index* place;
-  const std::uint16_t *neighbours, *carriers;
-  const Real* weights;
+  const Index *place, *row;  ///< Of a slot: in the fields, and in the gradients.
+  const DeviceCarrier<Real>* carriers;
   const Vec3<Real>*position, *normal;  ///< At rest; positions from the centre of the block.
   Vec3<StateReal>*displacement, *moved_normal;
+  const Real* gradients;  ///< [9, stride]
+  std::size_t stride;
+  int most_slots;
 };
 
-/// u + ∇u (x - x_i) of a carrier at the centre x of a block.
-template <class StateReal>
-struct alignas(16) CarrierMotion {
-  Vec3<StateReal> at_centre;
-  Mat3<StateReal> gradient;
-};
+/// The motions of carriers, u + ∇u (x - x_i) at the centre x of a block and ∇u: twelve numbers, as
+/// in an image of stresses.
+template <class Real>
+using CarrierMotions = Stresses<Real>;
 
+/// A thread a surfel.
 template <class Real, class StateReal>
 __global__ void __launch_bounds__(surfel_block)
     move_surfels(const __grid_constant__ Fields<Real, StateReal> f,
-                 const __grid_constant__ DeviceSurfels<Real, StateReal> s, int most_slots) {
-  extern __shared__ __align__(16) char image[];
-  auto* motions = reinterpret_cast<CarrierMotion<StateReal>*>(
-      image + static_cast<std::size_t>(Points<Real>::bytes) * most_slots);
+                 const __grid_constant__ DeviceSurfels<Real, StateReal> s) {
+  extern __shared__ __align__(16) char motions[];
   const SurfelBlock& block = s.blocks[blockIdx.x].at;
   const Vec3<Real> centre = s.blocks[blockIdx.x].centre;
-  const Index* places = s.place + block.first_slot;
   const int thread = static_cast<int>(threadIdx.x);
+  DeviceCarrier<Real> next[carrier_group];
+  const DeviceCarrier<Real>* list = s.carriers + block.first_carrier + thread;
+  const auto fetch_group = [&] {
+#pragma unroll
+    for (int g = 0; g < carrier_group; ++g) next[g] = list[g * surfel_block];
+    list += carrier_group * surfel_block;
+  };
+  fetch_group();
+  Index place = 0, row = 0;
+  const auto look_up = [&](int slot) {
+    if (slot >= block.slots) return;
+    place = s.place[block.first_slot + slot];
+    row = s.row[block.first_slot + slot];
+  };
+  look_up(thread);
+  let_next_launch_begin();
   wait_for_last_launch();
-  for (int k = thread; k < block.slots; k += surfel_block) {
-    f.points.fetch(image, most_slots, k, places[k]);
-  }
-  wait_for_copies();
-  __syncthreads();
-
-  // The carriers, `list_lanes` threads each; whole warps, for the sums across them.
-  const Real body_support = f.tiles[block.tile].inverse_h_squared;
-  const int lane = thread % list_lanes;
-  constexpr int at_once = surfel_block / list_lanes;
-  for (int first = 0; first < block.carriers; first += at_once) {
-    const int mine = first + thread / list_lanes;
-    const int c = mine < block.carriers ? mine : block.carriers - 1;
-    const auto place = static_cast<std::size_t>(places[c]);
-    const Real* m = f.moment_constants + place;
-    const Sym3<Real> inverse_moment{
-        m[0], m[f.places], m[2 * f.places], m[3 * f.places], m[4 * f.places], m[5 * f.places]};
-    const Real inverse_h_squared = f.inverse_h_squared ? f.inverse_h_squared[place] : body_support;
-    const auto own = Points<Real>::at(image, most_slots, 16 * c);
-    const std::uint16_t* list = s.neighbours + block.first_neighbour + c * block.longest;
-    Mat3<Real> sum;
-    for (int e = lane; e < block.longest; e += list_lanes) {
-      const auto p = Points<Real>::at(image, most_slots, 16U * list[e]);
-      const Vec3<Real> x = p.x - own.x;
-      add_gradient_term(sum, p.u - own.u, weight_shape_anywhere(dot(x, x), inverse_h_squared) * x);
+  for (int slot = thread; slot < block.slots; slot += surfel_block) {
+    const auto point = f.points.get(static_cast<std::size_t>(place));
+    Vec3<StateReal> u = to<StateReal>(point.u);
+    if constexpr (!std::is_same_v<Real, StateReal>) {
+      u = column3(f.displacement, f.places, static_cast<std::size_t>(place));
     }
-    for (int e = 0; e < 9; ++e) {
-      Real& value = sum(e / 3, e % 3);
-      for (int other = 1; other < list_lanes; other *= 2) {
-        value += __shfl_xor_sync(~0U, value, other);
-      }
-    }
-    if (lane == 0 && mine < block.carriers) {
-      const auto gradient = to<StateReal>(displacement_gradient(sum, inverse_moment));
-      Vec3<StateReal> u = to<StateReal>(own.u);
-      if constexpr (!std::is_same_v<Real, StateReal>) u = column3(f.displacement, f.places, place);
-      motions[c] = {u + gradient * to<StateReal>(centre - own.x), gradient};
-    }
+    Mat3<StateReal> gradient;
+    for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + row];
+    CarrierMotions<StateReal>::put(motions, s.most_slots, slot,
+                                   {u + gradient * to<StateReal>(centre - point.x), gradient});
+    look_up(slot + surfel_block);
   }
   __syncthreads();
 
   if (thread >= block.surfels) return;
   SurfelBlend<StateReal> blend;
-  const std::size_t list = block.first_carrier + thread;
-  for (int k = 0; k < block.most_carriers; ++k) {
-    const CarrierMotion<StateReal>& motion = motions[s.carriers[list + k * surfel_block]];
-    blend.add(s.weights[list + k * surfel_block], motion.at_centre, motion.gradient);
+  for (int left = block.carriers; left > 0; left -= carrier_group) {
+    DeviceCarrier<Real> group[carrier_group];
+#pragma unroll
+    for (int g = 0; g < carrier_group; ++g) group[g] = next[g];
+    if (left > carrier_group) fetch_group();
+#pragma unroll
+    for (int g = 0; g < carrier_group; ++g) {
+      const auto motion = CarrierMotions<StateReal>::at(motions, s.most_slots, group[g].offset);
+      blend.add(group[g].weight, motion.x, motion.q);
+    }
   }
   const std::size_t at = block.first_surfel + thread;
   const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(s.normal[at]));
@@ -102,18 +101,27 @@ __global__ void __launch_bounds__(surfel_block)
 template <class Real, class StateReal>
 class SurfelAdvection {
  public:
-  explicit SurfelAdvection(const DeviceModel<Real, StateReal>& model)
-      : SurfelAdvection(model, make_surfel_plan(model.model(), fetched_tiling(model.tiling()))) {}
+  /// @param all_gradients whether `launch` will find the gradients of all places, or those of the
+  ///   tiles that carry surfels only
+  SurfelAdvection(const DeviceModel<Real, StateReal>& model, bool all_gradients)
+      : SurfelAdvection(model, all_gradients,
+                        make_surfel_plan(model.model(), model.tiling().place)) {}
 
+  /// [9, places], to be filled before `launch`, or null: only some tiles' are wanted.
+  Real* all_gradients() const { return tiles_.size() ? nullptr : gradients_.data(); }
   /// Steps may be under way.
-  void launch() const {
-    m_.launch_overlapping(
+  void launch(const Passes<Real, StateReal>& passes) const {
+    if (tiles_.size()) {
+      passes.put_gradients({gradients_.data(), stride_, tiles_.data()},
+                           static_cast<Index>(tiles_.size()));
+    }
+    m_.launch_blocks(
         "move_surfels", move_surfels<Real, StateReal>, static_cast<unsigned>(blocks_.size()),
-        shared_bytes_, m_.fields(),
-        DeviceSurfels<Real, StateReal>{blocks_.data(), place_.data(), neighbours_.data(),
-                                       carriers_.data(), weights_.data(), position_.data(),
-                                       normal_.data(), displacement_.data(), moved_normal_.data()},
-        most_slots_);
+        shared_bytes_, tiles_.size() == 0, m_.fields(),
+        DeviceSurfels<Real, StateReal>{blocks_.data(), place_.data(), row_.data(), carriers_.data(),
+                                       position_.data(), normal_.data(), displacement_.data(),
+                                       moved_normal_.data(), gradients_.data(), stride_,
+                                       most_slots_});
   }
   void download(SurfelState& out) const {
     const std::vector<Vec3<StateReal>> displacement = fetched(displacement_),
@@ -127,19 +135,18 @@ class SurfelAdvection {
     }
   }
   std::size_t bytes() const {
-    return blocks_.bytes() + place_.bytes() + neighbours_.bytes() + carriers_.bytes() +
-           weights_.bytes() + position_.bytes() + normal_.bytes() + displacement_.bytes() +
-           moved_normal_.bytes();
+    return blocks_.bytes() + place_.bytes() + row_.bytes() + carriers_.bytes() + position_.bytes() +
+           normal_.bytes() + displacement_.bytes() + moved_normal_.bytes();
   }
 
  private:
   static_assert(surfel_block == tile_size);  // the threads of an overlapping launch
 
-  SurfelAdvection(const DeviceModel<Real, StateReal>& model, const SurfelPlan& plan)
+  SurfelAdvection(const DeviceModel<Real, StateReal>& model, bool all_gradients,
+                  const SurfelPlan& plan)
       : m_(model), order_(plan.order), most_slots_(plan.most_slots) {
     const Surfels& surfels = m_.model().surfels;
-    shared_bytes_ = Points<Real>::bytes * most_slots_ +
-                    static_cast<int>(sizeof(CarrierMotion<StateReal>)) * plan.most_block_carriers;
+    shared_bytes_ = CarrierMotions<StateReal>::bytes * most_slots_;
     if (shared_bytes_ > m_.most_shared_memory()) {
       throw InputError(m_.device().name + ": " + std::to_string(surfel_block) +
                        " surfels side by side and the phyxels that move them take " +
@@ -164,24 +171,48 @@ class SurfelAdvection {
     const std::string what = std::to_string(order_.size()) + " surfels";
     blocks_ = sent(blocks, what);
     place_ = sent(plan.place, what);
-    neighbours_ = sent(plan.neighbours, what);
-    carriers_ = sent(plan.carriers, what);
-    weights_ = sent(std::vector<Real>(plan.weights.begin(), plan.weights.end()), what);
+    if (all_gradients) {
+      row_ = sent(plan.place, what);
+      stride_ = m_.places();
+    } else {
+      tiles_ = sent(plan.tiles, what);
+      row_ = sent(rows_of(plan), what);
+      stride_ = plan.tiles.size() * tile_size;
+    }
+    gradients_ = {9 * stride_, what};
+    std::vector<DeviceCarrier<Real>> carriers;
+    for (const Carrier& c : plan.carriers) {
+      carriers.push_back({static_cast<Real>(c.weight), 16U * static_cast<unsigned>(c.slot)});
+    }
+    carriers_ = sent(carriers, what);
     position_ = sent(position, what);
     normal_ = sent(normal, what);
     displacement_ = {order_.size(), what};
     moved_normal_ = {order_.size(), what};
   }
 
+  /// Where each slot is among the tiles that carry surfels.
+  static std::vector<Index> rows_of(const SurfelPlan& plan) {
+    std::vector<Index> rows;
+    for (const Index place : plan.place) {
+      const auto tile = std::lower_bound(plan.tiles.begin(), plan.tiles.end(), place / tile_size) -
+                        plan.tiles.begin();
+      rows.push_back(static_cast<Index>(tile) * tile_size + place % tile_size);
+    }
+    return rows;
+  }
+
   const DeviceModel<Real, StateReal>& m_;
   std::vector<Index> order_;
   int most_slots_ = 0, shared_bytes_ = 0;
+  std::size_t stride_ = 0;
   DeviceArray<DeviceSurfelBlock<Real>> blocks_;
-  DeviceArray<Index> place_;
-  DeviceArray<std::uint16_t> neighbours_, carriers_;
-  DeviceArray<Real> weights_;
+  DeviceArray<Index> place_, row_;
+  DeviceArray<Index> tiles_;  // that have carriers; empty: gradients of all are found elsewhere
+  DeviceArray<DeviceCarrier<Real>> carriers_;
   DeviceArray<Vec3<Real>> position_, normal_;
   DeviceArray<Vec3<StateReal>> displacement_, moved_normal_;
+  DeviceArray<Real> gradients_;
 };
 
 }  // namespace phyxel::cuda
