@@ -1,4 +1,4 @@
-/// The cantilever that speed and error are measured on: what it settles to.
+/// The cantilever that speed and error are measured on: what it settles to, and the page about it.
 #include "cantilever.hpp"
 
 #include <gmock/gmock.h>
@@ -8,6 +8,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/model.hpp"
+#include "support/program.hpp"
 
 namespace phyxel {
 namespace {
@@ -16,6 +17,7 @@ using app::cantilever_scene;
 using app::settle;
 using app::Settled;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double factor = 1.4;  // 18 neighbours inside: the least work
 constexpr int threads = 1;      // two wait for each other on a busy machine
@@ -83,6 +85,27 @@ TEST(Cantilever, SaysSoIfItDoesNotSettle) {
     EXPECT_THAT(error.what(), HasSubstr("not settled"));
     EXPECT_THAT(error.what(), HasSubstr("allowed 1e-06"));
   }
+}
+
+class CantileverBench : public test::Program {};
+
+TEST_F(CantileverBench, PageHasASectionIfThereIsATable) {
+  std::filesystem::create_directory(folder_ / "tables");
+  const std::vector<std::string> page{"bench", "page", "--results", "tables", "--out", "page.md"};
+  ASSERT_EQ(run(page).code, 0);
+  EXPECT_THAT(test::text_of(folder_ / "page.md"), Not(HasSubstr("cantilever")));
+  // Double is measured although only float is asked for: it is what float is compared with.
+  const test::Outcome bench =
+      run({"bench", "cantilever", "--device", "cpu", "--across", "2,3", "--factor", "1.4",
+           "--precision", "float", "--csv", "tables/gpu_cantilever.csv"});
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  const test::Outcome made = run(page);
+  ASSERT_EQ(made.code, 0) << made.err;
+  const std::string text = test::text_of(folder_ / "page.md");
+  EXPECT_THAT(text, HasSubstr("## Speed against error: a cantilever"));
+  EXPECT_THAT(text, HasSubstr("From 2 to 3 phyxels across"));
+  EXPECT_THAT(text, HasSubstr("| 3 | 279 |"));
+  EXPECT_THAT(text, HasSubstr("rounding, float"));
 }
 
 }  // namespace
