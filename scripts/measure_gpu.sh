@@ -23,6 +23,7 @@ large=2097152,4096000,8000000,16974593
 step gpu_sizes step --phyxels "$small,$medium,$large" --terms green --seconds 0.2
 step gpu_terms step --phyxels 2097152
 step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
+step gpu_cantilever cantilever
 for body in dino alien_head horn_bug; do
   for count in 1 10 100; do
     step "gpu_small_${body}_$count" step --shape $body --bodies $count --terms green \

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "bench_page.hpp"
+#include "cantilever.hpp"
 #include "command.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
@@ -29,6 +30,7 @@ struct BenchOptions {
   std::vector<std::string> terms;
   std::string device = "cpu", csv, shape = "cube";
   int repeats = 5, bodies = 1;
+  std::vector<int> across;
   std::vector<double> factors = {NeighbourhoodRule{}.factor};
   double seconds = 0.3;
   bool force = false;
@@ -137,16 +139,19 @@ std::vector<Vec3d> exact_forces(const Model& model, const ChosenDevice& device) 
   return forces_of(*make_backend(model, Precision::double_, device, 0), deformed(model));
 }
 
-/// Largest difference of internal forces from the exact ones, over the largest of those.
-std::string force_error(const Model& model, Backend& backend, const std::vector<Vec3d>& exact) {
-  if (exact.empty()) return "";
-  const std::vector<Vec3d> force = forces_of(backend, deformed(model));
+/// Largest difference from the exact vectors, over the largest of those.
+std::string largest_error(const std::vector<Vec3d>& vectors, const std::vector<Vec3d>& exact) {
   double worst = 0, largest = 0;
-  for (std::size_t i = 0; i < force.size(); ++i) {
-    worst = std::max(worst, norm(force[i] - exact[i]));
+  for (std::size_t i = 0; i < vectors.size(); ++i) {
+    worst = std::max(worst, norm(vectors[i] - exact[i]));
     largest = std::max(largest, norm(exact[i]));
   }
   return fmt::format("{:.2e}", worst / largest);
+}
+
+/// Of internal forces; "" without exact ones.
+std::string force_error(const Model& model, Backend& backend, const std::vector<Vec3d>& exact) {
+  return exact.empty() ? "" : largest_error(forces_of(backend, deformed(model)), exact);
 }
 
 /// Rows go to the terminal as they come; the CSV file is written whole after each.
@@ -369,6 +374,63 @@ void bench_setup(const BenchOptions& options) {
   }
 }
 
+/// A cantilever of known deflection, settled in every precision on every cloud. Double comes first,
+/// asked for or not: it tells when the beam has settled, and how much of the others is rounding.
+void bench_cantilever(const BenchOptions& options) {
+  const ChosenDevice device = choose_device(options.device);
+  std::vector<Precision> precisions{Precision::double_};
+  for (const std::string& name : options.precisions) {
+    if (name != "double") precisions.push_back(precision_option(name));
+  }
+  Table table(options,
+              {"across", "factor", "precision", "path", "threads", "phyxels", "neighbours", "steps",
+               "seconds", "phyxel_steps_per_s", "deflection_m", "over_timoshenko",
+               "discretisation_error", "rounding_error", "last_change"},
+              gpu_facts(device));
+  for (const int across : options.across) {
+    for (const double factor : options.factors) {
+      const Scene scene = cantilever_scene(across, factor);
+      const Model model = make_model(scene, device);
+      const double n = model.size();
+      Settled exact;
+      for (const Precision precision : precisions) {
+        const auto backend = make_backend(model, precision, device, omp_get_max_threads());
+        const Settled beam = settle(scene, model, *backend, exact.frames);
+        if (precision == Precision::double_) exact = beam;
+        table.row({std::to_string(across), fmt::format("{:g}", factor), precision_name(precision),
+                   path_of(*backend), std::to_string(backend->threads()),
+                   std::to_string(model.size()),
+                   fmt::format("{:.1f}", static_cast<double>(model.pairs()) / n),
+                   std::to_string(beam.steps), fmt::format("{:.4g}", beam.seconds),
+                   fmt::format("{:.5g}", static_cast<double>(beam.steps) * n / beam.seconds),
+                   fmt::format("{:.9g}", beam.deflection),
+                   fmt::format("{:.5f}", beam.deflection / timoshenko_deflection()),
+                   fmt::format("{:.3e}", std::abs(beam.deflection / known_deflection() - 1)),
+                   largest_error(beam.state.displacement, exact.state.displacement),
+                   fmt::format("{:.1e}", beam.change)});
+      }
+    }
+  }
+}
+
+void add_table_options(CLI::App& command, BenchOptions& options) {
+  command.add_option("--csv", options.csv, "Also write the table to this file");
+  command.add_flag("--force", options.force, "Replace the CSV file");
+}
+
+void add_factors(CLI::App& command, BenchOptions& options) {
+  command
+      .add_option("--factor", options.factors,
+                  "Supports, as multiples of the mean distance to the 10 nearest")
+      ->delimiter(',')
+      ->check(CLI::Range(1.0, 4.0));
+}
+
+void add_device_options(CLI::App& command, BenchOptions& options) {
+  command.add_option("--device", options.device, device_help)->capture_default_str();
+  command.add_option("--precision", options.precisions, "float, double, mixed")->delimiter(',');
+}
+
 CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
                        std::vector<Index> sizes, void (*body)(const BenchOptions&)) {
   CLI::App* command = bench.add_subcommand(name, what);
@@ -382,14 +444,10 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   command->add_option("--threads", options->threads, "Thread counts, comma separated")
       ->delimiter(',')
       ->check(CLI::Range(1, 4096));
-  command->add_option("--csv", options->csv, "Also write the table to this file");
+  add_table_options(*command, *options);
   command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
-  command->add_flag("--force", options->force, "Replace the CSV file");
-  if (std::string(name) != "neighbours") {
-    command->add_option("--device", options->device, device_help)->capture_default_str();
-    command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
-  }
+  if (std::string(name) != "neighbours") add_device_options(*command, *options);
   if (std::string(name) == "step") {
     command
         ->add_option("--terms", options->terms,
@@ -397,11 +455,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
         ->delimiter(',');
     command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
         ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
-    command
-        ->add_option("--factor", options->factors,
-                     "Supports, as multiples of the mean distance to the 10 nearest")
-        ->delimiter(',')
-        ->check(CLI::Range(1.0, 4.0));
+    add_factors(*command, *options);
     command->add_option("--bodies", options->bodies, "How many of them, side by side")
         ->check(CLI::Range(1, 100'000));
     command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
@@ -409,6 +463,24 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   }
   command->callback([options, body] { body(*options); });
   return command;
+}
+
+void add_bench_cantilever(CLI::App& bench) {
+  CLI::App* command = bench.add_subcommand(
+      "cantilever", "Time to the known deflection of a beam, beside discretisation and rounding");
+  auto options = std::make_shared<BenchOptions>();
+  options->across = {4, 6, 8, 12, 16, 24};
+  options->factors = {1.4, 1.6, 1.8, 2};
+  command
+      ->add_option("--across", options->across,
+                   "Phyxels across the height, which is a tenth of the length")
+      ->delimiter(',')
+      ->check(CLI::Range(2, 200))
+      ->capture_default_str();
+  add_factors(*command, *options);
+  add_device_options(*command, *options);
+  add_table_options(*command, *options);
+  command->callback([options] { bench_cantilever(*options); });
 }
 
 }  // namespace
@@ -423,6 +495,7 @@ void add_bench(CLI::App& program) {
   add_bench_of(*bench, "neighbours",
                "Neighbour search: time per phyxel against the number of phyxels",
                {10648, 103823, 1000000, 9938375}, bench_neighbours);
+  add_bench_cantilever(*bench);
 
   CLI::App* page = bench->add_subcommand("page", "Write the page about the GPU from its tables");
   auto results = std::make_shared<std::string>("docs/results");

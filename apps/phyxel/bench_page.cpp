@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "cantilever_page.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
 #include "phyxel/error.hpp"
@@ -51,6 +52,7 @@ class Page {
     with("gpu_sizes.csv", [&](const CsvTable& t) { sizes(t); });
     with("gpu_small.csv", [&](const CsvTable& t) { small(t); });
     with("gpu_neighbours.csv", [&](const CsvTable& t) { neighbours(t); });
+    with("gpu_cantilever.csv", [&](const CsvTable& t) { cantilever(t); });
     with("gpu_terms.csv", [&](const CsvTable& t) { terms(t); });
     with("gpu_setup.csv", [&](const CsvTable& t) { setup(t); });
     with("gpu_profile.csv", [&](const CsvTable& t) { profile(t); });
@@ -77,7 +79,7 @@ class Page {
   static std::string rate(const CsvTable& t, std::size_t r) {
     return fmt::format("{:.3g}", t.number(r, "phyxel_steps_per_s") * 1e-9);
   }
-  /// A curve for each precision, drawn where gnuplot is.
+  /// A curve for each precision.
   void speeds(const CsvTable& t, const std::string& name, const std::string& title,
               const std::string& x, const std::string& x_label, bool logarithmic) {
     LineChart chart{.title = title,
@@ -94,9 +96,13 @@ class Page {
         curve.y.push_back(t.number(r, "phyxel_steps_per_s") * 1e-9);
       }
     }
+    figure(chart, name);
+  }
+  /// Drawn where gnuplot is, shown where it was.
+  void figure(const LineChart& chart, const std::string& name) {
     const fs::path file = results_ / (name + ".svg");
     if (can_plot()) draw_svg(script_of(chart), file);
-    if (fs::exists(file)) text_ += fmt::format("![{}]({}{}.svg)\n\n", title, link_, name);
+    if (fs::exists(file)) text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_, name);
   }
 
   void sizes(CsvTable t) {
@@ -188,6 +194,14 @@ class Page {
     text_ += table_text({"neighbours", "precision", "10⁹ phyxel-steps/s",
                          "10⁹ pairs/s, both passes", "bytes held a phyxel", "error"},
                         rows);
+  }
+
+  void cantilever(const CsvTable& t) {
+    text_ += "## Speed against error: a cantilever\n\n";
+    measured_by(t);
+    text_ += cantilever_words(t);
+    figure(cantilever_chart(t), "gpu_cantilever");
+    text_ += cantilever_table(t);
   }
 
   void terms(const CsvTable& t) {

@@ -81,8 +81,9 @@ std::string script_of(const LineChart& chart) {
       script += number(curve.x[k]) + " " + number(curve.y[k]) + "\n";
     }
     script += "EOD\n";
-    plots += fmt::format("{}$curve{} using 1:2 with linespoints lt {} title {}", c ? ", " : "", c,
-                         c + 1, quoted(curve.label));
+    plots += fmt::format("{}$curve{} using 1:2 with linespoints lt {}{} title {}", c ? ", " : "", c,
+                         curve.colour ? curve.colour : c + 1, curve.dashed ? " dt 2" : "",
+                         quoted(curve.label));
   }
   return script + "plot " + plots + "\n";
 }

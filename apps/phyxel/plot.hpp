@@ -10,6 +10,8 @@ namespace phyxel::app {
 struct Curve {
   std::string label;
   std::vector<double> x, y;  ///< Of one length.
+  int colour = 0;            ///< 1 to 6; 0: by its place in the chart.
+  bool dashed = false;
 };
 
 struct LineChart {
