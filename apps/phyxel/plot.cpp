@@ -94,7 +94,8 @@ std::string script_of(const BarChart& chart) {
       "set style data histogram\nset style histogram clustered gap 1\n"
       "set style fill solid noborder\nset boxwidth 0.9\nset xtics noenhanced font ',12'\n";
   // Groups stand at 0, 1, 2 …; gnuplot's own range leaves room for two more.
-  script += fmt::format("set xrange [-0.6:{}]\n", number(chart.groups.size() - 0.4));
+  script +=
+      fmt::format("set xrange [-0.6:{}]\n", number(static_cast<double>(chart.groups.size()) - 0.4));
   if (chart.log_y) {
     double lowest = HUGE_VAL;
     for (const auto& series : chart.series) {

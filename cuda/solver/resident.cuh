@@ -468,31 +468,18 @@ __global__ void __launch_bounds__(Post::threads)
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_pairs(r, slice.rows[0], memory.pairs);
   if (r.longest[1]) fetch_pairs(r, slice.rows[1], memory.second_pairs);
-  let_next_launch_begin();
-  wait_for_last_launch();
-
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
-  typename Points<Real>::Value point{};
-  Vec3<StateReal> velocity, displacement;
   Sym3<Real> inverse_moment;
-  Vec3<Real> moment_offset, load;
+  Vec3<Real> moment_offset;
   Real volume{}, inverse_mass{};
   if (owner) {
-    point = f.points.get(place);
-    velocity = column3(f.velocity, f.places, place);
-    if constexpr (std::is_same_v<Real, StateReal>) {
-      displacement = point.u;
-    } else {
-      displacement = column3(f.displacement, f.places, place);
-    }
     const Real* c = f.moment_constants + place;
     inverse_moment = {
         c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
     volume = c[6 * f.places];
     moment_offset = column3(f.force_constants, f.places, place);
     inverse_mass = f.force_constants[3 * f.places + place];
-    if (f.load) load = column3(f.load, f.places, place);
   }
   const bool somebody = owner && inverse_mass != Real(0);
   const int warp = thread / warp_size;
@@ -501,22 +488,40 @@ __global__ void __launch_bounds__(Post::threads)
   wait_for_copies();
   Post post(r, slice, memory, f.places, first_tag);  // all threads meet
 
-  // The displacements of all, then this phyxel's gradient.
-  const auto find_gradient = [&] {
+  let_next_launch_begin();
+  wait_for_last_launch();
+  typename Points<Real>::Value point{};
+  Vec3<StateReal> velocity, displacement;
+  Vec3<Real> load;
+  if (owner) {
+    point = f.points.get(place);
+    velocity = column3(f.velocity, f.places, place);
+    if constexpr (std::is_same_v<Real, StateReal>) {
+      displacement = point.u;
+    } else {
+      displacement = column3(f.displacement, f.places, place);
+    }
+    if (f.load) load = column3(f.load, f.places, place);
+  }
+  // Half a step more for the gradients of the last displacements.
+  for (int step = 0; step < steps + (gradients ? 1 : 0); ++step) {
     const Real u[] = {point.u.x, point.u.y, point.u.z};
     post.template send<u_letters>(0, memory.displacements, place, somebody, u);
     post.template receive<u_letters>(0, memory.displacements);
-    Mat3<Real> sum;
-    walk_pairs<Real, u_letters>(
-        memory.pairs + thread, length, memory.displacements, [&](const Real* u_j, Vec3<Real> wx) {
-          add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
-        });
-    return displacement_gradient(sum, inverse_moment);
-  };
-  for (int step = 0; step < steps; ++step) {
-    const Mat3<Real> grad_u = find_gradient();
     Mat3<Real> q;
-    if (owner) q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
+    if (owner) {
+      Mat3<Real> sum;
+      walk_pairs<Real, u_letters>(
+          memory.pairs + thread, length, memory.displacements, [&](const Real* u_j, Vec3<Real> wx) {
+            add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
+          });
+      const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
+      if (step == steps) {
+        for (int e = 0; e < 9; ++e) gradients[e * f.places + place] = grad_u(e / 3, e % 3);
+      }
+      q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
+    }
+    if (step == steps) break;
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1),
                             q(1, 2), q(2, 0), q(2, 1), q(2, 2)};
     post.template send<q_letters>(1, memory.stresses, place, somebody, numbers);
@@ -542,10 +547,6 @@ __global__ void __launch_bounds__(Post::threads)
     }
   }
 
-  if (gradients) {
-    const Mat3<Real> grad_u = find_gradient();
-    for (int e = 0; e < 9 && owner; ++e) gradients[e * f.places + place] = grad_u(e / 3, e % 3);
-  }
   post.finish();
   if (!somebody) return;
   f.points.set(place, point);
