@@ -125,9 +125,11 @@ class Run {
         stepping_since = Clock::now();
       }
     } catch (const DivergedError& error) {
-      throw DivergedError(with_last_good_state(error, progress));
+      throw DivergedError(with_last_good_state(error.what(), progress));
     } catch (const DeviceError& error) {
-      throw DeviceError(with_last_good_state(error, progress));
+      throw DeviceError(with_last_good_state(error.what(), progress));
+    } catch (const std::bad_alloc&) {
+      throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
     }
     writer_.finish();
     progress.finish();
@@ -144,12 +146,12 @@ class Run {
   static constexpr double watch_share = 50;
 
   /// Writes it, and says so.
-  std::string with_last_good_state(const Error& error, Progress& progress) {
+  std::string with_last_good_state(const char* error, Progress& progress) {
     progress.finish();
     write_state();
     writer_.finish();
-    return fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(),
-                       good_->state.time, checkpoint_.string());
+    return fmt::format("{}; the last good state, at t = {:g} s, is {}", error, good_->state.time,
+                       checkpoint_.string());
   }
 
   double speed() const {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -293,6 +294,54 @@ density = 1000
   const Outcome outcome = run({"run", "huge.toml"});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("memory"));
+}
+
+TEST_F(Program, MemoryThatRunsOutLeavesTheLastGoodState) {
+  if (PHYXEL_SANITIZED) GTEST_SKIP() << "sanitizers reserve more addresses than any limit allows";
+  write("large.toml", R"(
+gravity = [0.0, 0.0, -9.81]
+[time]
+end = 10
+[output]
+directory = "out"
+frames_per_second = 50
+surface = false
+[[body]]
+shape = "block"
+size = [1, 1, 1]
+phyxels = 250000
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+)");
+  // Large arrays come from the system each time and go back to it.
+  environment_ = {{"MALLOC_MMAP_THRESHOLD_", "131072"}};
+  const pid_t child = start({"run", "large.toml"});
+  const auto lines = [&] {
+    const std::string log = text_of(folder_ / "out" / "energy.csv");
+    return std::count(log.begin(), log.end(), '\n');
+  };
+  // The log comes last: nothing is written until the next frame.
+  for (int wait = 0; wait < 12000 && lines() < 3; ++wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  std::size_t pages = 0;
+  std::ifstream("/proc/" + std::to_string(child) + "/statm") >> pages;
+  // 40 MB more than now: energies need some 60, a checkpoint 20.
+  const rlim_t bytes = pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + 40'000'000;
+  const rlimit limit{bytes, bytes};
+  ASSERT_EQ(prlimit(child, RLIMIT_AS, &limit, nullptr), 0);
+  const Outcome outcome = finish(child);
+  EXPECT_EQ(outcome.code, 2) << outcome.out << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("out of memory"));
+  EXPECT_THAT(outcome.err, HasSubstr("last good state"));
+  const auto file = latest_checkpoint(folder_ / "out");
+  ASSERT_TRUE(file.has_value());
+  const Checkpoint checkpoint = read_checkpoint(*file);
+  EXPECT_GE(checkpoint.info.frames_written, 2);
+  EXPECT_EQ(read_series(folder_ / "out" / "phyxels.hdf.series").size(),
+            static_cast<std::size_t>(checkpoint.info.frames_written));
 }
 
 /// A file system of its own, unmounted at the end.
