@@ -1,9 +1,11 @@
 /// phyxel run: a scene, simulated, written and drawn.
 #include <fmt/format.h>
+#include <omp.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
+#include "background_writer.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
@@ -26,7 +28,16 @@ struct RunOptions {
   bool json = false;
 };
 
-/// One run from its plan to its summary.
+/// A state that passed the watch.
+struct GoodState {
+  State state;
+  Diagnostics diagnostics;
+};
+
+/// One run from its plan to its summary. Files are written on a thread of their own, while stepping
+/// goes on if a core is left for that. HDF5 is not made for threads: after the constructor that
+/// thread alone uses it, until all is written. At most two frames are held, the one being written
+/// and one that waits, and the last good state, which often is that of the latter.
 class Run {
  public:
   Run(const RunOptions& options)
@@ -60,10 +71,9 @@ class Run {
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
     peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
     StabilityWatch watch(model_, now);
-    good_ = solver.state();
-    good_diagnostics_ = now;
+    good_ = good_state(now);
     // Without a rate only the last frame is wanted.
-    if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_, now);
+    if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
 
     StopSignal signals;
     Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr,
@@ -75,6 +85,7 @@ class Run {
       double look_seconds = 0;
       while (solver.steps() < plan_.steps) {
         solver.step();
+        writer_.check();
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
         const bool stop = StopSignal::stop_requested() != 0;
@@ -88,22 +99,23 @@ class Run {
 
         backend.wait();
         step_seconds_ += seconds_since(stepping_since);
+        if (frame) writer_.wait_for_room();
         const auto look_start = Clock::now();
         now = diagnose(model_, backend, solver.steps(), solver.dt());
         watch.check(now);
         peak_energy_ =
             std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
-        State state = solver.state();
+        auto good = good_state(now);
         look_seconds = seconds_since(look_start);
-        if (frame) write_frame(state, now);
-        // Only now: a checkpoint of a state counts its frame as written.
-        good_ = std::move(state);
-        good_diagnostics_ = now;
+        if (frame) write_frame(good);
+        // Only now: a checkpoint of a state counts its frame as written, so that comes first.
+        good_ = std::move(good);
         if (last || stop || due) {
           write_state();
           last_checkpoint = Clock::now();
         }
         if (stop && !last) {
+          writer_.finish();
           progress.finish();
           throw Error(ExitCode::stopped,
                       fmt::format("stopped by signal {} at t = {:g} s (step {}); the checkpoint is "
@@ -113,10 +125,13 @@ class Run {
         stepping_since = Clock::now();
       }
     } catch (const DivergedError& error) {
-      throw DivergedError(with_last_good_state(error, progress));
+      throw DivergedError(with_last_good_state(error.what(), progress));
     } catch (const DeviceError& error) {
-      throw DeviceError(with_last_good_state(error, progress));
+      throw DeviceError(with_last_good_state(error.what(), progress));
+    } catch (const std::bad_alloc&) {
+      throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
     }
+    writer_.finish();
     progress.finish();
     loop_seconds_ = seconds_since(loop_start_);
     if (scene_.render.pictures && !options_.no_pictures) {
@@ -131,10 +146,11 @@ class Run {
   static constexpr double watch_share = 50;
 
   /// Writes it, and says so.
-  std::string with_last_good_state(const Error& error, Progress& progress) {
+  std::string with_last_good_state(const char* error, Progress& progress) {
     progress.finish();
     write_state();
-    return fmt::format("{}; the last good state, at t = {:g} s, is {}", error.what(), good_.time,
+    writer_.finish();
+    return fmt::format("{}; the last good state, at t = {:g} s, is {}", error, good_->state.time,
                        checkpoint_.string());
   }
 
@@ -183,14 +199,33 @@ class Run {
     return begin_->state;
   }
 
-  void write_frame(const State& state, const Diagnostics& now) {
-    SurfelState surfels;
+  std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const {
+    return std::make_shared<const GoodState>(GoodState{solver_.state(), now});
+  }
+
+  /// Whether one is left for the writer. Threads that step on all of them wait for one another
+  /// twice a step, and lose more to a writer that comes between than writing beside them saves.
+  bool core_is_left() const {
+    if (device_.gpu) return true;
+    const int threads = scene_.solver.threads > 0 ? scene_.solver.threads : omp_get_max_threads();
+    return threads < omp_get_num_procs();
+  }
+
+  /// What writes files, to the writer.
+  void hand_over(std::function<void()> job) {
+    writer_.submit(std::move(job));
+    if (!core_is_left()) writer_.finish();
+  }
+
+  /// Takes what the frame needs from the backend now; it is written in the background.
+  void write_frame(const std::shared_ptr<const GoodState>& good) {
+    const auto surfels = std::make_shared<SurfelState>();
     Frame frame;
-    frame.state = &state;
-    frame.diagnostics = now;
+    frame.state = &good->state;
+    frame.diagnostics = good->diagnostics;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
-      backend_->advect_surfels(surfels);
-      frame.surfels = &surfels;
+      backend_->advect_surfels(*surfels);
+      frame.surfels = surfels.get();
     }
     const auto wanted = [&](const char* field) {
       const auto& fields = scene_.output.fields;
@@ -200,20 +235,22 @@ class Run {
       stress_fields(model_, *backend_, wanted("von_mises") ? &frame.von_mises : nullptr,
                     wanted("volume_ratio") ? &frame.volume_ratio : nullptr);
     }
-    recorder_.write(frame);
+    hand_over([this, good, surfels, frame = std::move(frame)] { recorder_.write(frame); });
   }
 
-  /// The last good one.
+  /// The last good one, in the background, after the frames handed over before.
   void write_state() {
-    CheckpointInfo info;
-    info.program = program_version();
-    info.precision = scene_.solver.precision;
-    info.scene_text = scene_.text;
-    info.model_digest = model_digest(model_);
-    info.total_energy = good_diagnostics_.total_energy();
-    info.initial_energy = initial_energy_;
-    info.frames_written = recorder_.frames_written();
-    checkpoint_ = write_checkpoint(recorder_.directory(), good_, info);
+    hand_over([this, good = good_] {
+      CheckpointInfo info;
+      info.program = program_version();
+      info.precision = scene_.solver.precision;
+      info.scene_text = scene_.text;
+      info.model_digest = model_digest(model_);
+      info.total_energy = good->diagnostics.total_energy();
+      info.initial_energy = initial_energy_;
+      info.frames_written = recorder_.frames_written();
+      checkpoint_ = write_checkpoint(recorder_.directory(), good->state, info);
+    });
   }
 
   void say_plan() const {
@@ -332,13 +369,13 @@ class Run {
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_;
   Recorder recorder_;
-  State good_;  // the last state that passed the watch
-  Diagnostics good_diagnostics_;
+  std::shared_ptr<const GoodState> good_;  // the last one
   double initial_energy_ = 0, peak_energy_ = 0;
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;
   std::vector<std::filesystem::path> pictures_;
+  BackgroundWriter writer_;  // last: it ends first, and its jobs use the recorder
 };
 
 void run(const RunOptions& options) { Run(options).execute(); }

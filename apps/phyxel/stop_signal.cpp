@@ -1,13 +1,16 @@
 #include "stop_signal.hpp"
 
+#include <atomic>
 #include <csignal>
 #include <initializer_list>
 
 namespace phyxel::app {
 namespace {
 
-volatile std::sig_atomic_t stop = 0;
-volatile std::sig_atomic_t checkpoint = 0;
+// Atomic, because a signal may come to any thread of the program.
+std::atomic<int> stop = 0;
+std::atomic<bool> checkpoint = false;
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 void ask_to_stop(int signal) {
   if (stop != 0) {  // asked twice: do not wait for the end of the step
@@ -17,7 +20,7 @@ void ask_to_stop(int signal) {
   stop = signal;
 }
 
-void ask_for_checkpoint(int) { checkpoint = 1; }
+void ask_for_checkpoint(int) { checkpoint = true; }
 
 void handle(int signal, void (*handler)(int)) {
   struct sigaction action = {};
@@ -31,7 +34,7 @@ void handle(int signal, void (*handler)(int)) {
 
 StopSignal::StopSignal() {
   stop = 0;
-  checkpoint = 0;
+  checkpoint = false;
   for (const int signal : {SIGINT, SIGTERM, SIGUSR2}) handle(signal, ask_to_stop);
   handle(SIGUSR1, ask_for_checkpoint);
 }
@@ -42,10 +45,6 @@ StopSignal::~StopSignal() {
 
 int StopSignal::stop_requested() { return stop; }
 
-bool StopSignal::checkpoint_requested() {
-  const bool asked = checkpoint != 0;
-  checkpoint = 0;
-  return asked;
-}
+bool StopSignal::checkpoint_requested() { return checkpoint.exchange(false); }
 
 }  // namespace phyxel::app

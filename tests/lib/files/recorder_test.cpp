@@ -9,6 +9,7 @@
 
 #include "phyxel/error.hpp"
 #include "support/folder.hpp"
+#include "support/two_bodies.hpp"
 
 namespace phyxel {
 namespace {
@@ -17,51 +18,14 @@ namespace fs = std::filesystem;
 using test::text_of;
 using ::testing::HasSubstr;
 
-/// Two bodies of two and three phyxels; the surface is one tetrahedron, of the second body.
-Model small_model() {
-  Model model;
-  model.position = {{0, 0, 0}, {1, 0, 0}, {5, 0, 0}, {5, 1, 0}, {5, 0, 1}};
-  model.mass = {1, 2, 3, 4, 5};
-  model.volume = {0.1, 0.2, 0.3, 0.4, 0.5};
-  model.parts.resize(2);
-  model.parts[0].end = 2;
-  model.parts[1] = {.name = "second", .begin = 2, .end = 5, .surfel_begin = 0, .surfel_end = 4};
-  model.surfels.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  model.surfels.normal = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  model.surfels.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
-  return model;
-}
-
 class Recording : public test::Folder {
  protected:
-  Recording() {
-    scene_.title = "two bodies";
-    scene_.text = "title = \"two bodies\"\n";
-    scene_.time.end = 1;
-    scene_.output.directory = folder_ / "out";
-    scene_.output.fields = {"displacement", "velocity", "von_mises",
-                            "volume_ratio", "mass",     "volume"};
-  }
-  /// Frame number `k`: everything moved by k in x.
   void record(Recorder& recorder, int k) const {
-    State state;
-    state.displacement.assign(5, Vec3d{0.5 * k, 0, 0});
-    state.velocity.assign(5, Vec3d{0, 0.25 * k, 0});
-    SurfelState surfels{model_.surfels.position, model_.surfels.normal};
-    for (Vec3d& p : surfels.position) p.x += 0.5 * k;
-    Frame frame;
-    frame.state = &state;
-    frame.surfels = &surfels;
-    frame.von_mises.assign(5, 100.0 * k);
-    frame.volume_ratio.assign(5, 1.0);
-    frame.diagnostics.step = 10 * k;
-    frame.diagnostics.time = 0.1 * k;
-    frame.diagnostics.kinetic_energy = k;
-    recorder.write(frame);
+    recorder.write(test::TwoBodiesFrame(model_, k).frame());
   }
 
-  Model model_ = small_model();
-  Scene scene_;
+  Model model_ = test::two_bodies();
+  Scene scene_ = test::two_bodies_scene(folder_ / "out");
 };
 
 TEST_F(Recording, FramesComeBack) {
