@@ -24,17 +24,29 @@ step gpu_sizes step --phyxels "$small,$medium,$large" --terms green --seconds 0.
 step gpu_terms step --phyxels 2097152
 step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
 step gpu_cantilever cantilever
+# One table of several: one <table> <first>...
+one() {
+  local table=$1 part
+  shift
+  sed '/^[^#]/q' "$out/$1.csv" >"$out/$table.csv"
+  for part in "$@"; do
+    grep -v '^#' "$out/$part.csv" | tail -n +2 >>"$out/$table.csv"
+    rm "$out/$part.csv"
+  done
+}
+small=()
+surfels=()
 for body in dino alien_head horn_bug; do
   for count in 1 10 100; do
     step "gpu_small_${body}_$count" step --shape $body --bodies $count --terms green \
       --precision float
+    small+=("gpu_small_${body}_$count")
   done
+  step "gpu_surfels_$body" step --shape $body --terms green,surfels --precision float
+  surfels+=("gpu_surfels_$body")
 done
-# One table of them all.
-sed '$d' "$out/gpu_small_dino_1.csv" >"$out/gpu_small.csv"
-for table in "$out"/gpu_small_*.csv; do
-  tail -n 1 "$table" >>"$out/gpu_small.csv"
-  rm "$table"
-done
+step gpu_surfels_cube step --phyxels 27000,103823,1000000 --terms green,surfels --precision float
+one gpu_small "${small[@]}"
+one gpu_surfels "${surfels[@]}" gpu_surfels_cube
 step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
 step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3

@@ -31,7 +31,9 @@ class CudaBackend final : public Backend {
   std::string name() const override {
     const char* precision = m_.mixed ? "mixed" : sizeof(Real) == 4 ? "float" : "double";
     const std::string path =
-        residence_ ? residence_->describe() : "tiles of " + std::to_string(tile_size);
+        residence_ ? residence_->describe()
+                   : "tiles of " + std::to_string(tile_size) +
+                         (recorded_ ? ", graphs of " + std::to_string(graph_steps) + " steps" : "");
     return m_.device().name + ", " + precision + ", " + path;
   }
   Index size() const override { return m_.size(); }
