@@ -80,11 +80,11 @@ inline constexpr int displacement_letters = 3 / Mail<Real>::numbers;
 template <class Real>
 inline constexpr int stress_letters = 9 / Mail<Real>::numbers;
 
-/// A neighbour of a phyxel: w_ij x_ij and its slot.
+/// A neighbour of a phyxel: w_ij x_ij and its slot. Whole 16-byte words, with nothing left over.
 template <class Real>
 struct alignas(16) Pair {
   Vec3<Real> wx;
-  unsigned slot;
+  std::conditional_t<sizeof(Real) == 4, unsigned, unsigned long long> slot;
 };
 
 /// `ResidentPlan` in device memory.
@@ -385,7 +385,7 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
          k += static_cast<int>(blockDim.x)) {
       const int p = k % slice_size;
       const std::uint16_t entry = entries[rows.first_entry + k];
-      Pair<Real> pair{{}, static_cast<unsigned>(p)};  // its own: zero from itself
+      Pair<Real> pair{{}, static_cast<decltype(Pair<Real>::slot)>(p)};  // its own: zero from itself
       if (!(entry & far_entry)) {
         const auto own = static_cast<std::size_t>(slice.first_place) + p;
         const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
@@ -429,7 +429,8 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
     for (int k = 0; k < pair_group; ++k) {
       wx[k] = ahead[k].wx;
 #pragma unroll
-      for (int l = 0; l < letters; ++l) got[k][l] = image.letters[l * image.slots + ahead[k].slot];
+      for (int l = 0; l < letters; ++l)
+        got[k][l] = image.letters[l * image.slots + static_cast<int>(ahead[k].slot)];
     }
     pairs += pair_group * slice_size;
     if (left > pair_group) {
