@@ -11,6 +11,7 @@ find_package(OpenMP REQUIRED COMPONENTS CXX)
 if(NOT PHYXEL_FUZZ)  # the program and its tests
   find_package(CLI11 REQUIRED)
   find_package(PNG REQUIRED)
+  find_package(METIS REQUIRED)
 endif()
 
 # phyxel_header_library(NAME header debian-package [definition...]): a library that is one header.

@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "command.hpp"
 #include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
+#include "info_partition.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 
@@ -226,15 +228,34 @@ void add_info(CLI::App& program) {
   struct Options {
     fs::path file;
     bool json = false;
+    std::optional<int> parts;
+    std::string partitioner = "metis";
   };
   auto options = std::make_shared<Options>();
   command->add_option("file", options->file, "File or folder")->required();
   command->add_flag("--json", options->json, "As JSON");
+  CLI::Option* partition =
+      command
+          ->add_option("--partition", options->parts,
+                       "Cut a scene into so many parts in every way there is, and show what they "
+                       "would exchange")
+          ->check(CLI::Range(1, 100'000));
+  command
+      ->add_option("--partitioner", options->partitioner,
+                   "Whose plan is shown: metis, curve, bisection")
+      ->needs(partition)
+      ->capture_default_str();
   command->footer(
       "Examples:\n"
       "  phyxel info out/dino\n"
+      "  phyxel info scene.toml --partition 8\n"
       "  phyxel info out/dino/phyxels_000010.hdf --json");
   command->callback([options] {
+    if (options->parts) {
+      const Facts facts = partition_facts(options->file, *options->parts, options->partitioner);
+      fmt::print("{}", options->json ? facts.dump(2) + "\n" : partition_tables(facts));
+      return;
+    }
     const Facts facts = facts_of(options->file);
     if (options->json) {
       fmt::print("{}\n", facts.dump(2));

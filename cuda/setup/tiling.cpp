@@ -15,36 +15,16 @@
 namespace phyxel::cuda {
 namespace {
 
-/// Phyxels of one body along the curve.
-std::vector<Index> curve_order(const Model& model, const Part& part) {
-  if (part.begin == part.end) return {};
-  Vec3d low = model.position[part.begin], high = low;
-  for (Index i = part.begin; i < part.end; ++i) {
-    const Vec3d x = model.position[i];
-    low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
-    high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
-  }
-  const HilbertFrame frame = HilbertFrame::around(low, high);
-  std::vector<std::pair<std::uint64_t, Index>> keys(
-      static_cast<std::size_t>(part.end - part.begin));
-#pragma omp parallel for schedule(static)
-  for (Index i = part.begin; i < part.end; ++i) {
-    keys[static_cast<std::size_t>(i - part.begin)] = {frame.key_of(model.position[i]), i};
-  }
-  std::sort(keys.begin(), keys.end());
-  std::vector<Index> order;
-  order.reserve(keys.size());
-  for (const auto& key : keys) order.push_back(key.second);
-  return order;
-}
-
 /// Bodies one after the other, each from the start of a tile. Within a tile long lists come first,
 /// so that the lanes of a warp have about equally many neighbours.
 void place_phyxels(const Model& model, Tiling& tiling) {
   const Csr& lists = model.neighbourhood.neighbours;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
-    std::vector<Index> order = curve_order(model, model.parts[p]);
+    const Part& part = model.parts[p];
+    std::vector<Index> order =
+        curve_order(std::span(model.position).subspan(part.begin, part.end - part.begin));
+    for (Index& i : order) i += part.begin;
     for (std::size_t begin = 0; begin < order.size(); begin += tile_size) {
       const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin);
       const auto last =

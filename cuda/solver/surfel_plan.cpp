@@ -8,24 +8,6 @@
 namespace phyxel::cuda {
 namespace {
 
-/// Surfels of a body along Hilbert's curve.
-std::vector<Index> curve_order(const Model& model, Index begin, Index end) {
-  const std::vector<Vec3d>& position = model.surfels.position;
-  Vec3d low = position[begin], high = low;
-  for (Index s = begin; s < end; ++s) {
-    const Vec3d x = position[s];
-    low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
-    high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
-  }
-  const HilbertFrame frame = HilbertFrame::around(low, high);
-  std::vector<std::pair<std::uint64_t, Index>> keys;
-  for (Index s = begin; s < end; ++s) keys.emplace_back(frame.key_of(position[s]), s);
-  std::sort(keys.begin(), keys.end());
-  std::vector<Index> order;
-  for (const auto& [key, s] : keys) order.push_back(s);
-  return order;
-}
-
 int filled_up(int count, int group) { return (count + group - 1) / group * group; }
 
 void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place,
@@ -76,8 +58,10 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
   SurfelPlan plan;
   for (const Part& part : model.parts) {
     if (part.surfel_begin == part.surfel_end) continue;
-    const std::vector<Index> order = curve_order(model, part.surfel_begin, part.surfel_end);
-    plan.order.insert(plan.order.end(), order.begin(), order.end());
+    const std::vector<Index> order =
+        curve_order(std::span(model.surfels.position)
+                        .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin));
+    for (const Index s : order) plan.order.push_back(part.surfel_begin + s);
     for (Index first = part.surfel_begin; first < part.surfel_end; first += surfel_block) {
       SurfelBlock block;
       block.first_surfel = first;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "phyxel/types.hpp"
 
@@ -61,5 +63,8 @@ struct HilbertFrame {
     return static_cast<std::uint32_t>(at < 0 ? 0 : at > cells ? cells : at);
   }
 };
+
+/// Points along the curve over their box; those of one cell in the order of their indices.
+std::vector<Index> curve_order(std::span<const Vec3d> position);
 
 }  // namespace phyxel

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
@@ -275,6 +276,34 @@ TEST_F(Program, BenchPageIsMadeOfTheTables) {
   EXPECT_THAT(text, HasSubstr("| 27 | float | 1 thread:"));
   EXPECT_THAT(text, HasSubstr("| 64 | double | 1 thread:"));
   EXPECT_EQ(text.find("What each term costs"), std::string::npos);  // that table is not there
+}
+
+TEST_F(Program, InfoCutsAScene) {
+  write_beam();
+  replace_in_beam("spacing = 0.05", "spacing = 0.025");  // six tiles
+  const Outcome outcome = run({"info", "beam.toml", "--partition", "3", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto facts = nlohmann::json::parse(outcome.out);
+  ASSERT_EQ(facts["plans"].size(), 3U);
+  std::size_t phyxels = 0, ghosts = 0;
+  for (const auto& plan : facts["plans"]) {
+    phyxels += plan["phyxels"].get<std::size_t>();
+    ghosts += plan["ghosts"][0].get<std::size_t>();
+  }
+  EXPECT_EQ(phyxels, facts["phyxels"].get<std::size_t>());
+  for (const auto& cut : facts["cuts"]) {
+    if (cut["cut"] != "tiles" || cut["partitioner"] != "metis") continue;
+    EXPECT_EQ(ghosts, cut["ghosts"].get<std::size_t>());  // that of the plans shown
+  }
+  const Outcome table = run({"info", "beam.toml", "--partition", "3"});
+  EXPECT_THAT(table.out, HasSubstr("Tiles by metis"));
+
+  const Outcome unknown = run({"info", "beam.toml", "--partition", "3", "--partitioner", "rcb"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("allowed: metis, curve, bisection"));
+  const Outcome folder = run({"info", ".", "--partition", "3"});
+  EXPECT_EQ(folder.code, 2);
+  EXPECT_THAT(folder.err, HasSubstr("allowed for scenes"));
 }
 
 TEST_F(Program, MoreLatticePhyxelsThanMemoryIsAnError) {

@@ -1,0 +1,117 @@
+#include "info_partition.hpp"
+
+#include <fmt/format.h>
+
+#include "partition/halo_plan.hpp"
+#include "partition/partition.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/scene.hpp"
+#include "setup/tiling.hpp"
+#include "stopwatch.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using Facts = nlohmann::ordered_json;
+
+Facts quality_facts(const Graph& phyxels, const char* cut, Partitioner partitioner,
+                    const std::vector<int>& part_of, int parts, double seconds) {
+  const PartitionQuality q = quality_of(phyxels, part_of, parts);
+  return {{"cut", cut},
+          {"partitioner", partitioner_name(partitioner)},
+          {"imbalance", q.imbalance},
+          {"cut pairs", q.cut},
+          {"ghosts", q.ghosts},
+          {"most ghosts", q.most_ghosts},
+          {"most peers", q.most_peers},
+          {"empty parts", q.empty},
+          {"seconds", seconds}};
+}
+
+Facts plan_facts(const HaloPlan& plan) {
+  Facts peers = Facts::array();
+  for (const HaloPlan::Peer& peer : plan.peers) {
+    peers.push_back({{"part", peer.part},
+                     {"send", {peer.send[0].size(), peer.send[1].size()}},
+                     {"receive", {peer.receive[0].size(), peer.receive[1].size()}}});
+  }
+  return {{"part", plan.part},
+          {"phyxels", plan.owned.size()},
+          {"boundary", plan.boundary.size()},
+          {"ghosts", {plan.rings[0].size(), plan.rings[1].size()}},
+          {"peers", peers}};
+}
+
+}  // namespace
+
+Facts partition_facts(const std::filesystem::path& file, int parts,
+                      const std::string& partitioner) {
+  const Partitioner chosen = partitioner_of(partitioner);
+  if (file.extension() != ".toml") {
+    throw InputError(
+        fmt::format("{}: --partition {}: allowed for scenes (.toml)", file.string(), parts));
+  }
+  const Model model = build_model(read_scene(file));
+  const Graph phyxels = phyxel_graph(model);
+  const Groups tiles = curve_groups(model, cuda::tile_size);
+  const Graph coarse = grouped_graph(phyxels, tiles);
+  Facts cuts = Facts::array();
+  std::vector<int> chosen_parts;
+  for (const std::string& name : partitioner_names()) {
+    const Partitioner by = partitioner_of(name);
+    auto start = Clock::now();
+    std::vector<int> part_of = make_partition(phyxels, parts, by);
+    cuts.push_back(quality_facts(phyxels, "phyxels", by, part_of, parts, seconds_since(start)));
+    start = Clock::now();
+    part_of = ungrouped(make_partition(coarse, parts, by), tiles);
+    cuts.push_back(quality_facts(phyxels, "tiles", by, part_of, parts, seconds_since(start)));
+    if (by == chosen) chosen_parts = std::move(part_of);
+  }
+  Facts plans = Facts::array();
+  for (const HaloPlan& plan : make_halo_plans(phyxels, chosen_parts, parts, 2)) {
+    plans.push_back(plan_facts(plan));
+  }
+  return {{"file", file.string()}, {"phyxels", model.size()},
+          {"tiles", tiles.count},  {"parts", parts},
+          {"cuts", cuts},          {"partitioner", partitioner},
+          {"plans", plans}};
+}
+
+std::string partition_tables(const Facts& facts) {
+  const double n = facts["phyxels"].get<double>();
+  std::string text = fmt::format(
+      "{}: {} phyxels, {} tiles, {} parts\n\n"
+      "  cut      by         imbalance    cut pairs       ghosts            most   peers  "
+      "seconds\n",
+      facts["file"].get<std::string>(), facts["phyxels"].get<Index>(), facts["tiles"].get<Index>(),
+      facts["parts"].get<int>());
+  for (const Facts& cut : facts["cuts"]) {
+    const auto ghosts = cut["ghosts"].get<std::int64_t>();
+    const int empty = cut["empty parts"].get<int>();
+    text += fmt::format("  {:<8} {:<10} {:>8.2f}% {:>12} {:>12} {:>6.1f}% {:>9} {:>7} {:>8.3f}{}\n",
+                        cut["cut"].get<std::string>(), cut["partitioner"].get<std::string>(),
+                        100 * cut["imbalance"].get<double>(), cut["cut pairs"].get<std::int64_t>(),
+                        ghosts, n > 0 ? 100 * static_cast<double>(ghosts) / n : 0,
+                        cut["most ghosts"].get<Index>(), cut["most peers"].get<int>(),
+                        cut["seconds"].get<double>(),
+                        empty > 0 ? fmt::format("  ({} parts empty)", empty) : "");
+  }
+  text += fmt::format(
+      "\n  Tiles by {}:\n"
+      "  part      phyxels     boundary       ring 1       ring 2  peers (ghosts of ring 1)\n",
+      facts["partitioner"].get<std::string>());
+  for (const Facts& plan : facts["plans"]) {
+    std::string peers;
+    for (const Facts& peer : plan["peers"]) {
+      peers += fmt::format("{}{} ({})", peers.empty() ? "" : ", ", peer["part"].get<int>(),
+                           peer["receive"][0].get<std::size_t>());
+    }
+    text += fmt::format("  {:>4} {:>12} {:>12} {:>12} {:>12}  {}\n", plan["part"].get<int>(),
+                        plan["phyxels"].get<std::size_t>(), plan["boundary"].get<std::size_t>(),
+                        plan["ghosts"][0].get<std::size_t>(), plan["ghosts"][1].get<std::size_t>(),
+                        peers);
+  }
+  return text;
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,186 @@
+#include "partition/partition.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include "model/space_filling_curve.hpp"
+#include "partition/metis.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Vertices in order, cut where the shares of weight end.
+std::vector<int> cut_in_order(const Graph& graph, const std::vector<Index>& order, int parts) {
+  std::vector<int> part_of(order.size());
+  const auto n = static_cast<Index>(order.size());
+  const double share = static_cast<double>(graph.total_weight()) / parts;
+  double before = 0;
+  int part = 0;
+  Index in_part = 0;
+  for (Index k = 0; k < n; ++k) {
+    const auto weight = static_cast<double>(graph.vertex_weight[order[k]]);
+    // To the part in whose share its middle lies; but never leaves one empty, nor fewer vertices
+    // than parts that are still to be filled.
+    const bool full = before + weight / 2 >= share * (part + 1) || n - k <= parts - 1 - part;
+    if (in_part > 0 && part < parts - 1 && full) {
+      ++part;
+      in_part = 0;
+    }
+    part_of[order[k]] = part;
+    ++in_part;
+    before += weight;
+  }
+  return part_of;
+}
+
+class Bisection {
+ public:
+  Bisection(const Graph& graph, int parts) : graph_(graph), part_of_(graph.vertices(), 0) {
+    std::vector<Index> all(static_cast<std::size_t>(graph.vertices()));
+    std::iota(all.begin(), all.end(), 0);
+    split(all.begin(), all.end(), 0, parts);
+  }
+  std::vector<int> result() && { return std::move(part_of_); }
+
+ private:
+  using Iterator = std::vector<Index>::iterator;
+
+  void split(Iterator begin, Iterator end, int first_part, int parts) {
+    if (parts == 1 || begin == end) {
+      for (Iterator v = begin; v != end; ++v) part_of_[*v] = first_part;
+      return;
+    }
+    const int lower = parts / 2;
+    const int axis = longest_axis(begin, end);
+    std::sort(begin, end, [&](Index a, Index b) {
+      const double x = coordinate(a, axis), y = coordinate(b, axis);
+      return x != y ? x < y : a < b;
+    });
+    const Iterator middle = cut_at(begin, end, lower, parts);
+    split(begin, middle, first_part, lower);
+    split(middle, end, first_part + lower, parts - lower);
+  }
+  /// Where lower / parts of the weight lie before; both sides keep a vertex for each part if they
+  /// can.
+  Iterator cut_at(Iterator begin, Iterator end, int lower, int parts) const {
+    double total = 0;
+    for (Iterator v = begin; v != end; ++v) total += static_cast<double>(graph_.vertex_weight[*v]);
+    const double wanted = total * lower / parts;
+    double before = 0;
+    Iterator middle = begin;
+    for (; middle != end; ++middle) {
+      const auto weight = static_cast<double>(graph_.vertex_weight[*middle]);
+      if (before + weight / 2 >= wanted) break;
+      before += weight;
+    }
+    const auto n = end - begin;
+    const auto least = std::min<std::ptrdiff_t>(lower, n),
+               most = std::max<std::ptrdiff_t>(n - (parts - lower), least);
+    return begin + std::clamp(middle - begin, least, most);
+  }
+  int longest_axis(Iterator begin, Iterator end) const {
+    int longest = 0;
+    double extent = -1;
+    for (int axis = 0; axis < 3; ++axis) {
+      double low = coordinate(*begin, axis), high = low;
+      for (Iterator v = begin; v != end; ++v) {
+        low = std::min(low, coordinate(*v, axis));
+        high = std::max(high, coordinate(*v, axis));
+      }
+      if (high - low > extent) {
+        extent = high - low;
+        longest = axis;
+      }
+    }
+    return longest;
+  }
+  double coordinate(Index v, int axis) const {
+    const Vec3d& x = graph_.centre[v];
+    return axis == 0 ? x.x : axis == 1 ? x.y : x.z;
+  }
+
+  const Graph& graph_;
+  std::vector<int> part_of_;
+};
+
+}  // namespace
+
+const std::vector<std::string>& partitioner_names() {
+  static const std::vector<std::string> names{"metis", "curve", "bisection"};
+  return names;
+}
+std::string partitioner_name(Partitioner partitioner) {
+  return partitioner_names()[static_cast<std::size_t>(partitioner)];
+}
+Partitioner partitioner_of(const std::string& name) {
+  const auto& names = partitioner_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw InputError(fmt::format("partitioner \"{}\": unknown{}; allowed: {}", name,
+                                 did_you_mean(name, names), fmt::join(names, ", ")));
+  }
+  return static_cast<Partitioner>(found - names.begin());
+}
+
+std::vector<int> make_partition(const Graph& graph, int parts, Partitioner partitioner) {
+  if (parts < 1) throw InputError(fmt::format("{} parts: allowed: 1 or more", parts));
+  const Index n = graph.vertices();
+  if (parts == 1) return std::vector<int>(static_cast<std::size_t>(n), 0);
+  if (partitioner == Partitioner::bisection) return Bisection(graph, parts).result();
+  // As many parts as vertices, or more: nothing to choose.
+  if (partitioner == Partitioner::metis && n > parts) return metis_partition(graph, parts);
+  return cut_in_order(graph, curve_order(graph.centre), parts);
+}
+
+PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts) {
+  PartitionQuality q;
+  std::vector<std::int64_t> weight(static_cast<std::size_t>(parts), 0);
+  std::vector<Index> ghosts(static_cast<std::size_t>(parts), 0);
+  std::vector<std::set<int>> peers(static_cast<std::size_t>(parts));
+  std::vector<int> others;  // parts that need a vertex
+  std::vector<char> used(static_cast<std::size_t>(parts), 0);
+  for (Index v = 0; v < graph.vertices(); ++v) {
+    const int own = part_of[v];
+    weight[own] += graph.vertex_weight[v];
+    used[own] = 1;
+    others.clear();
+    for (Offset e = graph.offsets[v]; e < graph.offsets[v + 1]; ++e) {
+      const int other = part_of[graph.neighbours[e]];
+      if (other == own) continue;
+      q.cut += graph.weight_of_edge(e);
+      others.push_back(other);
+    }
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    for (const int other : others) {
+      ++ghosts[other];
+      peers[other].insert(own);
+    }
+  }
+  q.cut /= 2;  // seen from both ends
+  const double mean = static_cast<double>(graph.total_weight()) / parts;
+  if (mean > 0) {
+    q.imbalance =
+        static_cast<double>(*std::max_element(weight.begin(), weight.end())) / mean - 1;
+  }
+  q.ghosts = std::accumulate(ghosts.begin(), ghosts.end(), std::int64_t{0});
+  q.most_ghosts = *std::max_element(ghosts.begin(), ghosts.end());
+  for (const auto& of_part : peers) {
+    q.most_peers = std::max(q.most_peers, static_cast<int>(of_part.size()));
+  }
+  q.empty = static_cast<int>(std::count(used.begin(), used.end(), 0));
+  return q;
+}
+
+std::vector<int> ungrouped(const std::vector<int>& part_of_group, const Groups& groups) {
+  std::vector<int> part_of;
+  part_of.reserve(groups.of.size());
+  for (const Index g : groups.of) part_of.push_back(part_of_group[g]);
+  return part_of;
+}
+
+}  // namespace phyxel

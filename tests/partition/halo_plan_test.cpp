@@ -1,0 +1,134 @@
+/// Plans of who sends what to whom, against their definition and in use.
+#include "partition/halo_plan.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+#include "bodies.hpp"
+#include "partition/partition.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+
+class Halo : public ::testing::TestWithParam<CutCase> {};
+
+TEST_P(Halo, RingsAndBoundaryAreWhatTheyAreDefinedAs) {
+  const Graph graph = phyxel_graph(GetParam().make());
+  for (const int parts : {1, 3, 8}) {
+    const std::vector<int> part_of = make_partition(graph, parts, Partitioner::bisection);
+    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 2)) {
+      std::set<Index> reached;
+      for (Index v = 0; v < graph.vertices(); ++v) {
+        if (part_of[v] == plan.part) reached.insert(v);
+      }
+      EXPECT_EQ(plan.owned, std::vector<Index>(reached.begin(), reached.end()));
+      for (const std::vector<Index>& ring : plan.rings) {
+        std::set<Index> expected;
+        for (const Index v : reached) {
+          for (const Index w : graph.row(v)) {
+            if (!reached.count(w)) expected.insert(w);
+          }
+        }
+        EXPECT_EQ(ring, std::vector<Index>(expected.begin(), expected.end()));
+        reached.insert(expected.begin(), expected.end());
+      }
+      std::vector<Index> boundary;
+      for (const Index v : plan.owned) {
+        const auto row = graph.row(v);
+        if (std::any_of(row.begin(), row.end(), [&](Index w) { return part_of[w] != plan.part; })) {
+          boundary.push_back(v);
+        }
+      }
+      EXPECT_EQ(plan.boundary, boundary);
+    }
+  }
+}
+
+TEST_P(Halo, WhatOneSendsTheOtherReceives) {
+  const Graph graph = phyxel_graph(GetParam().make());
+  constexpr int parts = 6;
+  const std::vector<int> part_of = make_partition(graph, parts, Partitioner::curve);
+  const std::vector<HaloPlan> plans = make_halo_plans(graph, part_of, parts, 2);
+  const auto peer_of = [](const HaloPlan& plan, int part) -> const HaloPlan::Peer* {
+    for (const HaloPlan::Peer& peer : plan.peers) {
+      if (peer.part == part) return &peer;
+    }
+    return nullptr;
+  };
+  for (const HaloPlan& plan : plans) {
+    for (int r = 0; r < 2; ++r) {
+      std::vector<Index> received;
+      for (const HaloPlan::Peer& peer : plan.peers) {
+        EXPECT_NE(peer.part, plan.part);
+        const HaloPlan::Peer* other = peer_of(plans[peer.part], plan.part);
+        ASSERT_NE(other, nullptr);
+        EXPECT_EQ(peer.receive[r], other->send[r]);
+        for (const Index v : peer.receive[r]) EXPECT_EQ(part_of[v], peer.part);
+        received.insert(received.end(), peer.receive[r].begin(), peer.receive[r].end());
+      }
+      std::sort(received.begin(), received.end());
+      EXPECT_EQ(received, plan.rings[r]);  // every ghost once
+    }
+  }
+}
+
+/// Two gathers, one after the other, as a step has them.
+std::vector<std::int64_t> gathered(const Graph& graph, const std::vector<std::int64_t>& values,
+                                   const std::vector<Index>& rows) {
+  std::vector<std::int64_t> sums(values.size(), -1);
+  for (const Index v : rows) {
+    sums[v] = 7 * values[v];
+    for (const Index w : graph.row(v)) sums[v] += values[w];
+  }
+  return sums;
+}
+
+TEST_P(Halo, EitherDesignGivesEveryPartWhatTheWholeHas) {
+  const Graph graph = phyxel_graph(GetParam().make());
+  constexpr int parts = 5;
+  const std::vector<int> part_of = make_partition(graph, parts, Partitioner::metis);
+  const auto n = static_cast<std::size_t>(graph.vertices());
+  std::vector<std::int64_t> u(n);
+  std::vector<Index> all(n);
+  for (std::size_t v = 0; v < n; ++v) {
+    u[v] = static_cast<std::int64_t>(v * v % 1009);
+    all[v] = static_cast<Index>(v);
+  }
+  const std::vector<std::int64_t> q = gathered(graph, u, all), f = gathered(graph, q, all);
+
+  constexpr std::int64_t unknown = -1'000'000'000;
+  for (const int rings : {1, 2}) {
+    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, rings)) {
+      // A part knows its own values and those it receives, no others.
+      std::vector<std::int64_t> own_u(n, unknown);
+      std::vector<Index> first_rows = plan.owned;
+      for (const Index v : plan.owned) own_u[v] = u[v];
+      for (const HaloPlan::Peer& peer : plan.peers) {
+        for (const auto& ring : peer.receive) {
+          for (const Index v : ring) own_u[v] = u[v];
+        }
+      }
+      if (rings == 2) {  // the first ring's, computed again
+        first_rows.insert(first_rows.end(), plan.rings[0].begin(), plan.rings[0].end());
+      }
+      std::vector<std::int64_t> own_q = gathered(graph, own_u, first_rows);
+      if (rings == 1) {  // the first ring's, received
+        for (const HaloPlan::Peer& peer : plan.peers) {
+          for (const Index v : peer.receive[0]) own_q[v] = q[v];
+        }
+      }
+      const std::vector<std::int64_t> own_f = gathered(graph, own_q, plan.owned);
+      for (const Index v : plan.owned) EXPECT_EQ(own_f[v], f[v]);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, Halo, ::testing::ValuesIn(cut_cases()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+}  // namespace
+}  // namespace phyxel
