@@ -8,7 +8,8 @@
 set -euo pipefail
 
 build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev libfmt-dev
-       libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev libmetis-dev
+       libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev
+       libmetis-dev libopenmpi-dev openmpi-bin
        gnuplot-nox)  # the figures of phyxel paper
 # clang for the thread sanitizer and the fuzzers, Python to read our files independently.
 tests=(ccache pkg-config libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm

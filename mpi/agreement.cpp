@@ -1,0 +1,33 @@
+#include <fmt/format.h>
+
+#include "mpi/communicator.hpp"
+
+namespace phyxel {
+
+void Communicator::together(const std::function<void()>& work) const {
+  std::string message;
+  auto code = static_cast<int>(ExitCode::success);
+  try {
+    work();
+  } catch (const Error& error) {
+    message = error.what();
+    code = static_cast<int>(error.code());
+  } catch (const std::exception& error) {
+    message = error.what();
+    code = static_cast<int>(ExitCode::bad_input);
+  }
+  const bool failed = code != static_cast<int>(ExitCode::success);
+  const std::int64_t first = smallest(static_cast<std::int64_t>(failed ? rank_ : size_));
+  if (first == size_) return;
+  const std::int64_t failures = sum(static_cast<std::int64_t>(failed));
+  const auto from = static_cast<int>(first);
+  const std::vector<char> words =
+      broadcast(std::vector<char>(message.begin(), message.end()), from);
+  const int agreed = broadcast(std::vector<int>{code}, from).front();
+  message.assign(words.begin(), words.end());
+  // What fails everywhere is nobody's own.
+  if (failures < size_) message = fmt::format("rank {} of {}: {}", from, size_, message);
+  throw AgreedError(static_cast<ExitCode>(agreed), message);
+}
+
+}  // namespace phyxel

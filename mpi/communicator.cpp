@@ -1,0 +1,130 @@
+#include "mpi/communicator.hpp"
+
+#include <fmt/format.h>
+#include <mpi.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+
+namespace phyxel {
+namespace {
+
+/// @throws Error naming the call
+void check_mpi(int code, const char* call) {
+  if (code == MPI_SUCCESS) return;
+  char text[MPI_MAX_ERROR_STRING] = "";
+  int length = 0;
+  MPI_Error_string(code, text, &length);
+  throw Error(ExitCode::bad_input, fmt::format("MPI: {} failed: {}", call, text));
+}
+#define PHYXEL_MPI_CALL(call) check_mpi(call, #call)
+
+/// Counts of MPI are ints, and some networks fail above: larger messages go in pieces.
+constexpr std::size_t most_bytes = std::size_t{1} << 30;
+
+template <class T>
+T reduced(T value, MPI_Datatype type, MPI_Op operation) {
+  T result{};
+  PHYXEL_MPI_CALL(MPI_Allreduce(&value, &result, 1, type, operation, MPI_COMM_WORLD));
+  return result;
+}
+
+template <class Call>
+void in_pieces(std::size_t bytes, Call&& call) {
+  for (std::size_t at = 0; at < bytes; at += most_bytes) {
+    call(at, static_cast<int>(std::min(most_bytes, bytes - at)));
+  }
+}
+
+}  // namespace
+
+Communicator::Communicator(int& argc, char**& argv) {
+  int running = 0, level = 0;
+  MPI_Initialized(&running);
+  if (!running) {
+    // The writer's thread uses no MPI.
+    PHYXEL_MPI_CALL(MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &level));
+    started_here_ = true;
+  }
+  MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN);
+  PHYXEL_MPI_CALL(MPI_Comm_rank(MPI_COMM_WORLD, &rank_));
+  PHYXEL_MPI_CALL(MPI_Comm_size(MPI_COMM_WORLD, &size_));
+  MPI_Comm host = MPI_COMM_NULL;
+  PHYXEL_MPI_CALL(
+      MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host));
+  PHYXEL_MPI_CALL(MPI_Comm_rank(host, &host_rank_));
+  PHYXEL_MPI_CALL(MPI_Comm_size(host, &host_size_));
+  MPI_Comm_free(&host);
+}
+
+Communicator::~Communicator() {
+  if (started_here_) MPI_Finalize();
+}
+
+void Communicator::barrier() const { PHYXEL_MPI_CALL(MPI_Barrier(MPI_COMM_WORLD)); }
+
+// MPI may add in any order; a sum of numbers that were gathered has one.
+double Communicator::sum(double value) const {
+  const std::vector<double> all = gathered(std::span<const double>(&value, 1));
+  return std::accumulate(all.begin(), all.end(), 0.0);
+}
+std::int64_t Communicator::sum(std::int64_t value) const {
+  return reduced(value, MPI_INT64_T, MPI_SUM);
+}
+double Communicator::largest(double value) const { return reduced(value, MPI_DOUBLE, MPI_MAX); }
+std::int64_t Communicator::largest(std::int64_t value) const {
+  return reduced(value, MPI_INT64_T, MPI_MAX);
+}
+double Communicator::smallest(double value) const { return reduced(value, MPI_DOUBLE, MPI_MIN); }
+std::int64_t Communicator::smallest(std::int64_t value) const {
+  return reduced(value, MPI_INT64_T, MPI_MIN);
+}
+
+std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
+  const std::vector<std::vector<std::byte>> from_each =
+      exchanged_bytes(std::vector<std::span<const std::byte>>(static_cast<std::size_t>(size_), bytes));
+  std::vector<std::byte> all;
+  for (const std::vector<std::byte>& from : from_each) all.insert(all.end(), from.begin(), from.end());
+  return all;
+}
+
+void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
+  in_pieces(bytes.size(), [&](std::size_t at, int count) {
+    PHYXEL_MPI_CALL(MPI_Bcast(bytes.data() + at, count, MPI_BYTE, from, MPI_COMM_WORLD));
+  });
+}
+
+std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
+    const std::vector<std::span<const std::byte>>& send) const {
+  const auto ranks = static_cast<std::size_t>(size_);
+  std::vector<std::int64_t> sizes(ranks), coming(ranks);
+  for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send.at(r).size());
+  PHYXEL_MPI_CALL(MPI_Alltoall(sizes.data(), 1, MPI_INT64_T, coming.data(), 1, MPI_INT64_T,
+                               MPI_COMM_WORLD));
+  std::vector<std::vector<std::byte>> received(ranks);
+  std::vector<MPI_Request> requests;
+  for (std::size_t r = 0; r < ranks; ++r) {
+    received[r].resize(static_cast<std::size_t>(coming[r]));
+    in_pieces(received[r].size(), [&](std::size_t at, int count) {
+      PHYXEL_MPI_CALL(MPI_Irecv(received[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0,
+                                MPI_COMM_WORLD, &requests.emplace_back()));
+    });
+  }
+  for (std::size_t r = 0; r < ranks; ++r) {
+    in_pieces(send[r].size(), [&](std::size_t at, int count) {
+      PHYXEL_MPI_CALL(MPI_Isend(send[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0,
+                                MPI_COMM_WORLD, &requests.emplace_back()));
+    });
+  }
+  PHYXEL_MPI_CALL(
+      MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
+  return received;
+}
+
+void Communicator::abort(ExitCode code) const {
+  MPI_Abort(MPI_COMM_WORLD, static_cast<int>(code));
+  std::abort();  // it has returned: not seen
+}
+
+}  // namespace phyxel

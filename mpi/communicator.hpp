@@ -1,0 +1,102 @@
+/// The ranks of a run. Without MPI there is one. No MPI header is needed to include this.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+
+/// What every rank throws when one has failed: the message says which.
+class AgreedError : public Error {
+ public:
+  using Error::Error;
+};
+
+/// One for the whole program: MPI starts with it and ends with it. Every function but `rank`,
+/// `size` and `abort` is collective: all ranks call it, in the same order.
+class Communicator {
+ public:
+  /// @throws Error if MPI does not start
+  Communicator(int& argc, char**& argv);
+  ~Communicator();
+  Communicator(const Communicator&) = delete;
+  Communicator& operator=(const Communicator&) = delete;
+
+  int rank() const { return rank_; }
+  int size() const { return size_; }
+  /// Ranks of this host, and which of them this is: for the choice of a GPU.
+  int host_size() const { return host_size_; }
+  int host_rank() const { return host_rank_; }
+
+  void barrier() const;
+
+  /// Over all ranks, in the order of ranks, so that every run gets the same bits.
+  double sum(double value) const;
+  std::int64_t sum(std::int64_t value) const;
+  double largest(double value) const;
+  std::int64_t largest(std::int64_t value) const;
+  double smallest(double value) const;
+  std::int64_t smallest(std::int64_t value) const;
+
+  /// The values of all ranks, one after the other, on every rank.
+  template <class T>
+  std::vector<T> gathered(std::span<const T> values) const {
+    return from_bytes<T>(gathered_bytes(std::as_bytes(values)));
+  }
+  /// `values` of rank `from`, on every rank.
+  template <class T>
+  std::vector<T> broadcast(std::vector<T> values, int from = 0) const {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::int64_t count = static_cast<std::int64_t>(values.size());
+    broadcast_bytes(std::as_writable_bytes(std::span(&count, 1)), from);
+    values.resize(static_cast<std::size_t>(count));
+    broadcast_bytes(std::as_writable_bytes(std::span(values)), from);
+    return values;
+  }
+  /// What each rank has for each: send[r] goes to rank r. @returns [r]: from rank r
+  template <class T>
+  std::vector<std::vector<T>> exchanged(const std::vector<std::vector<T>>& send) const {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<std::span<const std::byte>> bytes;
+    for (const std::vector<T>& values : send) bytes.push_back(std::as_bytes(std::span(values)));
+    std::vector<std::vector<T>> received;
+    for (const std::vector<std::byte>& from : exchanged_bytes(bytes)) {
+      received.push_back(from_bytes<T>(from));
+    }
+    return received;
+  }
+
+  /// Does the work of this rank, which must not communicate; then all agree how it went.
+  /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of the
+  ///   first rank that failed
+  void together(const std::function<void()>& work) const;
+
+  /// Ends all ranks at once, for errors that no rank but this knows of.
+  [[noreturn]] void abort(ExitCode code) const;
+
+ private:
+  template <class T>
+  static std::vector<T> from_bytes(const std::vector<std::byte>& bytes) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<T> values(bytes.size() / sizeof(T));
+    if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
+    return values;
+  }
+  std::vector<std::byte> gathered_bytes(std::span<const std::byte> bytes) const;
+  void broadcast_bytes(std::span<std::byte> bytes, int from) const;
+  std::vector<std::vector<std::byte>> exchanged_bytes(
+      const std::vector<std::span<const std::byte>>& send) const;
+
+  int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
+  bool started_here_ = false;
+};
+
+}  // namespace phyxel

@@ -1,0 +1,30 @@
+/// One rank, for builds without MPI.
+#include <cstdlib>
+
+#include "mpi/communicator.hpp"
+
+namespace phyxel {
+
+Communicator::Communicator(int&, char**&) {}
+Communicator::~Communicator() = default;
+
+void Communicator::barrier() const {}
+double Communicator::sum(double value) const { return value; }
+std::int64_t Communicator::sum(std::int64_t value) const { return value; }
+double Communicator::largest(double value) const { return value; }
+std::int64_t Communicator::largest(std::int64_t value) const { return value; }
+double Communicator::smallest(double value) const { return value; }
+std::int64_t Communicator::smallest(std::int64_t value) const { return value; }
+
+std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
+  return {bytes.begin(), bytes.end()};
+}
+void Communicator::broadcast_bytes(std::span<std::byte>, int) const {}
+std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
+    const std::vector<std::span<const std::byte>>& send) const {
+  return {{send.at(0).begin(), send.at(0).end()}};
+}
+
+void Communicator::abort(ExitCode code) const { std::_Exit(static_cast<int>(code)); }
+
+}  // namespace phyxel

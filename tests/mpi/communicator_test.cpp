@@ -1,0 +1,99 @@
+/// Collective calls on as many ranks as mpirun starts.
+#include "mpi/communicator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "phyxel/types.hpp"
+#include "ranks.hpp"
+
+namespace phyxel {
+namespace {
+
+using test::world;
+using ::testing::HasSubstr;
+
+TEST(Communicator, KnowsItsRanks) {
+  EXPECT_GE(world().rank(), 0);
+  EXPECT_LT(world().rank(), world().size());
+  const int rank = world().rank();
+  const std::vector<int> all = world().gathered(std::span<const int>(&rank, 1));
+  ASSERT_EQ(static_cast<int>(all.size()), world().size());
+  for (int r = 0; r < world().size(); ++r) EXPECT_EQ(all[r], r);
+  EXPECT_EQ(world().host_size(), world().size());  // all on this machine
+  EXPECT_EQ(world().host_rank(), rank);
+}
+
+TEST(Communicator, ReducesOverAllRanks) {
+  const int ranks = world().size(), rank = world().rank();
+  EXPECT_EQ(world().sum(std::int64_t{rank + 1}), ranks * (ranks + 1) / 2);
+  EXPECT_EQ(world().largest(std::int64_t{rank}), ranks - 1);
+  EXPECT_EQ(world().smallest(std::int64_t{rank}), 0);
+  EXPECT_EQ(world().largest(-1.5 * rank), 0);
+  EXPECT_EQ(world().smallest(-1.5 * rank), -1.5 * (ranks - 1));
+  // In the order of ranks, to the last bit.
+  double expected = 0;
+  for (int r = 0; r < ranks; ++r) expected += 1.0 / (r + 3);
+  EXPECT_EQ(world().sum(1.0 / (rank + 3)), expected);
+}
+
+TEST(Communicator, GathersListsOfAnyLength) {
+  const int rank = world().rank();
+  std::vector<Vec3d> mine;  // none from the first rank
+  for (int k = 0; k < 3 * rank; ++k) mine.push_back({1.0 * rank, 1.0 * k, 0.5});
+  const std::vector<Vec3d> all = world().gathered(std::span<const Vec3d>(mine));
+  std::vector<Vec3d> expected;
+  for (int r = 0; r < world().size(); ++r) {
+    for (int k = 0; k < 3 * r; ++k) expected.push_back({1.0 * r, 1.0 * k, 0.5});
+  }
+  EXPECT_TRUE(all == expected);
+}
+
+TEST(Communicator, ExchangesWithEveryRank) {
+  const int ranks = world().size(), rank = world().rank();
+  std::vector<std::vector<int>> send(static_cast<std::size_t>(ranks));
+  for (int to = 0; to < ranks; ++to)
+    send[to].assign(static_cast<std::size_t>(to + rank), 100 * rank + to);
+  const auto received = world().exchanged(send);
+  ASSERT_EQ(static_cast<int>(received.size()), ranks);
+  for (int from = 0; from < ranks; ++from) {
+    EXPECT_EQ(received[from],
+              std::vector<int>(static_cast<std::size_t>(rank + from), 100 * from + rank));
+  }
+}
+
+TEST(Communicator, BroadcastsFromAnyRank) {
+  const int last = world().size() - 1;
+  std::vector<double> values;
+  if (world().rank() == last) values = {1, 2.5, -3};
+  EXPECT_EQ(world().broadcast(values, last), (std::vector<double>{1, 2.5, -3}));
+}
+
+TEST(Communicator, AFailureOfOneIsThatOfAll) {
+  const int last = world().size() - 1;
+  try {
+    world().together([&] {
+      if (world().rank() == last) throw DeviceError("no GPU is left");
+    });
+    FAIL() << "nobody was told";
+  } catch (const AgreedError& error) {
+    EXPECT_EQ(error.code(), ExitCode::device_failed);
+    EXPECT_THAT(error.what(), HasSubstr("no GPU is left"));
+    const std::string who = last > 0 ? "rank " + std::to_string(last) + " of" : "no GPU";
+    EXPECT_THAT(error.what(), HasSubstr(who));
+  }
+  // What all say is said once, of nobody.
+  try {
+    world().together([] { throw InputError("scene.toml:3: unknown key"); });
+    FAIL() << "nobody was told";
+  } catch (const AgreedError& error) {
+    EXPECT_EQ(error.code(), ExitCode::bad_input);
+    EXPECT_STREQ(error.what(), "scene.toml:3: unknown key");
+  }
+  int done = 0;
+  world().together([&] { ++done; });
+  EXPECT_EQ(done, 1);
+}
+
+}  // namespace
+}  // namespace phyxel

@@ -1,0 +1,43 @@
+/// main() of the tests that run on several ranks: each rank runs them all, the first one tells. A
+/// failure of any rank is the program's.
+#include "ranks.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+
+namespace phyxel::test {
+namespace {
+
+std::optional<Communicator> the_world;
+
+/// Other ranks speak only of failures.
+class OnlyFailures : public ::testing::EmptyTestEventListener {
+  void OnTestPartResult(const ::testing::TestPartResult& result) override {
+    if (!result.failed()) return;
+    std::fprintf(stderr, "rank %d: %s:%d: %s\n", world().rank(),
+                 result.file_name() ? result.file_name() : "", result.line_number(),
+                 result.summary());
+  }
+};
+
+}  // namespace
+
+const Communicator& world() { return *the_world; }
+
+}  // namespace phyxel::test
+
+int main(int argc, char** argv) {
+  using namespace phyxel::test;
+  ::testing::InitGoogleTest(&argc, argv);
+  the_world.emplace(argc, argv);
+  if (world().rank() > 0) {
+    auto& listeners = ::testing::UnitTest::GetInstance()->listeners();
+    delete listeners.Release(listeners.default_result_printer());
+    listeners.Append(new OnlyFailures);
+  }
+  const int failed = RUN_ALL_TESTS();
+  const auto all_failed = world().largest(static_cast<std::int64_t>(failed));
+  the_world.reset();
+  return static_cast<int>(all_failed);
+}
