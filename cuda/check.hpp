@@ -25,6 +25,8 @@ struct Launch {
 /// environment it waits for the kernel, so that a fault inside names its own launch.
 /// @throws DeviceError
 void check_launch(const Launch& launch);
+/// Whether `check_launch` waits, which launches that are only recorded do not survive.
+bool launches_are_waited_for();
 
 /// Waits for everything launched. @throws DeviceError naming the last launch.
 void wait_for_device(const Launch& last);

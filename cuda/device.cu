@@ -163,15 +163,19 @@ void check_launch(const Launch& launch) {
     throw DeviceError(current_device() + ": " + launch.describe() +
                       " could not be launched: " + reason(error));
   }
-  static const bool wait = [] {
-    const char* value = std::getenv("PHYXEL_CUDA_SYNC");
-    return value && std::strcmp(value, "0") != 0;
-  }();
-  if (!wait) return;
+  if (!launches_are_waited_for()) return;
   error = cudaDeviceSynchronize();
   if (error != cudaSuccess) {
     throw DeviceError(current_device() + ": " + launch.describe() + " failed: " + reason(error));
   }
+}
+
+bool launches_are_waited_for() {
+  static const bool wait = [] {
+    const char* value = std::getenv("PHYXEL_CUDA_SYNC");
+    return value && std::strcmp(value, "0") != 0;
+  }();
+  return wait;
 }
 
 void wait_for_device(const Launch& last) {

@@ -7,14 +7,14 @@
 namespace phyxel {
 namespace {
 
-/// Vertices next to `from` that are not in `seen`, ascending; they are then.
-std::vector<Index> next_ring(const Graph& graph, const std::vector<Index>& from,
-                             std::vector<char>& seen) {
+/// Vertices next to `from` that the part has not seen, ascending; it has then.
+std::vector<Index> next_ring(const Graph& graph, const std::vector<Index>& from, int part,
+                             std::vector<int>& seen_by) {
   std::vector<Index> ring;
   for (const Index v : from) {
     for (const Index w : graph.row(v)) {
-      if (seen[w]) continue;
-      seen[w] = 1;
+      if (seen_by[w] == part) continue;
+      seen_by[w] = part;
       ring.push_back(w);
     }
   }
@@ -53,13 +53,12 @@ std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>
         std::any_of(row.begin(), row.end(), [&](Index w) { return part_of[w] != part_of[v]; });
     if (at_boundary) plan.boundary.push_back(v);
   }
-  std::vector<char> seen(static_cast<std::size_t>(graph.vertices()));
+  std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()), -1);  // the part that last did
   for (HaloPlan& plan : plans) {
-    std::fill(seen.begin(), seen.end(), 0);
-    for (const Index v : plan.owned) seen[v] = 1;
+    for (const Index v : plan.owned) seen_by[v] = plan.part;
     for (int r = 0; r < rings; ++r) {
       // Only the boundary has neighbours outside.
-      plan.rings.push_back(next_ring(graph, r == 0 ? plan.boundary : plan.rings.back(), seen));
+      plan.rings.push_back(next_ring(graph, r == 0 ? plan.boundary : plan.rings.back(), plan.part, seen_by));
       for (const Index v : plan.rings.back()) {
         const auto all = static_cast<std::size_t>(rings);
         peer_of(plan, part_of[v], all).receive[r].push_back(v);

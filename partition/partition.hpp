@@ -20,8 +20,9 @@ std::string partitioner_name(Partitioner partitioner);
 /// @throws InputError for another name
 Partitioner partitioner_of(const std::string& name);
 
-/// The part of each vertex, 0 to parts - 1. The same for the same graph, everywhere. No part is
-/// empty unless there are fewer vertices than parts.
+/// The part of each vertex, 0 to parts - 1. No part is empty unless there are fewer vertices than
+/// parts. The same for the same graph; METIS's also depends on its version and on the C library, so
+/// ranks take one's result. Not from two threads at once: METIS uses rand().
 /// @throws InputError for fewer parts than one, and from METIS for graphs that its 32-bit indices
 ///   cannot name: allowed are groups of phyxels
 std::vector<int> make_partition(const Graph& graph, int parts, Partitioner partitioner);

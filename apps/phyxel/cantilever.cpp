@@ -64,7 +64,7 @@ Settled settle(const Scene& scene, const Model& model, Backend& backend, std::in
     return frames ? beam.frames == frames : beam.change < cantilever_settled;
   };
   do {
-    if (beam.steps >= plan.steps) {
+    if (beam.steps >= plan.steps || !std::isfinite(beam.deflection)) {
       throw DivergedError(
           fmt::format("{}: not settled after {} steps: in the last {} the deflection, {:g} m, "
                       "changed by {:.2g} "

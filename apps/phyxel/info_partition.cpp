@@ -55,15 +55,19 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
   const Graph phyxels = phyxel_graph(model);
   const Groups tiles = curve_groups(model, cuda::tile_size);
   const Graph coarse = grouped_graph(phyxels, tiles);
-  Facts cuts = Facts::array();
+  Facts cuts = Facts::array(), notes = Facts::array();
   std::vector<int> chosen_parts;
   for (const std::string& name : partitioner_names()) {
     const Partitioner by = partitioner_of(name);
     auto start = Clock::now();
-    std::vector<int> part_of = make_partition(phyxels, parts, by);
-    cuts.push_back(quality_facts(phyxels, "phyxels", by, part_of, parts, seconds_since(start)));
+    try {
+      const std::vector<int> part_of = make_partition(phyxels, parts, by);
+      cuts.push_back(quality_facts(phyxels, "phyxels", by, part_of, parts, seconds_since(start)));
+    } catch (const InputError& error) {  // too many for it: tiles are fewer
+      notes.push_back(error.what());
+    }
     start = Clock::now();
-    part_of = ungrouped(make_partition(coarse, parts, by), tiles);
+    std::vector<int> part_of = ungrouped(make_partition(coarse, parts, by), tiles);
     cuts.push_back(quality_facts(phyxels, "tiles", by, part_of, parts, seconds_since(start)));
     if (by == chosen) chosen_parts = std::move(part_of);
   }
@@ -71,9 +75,13 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
   for (const HaloPlan& plan : make_halo_plans(phyxels, chosen_parts, parts, 2)) {
     plans.push_back(plan_facts(plan));
   }
-  return {{"file", file.string()}, {"phyxels", model.size()},
-          {"tiles", tiles.count},  {"parts", parts},
-          {"cuts", cuts},          {"partitioner", partitioner},
+  return {{"file", file.string()},
+          {"phyxels", model.size()},
+          {"tiles", tiles.count},
+          {"parts", parts},
+          {"cuts", cuts},
+          {"notes", notes},
+          {"partitioner", partitioner},
           {"plans", plans}};
 }
 
@@ -96,6 +104,7 @@ std::string partition_tables(const Facts& facts) {
                         cut["seconds"].get<double>(),
                         empty > 0 ? fmt::format("  ({} parts empty)", empty) : "");
   }
+  for (const Facts& note : facts["notes"]) text += "  " + note.get<std::string>() + "\n";
   text += fmt::format(
       "\n  Tiles by {}:\n"
       "  part      phyxels     boundary       ring 1       ring 2  peers (ghosts of ring 1)\n",

@@ -148,8 +148,12 @@ class Run {
   /// Writes it, and says so.
   std::string with_last_good_state(const char* error, Progress& progress) {
     progress.finish();
-    write_state();
-    writer_.finish();
+    try {
+      write_state();
+      writer_.finish();
+    } catch (const Error& writing) {
+      return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
+    }
     return fmt::format("{}; the last good state, at t = {:g} s, is {}", error, good_->state.time,
                        checkpoint_.string());
   }
@@ -207,8 +211,7 @@ class Run {
   /// twice a step, and lose more to a writer that comes between than writing beside them saves.
   bool core_is_left() const {
     if (device_.gpu) return true;
-    const int threads = scene_.solver.threads > 0 ? scene_.solver.threads : omp_get_max_threads();
-    return threads < omp_get_num_procs();
+    return backend_->threads() < omp_get_num_procs();
   }
 
   /// What writes files, to the writer.

@@ -204,13 +204,12 @@ class CudaBackend final : public Backend {
     pending_then_ = then;
     const bool resident = residence_ && then == Then::nothing;
     const int most = resident ? residence_->most_steps : graph_steps;
-    if (++pending_ < most) return;
-    launch_pending();
-    bound_queue(most);
+    if (++pending_ == most) launch_pending();
   }
   void launch_pending() const {
     m_.use_device();
     const int steps = std::exchange(pending_, 0);  // once, whatever happens
+    bound_queue(steps);
     if (residence_ && pending_then_ == Then::nothing) {
       residence_->launch(m_.dt(), steps);
       return;
@@ -226,7 +225,8 @@ class CudaBackend final : public Backend {
         if (pending_then_ == Then::surfels) surfels_->launch(passes_);
       }
     };
-    if (steps == graph_steps && !(residence_ && residence_->by_mail())) {
+    if (steps == graph_steps && !(residence_ && residence_->by_mail()) &&
+        !launches_are_waited_for()) {
       graphs_[pending_then_ == Then::surfels].launch(m_.stream(), launch);
     } else {
       launch();

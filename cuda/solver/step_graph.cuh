@@ -32,6 +32,7 @@ class StepGraph {
       steps();
     } catch (...) {
       cudaStreamEndCapture(stream, &recorded);
+      cudaGetLastError();  // what went wrong is on its way
       if (recorded) cudaGraphDestroy(recorded);
       throw;
     }

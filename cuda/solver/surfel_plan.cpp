@@ -1,6 +1,7 @@
 #include "solver/surfel_plan.hpp"
 
 #include <algorithm>
+#include <unordered_set>
 
 #include "model/space_filling_curve.hpp"
 #include "solver/carrier_weights.hpp"
@@ -45,11 +46,26 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
     }
     std::sort(own.begin(), own.end(),
               [](const Carrier& a, const Carrier& b) { return a.slot < b.slot; });
+    own.resize(static_cast<std::size_t>(block.carriers), {0, own.front().slot});
     for (std::size_t k = 0; k < own.size(); ++k) {
       plan.carriers[block.first_carrier + k * surfel_block + s] = own[k];
     }
   }
   plan.blocks.push_back(block);
+}
+
+/// How many surfels from `first` on a block takes.
+int surfels_of_block(const Model& model, const SurfelPlan& plan, Index first, Index end) {
+  std::unordered_set<Index> carriers;
+  Index next = first;
+  for (; next < end && next - first < surfel_block; ++next) {
+    const auto row = model.surfels.carriers.row(plan.order[next]);
+    const auto fresh =
+        std::count_if(row.begin(), row.end(), [&](Index i) { return carriers.count(i) == 0; });
+    if (next > first && carriers.size() + static_cast<std::size_t>(fresh) > block_slots) break;
+    carriers.insert(row.begin(), row.end());
+  }
+  return next - first;
 }
 
 }  // namespace
@@ -62,11 +78,12 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
         curve_order(std::span(model.surfels.position)
                         .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin));
     for (const Index s : order) plan.order.push_back(part.surfel_begin + s);
-    for (Index first = part.surfel_begin; first < part.surfel_end; first += surfel_block) {
+    for (Index first = part.surfel_begin; first < part.surfel_end;) {
       SurfelBlock block;
       block.first_surfel = first;
-      block.surfels = std::min<int>(surfel_block, part.surfel_end - first);
+      block.surfels = surfels_of_block(model, plan, first, part.surfel_end);
       add_block(plan, model, place, block);
+      first += block.surfels;
     }
   }
   std::sort(plan.tiles.begin(), plan.tiles.end());

@@ -9,8 +9,10 @@
 
 namespace phyxel::cuda {
 
-inline constexpr int surfel_block = 256;  ///< Surfels a block.
-inline constexpr int carrier_group = 4;   ///< Carriers that a surfel takes at once.
+inline constexpr int surfel_block = 256;  ///< Surfels a block, at most.
+inline constexpr int block_slots =
+    512;  ///< Phyxels that carry them, at most, unless one surfel has more.
+inline constexpr int carrier_group = 4;  ///< Carriers that a surfel takes at once.
 
 /// Surfels near each other.
 struct SurfelBlock {

@@ -148,9 +148,8 @@ class SurfelAdvection {
     const Surfels& surfels = m_.model().surfels;
     shared_bytes_ = CarrierMotions<StateReal>::bytes * most_slots_;
     if (shared_bytes_ > m_.most_shared_memory()) {
-      throw InputError(m_.device().name + ": " + std::to_string(surfel_block) +
-                       " surfels side by side and the phyxels that move them take " +
-                       std::to_string(shared_bytes_) +
+      throw InputError(m_.device().name + ": a surfel that " + std::to_string(most_slots_) +
+                       " phyxels carry takes " + std::to_string(shared_bytes_) +
                        " bytes of shared memory, of which a block may have " +
                        std::to_string(m_.most_shared_memory()) +
                        ": allowed are a smaller support, precision \"float\" or the CPU");

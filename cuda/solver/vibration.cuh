@@ -83,6 +83,7 @@ class CudaVibration final : public Vibration {
     scale(current_, 1 / std::sqrt(product(current_, current_)));
   }
   double apply(double beta) override {
+    m_.use_device();
     m_.launch_tiles("bend", bend<Real, StateReal>, m_.fields(), current_.data(), amplitude_);
     passes_.linear_stress(tiles_.data());
     passes_.gather(force_.data());
@@ -91,11 +92,13 @@ class CudaVibration final : public Vibration {
     return product(next_, current_);
   }
   double subtract(double alpha) override {
+    m_.use_device();
     m_.launch_tiles("subtract", subtract_multiple<Real>, next_.data(), current_.data(),
                     static_cast<Real>(alpha));
     return std::sqrt(product(next_, next_));
   }
   void advance(double norm) override {
+    m_.use_device();
     std::swap(previous_, current_);
     std::swap(current_, next_);
     scale(current_, 1 / norm);

@@ -30,14 +30,35 @@ Model two_bodies() {
   return build_model(scene);
 }
 
-TEST(SurfelPlan, HasEverySurfelOnceWithItsCarriers) {
-  const Model model = two_bodies();
+/// A mesh so coarse that its vertices share no carriers.
+Model coarse_mesh() {
+  Scene scene = one_body();
+  BodyRequest& body = scene.bodies[0];
+  body.source.shape = {.name = "block", .size = {2.4, 2.4, 2.4}, .spacing = 0.1, .surface = true};
+  body.neighbourhood.factor = 2;
+  Cloud cloud = make_cloud(body);
+  Surface sparse;
+  for (std::size_t s = 0; s < cloud.surface.position.size(); s += 9) {
+    sparse.position.push_back(cloud.surface.position[s]);
+  }
+  for (Index s = 0; s + 2 < static_cast<Index>(sparse.position.size()); s += 3) {
+    sparse.triangle.push_back({s, s + 1, s + 2});
+  }
+  cloud.surface = sparse;
+  return build_model(scene, std::vector<Cloud>{cloud});
+}
+
+class SurfelPlans : public ::testing::TestWithParam<Model (*)()> {};
+
+TEST_P(SurfelPlans, HaveEverySurfelOnceWithItsCarriers) {
+  const Model model = GetParam()();
   const Tiling tiling = make_tiling(model);
   const SurfelPlan plan = make_surfel_plan(model, tiling.place);
   const auto count = model.surfels.position.size();
   ASSERT_EQ(plan.order.size(), count);
   std::vector<char> seen(count, 0);
   int next = 0;
+  EXPECT_LE(plan.most_slots, block_slots);
   for (const SurfelBlock& block : plan.blocks) {
     EXPECT_EQ(block.first_surfel, next);
     next += block.surfels;
@@ -67,6 +88,9 @@ TEST(SurfelPlan, HasEverySurfelOnceWithItsCarriers) {
   }
   EXPECT_EQ(next, static_cast<int>(count));
 }
+
+INSTANTIATE_TEST_SUITE_P(Bodies, SurfelPlans, ::testing::Values(two_bodies, coarse_mesh),
+                         [](const auto& test) { return test.index == 0 ? "Dense" : "Coarse"; });
 
 }  // namespace
 }  // namespace phyxel::cuda
