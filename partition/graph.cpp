@@ -12,6 +12,13 @@ std::int64_t Graph::total_weight() const {
   return std::accumulate(vertex_weight.begin(), vertex_weight.end(), std::int64_t{0});
 }
 
+std::vector<std::int64_t> part_weights(const Graph& graph, const std::vector<int>& part_of,
+                                       int parts) {
+  std::vector<std::int64_t> weights(static_cast<std::size_t>(parts), 0);
+  for (Index v = 0; v < graph.vertices(); ++v) weights[part_of[v]] += graph.vertex_weight[v];
+  return weights;
+}
+
 Graph phyxel_graph(const Model& model) {
   const Neighbourhood& hood = model.with_lists().neighbourhood;
   Graph graph;
@@ -32,13 +39,10 @@ Groups curve_groups(const Model& model, int size) {
   Groups groups;
   groups.of.resize(static_cast<std::size_t>(model.size()));
   for (const Part& part : model.parts) {
-    const auto count = static_cast<std::size_t>(part.end - part.begin);
-    const std::vector<Index> order =
-        curve_order(std::span(model.position).subspan(part.begin, count));
-    for (std::size_t k = 0; k < count; ++k) {
-      groups.of[part.begin + order[k]] = groups.count + static_cast<Index>(k) / size;
-    }
-    groups.count += static_cast<Index>((count + size - 1) / size);
+    const std::vector<Index> order = curve_order(model.position, part.begin, part.end);
+    const auto count = static_cast<Index>(order.size());
+    for (Index k = 0; k < count; ++k) groups.of[order[k]] = groups.count + k / size;
+    groups.count += (count + size - 1) / size;
   }
   return groups;
 }

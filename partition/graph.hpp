@@ -27,6 +27,10 @@ struct Graph {
   std::int64_t total_weight() const;
 };
 
+/// Weight of each part, shape [parts].
+std::vector<std::int64_t> part_weights(const Graph& graph, const std::vector<int>& part_of,
+                                       int parts);
+
 /// A vertex for each phyxel, an edge where one is a neighbour of the other. A phyxel costs its
 /// neighbours and one more, an edge 1.
 Graph phyxel_graph(const Model& model);

@@ -31,12 +31,9 @@ std::vector<idx_t> fitted(const std::vector<std::int64_t>& weights) {
 /// Gives each empty part the lightest vertex of the heaviest part: METIS leaves parts empty where
 /// there are hardly more vertices than parts.
 void fill_empty_parts(const Graph& graph, int parts, std::vector<int>& part_of) {
-  std::vector<std::int64_t> weight(static_cast<std::size_t>(parts), 0);
+  std::vector<std::int64_t> weight = part_weights(graph, part_of, parts);
   std::vector<Index> count(static_cast<std::size_t>(parts), 0);
-  for (Index v = 0; v < graph.vertices(); ++v) {
-    weight[part_of[v]] += graph.vertex_weight[v];
-    ++count[part_of[v]];
-  }
+  for (const int part : part_of) ++count[part];
   for (int empty = 0; empty < parts; ++empty) {
     if (count[empty] > 0) continue;
     int heaviest = -1;
@@ -57,8 +54,7 @@ void fill_empty_parts(const Graph& graph, int parts, std::vector<int>& part_of) 
 }
 
 double largest_weight(const Graph& graph, const std::vector<int>& part_of, int parts) {
-  std::vector<std::int64_t> weight(static_cast<std::size_t>(parts), 0);
-  for (Index v = 0; v < graph.vertices(); ++v) weight[part_of[v]] += graph.vertex_weight[v];
+  const std::vector<std::int64_t> weight = part_weights(graph, part_of, parts);
   return static_cast<double>(*std::max_element(weight.begin(), weight.end()));
 }
 

@@ -9,6 +9,7 @@
 #include "model/space_filling_curve.hpp"
 #include "partition/metis.hpp"
 #include "phyxel/error.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel {
 namespace {
@@ -133,19 +134,18 @@ std::vector<int> make_partition(const Graph& graph, int parts, Partitioner parti
   if (partitioner == Partitioner::bisection) return Bisection(graph, parts).result();
   // As many parts as vertices, or more: nothing to choose.
   if (partitioner == Partitioner::metis && n > parts) return metis_partition(graph, parts);
-  return cut_in_order(graph, curve_order(graph.centre), parts);
+  return cut_in_order(graph, curve_order(graph.centre, 0, n), parts);
 }
 
 PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts) {
   PartitionQuality q;
-  std::vector<std::int64_t> weight(static_cast<std::size_t>(parts), 0);
+  const std::vector<std::int64_t> weight = part_weights(graph, part_of, parts);
   std::vector<Index> ghosts(static_cast<std::size_t>(parts), 0);
   std::vector<std::set<int>> peers(static_cast<std::size_t>(parts));
   std::vector<int> others;  // parts that need a vertex
   std::vector<char> used(static_cast<std::size_t>(parts), 0);
   for (Index v = 0; v < graph.vertices(); ++v) {
     const int own = part_of[v];
-    weight[own] += graph.vertex_weight[v];
     used[own] = 1;
     others.clear();
     for (Offset e = graph.offsets[v]; e < graph.offsets[v + 1]; ++e) {
@@ -154,8 +154,7 @@ PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of,
       q.cut += graph.weight_of_edge(e);
       others.push_back(other);
     }
-    std::sort(others.begin(), others.end());
-    others.erase(std::unique(others.begin(), others.end()), others.end());
+    sort_unique(others);
     for (const int other : others) {
       ++ghosts[other];
       peers[other].insert(own);

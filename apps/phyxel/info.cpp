@@ -10,6 +10,7 @@
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "info_partition.hpp"
+#include "model/box.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 
@@ -21,11 +22,7 @@ using Facts = nlohmann::ordered_json;
 
 Facts box_of(const std::vector<Vec3d>& points) {
   if (points.empty()) return "empty";
-  Vec3d low = points.front(), high = low;
-  for (const Vec3d& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = box_around(points);
   return {{"low", {low.x, low.y, low.z}}, {"high", {high.x, high.y, high.z}}};
 }
 

@@ -8,6 +8,7 @@
 #include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -146,8 +147,7 @@ std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t av
       }
       chosen.push_back(static_cast<std::size_t>(frame < 0 ? frame + n : frame));
     }
-    std::sort(chosen.begin(), chosen.end());
-    chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+    sort_unique(chosen);
   } else if (choice.count == 1) {
     if (n > 0) chosen.push_back(available - 1);  // the end of a motion tells the most
   } else if (choice.count > 0) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "check.hpp"
+#include "model/box.hpp"
 
 namespace phyxel::cuda {
 
@@ -128,10 +129,6 @@ std::vector<T> fetched(const DeviceArray<T>& array) {
   return values;
 }
 
-/// A box around points.
-struct Box {
-  Vec3<double> low, high;
-};
 struct AroundBoth {
   __host__ __device__ Box operator()(const Box& a, const Box& b) const {
     return {{fmin(a.low.x, b.low.x), fmin(a.low.y, b.low.y), fmin(a.low.z, b.low.z)},

@@ -11,6 +11,7 @@
 #include "model/space_filling_curve.hpp"
 #include "phyxel/error.hpp"
 #include "setup/wait_free.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel::cuda {
 namespace {
@@ -22,9 +23,7 @@ void place_phyxels(const Model& model, Tiling& tiling) {
   tiling.place.resize(static_cast<std::size_t>(model.size()));
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     const Part& part = model.parts[p];
-    std::vector<Index> order =
-        curve_order(std::span(model.position).subspan(part.begin, part.end - part.begin));
-    for (Index& i : order) i += part.begin;
+    std::vector<Index> order = curve_order(model.position, part.begin, part.end);
     for (std::size_t begin = 0; begin < order.size(); begin += tile_size) {
       const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin);
       const auto last =
@@ -58,8 +57,7 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
       if (other < begin || other >= end) rows.halo.push_back(other);
     }
   }
-  std::sort(rows.halo.begin(), rows.halo.end());
-  rows.halo.erase(std::unique(rows.halo.begin(), rows.halo.end()), rows.halo.end());
+  sort_unique(rows.halo);
   if (rows.halo.size() > most_halo) refuse_halo(static_cast<int>(rows.halo.size()));
   const auto slot_of = [&](Index place) {
     if (place >= begin && place < end) return static_cast<std::uint16_t>(place - begin);

@@ -5,6 +5,7 @@
 
 #include "model/space_filling_curve.hpp"
 #include "solver/carrier_weights.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel::cuda {
 namespace {
@@ -24,8 +25,7 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
   }
   block.carriers = filled_up(block.carriers, carrier_group);
   // Ascending, so that surfels side by side name the same one at the same time.
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
+  sort_unique(places);
   block.slots = static_cast<int>(places.size());
   block.tile = places.front() / tile_size;
   block.first_slot = static_cast<Offset>(plan.place.size());
@@ -75,9 +75,8 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
   for (const Part& part : model.parts) {
     if (part.surfel_begin == part.surfel_end) continue;
     const std::vector<Index> order =
-        curve_order(std::span(model.surfels.position)
-                        .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin));
-    for (const Index s : order) plan.order.push_back(part.surfel_begin + s);
+        curve_order(model.surfels.position, part.surfel_begin, part.surfel_end);
+    plan.order.insert(plan.order.end(), order.begin(), order.end());
     for (Index first = part.surfel_begin; first < part.surfel_end;) {
       SurfelBlock block;
       block.first_surfel = first;
@@ -86,8 +85,7 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
       first += block.surfels;
     }
   }
-  std::sort(plan.tiles.begin(), plan.tiles.end());
-  plan.tiles.erase(std::unique(plan.tiles.begin(), plan.tiles.end()), plan.tiles.end());
+  sort_unique(plan.tiles);
   return plan;
 }
 

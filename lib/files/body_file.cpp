@@ -8,6 +8,7 @@
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
+#include "sort_unique.hpp"
 #include "version.hpp"
 
 namespace phyxel {
@@ -109,8 +110,7 @@ Cloud read_body(const std::filesystem::path& file) {
     const std::string path = "/regions/" + name;
     std::vector<Index> phyxels = in.array<Index>(path);
     check_range(in, path, phyxels, cloud.position.size());
-    std::sort(phyxels.begin(), phyxels.end());
-    phyxels.erase(std::unique(phyxels.begin(), phyxels.end()), phyxels.end());
+    sort_unique(phyxels);
     cloud.regions[name] = std::move(phyxels);
   }
   return cloud;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "model/box.hpp"
+
 namespace phyxel {
 namespace {
 
@@ -52,16 +54,12 @@ double enclosed_volume(const Surface& surface) {
 void order_along_curve(Cloud& cloud) {
   const std::size_t n = cloud.position.size();
   if (n < 2) return;
-  Vec3d low = cloud.position[0], high = cloud.position[0];
-  for (const Vec3d& p : cloud.position) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const double extent = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  const Box box = box_around(cloud.position);
+  const double extent = box.extent();
   const double scale = extent > 0 ? 2097151.0 / extent : 0;
   std::vector<std::pair<std::uint64_t, Index>> key(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec3d cell = scale * (cloud.position[i] - low);
+    const Vec3d cell = scale * (cloud.position[i] - box.low);
     key[i] = {spread_bits(static_cast<std::uint64_t>(cell.x)) |
                   spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
                   spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,

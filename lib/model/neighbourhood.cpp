@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "model/box.hpp"
 #include "model/nearest_distances.hpp"
 #include "model/spatial_hash.hpp"
 
@@ -49,11 +50,7 @@ Csr build_rows(Index rows, Fill&& fill) {
 /// A hash whose cells hold a handful of points each, without knowing the cloud's shape: starts
 /// from the bounding box and shrinks while cells are crowded.
 SpatialHash roomy_hash(std::span<const Vec3d> position) {
-  Vec3d low = position[0], high = position[0];
-  for (const Vec3d& p : position) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  const auto [low, high] = box_around(position);
   double cell = roomy_cell_size(low, high, position.size());
   for (int attempt = 0;; ++attempt) {
     SpatialHash hash(position, cell);

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "model/box.hpp"
 #include "phyxel/error.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel {
 namespace {
@@ -39,8 +41,7 @@ std::vector<Index> of_indices(const Selection& selection, const Cloud& cloud,
                                    selection.where, i, body, cloud.position.size() - 1));
     }
   }
-  std::sort(chosen.begin(), chosen.end());
-  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  sort_unique(chosen);
   return chosen;
 }
 
@@ -67,12 +68,7 @@ std::vector<Index> select(const Selection& selection, const Cloud& cloud, const 
     chosen = indices_where(cloud, [](Vec3d) { return true; });
   }
   if (chosen.empty()) {
-    Vec3d low{}, high{};
-    if (!cloud.position.empty()) low = high = cloud.position[0];
-    for (const Vec3d& p : cloud.position) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-    }
+    const auto [low, high] = box_around(cloud.position);
     throw InputError(fmt::format(
         "{}: this selects no phyxel of body \"{}\", whose phyxels lie in [{:g}, {:g}, {:g}] to "
         "[{:g}, {:g}, {:g}] m",

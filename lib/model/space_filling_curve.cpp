@@ -1,19 +1,16 @@
 #include "model/space_filling_curve.hpp"
 
+#include "model/box.hpp"
+
 namespace phyxel {
 
-std::vector<Index> curve_order(std::span<const Vec3d> position) {
-  if (position.empty()) return {};
-  Vec3d low = position.front(), high = low;
-  for (const Vec3d& x : position) {
-    low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
-    high = {std::max(high.x, x.x), std::max(high.y, x.y), std::max(high.z, x.z)};
-  }
-  const HilbertFrame frame = HilbertFrame::around(low, high);
-  const auto n = static_cast<Index>(position.size());
-  std::vector<std::pair<std::uint64_t, Index>> keys(position.size());
+std::vector<Index> curve_order(std::span<const Vec3d> position, Index begin, Index end) {
+  const auto count = static_cast<std::size_t>(end - begin);
+  const Box box = box_around(position.subspan(static_cast<std::size_t>(begin), count));
+  const HilbertFrame frame = HilbertFrame::around(box.low, box.high);
+  std::vector<std::pair<std::uint64_t, Index>> keys(count);
 #pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) keys[i] = {frame.key_of(position[i]), i};
+  for (Index i = begin; i < end; ++i) keys[i - begin] = {frame.key_of(position[i]), i};
   std::sort(keys.begin(), keys.end());
   std::vector<Index> order;
   order.reserve(keys.size());

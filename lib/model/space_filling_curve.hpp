@@ -64,7 +64,8 @@ struct HilbertFrame {
   }
 };
 
-/// Points along the curve over their box; those of one cell in the order of their indices.
-std::vector<Index> curve_order(std::span<const Vec3d> position);
+/// Points [begin, end) along the curve over their box; those of one cell in the order of their
+/// indices.
+std::vector<Index> curve_order(std::span<const Vec3d> position, Index begin, Index end);
 
 }  // namespace phyxel

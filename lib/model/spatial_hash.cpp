@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <bit>
 
+#include "model/box.hpp"
+
 namespace phyxel {
 
 SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
   const std::size_t n = position.size();
-  if (n > 0) grid_.low = high_ = position[0];
-  for (const Vec3d& p : position) {
-    grid_.low = {std::min(grid_.low.x, p.x), std::min(grid_.low.y, p.y),
-                 std::min(grid_.low.z, p.z)};
-    high_ = {std::max(high_.x, p.x), std::max(high_.y, p.y), std::max(high_.z, p.z)};
-  }
+  const Box box = box_around(position);
+  grid_.low = box.low;
+  high_ = box.high;
   cell_size_ = cell_size_for(grid_.low, high_, cell_size);
   grid_.inverse_cell_size = 1 / cell_size_;
 

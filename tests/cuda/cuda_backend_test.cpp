@@ -198,6 +198,16 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
   }
 }
 
+/// Steps of sizes of their own. @returns the time after them
+double advance_by(Backend& backend, double time, int steps, double dt) {
+  for (int s = 0; s < steps; ++s) {
+    backend.stress();
+    backend.advance(time, dt);
+    time += dt;
+  }
+  return time;
+}
+
 TEST(CudaResidenceOf, BodiesWithListsOfTheirOwnForEachPassInEveryPrecision) {
   const Case terms{"", true, true, true};
   Scene scene = scene_of(terms);
@@ -214,13 +224,8 @@ TEST(CudaResidenceOf, BodiesWithListsOfTheirOwnForEachPassInEveryPrecision) {
     EXPECT_NE(resident->name().find("resident"), std::string::npos) << resident->name();
     for (Backend* backend : {resident.get(), launched.get()}) {
       backend->upload(initial_state(model, scene, dt));
-      double time = 0;
-      for (int s = 0; s < 30; ++s) {
-        const double step = s < 13 ? dt : 2 * dt;  // changes while steps wait to be launched
-        backend->stress();
-        backend->advance(time, step);
-        time += step;
-      }
+      const double time = advance_by(*backend, 0, 13, dt);
+      advance_by(*backend, time, 17, 2 * dt);  // while steps wait to be launched
     }
     State a, b;
     resident->download(a);
@@ -244,14 +249,10 @@ TEST(CudaGraphs, EqualLaunchesToTheLastBit) {
     start.displacement = random_deformation(model, 0.003);
     for (const auto& [backend, out] : {std::pair{&recorded, &a}, std::pair{&launched, &b}}) {
       (*backend)->upload(start);
-      double time = 0;
-      for (int s = 0; s < 60; ++s) {
-        const double step = s < 38 ? dt : 1.5 * dt;  // in the middle of a graph, which is then void
-        (*backend)->stress();
-        (*backend)->advance(time, step);
-        time += step;
-        if (s == 20) (*backend)->download(*out);  // with steps that wait
-      }
+      double time = advance_by(**backend, 0, 21, dt);
+      (*backend)->download(*out);  // with steps that wait
+      time = advance_by(**backend, time, 17, dt);
+      advance_by(**backend, time, 22, 1.5 * dt);  // in the middle of a graph, which is then void
       (*backend)->download(*out);
     }
     EXPECT_TRUE(a.displacement == b.displacement) << recorded->name();
@@ -318,22 +319,8 @@ INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
                                            Case{"AdaptiveEverything", true, false, true}),
                          [](const auto& test) { return std::string(test.param.name); });
 
-Model model_with_surfels() {
-  Scene scene;
-  for (const char* shape : {"dino", "alien_head"}) {
-    BodyRequest body;
-    body.name = shape;
-    body.where = "test";
-    body.source.shape.name = shape;
-    body.translation = {shape[0] == 'd' ? 0.0 : 40.0, 0, 0};
-    body.material = rubber();
-    scene.bodies.push_back(body);
-  }
-  return build_model(scene);
-}
-
 TEST(CudaSurfels, EqualTheCpus) {
-  const Model model = model_with_surfels();
+  const Model model = built_in_bodies("dino", "alien_head");
   const State state = state_of(random_deformation(model, 0.001));
   const auto cpu = make_cpu_backend(model, Precision::double_);
   cpu->upload(state);
@@ -357,7 +344,7 @@ TEST(CudaSurfels, EqualTheCpus) {
 }
 
 TEST(CudaSurfels, FollowEveryStepOnEveryPath) {
-  const Model model = model_with_surfels();
+  const Model model = built_in_bodies("dino", "alien_head");
   for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
     const auto resident = make_cuda_backend(model, precision),
                launched = make_cuda_backend(model, precision, 0, CudaPath::launches);

@@ -16,18 +16,7 @@ using namespace phyxel::testing;
 
 /// Two bodies, the second in between two tiles' sizes, supports of each phyxel's own.
 Model two_bodies() {
-  Scene scene;
-  for (const char* shape : {"horn_bug", "alien_head"}) {
-    BodyRequest body;
-    body.name = shape;
-    body.where = "test";
-    body.source.shape.name = shape;
-    body.translation = {shape[0] == 'h' ? 0.0 : 40.0, 0, 0};
-    body.material = rubber();
-    body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
-    scene.bodies.push_back(body);
-  }
-  return build_model(scene);
+  return built_in_bodies("horn_bug", "alien_head", NeighbourhoodRule::Support::adaptive);
 }
 
 /// A mesh so coarse that its vertices share no carriers.

@@ -57,6 +57,24 @@ inline Model model_of(const Scene& scene, const Cloud& cloud) {
   return build_model(scene, std::span(&cloud, 1));
 }
 
+/// Two built-in bodies that never meet, with their surfels.
+inline Model built_in_bodies(
+    const char* first, const char* second,
+    NeighbourhoodRule::Support support = NeighbourhoodRule::Support::uniform) {
+  Scene scene;
+  for (const char* shape : {first, second}) {
+    BodyRequest body;
+    body.name = shape;
+    body.where = "test";
+    body.source.shape.name = shape;
+    body.translation = {scene.bodies.empty() ? 0.0 : 40.0, 0, 0};
+    body.material = rubber();
+    body.neighbourhood.support = support;
+    scene.bodies.push_back(body);
+  }
+  return build_model(scene);
+}
+
 inline State state_of(const std::vector<Vec3d>& displacement, double dt = 1e-3) {
   State state;
   state.displacement = displacement;
