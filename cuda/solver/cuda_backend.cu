@@ -31,9 +31,10 @@ class CudaBackend final : public Backend {
   std::string name() const override {
     const char* precision = m_.mixed ? "mixed" : sizeof(Real) == 4 ? "float" : "double";
     const std::string path =
-        residence_ ? residence_->describe()
-                   : "tiles of " + std::to_string(tile_size) +
-                         (recorded_ ? ", graphs of " + std::to_string(graph_steps) + " steps" : "");
+        residence_
+            ? residence_->describe()
+            : "tiles of " + std::to_string(tile_size) +
+                  (recorded_ ? ", graphs of " + std::to_string(steps_together) + " steps" : "");
     return m_.device().name + ", " + precision + ", " + path;
   }
   Index size() const override { return m_.size(); }
@@ -153,15 +154,12 @@ class CudaBackend final : public Backend {
     if (m_.model().surfels.position.empty()) return;
     if (!surfels_) {
       settle();
-      surfels_.emplace(m_, residence_ != nullptr);
+      surfels_.emplace(m_, residence_ ? steps_together : 0);
     }
     if (open_) {
       close_step(Then::surfels);
     } else {
       settle();
-      if (Real* all = surfels_->all_gradients()) {
-        passes_.put_gradients({all, m_.places(), nullptr}, m_.tiles());
-      }
       surfels_->launch(passes_);
     }
   }
@@ -186,9 +184,9 @@ class CudaBackend final : public Backend {
   std::size_t step_traffic() const override { return m_.step_traffic(); }
 
  private:
-  /// Steps that a graph repeats, and bodies for which that is worth while: a step of more phyxels
-  /// takes longer than its launches.
-  static constexpr int graph_steps = 16;
+  /// Steps of a graph or of a trail, and bodies for which a graph is worth while: a step of more
+  /// phyxels takes longer than its launches.
+  static constexpr int steps_together = 16;
   static constexpr Index most_recorded = 4'000'000;
   /// What follows a step, before the next.
   enum class Then { nothing, surfels };
@@ -203,31 +201,28 @@ class CudaBackend final : public Backend {
     if (pending_ > 0 && then != pending_then_) launch_pending();
     pending_then_ = then;
     const bool resident = residence_ && then == Then::nothing;
-    const int most = resident ? residence_->most_steps : graph_steps;
+    const int most = resident ? residence_->most_steps : steps_together;
     if (++pending_ == most) launch_pending();
   }
   void launch_pending() const {
     m_.use_device();
     const int steps = std::exchange(pending_, 0);  // once, whatever happens
     bound_queue(steps);
-    if (residence_ && pending_then_ == Then::nothing) {
-      residence_->launch(m_.dt(), steps);
+    const bool surfels = pending_then_ == Then::surfels;
+    if (residence_) {
+      residence_->launch(m_.dt(), steps, surfels ? surfels_->trail() : Trail<Real, StateReal>{});
+      if (surfels) surfels_->launch_trail(steps);
       return;
     }
     const auto launch = [&] {
       for (int s = 0; s < steps; ++s) {
-        if (residence_) {
-          residence_->launch(m_.dt(), 1, surfels_->all_gradients());
-        } else {
-          passes_.stress();
-          passes_.advance(m_.dt());
-        }
-        if (pending_then_ == Then::surfels) surfels_->launch(passes_);
+        passes_.stress();
+        passes_.advance(m_.dt());
+        if (surfels) surfels_->launch(passes_);
       }
     };
-    if (steps == graph_steps && !(residence_ && residence_->by_mail()) &&
-        !launches_are_waited_for()) {
-      graphs_[pending_then_ == Then::surfels].launch(m_.stream(), launch);
+    if (steps == steps_together && !launches_are_waited_for()) {
+      graphs_[surfels].launch(m_.stream(), launch);
     } else {
       launch();
     }

@@ -25,20 +25,17 @@ class Residence {
     return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
   }
-  /// Whether each launch needs tags of its own.
-  bool by_mail() const { return cluster_ == 0; }
   std::size_t bytes() const {
     return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() +
            destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
   }
 
-  /// @param gradients for those of the last displacements, shape [9, places], or null
-  void launch(double dt, int steps, Real* gradients = nullptr) {
+  void launch(double dt, int steps, Trail<Real, StateReal> trail = {}) {
     if (next_tag_ > 0xF000'0000U) clear_mail();
     Fields<Real, StateReal> fields = m_.fields();
     auto step = static_cast<StateReal>(dt);
     unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps) + 1);
-    void* arguments[] = {&fields, &view_, &step, &steps, &gradients, &tag};
+    void* arguments[] = {&fields, &view_, &step, &steps, &trail, &tag};
     const LaunchOf launch(*this);
     PHYXEL_CUDA(cudaLaunchKernelExC(&launch.config, kernel_, arguments));
     m_.launched("resident_steps", blocks_, threads_);

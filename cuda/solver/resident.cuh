@@ -101,6 +101,13 @@ struct ResidentView {
   int longest[2];  ///< Entries a lane may have; the second is 0 where one list serves both passes.
 };
 
+/// What surfels need of the phyxels that carry them, after each step of a launch.
+template <class Real, class StateReal>
+struct Trail {
+  Real* gradients;           ///< [steps, 9, places]; null: nothing is wanted.
+  StateReal* displacements;  ///< [steps, 3, places]
+};
+
 /// Numbers of all slots: letter k of slot s is letters[k * slots + s].
 struct SlotImage {
   Letter* letters;
@@ -447,13 +454,12 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
   }
 }
 
-/// @param gradients of the last displacements, shape [9, places], if they are wanted
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
 template <class Real, class StateReal, class Post>
 __global__ void __launch_bounds__(Post::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
-                   Real* gradients, unsigned first_tag) {
+                   Trail<Real, StateReal> trail, unsigned first_tag) {
   constexpr int u_letters = displacement_letters<Real>, q_letters = stress_letters<Real>;
   extern __shared__ __align__(16) char shared[];
   const int number = r.slice_of_block[blockIdx.x];
@@ -505,7 +511,7 @@ __global__ void __launch_bounds__(Post::threads)
     if (f.load) load = column3(f.load, f.places, place);
   }
   // Half a step more for the gradients of the last displacements.
-  for (int step = 0; step < steps + (gradients ? 1 : 0); ++step) {
+  for (int step = 0; step < steps + (trail.gradients ? 1 : 0); ++step) {
     const Real u[] = {point.u.x, point.u.y, point.u.z};
     post.template send<u_letters>(0, memory.displacements, place, somebody, u);
     post.template receive<u_letters>(0, memory.displacements);
@@ -517,8 +523,12 @@ __global__ void __launch_bounds__(Post::threads)
             add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
           });
       const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
-      if (step == steps) {
-        for (int e = 0; e < 9; ++e) gradients[e * f.places + place] = grad_u(e / 3, e % 3);
+      if (trail.gradients && step > 0) {
+        const auto before = static_cast<std::size_t>(step - 1) * f.places;
+        for (int e = 0; e < 9; ++e) {
+          trail.gradients[9 * before + e * f.places + place] = grad_u(e / 3, e % 3);
+        }
+        set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
       q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
     }

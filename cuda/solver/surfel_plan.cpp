@@ -12,20 +12,42 @@ namespace {
 
 int filled_up(int count, int group) { return (count + group - 1) / group * group; }
 
-void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place,
-               SurfelBlock block) {
-  const Csr& carriers = model.surfels.carriers;
-  const auto surfel = [&](int s) { return plan.order[block.first_surfel + s]; };
+/// The places of the phyxels that carry the surfels from `first` on, as many of these as a block
+/// takes, ascending, so that surfels side by side name the same one at the same time; and where the
+/// next block begins.
+struct Taken {
   std::vector<Index> places;
+  Index next;
+};
+Taken take_surfels(const Model& model, const std::vector<Index>& place,
+                   const std::vector<Index>& order, Index first, Index end) {
+  std::unordered_set<Index> places;
+  Index next = first;
+  for (; next < end && next - first < surfel_block; ++next) {
+    const auto row = model.surfels.carriers.row(order[next]);
+    const auto fresh =
+        std::count_if(row.begin(), row.end(), [&](Index i) { return places.count(place[i]) == 0; });
+    if (next > first && places.size() + static_cast<std::size_t>(fresh) > block_slots) break;
+    for (const Index i : row) places.insert(place[i]);
+  }
+  std::vector<Index> ascending(places.begin(), places.end());
+  std::sort(ascending.begin(), ascending.end());
+  return {std::move(ascending), next};
+}
+
+void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place, Index first,
+               const Taken& taken) {
+  const Csr& carriers = model.surfels.carriers;
+  const std::vector<Index>& places = taken.places;
+  SurfelBlock block;
+  block.first_surfel = first;
+  block.surfels = taken.next - first;
+  const auto surfel = [&](int s) { return plan.order[first + s]; };
   for (int s = 0; s < block.surfels; ++s) {
     block.centre += 1.0 / block.surfels * model.surfels.position[surfel(s)];
-    const auto row = carriers.row(surfel(s));
-    block.carriers = std::max(block.carriers, static_cast<int>(row.size()));
-    for (const Index i : row) places.push_back(place[i]);
+    block.carriers = std::max(block.carriers, static_cast<int>(carriers.row(surfel(s)).size()));
   }
   block.carriers = filled_up(block.carriers, carrier_group);
-  // Ascending, so that surfels side by side name the same one at the same time.
-  sort_unique(places);
   block.slots = static_cast<int>(places.size());
   block.tile = places.front() / tile_size;
   block.first_slot = static_cast<Offset>(plan.place.size());
@@ -54,20 +76,6 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
   plan.blocks.push_back(block);
 }
 
-/// How many surfels from `first` on a block takes.
-int surfels_of_block(const Model& model, const SurfelPlan& plan, Index first, Index end) {
-  std::unordered_set<Index> carriers;
-  Index next = first;
-  for (; next < end && next - first < surfel_block; ++next) {
-    const auto row = model.surfels.carriers.row(plan.order[next]);
-    const auto fresh =
-        std::count_if(row.begin(), row.end(), [&](Index i) { return carriers.count(i) == 0; });
-    if (next > first && carriers.size() + static_cast<std::size_t>(fresh) > block_slots) break;
-    carriers.insert(row.begin(), row.end());
-  }
-  return next - first;
-}
-
 }  // namespace
 
 SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place) {
@@ -78,11 +86,9 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
         curve_order(model.surfels.position, part.surfel_begin, part.surfel_end);
     plan.order.insert(plan.order.end(), order.begin(), order.end());
     for (Index first = part.surfel_begin; first < part.surfel_end;) {
-      SurfelBlock block;
-      block.first_surfel = first;
-      block.surfels = surfels_of_block(model, plan, first, part.surfel_end);
-      add_block(plan, model, place, block);
-      first += block.surfels;
+      const Taken taken = take_surfels(model, place, plan.order, first, part.surfel_end);
+      add_block(plan, model, place, first, taken);
+      first = taken.next;
     }
   }
   sort_unique(plan.tiles);

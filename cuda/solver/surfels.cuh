@@ -3,6 +3,7 @@
 
 #include "phyxel/physics/surfel.hpp"
 #include "solver/passes.cuh"
+#include "solver/resident.cuh"
 #include "solver/surfel_plan.hpp"
 
 namespace phyxel::cuda {
@@ -25,12 +26,13 @@ struct alignas(2 * sizeof(Real)) DeviceCarrier {
 template <class Real, class StateReal>
 struct DeviceSurfels {
   const DeviceSurfelBlock<Real>* blocks;
-  const Index *place, *row;  ///< Of a slot: in the fields, and in the gradients.
+  const Index *place, *row;  ///< Of a slot: in the fields, and in the trail.
   const DeviceCarrier<Real>* carriers;
   const Vec3<Real>*position, *normal;  ///< At rest; positions from the centre of the block.
   Vec3<StateReal>*displacement, *moved_normal;
-  const Real* gradients;  ///< [9, stride]
-  std::size_t stride;
+  Trail<Real, StateReal> trail;  ///< Displacements null: as in the fields.
+  std::size_t stride;            ///< Of the trail: its places.
+  int steps;                     ///< Of the trail: surfels move after each of them.
   int most_slots;
 };
 
@@ -49,80 +51,91 @@ __global__ void __launch_bounds__(surfel_block)
   const Vec3<Real> centre = s.blocks[blockIdx.x].centre;
   const int thread = static_cast<int>(threadIdx.x);
   DeviceCarrier<Real> next[carrier_group];
-  const DeviceCarrier<Real>* list = s.carriers + block.first_carrier + thread;
+  const DeviceCarrier<Real>* list = nullptr;
   const auto fetch_group = [&] {
 #pragma unroll
     for (int g = 0; g < carrier_group; ++g) next[g] = list[g * surfel_block];
     list += carrier_group * surfel_block;
   };
-  fetch_group();
   Index place = 0, row = 0;
   const auto look_up = [&](int slot) {
     if (slot >= block.slots) return;
     place = s.place[block.first_slot + slot];
     row = s.row[block.first_slot + slot];
   };
-  look_up(thread);
+  const auto begin_step = [&] {
+    list = s.carriers + block.first_carrier + thread;
+    fetch_group();
+    look_up(thread);
+  };
+  begin_step();
   let_next_launch_begin();
   wait_for_last_launch();
-  for (int slot = thread; slot < block.slots; slot += surfel_block) {
-    const auto point = f.points.get(static_cast<std::size_t>(place));
-    Vec3<StateReal> u = to<StateReal>(point.u);
-    if constexpr (!std::is_same_v<Real, StateReal>) {
-      u = column3(f.displacement, f.places, static_cast<std::size_t>(place));
+  for (int step = 0; step < s.steps; ++step) {
+    const std::size_t before = static_cast<std::size_t>(step) * s.stride;
+    const Real* gradients = s.trail.gradients + 9 * before;
+    for (int slot = thread; slot < block.slots; slot += surfel_block) {
+      const auto point = f.points.get(static_cast<std::size_t>(place));
+      Vec3<StateReal> u = to<StateReal>(point.u);
+      if (s.trail.displacements) {
+        u = column3(s.trail.displacements + 3 * before, s.stride, static_cast<std::size_t>(row));
+      } else if constexpr (!std::is_same_v<Real, StateReal>) {
+        u = column3(f.displacement, f.places, static_cast<std::size_t>(place));
+      }
+      Mat3<StateReal> gradient;
+      for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = gradients[e * s.stride + row];
+      CarrierMotions<StateReal>::put(motions, s.most_slots, slot,
+                                     {u + gradient * to<StateReal>(centre - point.x), gradient});
+      look_up(slot + surfel_block);
     }
-    Mat3<StateReal> gradient;
-    for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + row];
-    CarrierMotions<StateReal>::put(motions, s.most_slots, slot,
-                                   {u + gradient * to<StateReal>(centre - point.x), gradient});
-    look_up(slot + surfel_block);
-  }
-  __syncthreads();
+    __syncthreads();
 
-  if (thread >= block.surfels) return;
-  SurfelBlend<StateReal> blend;
-  for (int left = block.carriers; left > 0; left -= carrier_group) {
-    DeviceCarrier<Real> group[carrier_group];
+    if (thread < block.surfels) {
+      SurfelBlend<StateReal> blend;
+      for (int left = block.carriers; left > 0; left -= carrier_group) {
+        DeviceCarrier<Real> group[carrier_group];
 #pragma unroll
-    for (int g = 0; g < carrier_group; ++g) group[g] = next[g];
-    if (left > carrier_group) fetch_group();
+        for (int g = 0; g < carrier_group; ++g) group[g] = next[g];
+        if (left > carrier_group) fetch_group();
 #pragma unroll
-    for (int g = 0; g < carrier_group; ++g) {
-      const auto motion = CarrierMotions<StateReal>::at(motions, s.most_slots, group[g].offset);
-      blend.add(group[g].weight, motion.x, motion.q);
+        for (int g = 0; g < carrier_group; ++g) {
+          const auto motion = CarrierMotions<StateReal>::at(motions, s.most_slots, group[g].offset);
+          blend.add(group[g].weight, motion.x, motion.q);
+        }
+      }
+      const std::size_t at = block.first_surfel + thread;
+      const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(s.normal[at]));
+      s.displacement[at] = blend.surfel_displacement(to<StateReal>(s.position[at]));
+      s.moved_normal[at] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
     }
+    if (step + 1 == s.steps) return;
+    begin_step();
+    __syncthreads();  // motions are read
   }
-  const std::size_t at = block.first_surfel + thread;
-  const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(s.normal[at]));
-  s.displacement[at] = blend.surfel_displacement(to<StateReal>(s.position[at]));
-  s.moved_normal[at] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
 
 template <class Real, class StateReal>
 class SurfelAdvection {
  public:
-  /// @param all_gradients whether `launch` will find the gradients of all places, or those of the
-  ///   tiles that carry surfels only
-  SurfelAdvection(const DeviceModel<Real, StateReal>& model, bool all_gradients)
-      : SurfelAdvection(model, all_gradients,
-                        make_surfel_plan(model.model(), model.tiling().place)) {}
+  /// @param trail_steps of which `launch_trail` may be told, the steps of all places; 0: `launch`
+  ///   will do, which finds the gradients of the tiles that carry surfels
+  SurfelAdvection(const DeviceModel<Real, StateReal>& model, int trail_steps)
+      : SurfelAdvection(model, trail_steps, make_surfel_plan(model.model(), model.tiling().place)) {
+  }
 
-  /// [9, places], to be filled before `launch`, or null: only some tiles' are wanted.
-  Real* all_gradients() const { return tiles_.size() ? nullptr : gradients_.data(); }
-  /// Steps may be under way.
+  /// As the phyxels are now. Steps may be under way.
   void launch(const Passes<Real, StateReal>& passes) const {
     if (tiles_.size()) {
       passes.put_gradients({gradients_.data(), stride_, tiles_.data()},
                            static_cast<Index>(tiles_.size()));
+    } else {
+      passes.put_gradients({gradients_.data(), stride_, nullptr}, m_.tiles());
     }
-    m_.launch_blocks(
-        "move_surfels", move_surfels<Real, StateReal>, static_cast<unsigned>(blocks_.size()),
-        shared_bytes_, tiles_.size() == 0, m_.fields(),
-        DeviceSurfels<Real, StateReal>{blocks_.data(), place_.data(), row_.data(), carriers_.data(),
-                                       position_.data(), normal_.data(), displacement_.data(),
-                                       moved_normal_.data(), gradients_.data(), stride_,
-                                       most_slots_});
+    launch_kernel({gradients_.data(), nullptr}, 1);
   }
+  /// To be filled before `launch_trail`.
+  Trail<Real, StateReal> trail() const { return {gradients_.data(), displacements_.data()}; }
+  void launch_trail(int steps) const { launch_kernel(trail(), steps); }
   void download(SurfelState& out) const {
     const std::vector<Vec3<StateReal>> displacement = fetched(displacement_),
                                        normal = fetched(moved_normal_);
@@ -135,14 +148,15 @@ class SurfelAdvection {
     }
   }
   std::size_t bytes() const {
-    return blocks_.bytes() + place_.bytes() + row_.bytes() + carriers_.bytes() + position_.bytes() +
-           normal_.bytes() + displacement_.bytes() + moved_normal_.bytes();
+    return blocks_.bytes() + place_.bytes() + row_.bytes() + tiles_.bytes() + carriers_.bytes() +
+           position_.bytes() + normal_.bytes() + displacement_.bytes() + moved_normal_.bytes() +
+           gradients_.bytes() + displacements_.bytes();
   }
 
  private:
   static_assert(surfel_block == tile_size);  // the threads of an overlapping launch
 
-  SurfelAdvection(const DeviceModel<Real, StateReal>& model, bool all_gradients,
+  SurfelAdvection(const DeviceModel<Real, StateReal>& model, int trail_steps,
                   const SurfelPlan& plan)
       : m_(model), order_(plan.order), most_slots_(plan.most_slots) {
     const Surfels& surfels = m_.model().surfels;
@@ -170,15 +184,15 @@ class SurfelAdvection {
     const std::string what = std::to_string(order_.size()) + " surfels";
     blocks_ = sent(blocks, what);
     place_ = sent(plan.place, what);
-    if (all_gradients) {
-      row_ = sent(plan.place, what);
+    if (trail_steps > 0) {
       stride_ = m_.places();
+      displacements_ = {static_cast<std::size_t>(trail_steps) * 3 * stride_, what};
     } else {
       tiles_ = sent(plan.tiles, what);
       row_ = sent(rows_of(plan), what);
       stride_ = plan.tiles.size() * tile_size;
     }
-    gradients_ = {9 * stride_, what};
+    gradients_ = {static_cast<std::size_t>(std::max(1, trail_steps)) * 9 * stride_, what};
     std::vector<DeviceCarrier<Real>> carriers;
     for (const Carrier& c : plan.carriers) {
       carriers.push_back({static_cast<Real>(c.weight), 16U * static_cast<unsigned>(c.slot)});
@@ -188,6 +202,16 @@ class SurfelAdvection {
     normal_ = sent(normal, what);
     displacement_ = {order_.size(), what};
     moved_normal_ = {order_.size(), what};
+  }
+
+  void launch_kernel(Trail<Real, StateReal> trail, int steps) const {
+    const Index* row = row_.size() ? row_.data() : place_.data();
+    m_.launch_blocks(
+        "move_surfels", move_surfels<Real, StateReal>, static_cast<unsigned>(blocks_.size()),
+        shared_bytes_, tiles_.size() == 0, m_.fields(),
+        DeviceSurfels<Real, StateReal>{blocks_.data(), place_.data(), row, carriers_.data(),
+                                       position_.data(), normal_.data(), displacement_.data(),
+                                       moved_normal_.data(), trail, stride_, steps, most_slots_});
   }
 
   /// Where each slot is among the tiles that carry surfels.
@@ -206,12 +230,13 @@ class SurfelAdvection {
   int most_slots_ = 0, shared_bytes_ = 0;
   std::size_t stride_ = 0;
   DeviceArray<DeviceSurfelBlock<Real>> blocks_;
-  DeviceArray<Index> place_, row_;
-  DeviceArray<Index> tiles_;  // that have carriers; empty: gradients of all are found elsewhere
+  DeviceArray<Index> place_;
+  DeviceArray<Index> row_, tiles_;  // empty: the trail has all places
   DeviceArray<DeviceCarrier<Real>> carriers_;
   DeviceArray<Vec3<Real>> position_, normal_;
   DeviceArray<Vec3<StateReal>> displacement_, moved_normal_;
   DeviceArray<Real> gradients_;
+  DeviceArray<StateReal> displacements_;
 };
 
 }  // namespace phyxel::cuda
