@@ -160,8 +160,8 @@ class DeviceModel {
   /// @param overlapping the kernel may begin while the launch before it ends: it waits inside
   ///   (`wait_for_last_launch`)
   template <class... Parameters, class... Arguments>
-  void launch_blocks(const char* name, void (*kernel)(Parameters...), unsigned blocks,
-                     int shared_bytes, bool overlapping, Arguments... arguments) const {
+  void launch_blocks(const char* name, void (*kernel)(Parameters...), dim3 blocks, int shared_bytes,
+                     bool overlapping, Arguments... arguments) const {
     allow_shared_memory(reinterpret_cast<const void*>(kernel));
     cudaLaunchAttribute overlap = overlap_attribute();
     cudaLaunchConfig_t config{};
@@ -172,7 +172,7 @@ class DeviceModel {
     config.attrs = &overlap;
     config.numAttrs = overlapping && device_.major >= 9 ? 1 : 0;
     PHYXEL_CUDA(cudaLaunchKernelEx(&config, kernel, arguments...));
-    launched(name, blocks, tile_size);
+    launched(name, blocks.x * blocks.y, tile_size);
   }
   static cudaLaunchAttribute overlap_attribute() {
     cudaLaunchAttribute overlap;

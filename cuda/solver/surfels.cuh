@@ -29,10 +29,9 @@ struct DeviceSurfels {
   const Index *place, *row;  ///< Of a slot: in the fields, and in the trail.
   const DeviceCarrier<Real>* carriers;
   const Vec3<Real>*position, *normal;  ///< At rest; positions from the centre of the block.
-  Vec3<StateReal>*displacement, *moved_normal;
-  Trail<Real, StateReal> trail;  ///< Displacements null: as in the fields.
-  std::size_t stride;            ///< Of the trail: its places.
-  int steps;                     ///< Of the trail: surfels move after each of them.
+  Vec3<StateReal>*displacement, *moved_normal;  ///< [steps, surfels]
+  Trail<Real, StateReal> trail;                 ///< Displacements null: as in the fields.
+  std::size_t stride, surfels;                  ///< Places of the trail, and surfels.
   int most_slots;
 };
 
@@ -41,7 +40,7 @@ struct DeviceSurfels {
 template <class Real>
 using CarrierMotions = Stresses<Real>;
 
-/// A thread a surfel.
+/// A thread a surfel and step.
 template <class Real, class StateReal>
 __global__ void __launch_bounds__(surfel_block)
     move_surfels(const __grid_constant__ Fields<Real, StateReal> f,
@@ -51,67 +50,58 @@ __global__ void __launch_bounds__(surfel_block)
   const Vec3<Real> centre = s.blocks[blockIdx.x].centre;
   const int thread = static_cast<int>(threadIdx.x);
   DeviceCarrier<Real> next[carrier_group];
-  const DeviceCarrier<Real>* list = nullptr;
+  const DeviceCarrier<Real>* list = s.carriers + block.first_carrier + thread;
   const auto fetch_group = [&] {
 #pragma unroll
     for (int g = 0; g < carrier_group; ++g) next[g] = list[g * surfel_block];
     list += carrier_group * surfel_block;
   };
+  fetch_group();
   Index place = 0, row = 0;
   const auto look_up = [&](int slot) {
     if (slot >= block.slots) return;
     place = s.place[block.first_slot + slot];
     row = s.row[block.first_slot + slot];
   };
-  const auto begin_step = [&] {
-    list = s.carriers + block.first_carrier + thread;
-    fetch_group();
-    look_up(thread);
-  };
-  begin_step();
+  look_up(thread);
   let_next_launch_begin();
   wait_for_last_launch();
-  for (int step = 0; step < s.steps; ++step) {
-    const std::size_t before = static_cast<std::size_t>(step) * s.stride;
-    const Real* gradients = s.trail.gradients + 9 * before;
-    for (int slot = thread; slot < block.slots; slot += surfel_block) {
-      const auto point = f.points.get(static_cast<std::size_t>(place));
-      Vec3<StateReal> u = to<StateReal>(point.u);
-      if (s.trail.displacements) {
-        u = column3(s.trail.displacements + 3 * before, s.stride, static_cast<std::size_t>(row));
-      } else if constexpr (!std::is_same_v<Real, StateReal>) {
-        u = column3(f.displacement, f.places, static_cast<std::size_t>(place));
-      }
-      Mat3<StateReal> gradient;
-      for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = gradients[e * s.stride + row];
-      CarrierMotions<StateReal>::put(motions, s.most_slots, slot,
-                                     {u + gradient * to<StateReal>(centre - point.x), gradient});
-      look_up(slot + surfel_block);
+  const std::size_t before = blockIdx.y * s.stride;
+  const Real* gradients = s.trail.gradients + 9 * before;
+  const StateReal* displacements = s.trail.displacements;
+  for (int slot = thread; slot < block.slots; slot += surfel_block) {
+    const auto point = f.points.get(static_cast<std::size_t>(place));
+    Vec3<StateReal> u = to<StateReal>(point.u);
+    if (displacements) {
+      u = column3(displacements + 3 * before, s.stride, static_cast<std::size_t>(row));
+    } else if constexpr (!std::is_same_v<Real, StateReal>) {
+      u = column3(f.displacement, f.places, static_cast<std::size_t>(place));
     }
-    __syncthreads();
-
-    if (thread < block.surfels) {
-      SurfelBlend<StateReal> blend;
-      for (int left = block.carriers; left > 0; left -= carrier_group) {
-        DeviceCarrier<Real> group[carrier_group];
-#pragma unroll
-        for (int g = 0; g < carrier_group; ++g) group[g] = next[g];
-        if (left > carrier_group) fetch_group();
-#pragma unroll
-        for (int g = 0; g < carrier_group; ++g) {
-          const auto motion = CarrierMotions<StateReal>::at(motions, s.most_slots, group[g].offset);
-          blend.add(group[g].weight, motion.x, motion.q);
-        }
-      }
-      const std::size_t at = block.first_surfel + thread;
-      const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(s.normal[at]));
-      s.displacement[at] = blend.surfel_displacement(to<StateReal>(s.position[at]));
-      s.moved_normal[at] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
-    }
-    if (step + 1 == s.steps) return;
-    begin_step();
-    __syncthreads();  // motions are read
+    Mat3<StateReal> gradient;
+    for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = gradients[e * s.stride + row];
+    CarrierMotions<StateReal>::put(motions, s.most_slots, slot,
+                                   {u + gradient * to<StateReal>(centre - point.x), gradient});
+    look_up(slot + surfel_block);
   }
+  __syncthreads();
+
+  if (thread >= block.surfels) return;
+  SurfelBlend<StateReal> blend;
+  for (int left = block.carriers; left > 0; left -= carrier_group) {
+    DeviceCarrier<Real> group[carrier_group];
+#pragma unroll
+    for (int g = 0; g < carrier_group; ++g) group[g] = next[g];
+    if (left > carrier_group) fetch_group();
+#pragma unroll
+    for (int g = 0; g < carrier_group; ++g) {
+      const auto motion = CarrierMotions<StateReal>::at(motions, s.most_slots, group[g].offset);
+      blend.add(group[g].weight, motion.x, motion.q);
+    }
+  }
+  const std::size_t at = block.first_surfel + thread, out = blockIdx.y * s.surfels + at;
+  const Vec3<StateReal> normal = blend.surfel_normal(to<StateReal>(s.normal[at]));
+  s.displacement[out] = blend.surfel_displacement(to<StateReal>(s.position[at]));
+  s.moved_normal[out] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
 
 template <class Real, class StateReal>
@@ -139,12 +129,13 @@ class SurfelAdvection {
   void download(SurfelState& out) const {
     const std::vector<Vec3<StateReal>> displacement = fetched(displacement_),
                                        normal = fetched(moved_normal_);
+    const std::size_t last = (last_steps_ - 1) * order_.size();
     out.position.resize(order_.size());
     out.normal.resize(order_.size());
     for (std::size_t k = 0; k < order_.size(); ++k) {
       const auto s = static_cast<std::size_t>(order_[k]);
-      out.position[s] = m_.model().surfels.position[s] + to<double>(displacement[k]);
-      out.normal[s] = normalised(to<double>(normal[k]));
+      out.position[s] = m_.model().surfels.position[s] + to<double>(displacement[last + k]);
+      out.normal[s] = normalised(to<double>(normal[last + k]));
     }
   }
   std::size_t bytes() const {
@@ -192,7 +183,8 @@ class SurfelAdvection {
       row_ = sent(rows_of(plan), what);
       stride_ = plan.tiles.size() * tile_size;
     }
-    gradients_ = {static_cast<std::size_t>(std::max(1, trail_steps)) * 9 * stride_, what};
+    const auto steps = static_cast<std::size_t>(std::max(1, trail_steps));
+    gradients_ = {steps * 9 * stride_, what};
     std::vector<DeviceCarrier<Real>> carriers;
     for (const Carrier& c : plan.carriers) {
       carriers.push_back({static_cast<Real>(c.weight), 16U * static_cast<unsigned>(c.slot)});
@@ -200,18 +192,20 @@ class SurfelAdvection {
     carriers_ = sent(carriers, what);
     position_ = sent(position, what);
     normal_ = sent(normal, what);
-    displacement_ = {order_.size(), what};
-    moved_normal_ = {order_.size(), what};
+    displacement_ = {steps * order_.size(), what};
+    moved_normal_ = {steps * order_.size(), what};
   }
 
   void launch_kernel(Trail<Real, StateReal> trail, int steps) const {
+    last_steps_ = static_cast<std::size_t>(steps);
     const Index* row = row_.size() ? row_.data() : place_.data();
-    m_.launch_blocks(
-        "move_surfels", move_surfels<Real, StateReal>, static_cast<unsigned>(blocks_.size()),
-        shared_bytes_, tiles_.size() == 0, m_.fields(),
-        DeviceSurfels<Real, StateReal>{blocks_.data(), place_.data(), row, carriers_.data(),
-                                       position_.data(), normal_.data(), displacement_.data(),
-                                       moved_normal_.data(), trail, stride_, steps, most_slots_});
+    m_.launch_blocks("move_surfels", move_surfels<Real, StateReal>,
+                     {static_cast<unsigned>(blocks_.size()), static_cast<unsigned>(steps)},
+                     shared_bytes_, tiles_.size() == 0, m_.fields(),
+                     DeviceSurfels<Real, StateReal>{
+                         blocks_.data(), place_.data(), row, carriers_.data(), position_.data(),
+                         normal_.data(), displacement_.data(), moved_normal_.data(), trail, stride_,
+                         order_.size(), most_slots_});
   }
 
   /// Where each slot is among the tiles that carry surfels.
@@ -229,6 +223,7 @@ class SurfelAdvection {
   std::vector<Index> order_;
   int most_slots_ = 0, shared_bytes_ = 0;
   std::size_t stride_ = 0;
+  mutable std::size_t last_steps_ = 1;  // that the surfels were last moved after, together
   DeviceArray<DeviceSurfelBlock<Real>> blocks_;
   DeviceArray<Index> place_;
   DeviceArray<Index> row_, tiles_;  // empty: the trail has all places
