@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # On a machine with a GPU: all tests of the CUDA build, then NVIDIA's sanitizers on the kernels.
 #
-#   scripts/test_gpu.sh [summary.txt]     after cmake --preset cuda && cmake --build --preset cuda
+#   scripts/test_gpu.sh [summary.txt [tests | sanitizers]]
 #
-# Ends with exit code 1 if anything failed. With a file name, a summary goes there too.
+# after cmake --preset cuda && cmake --build --preset cuda. Ends with exit code 1 if anything failed.
+# With a file name, a summary goes there too; with a part, that part is added to it.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,6 +12,7 @@ if ! nvidia-smi -L >/dev/null 2>&1; then
   echo "scripts/test_gpu.sh: no NVIDIA GPU here; scripts/test.sh tests everything else" >&2
   exit 1
 fi
+part=${2-all}
 tests=build/cuda/tests
 logs=build/cuda/gpu-logs
 mkdir -p "$logs"
@@ -22,9 +24,11 @@ say() { echo "$*" | tee -a "$summary"; }
 : >"$summary"
 say "$(build/cuda/bin/phyxel --version), $(nvidia-smi --query-gpu=name --format=csv,noheader | head -1), $(date -u +%F)"
 
-OMP_WAIT_POLICY=passive ctest --test-dir build/cuda -j "$(nproc)" --timeout 300 --output-on-failure \
-  >"$logs/ctest.log" 2>&1 || failed=1
-say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
+run_tests() {
+  OMP_WAIT_POLICY=passive ctest --test-dir build/cuda -j "$(nproc)" --timeout 300 \
+    --output-on-failure >"$logs/ctest.log" 2>&1 || failed=1
+  say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
+}
 
 # Small cases: each tool slows kernels down a hundredfold. `device_test` faults on purpose.
 # check <program> <filter> [tools]
@@ -39,14 +43,28 @@ check() {
       sed -E 's/.*\] ([0-9]+ tests?) .*/\1/'): $(grep SUMMARY "$log" | tail -1 | sed 's/^=* //')"
   done
 }
-check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
-check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
-# Blocks that wait for each other's mail take hours where every access is recorded for races.
-check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
-check setup_test '*Overlapping*'
-check physics_device_test '*'
+run_sanitizers() {
+  check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
+  check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
+  # Blocks that wait for each other's mail take hours where every access is recorded for races.
+  check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
+  check setup_test '*Overlapping*'
+  check physics_device_test '*'
+}
 
-if [[ -n ${1-} ]]; then
+case $part in
+  all) run_tests && run_sanitizers ;;
+  tests) run_tests ;;
+  sanitizers) run_sanitizers ;;
+  *)
+    echo "scripts/test_gpu.sh: $part: allowed are tests, sanitizers" >&2
+    exit 2
+    ;;
+esac
+
+if [[ -n ${1-} && $part == all ]]; then
   cp "$summary" "$1"
+elif [[ -n ${1-} ]]; then
+  cat "$summary" >>"$1"
 fi
 exit $failed

@@ -344,7 +344,7 @@ TEST(CudaSurfels, EqualTheCpus) {
 }
 
 TEST(CudaSurfels, FollowEveryStepOnEveryPath) {
-  const Model model = built_in_bodies("dino", "alien_head");
+  const Model model = built_in_bodies("horn_bug", "horn_bug");
   for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
     const auto resident = make_cuda_backend(model, precision),
                launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
