@@ -60,8 +60,10 @@ class DeviceArray {
   void upload(const T* from) const {
     if (count_) PHYXEL_CUDA(cudaMemcpy(data_, from, bytes(), cudaMemcpyHostToDevice));
   }
-  void download(T* to) const {
-    if (count_) PHYXEL_CUDA(cudaMemcpy(to, data_, bytes(), cudaMemcpyDeviceToHost));
+  void download(T* to) const { download(to, 0, count_); }
+  void download(T* to, std::size_t first, std::size_t count) const {
+    if (count)
+      PHYXEL_CUDA(cudaMemcpy(to, data_ + first, count * sizeof(T), cudaMemcpyDeviceToHost));
   }
 
  private:

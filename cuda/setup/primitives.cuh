@@ -111,8 +111,7 @@ DeviceArray<T> running_sums(const DeviceArray<T>& values) {
 template <class T>
 T last_of(const DeviceArray<T>& array) {
   T value;
-  PHYXEL_CUDA(
-      cudaMemcpy(&value, array.data() + array.size() - 1, sizeof(T), cudaMemcpyDeviceToHost));
+  array.download(&value, array.size() - 1, 1);
   return value;
 }
 
@@ -123,10 +122,14 @@ DeviceArray<T> sent(const std::vector<T>& values, const std::string& what) {
   return array;
 }
 template <class T>
-std::vector<T> fetched(const DeviceArray<T>& array) {
-  std::vector<T> values(array.size());
-  array.download(values.data());
+std::vector<T> fetched(const DeviceArray<T>& array, std::size_t first, std::size_t count) {
+  std::vector<T> values(count);
+  array.download(values.data(), first, count);
   return values;
+}
+template <class T>
+std::vector<T> fetched(const DeviceArray<T>& array) {
+  return fetched(array, 0, array.size());
 }
 
 struct AroundBoth {

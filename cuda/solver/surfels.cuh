@@ -127,15 +127,15 @@ class SurfelAdvection {
   Trail<Real, StateReal> trail() const { return {gradients_.data(), displacements_.data()}; }
   void launch_trail(int steps) const { launch_kernel(trail(), steps); }
   void download(SurfelState& out) const {
-    const std::vector<Vec3<StateReal>> displacement = fetched(displacement_),
-                                       normal = fetched(moved_normal_);
-    const std::size_t last = (last_steps_ - 1) * order_.size();
-    out.position.resize(order_.size());
-    out.normal.resize(order_.size());
-    for (std::size_t k = 0; k < order_.size(); ++k) {
+    const std::size_t count = order_.size(), first = (last_steps_ - 1) * count;
+    const std::vector<Vec3<StateReal>> displacement = fetched(displacement_, first, count),
+                                       normal = fetched(moved_normal_, first, count);
+    out.position.resize(count);
+    out.normal.resize(count);
+    for (std::size_t k = 0; k < count; ++k) {
       const auto s = static_cast<std::size_t>(order_[k]);
-      out.position[s] = m_.model().surfels.position[s] + to<double>(displacement[last + k]);
-      out.normal[s] = normalised(to<double>(normal[last + k]));
+      out.position[s] = m_.model().surfels.position[s] + to<double>(displacement[k]);
+      out.normal[s] = normalised(to<double>(normal[k]));
     }
   }
   std::size_t bytes() const {
