@@ -3,6 +3,8 @@
 docs/results. No number there is typed by hand.
 
     build/cpu/bin/phyxel bench step --csv docs/results/cpu_step.csv --force
+    build/cpu/bin/phyxel bench step --terms green --threads 1,4,16 --phyxels 100000,1000000 \
+      --csv docs/results/cpu_step_16.csv --force
     build/cpu/bin/phyxel bench neighbours --csv docs/results/cpu_neighbours.csv --force
     bench/compare/lammps_tlsph.py path/to/lmp
     scripts/results_page.py
@@ -39,11 +41,11 @@ def million(text):
     return f"{float(text) / 1e6:.2f}"
 
 
-def step_section():
-    facts, rows = read("cpu_step.csv")
+def step_section(name, title):
+    facts, rows = read(name)
     if not rows:
         return ""
-    text = "## One time step on the CPU\n\n"
+    text = f"\n## {title}\n\n"
     text += f"`phyxel bench step --device cpu`, {measured(facts)}. A jittered cube; medians; `spread` is "
     text += "(fastest − slowest)/median over the repeats. The force error is the largest difference from "
     text += "double over the largest force. Bytes are the least a step must move; the last column sets them "
@@ -59,14 +61,16 @@ def step_section():
     scaling = {}
     for r in rows:
         scaling.setdefault((r["terms"], r["precision"], r["phyxels"]), {})[r["threads"]] = r
-    ratios = [[*key, f"{float(by['2']['phyxel_steps_per_s']) / float(by['1']['phyxel_steps_per_s']):.2f}",
-               by["2"]["core_round_trip_ns"]]
-              for key, by in scaling.items() if "1" in by and "2" in by]
+    ratios = [[*key, threads, f"{float(r['phyxel_steps_per_s']) / float(by['1']['phyxel_steps_per_s']):.2f}",
+               r["core_round_trip_ns"]]
+              for key, by in scaling.items() if "1" in by
+              for threads, r in by.items() if threads != "1"]
     if ratios:
-        text += "\n### From one thread to two\n\nThe last column is the time in nanoseconds in which the two "
-        text += "cores answer each other through a cache line, measured right after: a virtual machine's cores "
-        text += "move, and where they no longer share a cache, small bodies scale less.\n\n"
-        text += table(["terms", "precision", "phyxels", "ratio", "core round trip"], ratios)
+        text += "\n### More threads\n\nThe speed over that of one thread. The last column is the time in "
+        text += "nanoseconds in which two cores answer each other through a cache line, measured right after: "
+        text += "a virtual machine's cores move, and where they no longer share a cache, small bodies scale "
+        text += "less.\n\n"
+        text += table(["terms", "precision", "phyxels", "threads", "ratio", "core round trip"], ratios)
     return text
 
 
@@ -141,8 +145,10 @@ def main():
     page = "# Measurements\n\nMade by `scripts/results_page.py` from the CSV files in this folder, which the "
     page += "`bench` commands write. [The 2008 paper, run again](paper/paper.md) is a page of its own, made "
     page += "by `phyxel paper`; so is [the GPU solver's performance](../performance.md), by `phyxel bench "
-    page += "page`.\n\n"
-    page += step_section() + neighbours_section() + peer_section()
+    page += "page`.\n"
+    page += step_section("cpu_step.csv", "One time step on the CPU")
+    page += step_section("cpu_step_16.csv", "Sixteen cores with AVX-512")
+    page += neighbours_section() + peer_section()
     (FOLDER / "README.md").write_text(page)
     readme = (ROOT / "README.md").read_text()
     before, rest = readme.split(BEGIN)

@@ -209,8 +209,9 @@ class Page {
     text_ += table_text({"body", "phyxels", "surfels", "steps/s", "µs a step", "µs a step without"},
                         rows);
     text_ +=
-        "A body that is resident is launched anew for each step here, so that whoever uses the "
-        "surfels can come between; that costs it more than the surfels do.\n\n";
+        "A resident body leaves what its surfels need after each of up to sixteen steps of a "
+        "launch; then all surfels move after all of those steps at once. Whoever wants to see them "
+        "after a step ends the launch there.\n\n";
   }
 
   void neighbours(const CsvTable& t) {
@@ -339,12 +340,12 @@ class Page {
         "others in a column), records half as precise. Launches that begin while the last one ends "
         "gained 2 to 5% at half a million phyxels, nothing above, and lost a third at 27 thousand: "
         "graphs gain 4 to 17% below a million and lose nowhere. For surfels, gradients found by "
-        "each "
-        "block of surfels itself lost a half to the tiles' own pass, and lists of carriers common "
-        "to "
-        "a warp won 4% where surfels are dense and lost 20% where they are not. In clusters: "
-        "fetching the next "
-        "neighbours' stresses while the present ones are summed (the longer loop waits for its own "
+        "each block of surfels itself lost a half to the tiles' own pass, and lists of carriers "
+        "common to a warp won 4% where surfels are dense and lost 20% where they are not; of a "
+        "resident body's surfels, one launch a step lost a third to sixteen steps together, and "
+        "blocks that walk the sixteen steps one after another lost up to a half to a block a step. "
+        "In clusters: fetching the next neighbours' stresses while the present ones are summed "
+        "(the longer loop waits for its own "
         "instructions).\n";
   }
 

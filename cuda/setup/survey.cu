@@ -93,17 +93,19 @@ DeviceArray<double> supports(const DeviceArray<double>& spacing, std::size_t n,
   return support;
 }
 
-/// What one phyxel's neighbours amount to.
+/// What one phyxel's neighbours amount to. Here and below without padding, which nobody would write
+/// and copies read.
 struct Finding {
   Index length;
-  signed char rank;
-  char coincident;
+  std::int16_t rank, coincident;
 };
 struct Lengths {
   Offset pairs;
   Index fewest, most;
-  Index degenerate;
+  Offset degenerate;
 };
+static_assert(std::has_unique_object_representations_v<Finding> &&
+              std::has_unique_object_representations_v<Lengths>);
 struct AsLengths {
   __device__ Lengths operator()(const Finding& f) const {
     return {f.length, f.length, f.length, f.rank < 3 || f.coincident};
@@ -153,7 +155,7 @@ Survey survey_on_device(std::span<const Vec3d> host_position, const Neighbourhoo
                  if (d2 <= 1e-20 * h * h) f.coincident = 1;
                  if (kernel_sum) sum += cube(hash.index[k]) * weight(sqrt(d2), h);
                });
-               f.rank = static_cast<signed char>(pseudo_inverse(moment).rank);
+               f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
                findings[i] = f;
                if (kernel_sum) kernel_sum[i] = sum;
              });
