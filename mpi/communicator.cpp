@@ -81,6 +81,11 @@ std::int64_t Communicator::smallest(std::int64_t value) const {
   return reduced(value, MPI_INT64_T, MPI_MIN);
 }
 
+void Communicator::add(std::span<std::int64_t> values) const {
+  PHYXEL_MPI_CALL(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()),
+                                MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD));
+}
+
 std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
   const std::vector<std::vector<std::byte>> from_each =
       exchanged_bytes(std::vector<std::span<const std::byte>>(static_cast<std::size_t>(size_), bytes));
@@ -120,6 +125,34 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
   PHYXEL_MPI_CALL(
       MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
   return received;
+}
+
+struct Transfers::Requests {
+  std::vector<MPI_Request> list;
+};
+Transfers::Transfers() : requests_(std::make_unique<Requests>()) {}
+Transfers::~Transfers() = default;
+
+namespace {
+constexpr int transfer_tag = 1;  // `exchanged` has 0
+}
+
+void Transfers::receive(int from, std::span<std::byte> bytes) {
+  in_pieces(bytes.size(), [&](std::size_t at, int count) {
+    PHYXEL_MPI_CALL(MPI_Irecv(bytes.data() + at, count, MPI_BYTE, from, transfer_tag,
+                              MPI_COMM_WORLD, &requests_->list.emplace_back()));
+  });
+}
+void Transfers::send(int to, std::span<const std::byte> bytes) {
+  in_pieces(bytes.size(), [&](std::size_t at, int count) {
+    PHYXEL_MPI_CALL(MPI_Isend(bytes.data() + at, count, MPI_BYTE, to, transfer_tag, MPI_COMM_WORLD,
+                              &requests_->list.emplace_back()));
+  });
+}
+void Transfers::wait() {
+  std::vector<MPI_Request>& list = requests_->list;
+  PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(list.size()), list.data(), MPI_STATUSES_IGNORE));
+  list.clear();
 }
 
 void Communicator::abort(ExitCode code) const {

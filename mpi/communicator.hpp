@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -45,6 +46,9 @@ class Communicator {
   std::int64_t largest(std::int64_t value) const;
   double smallest(double value) const;
   std::int64_t smallest(std::int64_t value) const;
+
+  /// Element by element, in place.
+  void add(std::span<std::int64_t> values) const;
 
   /// The values of all ranks, one after the other, on every rank.
   template <class T>
@@ -97,6 +101,24 @@ class Communicator {
 
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
   bool started_here_ = false;
+};
+
+/// Messages under way between this rank and others, whose lengths both sides know. Not collective.
+class Transfers {
+ public:
+  Transfers();
+  ~Transfers();
+  Transfers(const Transfers&) = delete;
+  Transfers& operator=(const Transfers&) = delete;
+
+  /// Both return at once. The bytes stay where they are until `wait` has returned.
+  void receive(int from, std::span<std::byte> bytes);
+  void send(int to, std::span<const std::byte> bytes);
+  void wait();
+
+ private:
+  struct Requests;
+  std::unique_ptr<Requests> requests_;
 };
 
 }  // namespace phyxel

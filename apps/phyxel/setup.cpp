@@ -21,7 +21,7 @@ std::string terms_of(const Material& m) {
 
 std::string neighbours_of(const Part& part) {
   return fmt::format("{:.1f} neighbours ({} to {})",
-                     static_cast<double>(part.lists.pairs) / std::max(part.end - part.begin, 1),
+                     static_cast<double>(part.lists.pairs) / std::max(part.size, 1),
                      part.lists.fewest, part.lists.most);
 }
 
@@ -113,14 +113,9 @@ std::string describe_model(const Scene& scene, const Model& model) {
   for (std::size_t p = 0; p < shown; ++p) {
     const Part& part = model.parts[p];
     const Material& m = part.material;
-    double mass = 0, volume = 0;
-    for (Index i = part.begin; i < part.end; ++i) {
-      mass += model.mass[i];
-      volume += model.volume[i];
-    }
     text += fmt::format(
         "  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n", part.name,
-        part.end - part.begin, part.surfel_end - part.surfel_begin, mass, volume,
+        part.size, part.surfel_end - part.surfel_begin, part.mass, part.volume,
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
     text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,

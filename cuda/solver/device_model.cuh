@@ -89,7 +89,7 @@ class DeviceModel {
 
   /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
   /// digits in float.
-  Vec3d origin_of(Index part) const { return model_.position[model_.parts[part].begin]; }
+  Vec3d origin_of(Index part) const { return model_.parts[part].origin; }
 
   /// The step size that the constants are for [s].
   double dt() const { return dt_; }

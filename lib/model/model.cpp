@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "exact_sum.hpp"
 #include "model/host_memory.hpp"
 #include "model/selection.hpp"
 #include "phyxel/body_file.hpp"
@@ -247,6 +248,22 @@ void append(Degenerate& to, const Degenerate& found, Index shift) {
   append(to.coincident, shifted(found.coincident, shift));
 }
 
+/// Mass, volume and centre of a body; its origin.
+void weigh(Part& part, const Model& model) {
+  if (part.begin == part.end) return;
+  part.origin = model.position[part.begin];
+  ExactSum mass, volume;
+  ExactVector moment;
+  for (Index i = part.begin; i < part.end; ++i) {
+    mass.add(model.mass[i]);
+    volume.add(model.volume[i]);
+    moment.add(model.mass[i] * model.position[i]);
+  }
+  part.mass = mass.value();
+  part.volume = volume.value();
+  if (part.mass > 0) part.centre = moment.value() / part.mass;
+}
+
 /// @param surveyor null: lists and moments are made here.
 void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
               const Surveyor* surveyor) {
@@ -297,7 +314,9 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
                          .material = request.material,
                          .neighbourhood = in_words(request.neighbourhood),
                          .lists = survey.lists,
-                         .kernel_volumes = masses.kernel});
+                         .kernel_volumes = masses.kernel,
+                         .size = model.size() - shift});
+  weigh(model.parts.back(), model);
   add_boundary(model, request, cloud, shift);
 }
 
@@ -421,6 +440,13 @@ const Model& Model::with_lists() const {
         "backend on that device, or a model built without a surveyor");
   }
   return *this;
+}
+
+bool Model::owns(Index i) const {
+  if (!share) return true;
+  const auto part = std::find_if(parts.begin(), parts.end(),
+                                 [&](const Part& p) { return i >= p.begin && i < p.end; });
+  return part != parts.end() && i < part->owned_end();
 }
 
 Offset Model::pairs() const {

@@ -47,7 +47,8 @@ class CpuBackend final : public Backend {
       : model_(model.with_lists()),
         threads_(threads > 0 ? threads : omp_get_max_threads()),
         layout_(model, W),
-        runs_(find_runs()),
+        runs_(find_runs(&Layout::owned)),
+        ghost_runs_(find_runs(&Layout::near_ghosts)),
         lists_(model.neighbourhood.neighbours, layout_) {
     if (!model.neighbourhood.symmetric)
       inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
@@ -94,15 +95,13 @@ class CpuBackend final : public Backend {
   }
 
   void stress() override {
-    for_each_law([&](const auto& law, PackRange range) {
-#pragma omp parallel for schedule(static) num_threads(threads_for(range))
-      for (Index p = range.begin; p < range.end; ++p) {
-        const Mat3<P> grad_u = displacement_gradient_of(p);
-        const Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
-                                      inverse_moment_of(p));
-        store_pair_stress(p, q);
-      }
-    });
+    find_stresses(runs_);
+    if (!model_.share) return;
+    if (model_.share->rings == 1) {
+      refresh(stress_records());
+    } else {
+      find_stresses(ghost_runs_);
+    }
   }
 
   void advance(double time, double dt) override {
@@ -120,6 +119,7 @@ class CpuBackend final : public Backend {
       const Vec3d velocity = (after - motion.displacement_at(time)) / dt;
       for (const Index i : motion.phyxels) set_state(i, after, velocity);
     }
+    if (model_.share) refresh(displacement_records());
   }
 
   void internal_forces(std::vector<Vec3d>& force) override {
@@ -169,6 +169,9 @@ class CpuBackend final : public Backend {
           record[CarrierRecord::displacement + c] = moved[c];
         }
       }
+    }
+    if (model_.share) {
+      refresh(records_of(records, CarrierRecord::size, 0, CarrierRecord::size));
     }
     surfels_->advect(records, threads_, out);
   }
@@ -245,14 +248,16 @@ class CpuBackend final : public Backend {
     PackRange range;
   };
 
-  std::vector<Run> find_runs() const {
+  std::vector<Run> find_runs(const PackRange& (Layout::*range_of)(std::size_t) const) const {
     std::vector<Run> runs;
     for (std::size_t part = 0; part < model_.parts.size(); ++part) {
       const Material& material = model_.parts[part].material;
+      const PackRange range = (layout_.*range_of)(part);
+      if (range.begin == range.end) continue;
       if (!runs.empty() && runs.back().material == material) {
-        runs.back().range.end = layout_.part(part).end;
+        runs.back().range.end = range.end;
       } else {
-        runs.push_back({material, layout_.part(part)});
+        runs.push_back({material, range});
       }
     }
     return runs;
@@ -300,11 +305,23 @@ class CpuBackend final : public Backend {
     }
   }
 
+  void find_stresses(const std::vector<Run>& runs) {
+    for_each_law(runs, [&](const auto& law, PackRange range) {
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+      for (Index p = range.begin; p < range.end; ++p) {
+        const Mat3<P> grad_u = displacement_gradient_of(p);
+        const Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
+                                      inverse_moment_of(p));
+        store_pair_stress(p, q);
+      }
+    });
+  }
+
   /// Calls apply(law, packs) for each run of bodies, with the law its scene asks for: the one place
   /// where terms chosen at run time become code chosen at compile time.
   template <class Apply>
-  void for_each_law(Apply&& apply) const {
-    for (const Run& run : runs_) {
+  static void for_each_law(const std::vector<Run>& runs, Apply&& apply) {
+    for (const Run& run : runs) {
       const Material& m = run.material;
       const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
@@ -372,6 +389,22 @@ class CpuBackend final : public Backend {
   PHYXEL_HD Real* stress_record(Index slot) {
     return stresses_.data() + std::ptrdiff_t{slot} * StressRecord::size;
   }
+  /// What ghosts take from their owners.
+  Records displacement_records() {
+    return records_of(points_, PointRecord::size, PointRecord::displacement, 3);
+  }
+  Records stress_records() {
+    return records_of(stresses_, StressRecord::size, StressRecord::pair_stress, 9);
+  }
+  template <class T>
+  Records records_of(AlignedVector<T>& array, int size, int first, int count) {
+    return {reinterpret_cast<std::byte*>(array.data() + first), sizeof(T) * size, sizeof(T) * count,
+            layout_.slot_of_phyxel()};
+  }
+  void refresh(const Records& records) const {
+    model_.share->others->begin(records);
+    model_.share->others->finish();
+  }
   PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
     return {record[first], record[first + 1], record[first + 2]};
   }
@@ -403,11 +436,9 @@ class CpuBackend final : public Backend {
   /// that a body far from the origin keeps its digits in float.
   void pack_part(std::size_t p) {
     const Part& part = model_.parts[p];
-    if (part.begin == part.end) return;
-    const Vec3d origin = model_.position[part.begin];
     for (Index i = part.begin; i < part.end; ++i) {
       const Index slot = layout_.slot(i);
-      const Vec3d x = model_.position[i] - origin;
+      const Vec3d x = model_.position[i] - part.origin;
       const double h = model_.neighbourhood.support[i];
       Real *point = point_record(slot), *stress = stress_record(slot);
       set_values(point + PointRecord::position, x);
@@ -456,7 +487,7 @@ class CpuBackend final : public Backend {
   const Model& model_;
   int threads_;
   Layout layout_;
-  std::vector<Run> runs_;
+  std::vector<Run> runs_, ghost_runs_;     // own phyxels; ghosts whose stresses are found here
   PackedLists lists_, inverse_;            // inverse_ is empty when lists_ is its own inverse
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;

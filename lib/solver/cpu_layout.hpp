@@ -1,5 +1,6 @@
 /// How the CPU backend numbers phyxels: bodies start at a multiple of the SIMD width, so that a
-/// pack never mixes two bodies, and neighbour lists are stored pack by pack.
+/// pack never mixes two bodies, nor a share's own phyxels with ghosts; neighbour lists are stored
+/// pack by pack.
 #pragma once
 
 #include <algorithm>
@@ -34,39 +35,42 @@ struct PackRange {
   Index begin = 0, end = 0;
 };
 
-/// Slots: phyxels renumbered so that each body fills whole packs. Slots past a body's end are
-/// padding: they have no neighbours but themselves, no volume and no mass.
+/// Slots: phyxels renumbered so that what is alike fills whole packs: first all bodies' own
+/// phyxels, then the ghosts whose stresses are found here, then the other ghosts. Slots past an end
+/// are padding: they have no neighbours but themselves, no volume and no mass.
 class Layout {
  public:
-  Layout(const Model& model, int width) : width_(width) {
-    Index pack = 0;
+  Layout(const Model& model, int width)
+      : width_(width), slot_(static_cast<std::size_t>(model.size())) {
     for (const Part& part : model.parts) {
-      const Index count = part.end - part.begin;
-      first_slot_.push_back(pack * width);
-      const Index packs = (count + width - 1) / width;
-      parts_.push_back({pack, pack + packs});
-      pack += packs;
+      owned_.push_back(add(part.begin, part.owned_end()));
     }
-    packs_ = pack;
-    for (std::size_t p = 0; p < model.parts.size(); ++p) {
-      for (Index i = model.parts[p].begin; i < model.parts[p].end; ++i) {
-        slot_.push_back(first_slot_[p] + (i - model.parts[p].begin));
-      }
+    for (const Part& part : model.parts) {
+      near_.push_back(add(part.owned_end(), part.end - part.far_ghosts));
     }
+    for (const Part& part : model.parts) add(part.end - part.far_ghosts, part.end);
   }
 
   int width() const { return width_; }
   Index packs() const { return packs_; }
   Index slots() const { return packs_ * width_; }
   Index slot(Index phyxel) const { return slot_[phyxel]; }
-  const PackRange& part(std::size_t p) const { return parts_[p]; }
-  std::size_t parts() const { return parts_.size(); }
+  const Index* slot_of_phyxel() const { return slot_.data(); }
+  /// What is stepped of a body, and the ghosts whose stresses are found here.
+  const PackRange& owned(std::size_t part) const { return owned_[part]; }
+  const PackRange& near_ghosts(std::size_t part) const { return near_[part]; }
 
  private:
+  PackRange add(Index begin, Index end) {
+    const Index first = packs_;
+    for (Index i = begin; i < end; ++i) slot_[i] = first * width_ + (i - begin);
+    packs_ += (end - begin + width_ - 1) / width_;
+    return {first, packs_};
+  }
+
   int width_;
   Index packs_ = 0;
-  std::vector<Index> first_slot_;
-  std::vector<PackRange> parts_;
+  std::vector<PackRange> owned_, near_;
   std::vector<Index> slot_;
 };
 

@@ -45,7 +45,7 @@ class CpuSurfels {
     std::size_t part = 0;
     for (Index s = 0; s < count; ++s) {
       while (s >= model.parts[part].surfel_end) ++part;
-      const Vec3d origin = model.position[model.parts[part].begin];
+      const Vec3d origin = model.parts[part].origin;
       set3(position_, s, surfels.position[s] - origin);
       set3(normal_, s, surfels.normal[s]);
       set_carriers(layout, s);

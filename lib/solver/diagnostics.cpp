@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "exact_sum.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/stress.hpp"
 
@@ -39,6 +41,83 @@ double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
   return std::sqrt(1.5 * squares);
 }
 
+/// Sums of phyxels, in whatever order and on however many ranks the same.
+struct Totals {
+  ExactSum kinetic_energy, strain_energy, volume_energy, gravity_energy, load_energy;
+  ExactSum force_scale, torque_scale;
+  ExactVector momentum, angular_momentum, internal_force, internal_torque;
+  std::int64_t inverted = 0;
+  double largest_displacement = 0, largest_speed = 0;
+  Index fastest = -1, first_bad = std::numeric_limits<Index>::max();
+
+  template <class Each>
+  void for_each_sum(Each&& each) {
+    each(kinetic_energy), each(strain_energy), each(volume_energy), each(gravity_energy);
+    each(load_energy), each(force_scale), each(torque_scale);
+    for (ExactVector* v : {&momentum, &angular_momentum, &internal_force, &internal_torque}) {
+      each(v->x), each(v->y), each(v->z);
+    }
+  }
+  /// Of equally fast ones the first.
+  void look_at_speed(double speed, Index phyxel) {
+    if (speed > largest_speed || (speed == largest_speed && fastest >= 0 && phyxel < fastest)) {
+      largest_speed = speed;
+      fastest = phyxel;
+    }
+  }
+  void add(Totals other) {
+    std::vector<ExactSum*> own;
+    for_each_sum([&](ExactSum& sum) { own.push_back(&sum); });
+    std::size_t k = 0;
+    other.for_each_sum([&](const ExactSum& sum) { own[k++]->add(sum); });
+    inverted += other.inverted;
+    largest_displacement = std::max(largest_displacement, other.largest_displacement);
+    if (other.fastest >= 0) look_at_speed(other.largest_speed, other.fastest);
+    first_bad = std::min(first_bad, other.first_bad);
+  }
+  void add_others(const Others& others) {
+    std::vector<std::int64_t> words{inverted};
+    for_each_sum([&](ExactSum& sum) {
+      const auto ready = sum.ready();
+      words.insert(words.end(), ready.begin(), ready.end());
+    });
+    others.add(words);
+    auto from = words.begin();
+    inverted = *from++;
+    for_each_sum([&](ExactSum& sum) {
+      for (std::int64_t& word : sum.ready()) word = *from++;
+    });
+    largest_displacement = others.largest(largest_displacement);
+    const double fastest_of_all = others.largest(largest_speed);
+    const double nobody = std::numeric_limits<double>::infinity();
+    const double who = others.smallest(
+        largest_speed == fastest_of_all && fastest >= 0 ? static_cast<double>(fastest) : nobody);
+    largest_speed = fastest_of_all;
+    fastest = who < nobody ? static_cast<Index>(who) : -1;
+    first_bad = static_cast<Index>(others.smallest(static_cast<double>(first_bad)));
+  }
+  Diagnostics values() const {
+    Diagnostics d;
+    d.kinetic_energy = kinetic_energy.value();
+    d.strain_energy = strain_energy.value();
+    d.volume_energy = volume_energy.value();
+    d.gravity_energy = gravity_energy.value();
+    d.load_energy = load_energy.value();
+    d.momentum = momentum.value();
+    d.angular_momentum = angular_momentum.value();
+    d.internal_force = internal_force.value();
+    d.internal_torque = internal_torque.value();
+    d.force_scale = force_scale.value();
+    d.torque_scale = torque_scale.value();
+    d.inverted = static_cast<Index>(inverted);
+    d.largest_displacement = largest_displacement;
+    d.largest_speed = largest_speed;
+    d.fastest_phyxel = fastest;
+    d.bad_phyxel = first_bad < std::numeric_limits<Index>::max() ? first_bad : -1;
+    return d;
+  }
+};
+
 }  // namespace
 
 double pressure_wave_speed(const Material& m) {
@@ -46,12 +125,10 @@ double pressure_wave_speed(const Material& m) {
 }
 
 Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
-  Diagnostics d;
-  d.step = step;
-  d.time = static_cast<double>(step) * dt;
-  if (auto summed = backend.diagnostics(d.time, dt)) {
+  const double time = static_cast<double>(step) * dt;
+  if (auto summed = backend.diagnostics(time, dt)) {
     summed->step = step;
-    summed->time = d.time;
+    summed->time = time;
     return *summed;
   }
   State state;
@@ -62,12 +139,14 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
   backend.displacement_gradients(gradient);
 
   // Total force with loads, for the velocity at t; the loads' potential on the way.
+  Totals all;
   std::vector<Vec3d> applied(model.loads.empty() ? 0 : force.size());
   for (const Load& load : model.loads) {
-    const double scale = load.scale_at(d.time);
+    const double scale = load.scale_at(time);
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      applied[load.phyxels[k]] += scale * load.force[k];
-      d.load_energy -= scale * dot(load.force[k], state.displacement[load.phyxels[k]]);
+      const Index i = load.phyxels[k];
+      applied[i] += scale * load.force[k];
+      if (model.owns(i)) all.load_energy.add(-scale * dot(load.force[k], state.displacement[i]));
     }
   }
   std::vector<char> moved(force.size(), 0);
@@ -75,44 +154,52 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
     for (const Index i : motion.phyxels) moved[i] = 1;
   }
 
-  for (const Part& part : model.parts) {
-    const Material& m = part.material;
-    const Hooke<double> hooke{m.lame_lambda(), m.lame_mu()};
-    const VolumeConservation<double> volume_law{m.volume_stiffness};
-    for (Index i = part.begin; i < part.end; ++i) {
-      const Vec3d u = state.displacement[i], x = model.position[i] + u;
-      if (d.bad_phyxel < 0 && !(is_finite(u) && is_finite(state.velocity[i]) &&
-                                is_finite(force[i]) && all_finite(gradient[i]))) {
-        d.bad_phyxel = i;
-      }
-      Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
-      if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
-      acceleration -= m.damping * state.velocity[i];
-      const Vec3d v = moved[i] ? state.velocity[i] : state.velocity[i] + (dt / 2) * acceleration;
-      const Vec3d p = model.mass[i] * v;
-      d.kinetic_energy += 0.5 * dot(p, v);
-      d.momentum += p;
-      d.angular_momentum += cross(x, p);
-      d.gravity_energy -= model.mass[i] * dot(model.gravity, u);
-      const double strain_energy = m.strain == Strain::green
-                                       ? GreenHooke<double>{hooke}.energy(gradient[i])
-                                       : CauchyHooke<double>{hooke}.energy(gradient[i]);
-      d.strain_energy += model.volume[i] * strain_energy;
-      if (m.volume_stiffness > 0) {
-        d.volume_energy += model.volume[i] * volume_law.energy(gradient[i]);
-      }
-      d.inverted += VolumeConservation<double>::volume_change(gradient[i]) <= -1;
-      d.internal_force += force[i];
-      d.internal_torque += cross(x, force[i]);
-      d.force_scale += norm(force[i]);
-      d.torque_scale += norm(x) * norm(force[i]);
-      d.largest_displacement = std::max(d.largest_displacement, norm(u));
-      if (norm(v) > d.largest_speed) {
-        d.largest_speed = norm(v);
-        d.fastest_phyxel = i;
+#pragma omp parallel
+  {
+    Totals own;
+    for (const Part& part : model.parts) {
+      const Material& m = part.material;
+      const Hooke<double> hooke{m.lame_lambda(), m.lame_mu()};
+      const VolumeConservation<double> volume_law{m.volume_stiffness};
+#pragma omp for schedule(static) nowait
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        const Vec3d u = state.displacement[i], x = model.position[i] + u;
+        if (!(is_finite(u) && is_finite(state.velocity[i]) && is_finite(force[i]) &&
+              all_finite(gradient[i]))) {
+          own.first_bad = std::min(own.first_bad, model.number(i));
+        }
+        Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
+        if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
+        acceleration -= m.damping * state.velocity[i];
+        const Vec3d v = moved[i] ? state.velocity[i] : state.velocity[i] + (dt / 2) * acceleration;
+        const Vec3d p = model.mass[i] * v;
+        own.kinetic_energy.add(0.5 * dot(p, v));
+        own.momentum.add(p);
+        own.angular_momentum.add(cross(x, p));
+        own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
+        own.strain_energy.add(model.volume[i] *
+                              (m.strain == Strain::green
+                                   ? GreenHooke<double>{hooke}.energy(gradient[i])
+                                   : CauchyHooke<double>{hooke}.energy(gradient[i])));
+        if (m.volume_stiffness > 0) {
+          own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
+        }
+        own.inverted += VolumeConservation<double>::volume_change(gradient[i]) <= -1;
+        own.internal_force.add(force[i]);
+        own.internal_torque.add(cross(x, force[i]));
+        own.force_scale.add(norm(force[i]));
+        own.torque_scale.add(norm(x) * norm(force[i]));
+        own.largest_displacement = std::max(own.largest_displacement, norm(u));
+        own.look_at_speed(norm(v), model.number(i));
       }
     }
+#pragma omp critical
+    all.add(own);
   }
+  if (model.share) all.add_others(*model.share->others);
+  Diagnostics d = all.values();
+  d.step = step;
+  d.time = time;
   return d;
 }
 
@@ -140,9 +227,11 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start)
 
 void StabilityWatch::check(const Diagnostics& now) {
   const auto body_of = [&](Index i) {
+    Index begin = 0;
     for (const Part& part : model_.parts) {
-      if (i >= part.begin && i < part.end)
-        return fmt::format("phyxel {} of body \"{}\"", i - part.begin, part.name);
+      if (i >= begin && i < begin + part.size)
+        return fmt::format("phyxel {} of body \"{}\"", i - begin, part.name);
+      begin += part.size;
     }
     return std::string("no phyxel");
   };

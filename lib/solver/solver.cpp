@@ -8,16 +8,9 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.velocity.resize(state.displacement.size());
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     const Part& part = model.parts[p];
-    Vec3d centre;
-    double mass = 0;
-    for (Index i = part.begin; i < part.end; ++i) {
-      centre += model.mass[i] * model.position[i];
-      mass += model.mass[i];
-    }
-    if (mass > 0) centre = centre / mass;
     for (Index i = part.begin; i < part.end; ++i) {
       state.velocity[i] =
-          scene.bodies[p].velocity + cross(scene.bodies[p].spin, model.position[i] - centre);
+          scene.bodies[p].velocity + cross(scene.bodies[p].spin, model.position[i] - part.centre);
     }
   }
   // The stored velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "exact_sum.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
@@ -13,67 +14,95 @@
 namespace phyxel {
 namespace {
 
-using Vector = Eigen::VectorXd;
-
-/// K x is minus the force of a displacement so small that only its linear part shows.
+/// K x is minus the force of a displacement so small that only its linear part shows. Of a share,
+/// vectors have its own phyxels, and their products those of all ranks.
 class CpuVibration final : public Vibration {
  public:
   CpuVibration(const Model& model, int threads)
       : model_(model), backend_(make_cpu_backend(model, Precision::double_, threads)) {
-    const Eigen::Index size = 3 * static_cast<Eigen::Index>(model.size());
-    previous_ = Vector::Zero(size);
-    current_.resize(size);
-    for (Index i = 0; i < model.size(); ++i) {
-      const Vec3d start = start_component(i);
-      current_.segment<3>(3 * static_cast<Eigen::Index>(i)) << start.x, start.y, start.z;
-    }
-    current_.normalize();
-    state_.displacement.resize(static_cast<std::size_t>(model.size()));
-    state_.velocity.resize(state_.displacement.size());
+    const auto n = static_cast<std::size_t>(model.size());
+    previous_.resize(n);
+    current_.resize(n);
+    next_.resize(n);
+    for_owned([&](Index i) { current_[i] = start_component(model.number(i)); });
+    const double length = std::sqrt(product(current_, current_));
+    for_owned([&](Index i) { current_[i] = current_[i] / length; });
+    state_.displacement.resize(n);
+    state_.velocity.resize(n);
     for (Index i = 0; i < model.size(); ++i) {
       const double h = model.neighbourhood.support[i];
       if (h > 0) smallest_support_ = std::min(smallest_support_, h);
     }
+    if (model.share) smallest_support_ = model.share->others->smallest(smallest_support_);
   }
 
   double apply(double beta) override {
     double largest = 0;
-    for (Index i = 0; i < model_.size(); ++i) largest = std::max(largest, displacement(i));
+    for (const Part& part : model_.parts) {
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        largest = std::max(largest, norm(current_[i]) / std::sqrt(model_.mass[i]));
+      }
+    }
+    if (model_.share) largest = model_.share->others->largest(largest);
     // Strains of 1e-8: second-order terms are 1e-8 of the force, rounding 1e-8 of the strain.
     const double amplitude = 1e-8 * smallest_support_ / largest;
-    for (Index i = 0; i < model_.size(); ++i) {
-      const double scale = amplitude / std::sqrt(model_.mass[i]);
-      const auto x = current_.segment<3>(3 * static_cast<Eigen::Index>(i));
-      state_.displacement[i] = {scale * x[0], scale * x[1], scale * x[2]};
-    }
+    for_owned([&](Index i) {
+      state_.displacement[i] = (amplitude / std::sqrt(model_.mass[i])) * current_[i];
+    });
+    if (model_.share) refresh_ghosts();
     backend_->upload(state_);
     backend_->internal_forces(force_);
-    next_ = -beta * previous_;
-    for (Index i = 0; i < model_.size(); ++i) {
-      const double scale = -1 / (amplitude * std::sqrt(model_.mass[i]));
-      next_.segment<3>(3 * static_cast<Eigen::Index>(i)) +=
-          scale * Eigen::Vector3d(force_[i].x, force_[i].y, force_[i].z);
-    }
-    return next_.dot(current_);
+    for_owned([&](Index i) {
+      next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * force_[i] - beta * previous_[i];
+    });
+    return product(next_, current_);
   }
 
   double subtract(double alpha) override {
-    next_ -= alpha * current_;
-    return next_.norm();
+    for_owned([&](Index i) { next_[i] -= alpha * current_[i]; });
+    return std::sqrt(product(next_, next_));
   }
 
   void advance(double norm) override {
     previous_.swap(current_);
-    current_ = next_ / norm;
+    for_owned([&](Index i) { current_[i] = next_[i] / norm; });
   }
 
  private:
-  double displacement(Index i) const {
-    return current_.segment<3>(3 * static_cast<Eigen::Index>(i)).norm() / std::sqrt(model_.mass[i]);
+  using Vectors = std::vector<Vec3d>;
+
+  template <class Each>
+  void for_owned(Each&& each) const {
+    for (const Part& part : model_.parts) {
+#pragma omp parallel for schedule(static) if (part.size > 1000)
+      for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
+    }
   }
+  double product(const Vectors& a, const Vectors& b) const {
+    ExactSum all;
+#pragma omp parallel
+    {
+      ExactSum own;
+      for (const Part& part : model_.parts) {
+#pragma omp for schedule(static) nowait
+        for (Index i = part.begin; i < part.owned_end(); ++i) own.add(dot(a[i], b[i]));
+      }
+#pragma omp critical
+      all.add(own);
+    }
+    if (model_.share) model_.share->others->add(all.ready());
+    return all.value();
+  }
+  void refresh_ghosts() {
+    const Others& others = *model_.share->others;
+    others.begin({reinterpret_cast<std::byte*>(state_.displacement.data()), sizeof(Vec3d),
+                  sizeof(Vec3d), nullptr});
+    others.finish();
+  }
+
   const Model& model_;
   std::unique_ptr<Backend> backend_;
-  Vector previous_, current_, next_;
+  Vectors previous_, current_, next_;
   State state_;
   std::vector<Vec3d> force_;
   double smallest_support_ = std::numeric_limits<double>::infinity();
@@ -88,7 +117,7 @@ struct Bound {
 Bound largest_eigenvalue(const std::vector<double>& diagonal,
                          const std::vector<double>& off_diagonal, double beta) {
   const auto map = [](const std::vector<double>& v) {
-    return Eigen::Map<const Vector>(v.data(), static_cast<Eigen::Index>(v.size()));
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
   };
   Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
   ritz.computeFromTridiagonal(map(diagonal), map(off_diagonal));
@@ -105,6 +134,7 @@ double smallest_sound_step(const Model& model) {
       if (h > 0) smallest = std::min(smallest, h / c);
     }
   }
+  if (model.share) smallest = model.share->others->smallest(smallest);
   return smallest;
 }
 
@@ -113,7 +143,7 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
   limit.sound_step = smallest_sound_step(model);
   std::vector<double> diagonal, off_diagonal;
   double beta = 0;
-  const auto most = std::min<std::int64_t>(120, 3 * static_cast<std::int64_t>(model.size()));
+  const auto most = std::min<std::int64_t>(120, 3 * static_cast<std::int64_t>(model.whole_size()));
   for (std::int64_t k = 0; k < most; ++k) {
     const double alpha = vibration.apply(beta);
     diagonal.push_back(alpha);

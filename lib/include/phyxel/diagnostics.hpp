@@ -8,8 +8,9 @@
 namespace phyxel {
 
 /// Energies, conserved quantities and a finiteness check of a backend's present state, which is at
-/// `time` = `step` × `dt`. Sums run in double and in one order, so they do not depend on the number
-/// of threads; a device that sums itself has its own.
+/// `time` = `step` × `dt`. Sums run in double and exactly, so they do not depend on the number of
+/// threads or ranks; a device that sums itself has its own. Of a share, those of the whole model:
+/// collective.
 Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt);
 
 /// Von Mises equivalent of the Cauchy stress [Pa] and det F of every phyxel, shape [n]; either

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "phyxel/cloud.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/scene.hpp"
+#include "phyxel/share.hpp"
 
 namespace phyxel {
 
@@ -18,15 +20,24 @@ struct ListLengths {
   Index fewest = 0, most = 0;
 };
 
-/// One body's share of the model: phyxels [begin, end), surfels [surfel_begin, surfel_end).
+/// One body of the model: phyxels [begin, end), surfels [surfel_begin, surfel_end). In a rank's
+/// share, the last `ghosts` phyxels are stepped elsewhere, and stresses of the last `far_ghosts`
+/// are not found here.
 struct Part {
   std::string name;
   Index begin = 0, end = 0;
+  Index ghosts = 0, far_ghosts = 0;
   Index surfel_begin = 0, surfel_end = 0;
   Material material;
-  std::string neighbourhood;  ///< The rule in words, for summaries.
-  ListLengths lists;
+  std::string neighbourhood;    ///< The rule in words, for summaries.
+  ListLengths lists;            ///< Of the whole body.
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
+  Index size = 0;               ///< Phyxels of the whole body.
+  Vec3d origin;                 ///< Its first phyxel at rest [m]: solvers count positions from it.
+  double mass = 0, volume = 0;  ///< Of the whole body [kg, m³].
+  Vec3d centre;                 ///< Of its mass, at rest [m].
+
+  Index owned_end() const { return end - ghosts; }
 };
 
 /// Phyxels whose neighbours do not span space.
@@ -88,9 +99,16 @@ struct Model {
   std::vector<Load> loads;
   Vec3d gravity;  ///< [m/s^2]
   Degenerate degenerate;
-  std::vector<std::string> warnings;  ///< For the summary.
+  std::vector<std::string> warnings;   ///< For the summary.
+  std::shared_ptr<const Share> share;  ///< Null: this is the whole model.
 
   Index size() const { return static_cast<Index>(position.size()); }
+  /// Phyxels of the whole model.
+  Index whole_size() const { return share ? share->whole : size(); }
+  /// Which phyxel of the whole model phyxel i is.
+  Index number(Index i) const { return share ? share->number[i] : i; }
+  /// Whether phyxel i is no ghost.
+  bool owns(Index i) const;
   bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
   /// This model, for whoever needs the lists. @throws InputError if they were left to a device.
   const Model& with_lists() const;

@@ -1,0 +1,106 @@
+/// Sums without rounding: the same bits in whatever order, and on however many threads and ranks,
+/// the terms are added. Source: U. Kulisch's long accumulator; limbs of 32 bits in 64-bit words, so
+/// that two billion terms are added before a carry has to move.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+class ExactSum {
+  // Bit 0 of limb 0 stands for 2^lowest; a double reaches from 2^-1074 to below 2^1024.
+  static constexpr int lowest = -1074, limb_bits = 32;
+  static constexpr int limbs = (1024 - lowest) / limb_bits + 3;  // two more for the carry
+
+ public:
+  /// Words that ranks may add element by element.
+  static constexpr int words = limbs + 1;
+
+  void add(double value) {
+    const auto bits = std::bit_cast<std::uint64_t>(value);
+    const int exponent = static_cast<int>(bits >> 52 & 0x7FF);
+    std::uint64_t mantissa = bits & ((std::uint64_t{1} << 52) - 1);
+    if (exponent == 0x7FF) {
+      ++words_[limbs];
+      return;
+    }
+    if (exponent > 0) mantissa |= std::uint64_t{1} << 52;
+    const int at = exponent > 0 ? exponent - 1 : 0;  // of the lowest bit, above 2^-1074
+    const int limb = at / limb_bits, shift = at % limb_bits;
+    const std::uint64_t low = mantissa << shift;  // 53 + 31 bits: the top ones are added apart
+    const std::uint64_t top = shift ? mantissa >> (64 - shift) : 0;
+    const std::int64_t sign = bits >> 63 ? -1 : 1;
+    words_[limb] += sign * static_cast<std::int64_t>(low & 0xFFFF'FFFF);
+    words_[limb + 1] += sign * static_cast<std::int64_t>(low >> 32);
+    words_[limb + 2] += sign * static_cast<std::int64_t>(top);
+    if (++terms_ == most_terms) carry();
+  }
+  void add(const ExactSum& other) {
+    ExactSum from = other;
+    from.carry();
+    carry();
+    for (int k = 0; k < words; ++k) words_[k] += from.words_[k];
+    carry();
+  }
+
+  /// For sums over ranks: after `ready`, the words of all ranks may be added.
+  std::span<std::int64_t> ready() {
+    carry();
+    return words_;
+  }
+
+  /// The sum, rounded; NaN if a term was not finite.
+  double value() const {
+    if (words_[limbs] != 0) return std::numeric_limits<double>::quiet_NaN();
+    ExactSum whole = *this;
+    whole.carry();
+    // Carries leave limbs of [0, 2^32) below one that has the sign: of a negative number, its
+    // complement. The magnitude has its leading bits in three limbs at most.
+    const bool negative = whole.words_[limbs - 1] < 0;
+    if (negative) {
+      for (int k = 0; k < limbs; ++k) whole.words_[k] = -whole.words_[k];
+      whole.carry();
+    }
+    int top = limbs - 1;
+    while (top > 0 && whole.words_[top] == 0) --top;
+    double sum = 0;
+    for (int k = std::max(0, top - 3); k <= top; ++k) {
+      sum += std::ldexp(static_cast<double>(whole.words_[k]), lowest + k * limb_bits);
+    }
+    return negative ? -sum : sum;
+  }
+
+ private:
+  static constexpr std::int64_t most_terms = std::int64_t{1} << 30;
+
+  void carry() {
+    for (int k = 0; k + 1 < limbs; ++k) {
+      words_[k + 1] += words_[k] >> limb_bits;  // rounds down, also of negative ones
+      words_[k] &= 0xFFFF'FFFF;
+    }
+    terms_ = 0;
+  }
+
+  std::array<std::int64_t, words> words_{};  // the last: terms that were not finite
+  std::int64_t terms_ = 0;                   // since the last carry
+};
+
+/// Three of them.
+struct ExactVector {
+  ExactSum x, y, z;
+  void add(Vec3d v) {
+    x.add(v.x);
+    y.add(v.y);
+    z.add(v.z);
+  }
+  Vec3d value() const { return {x.value(), y.value(), z.value()}; }
+};
+
+}  // namespace phyxel

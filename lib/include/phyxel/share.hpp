@@ -1,0 +1,54 @@
+/// One rank's share of a model that several ranks step together.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// Values of phyxels in memory: those of phyxel i are `bytes` bytes at base + slot[i] * stride.
+struct Records {
+  std::byte* base = nullptr;
+  std::size_t stride = 0, bytes = 0;
+  const Index* slot = nullptr;  ///< Null: phyxel i is in slot i.
+
+  std::byte* of(Index i) const {
+    return base + static_cast<std::size_t>(slot ? slot[i] : i) * stride;
+  }
+};
+
+/// The other ranks, as one of them sees them. Every function is collective: all ranks call it, in
+/// the same order.
+class Others {
+ public:
+  virtual ~Others() = default;
+  virtual int ranks() const = 0;
+  /// Over all ranks, element by element.
+  virtual void add(std::span<std::int64_t> values) const = 0;
+  virtual double largest(double value) const = 0;
+  virtual double smallest(double value) const = 0;
+  /// Copies values from the ranks that own phyxels to those that have them as ghosts: `begin`
+  /// takes them, and `finish` puts them there. Between the two, neither what is sent nor ghosts'
+  /// values may be touched, and nothing else may begin.
+  virtual void begin(const Records& records) const = 0;
+  virtual void finish() const = 0;
+};
+
+/// What a share knows of the whole. Of each body it has the phyxels that it owns, then ghosts whose
+/// stresses are found here, too, then ghosts whose stresses are not (see `Part`).
+struct Share {
+  Index whole = 0;                   ///< Phyxels of the whole model.
+  std::vector<Index> number;         ///< Which of them each phyxel is, shape [n].
+  std::vector<Index> surfel_number;  ///< Which of the whole model's surfels each surfel is.
+  /// 1: ghosts' stresses come from their owners. 2: displacements of two rings of ghosts do, and
+  /// the inner ring's stresses are found twice.
+  int rings = 1;
+  std::shared_ptr<const Others> others;
+};
+
+}  // namespace phyxel

@@ -1,0 +1,141 @@
+#include "partition/share.hpp"
+
+#include <algorithm>
+
+namespace phyxel {
+namespace {
+
+/// What kind a phyxel is for a part, in the order in which each body has them.
+enum Kind : char { absent, owned, near_ghost, far_ghost };
+
+class Maker {
+ public:
+  Maker(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of)
+      : whole_(whole),
+        part_of_(part_of),
+        kind_(static_cast<std::size_t>(whole.size()), absent),
+        here_(kind_.size(), -1) {
+    out_.share.whole = whole.size();
+    out_.share.rings = static_cast<int>(plan.rings.size());
+    for (const Index i : plan.owned) kind_[i] = owned;
+    for (std::size_t r = 0; r < plan.rings.size(); ++r) {
+      const bool last = r + 1 == plan.rings.size();
+      for (const Index i : plan.rings[r]) kind_[i] = last ? far_ghost : near_ghost;
+    }
+    for (Index s = 0; s < static_cast<Index>(whole.surfels.position.size()); ++s) {
+      if (!has_surfel(s)) continue;
+      out_.share.surfel_number.push_back(s);
+      for (const Index i : whole.surfels.carriers.row(s)) {
+        if (kind_[i] == absent) kind_[i] = far_ghost;
+      }
+    }
+  }
+
+  ModelShare make() {
+    Model& m = out_.model;
+    m.gravity = whole_.gravity;
+    m.degenerate = whole_.degenerate;
+    m.warnings = whole_.warnings;
+    m.neighbourhood.symmetric = whole_.neighbourhood.symmetric;
+    for (const Part& part : whole_.parts) add_part(part);
+    for (const Index i : out_.share.number) add_phyxel(i);
+    add_surfels();
+    for (const Motion& motion : whole_.motions) {
+      m.motions.push_back(motion);
+      m.motions.back().phyxels.clear();
+      for (const Index i : motion.phyxels) {
+        if (here_[i] >= 0) m.motions.back().phyxels.push_back(here_[i]);
+      }
+    }
+    for (const Load& load : whole_.loads) {
+      Load& own = m.loads.emplace_back(load);
+      own.phyxels.clear();
+      own.force.clear();
+      for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+        if (here_[load.phyxels[k]] < 0) continue;
+        own.phyxels.push_back(here_[load.phyxels[k]]);
+        own.force.push_back(load.force[k]);
+      }
+    }
+    return std::move(out_);
+  }
+
+ private:
+  bool has_surfel(Index s) const {
+    return kind_[whole_.surfels.carriers.row(s).front()] == owned;
+  }
+  Index present() const { return static_cast<Index>(out_.share.number.size()); }
+
+  void add_part(const Part& part) {
+    Part own = part;
+    own.begin = present();
+    Index count[far_ghost + 1] = {};
+    for (const Kind kind : {owned, near_ghost, far_ghost}) {
+      const Index first = present();
+      for (Index i = part.begin; i < part.end; ++i) {
+        if (kind_[i] != kind) continue;
+        here_[i] = present();
+        out_.share.number.push_back(i);
+      }
+      count[kind] = present() - first;
+    }
+    own.end = present();
+    own.far_ghosts = count[far_ghost];
+    own.ghosts = count[near_ghost] + count[far_ghost];
+    const std::vector<Index>& surfels = out_.share.surfel_number;
+    const auto before = [&](Index end) {
+      return static_cast<Index>(std::lower_bound(surfels.begin(), surfels.end(), end) -
+                                surfels.begin());
+    };
+    own.surfel_begin = before(part.surfel_begin);
+    own.surfel_end = before(part.surfel_end);
+    out_.model.parts.push_back(own);
+  }
+
+  void add_phyxel(Index i) {
+    Model& m = out_.model;
+    out_.owner.push_back(part_of_[i]);
+    m.position.push_back(whole_.position[i]);
+    m.volume.push_back(whole_.volume[i]);
+    m.mass.push_back(whole_.mass[i]);
+    m.inverse_moment.push_back(whole_.inverse_moment[i]);
+    m.moment_offset.push_back(whole_.moment_offset[i]);
+    Neighbourhood& hood = m.neighbourhood;
+    hood.support.push_back(whole_.neighbourhood.support[i]);
+    const bool has_row = kind_[i] != far_ghost;
+    add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, has_row);
+    if (!hood.symmetric) {
+      add_row(hood.inverse_lists, whole_.neighbourhood.inverse_lists, i, kind_[i] == owned);
+    }
+  }
+  void add_row(Csr& to, const Csr& from, Index row, bool filled) const {
+    if (filled) {
+      for (const Index j : from.row(row)) to.indices.push_back(here_[j]);
+    }
+    to.offsets.push_back(static_cast<Offset>(to.indices.size()));
+  }
+
+  void add_surfels() {
+    Surfels& surfels = out_.model.surfels;
+    surfels.unreached = whole_.surfels.unreached;
+    for (const Index s : out_.share.surfel_number) {
+      surfels.position.push_back(whole_.surfels.position[s]);
+      surfels.normal.push_back(whole_.surfels.normal[s]);
+      add_row(surfels.carriers, whole_.surfels.carriers, s, true);
+    }
+  }
+
+  const Model& whole_;
+  const std::vector<int>& part_of_;
+  std::vector<char> kind_;   // of each phyxel of the whole
+  std::vector<Index> here_;  // where it is here; -1: nowhere
+  ModelShare out_;
+};
+
+}  // namespace
+
+ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of) {
+  return Maker(whole.with_lists(), plan, part_of).make();
+}
+
+}  // namespace phyxel

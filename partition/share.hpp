@@ -1,0 +1,32 @@
+/// What one rank has of a model.
+#pragma once
+
+#include <vector>
+
+#include "partition/halo_plan.hpp"
+#include "phyxel/share.hpp"
+
+namespace phyxel {
+
+/// A share that does not know the others yet.
+struct ModelShare {
+  Model model;  ///< `share` is null.
+  Share share;  ///< `others` is null.
+  std::vector<int> owner;  ///< The part that each phyxel belongs to, shape [n].
+};
+
+/// The phyxels that a plan owns and their ghosts, and the surfels whose first carrier it owns. Lists
+/// keep the order that they have in the whole model, so that sums run alike; they are whole for own
+/// phyxels and for ghosts whose stresses are found here, and empty for others.
+/// @param plan of one ring or two
+ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of);
+
+/// Values of all phyxels of the whole model, for those of a share.
+template <class T>
+std::vector<T> values_of(const Share& share, const std::vector<T>& whole) {
+  std::vector<T> values;
+  for (const Index i : share.number) values.push_back(whole[i]);
+  return values;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,177 @@
+/// One answer: a body stepped by several ranks moves as by one, to the last bit.
+#include <gmock/gmock.h>
+
+#include <map>
+#include <random>
+
+#include "../partition/bodies.hpp"
+#include "mpi/halo.hpp"
+#include "partition/partition.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/solver.hpp"
+#include "ranks.hpp"
+
+namespace phyxel {
+namespace {
+
+using test::world;
+
+/// Terms of every kind, lists of one side, something held, moved, pulled; surfels.
+Model everything() {
+  Scene scene;
+  for (const char* shape : {"horn_bug", "alien_head"}) {
+    BodyRequest body;
+    body.name = shape;
+    body.where = "test";
+    body.source.shape.name = shape;
+    body.translation = {scene.bodies.empty() ? 0.0 : 40.0, 0, 0};
+    body.material = testing::rubber();
+    body.material.volume_stiffness = 1e4;
+    body.material.damping = 0.5;
+    body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+    body.fixed.push_back({.select = {.indices = std::vector<Index>{0, 1, 2}}});
+    body.motions.push_back({.select = {.indices = std::vector<Index>{50, 100, 200}},
+                            .velocity = {0.1, 0, 0},
+                            .amplitude = {0, 0.02, 0},
+                            .frequency = 30});
+    body.loads.push_back({.select = {.all = true}, .force = {3, 0, 1}, .ramp = 0.01});
+    scene.bodies.push_back(body);
+  }
+  scene.gravity = {0, 0, -9.81};
+  return build_model(scene);
+}
+
+struct ShareCase {
+  const char* name;
+  Model (*make)();
+};
+const std::vector<ShareCase>& share_cases() {
+  static const std::vector<ShareCase> cases{
+      {"Cube", testing::cube},   {"Coil", testing::coil}, {"Thread", testing::thread},
+      {"Apart", testing::apart}, {"Tiny", testing::tiny}, {"Everything", everything}};
+  return cases;
+}
+
+/// Built once for all tests.
+const Model& whole_of(const ShareCase& c) {
+  static std::map<std::string, Model> made;
+  const auto found = made.find(c.name);
+  return found != made.end() ? found->second : made.emplace(c.name, c.make()).first->second;
+}
+
+class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, int>> {
+ protected:
+  Shares() {
+    const int rings = std::get<1>(GetParam());
+    const Graph graph = phyxel_graph(whole_);
+    // METIS asks the C library for random numbers: one rank's answer serves all.
+    const auto partitioner = static_cast<Partitioner>((rings + world().size()) % 3);
+    part_of_ = world().broadcast(make_partition(graph, world().size(), partitioner));
+    ModelShare share = share_of(
+        whole_, make_halo_plans(graph, part_of_, world().size(), rings)[world().rank()], part_of_);
+    model_ = connected(world(), std::move(share));
+  }
+  State start(const Model& model) const {
+    State state;
+    std::mt19937_64 engine(5);
+    for (Index i = 0; i < whole_.size(); ++i) {
+      state.displacement.push_back(testing::uniform_vector(engine, 0.002));
+    }
+    if (model.share) state.displacement = values_of(*model.share, state.displacement);
+    state.velocity.resize(state.displacement.size());
+    state.dt = 0.3 * step_limit(model, 1).largest_step;
+    return state;
+  }
+
+  const Model& whole_ = whole_of(std::get<0>(GetParam()));
+  std::vector<int> part_of_;
+  Model model_;
+};
+
+/// A thousand steps of the first body, a few of the others.
+TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
+  const State start_of_whole = start(whole_), start_of_share = start(model_);
+  EXPECT_EQ(start_of_whole.dt, start_of_share.dt);
+  const double dt = start_of_whole.dt;
+  for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
+    const int steps =
+        std::get<0>(GetParam()).name == std::string("Cube") && precision == Precision::single ? 1000
+                                                                                              : 30;
+    const auto alone = make_cpu_backend(whole_, precision, 1),
+               here = make_cpu_backend(model_, precision, 1);
+    Solver whole(*alone, start_of_whole), share(*here, start_of_share);
+    for (int s = 0; s < steps; ++s) {
+      whole.step();
+      share.step();
+    }
+    const State a = whole.state(), b = share.state();
+    // No assertion that ends one rank's test may stand before what all ranks do together.
+    std::vector<Index> different;
+    Index owned = 0;
+    for (Index i = 0; i < model_.size(); ++i) {
+      if (!model_.owns(i)) continue;
+      const Index n = model_.number(i);
+      if (!(a.displacement[n] == b.displacement[i] && a.velocity[n] == b.velocity[i])) {
+        different.push_back(n);
+      }
+      EXPECT_EQ(part_of_[n], world().rank());
+      ++owned;
+    }
+    EXPECT_THAT(different, ::testing::IsEmpty());
+    EXPECT_EQ(world().sum(std::int64_t{owned}), whole_.size());
+
+    const Diagnostics d = diagnose(whole_, *alone, steps, dt),
+                      e = diagnose(model_, *here, steps, dt);
+    EXPECT_EQ(d.total_energy(), e.total_energy());
+    EXPECT_EQ(d.momentum, e.momentum);
+    EXPECT_EQ(d.internal_torque, e.internal_torque);
+    EXPECT_EQ(d.force_scale, e.force_scale);
+    EXPECT_EQ(d.fastest_phyxel, e.fastest_phyxel);
+    EXPECT_EQ(d.largest_speed, e.largest_speed);
+    EXPECT_GT(d.largest_speed, 0);
+
+    SurfelState p, q;
+    alone->advect_surfels(p);
+    here->advect_surfels(q);
+    different.clear();
+    for (std::size_t s = 0; s < q.position.size(); ++s) {
+      const Index k = model_.share->surfel_number.at(s);
+      if (!(p.position[k] == q.position[s] && p.normal[k] == q.normal[s])) different.push_back(k);
+    }
+    EXPECT_THAT(different, ::testing::IsEmpty());
+    EXPECT_EQ(world().sum(static_cast<std::int64_t>(q.position.size())),
+              static_cast<std::int64_t>(p.position.size()));
+  }
+}
+
+TEST_P(Shares, AreAsStiffAsTheWholeToTheLastBit) {
+  const StepLimit one = step_limit(whole_, 1), all = step_limit(model_, 1);
+  EXPECT_EQ(one.omega_max, all.omega_max);
+  EXPECT_EQ(one.iterations, all.iterations);
+  EXPECT_EQ(one.sound_step, all.sound_step);
+}
+
+TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
+  const auto here = make_cpu_backend(model_, Precision::single, 1);
+  State state = start(model_);
+  const Index broken = whole_.size() - 1;
+  for (Index i = 0; i < model_.size(); ++i) {
+    if (model_.number(i) == broken) state.displacement[i].x = std::nan("");
+  }
+  here->upload(state);
+  const Diagnostics d = diagnose(model_, *here, 0, state.dt);
+  ASSERT_GE(d.bad_phyxel, 0);  // it, or a neighbour that its NaN has reached
+  EXPECT_LE(norm(whole_.position[d.bad_phyxel] - whole_.position[broken]),
+            2 * whole_.neighbourhood.support[broken]);
+}
+
+INSTANTIATE_TEST_SUITE_P(Bodies, Shares,
+                         ::testing::Combine(::testing::ValuesIn(share_cases()),
+                                            ::testing::Values(1, 2)),
+                         [](const auto& test) {
+                           return std::string(std::get<0>(test.param).name) +
+                                  (std::get<1>(test.param) == 1 ? "OneRing" : "TwoRings");
+                         });
+
+}  // namespace
+}  // namespace phyxel
