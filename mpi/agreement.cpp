@@ -5,6 +5,10 @@
 namespace phyxel {
 
 void Communicator::together(const std::function<void()>& work) const {
+  if (size_ == 1) {
+    work();
+    return;
+  }
   std::string message;
   auto code = static_cast<int>(ExitCode::success);
   try {

@@ -24,7 +24,8 @@ void check_mpi(int code, const char* call) {
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 
 template <class T>
-T reduced(T value, MPI_Datatype type, MPI_Op operation) {
+T reduced(int ranks, T value, MPI_Datatype type, MPI_Op operation) {
+  if (ranks == 1) return value;
   T result{};
   PHYXEL_MPI_CALL(MPI_Allreduce(&value, &result, 1, type, operation, MPI_COMM_WORLD));
   return result;
@@ -62,7 +63,9 @@ Communicator::~Communicator() {
   if (started_here_) MPI_Finalize();
 }
 
-void Communicator::barrier() const { PHYXEL_MPI_CALL(MPI_Barrier(MPI_COMM_WORLD)); }
+void Communicator::barrier() const {
+  if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(MPI_COMM_WORLD));
+}
 
 // MPI may add in any order; a sum of numbers that were gathered has one.
 double Communicator::sum(double value) const {
@@ -70,18 +73,19 @@ double Communicator::sum(double value) const {
   return std::accumulate(all.begin(), all.end(), 0.0);
 }
 std::int64_t Communicator::sum(std::int64_t value) const {
-  return reduced(value, MPI_INT64_T, MPI_SUM);
+  return reduced(size_, value, MPI_INT64_T, MPI_SUM);
 }
-double Communicator::largest(double value) const { return reduced(value, MPI_DOUBLE, MPI_MAX); }
+double Communicator::largest(double value) const { return reduced(size_, value, MPI_DOUBLE, MPI_MAX); }
 std::int64_t Communicator::largest(std::int64_t value) const {
-  return reduced(value, MPI_INT64_T, MPI_MAX);
+  return reduced(size_, value, MPI_INT64_T, MPI_MAX);
 }
-double Communicator::smallest(double value) const { return reduced(value, MPI_DOUBLE, MPI_MIN); }
+double Communicator::smallest(double value) const { return reduced(size_, value, MPI_DOUBLE, MPI_MIN); }
 std::int64_t Communicator::smallest(std::int64_t value) const {
-  return reduced(value, MPI_INT64_T, MPI_MIN);
+  return reduced(size_, value, MPI_INT64_T, MPI_MIN);
 }
 
 void Communicator::add(std::span<std::int64_t> values) const {
+  if (size_ == 1) return;
   PHYXEL_MPI_CALL(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()),
                                 MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD));
 }
@@ -95,6 +99,7 @@ std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> b
 }
 
 void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
+  if (size_ == 1) return;
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
     PHYXEL_MPI_CALL(MPI_Bcast(bytes.data() + at, count, MPI_BYTE, from, MPI_COMM_WORLD));
   });
@@ -102,6 +107,7 @@ void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
 
 std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
     const std::vector<std::span<const std::byte>>& send) const {
+  if (size_ == 1) return {{send.at(0).begin(), send.at(0).end()}};
   const auto ranks = static_cast<std::size_t>(size_);
   std::vector<std::int64_t> sizes(ranks), coming(ranks);
   for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send.at(r).size());
@@ -125,6 +131,13 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
   PHYXEL_MPI_CALL(
       MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
   return received;
+}
+
+bool launched_as_rank() {
+  for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"}) {
+    if (std::getenv(variable)) return true;
+  }
+  return false;
 }
 
 struct Transfers::Requests {
@@ -156,8 +169,8 @@ void Transfers::wait() {
 }
 
 void Communicator::abort(ExitCode code) const {
-  MPI_Abort(MPI_COMM_WORLD, static_cast<int>(code));
-  std::abort();  // it has returned: not seen
+  if (size_ > 1) MPI_Abort(MPI_COMM_WORLD, static_cast<int>(code));
+  std::_Exit(static_cast<int>(code));
 }
 
 }  // namespace phyxel

@@ -1,4 +1,5 @@
-/// The ranks of a run. Without MPI there is one. No MPI header is needed to include this.
+/// The ranks of a run: one, unless mpirun or srun has started several. No MPI header is needed to
+/// include this.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +7,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -25,6 +27,8 @@ class AgreedError : public Error {
 /// `size` and `abort` is collective: all ranks call it, in the same order.
 class Communicator {
  public:
+  /// One rank, without MPI.
+  Communicator() = default;
   /// @throws Error if MPI does not start
   Communicator(int& argc, char**& argv);
   ~Communicator();
@@ -80,8 +84,16 @@ class Communicator {
 
   /// Does the work of this rank, which must not communicate; then all agree how it went.
   /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of the
-  ///   first rank that failed
+  ///   first rank that failed; what it threw, if there is one rank
   void together(const std::function<void()>& work) const;
+
+  /// `make()`, which must not communicate, on every rank. @throws AgreedError as `together`
+  template <class Make>
+  auto agreed(Make&& make) const {
+    std::optional<decltype(make())> made;
+    together([&] { made.emplace(make()); });
+    return std::move(*made);
+  }
 
   /// Ends all ranks at once, for errors that no rank but this knows of.
   [[noreturn]] void abort(ExitCode code) const;
@@ -102,6 +114,9 @@ class Communicator {
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
   bool started_here_ = false;
 };
+
+/// Whether mpirun, srun or another launcher has started this program as one of several.
+bool launched_as_rank();
 
 /// Messages under way between this rank and others, whose lengths both sides know. Not collective.
 class Transfers {

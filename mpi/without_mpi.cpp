@@ -27,6 +27,8 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
   return {{send.at(0).begin(), send.at(0).end()}};
 }
 
+bool launched_as_rank() { return false; }
+
 struct Transfers::Requests {};
 Transfers::Transfers() = default;
 Transfers::~Transfers() = default;

@@ -5,16 +5,38 @@
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <optional>
 
 #include "command.hpp"
+#include "ensemble.hpp"
 #include "phyxel/error.hpp"
 #include "version.hpp"
 
 namespace {
 
-int fail(phyxel::ExitCode code, const char* message) {
-  fmt::print(stderr, "phyxel: error: {}\n", message);
+using phyxel::app::ranks;
+
+/// What all ranks know of, the first one tells; what one alone has met ends them all.
+int fail(phyxel::ExitCode code, const char* message, bool agreed = false) {
+  if (ranks().size() == 1) {
+    fmt::print(stderr, "phyxel: error: {}\n", message);
+  } else if (!agreed) {
+    fmt::print(stderr, "phyxel: error: rank {} of {}: {}\n", ranks().rank(), ranks().size(),
+               message);
+    ranks().abort(code);
+  } else if (ranks().rank() == 0) {
+    fmt::print(stderr, "phyxel: error: {}\n", message);
+  }
   return static_cast<int>(code);
+}
+
+/// One of several ranks can only run.
+void check_ranks(const CLI::App& program) {
+  if (ranks().size() == 1 || program.got_subcommand("run")) return;
+  throw phyxel::AgreedError(
+      phyxel::ExitCode::bad_input,
+      fmt::format("{} ranks: allowed with \"phyxel run\"; start all else without mpirun",
+                  ranks().size()));
 }
 
 }  // namespace
@@ -44,18 +66,21 @@ int main(int argc, char** argv) {
   phyxel::app::add_export(program);
   phyxel::app::add_bench(program);
   phyxel::app::add_paper(program);
+  std::optional<phyxel::Communicator> world;
   try {
+    if (phyxel::launched_as_rank()) {
+      phyxel::app::set_ranks(world.emplace(argc, argv));
+      program.parse_complete_callback([&] { check_ranks(program); });
+    }
     program.parse(argc, argv);
     return static_cast<int>(ExitCode::success);
-  } catch (const CLI::CallForHelp& help) {
-    return program.exit(help);
-  } catch (const CLI::CallForAllHelp& help) {
-    return program.exit(help);
-  } catch (const CLI::CallForVersion& version) {
-    return program.exit(version);
+  } catch (const CLI::Success& help) {  // --help, --version
+    return ranks().rank() == 0 ? program.exit(help) : 0;
   } catch (const CLI::ParseError& error) {
-    program.exit(error);
+    if (ranks().rank() == 0) program.exit(error);
     return static_cast<int>(ExitCode::bad_input);
+  } catch (const phyxel::AgreedError& error) {
+    return fail(error.code(), error.what(), true);
   } catch (const phyxel::Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {

@@ -8,6 +8,7 @@
 #include "background_writer.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
+#include "ensemble.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -21,6 +22,7 @@ namespace {
 
 struct RunOptions {
   Overrides overrides;
+  CutOptions cut;
   std::string resume;  // "", "auto" or a checkpoint file
   bool force = false;
   bool no_pictures = false;
@@ -34,27 +36,46 @@ struct GoodState {
   Diagnostics diagnostics;
 };
 
-/// One run from its plan to its summary. Files are written on a thread of their own, while stepping
-/// goes on if a core is left for that. HDF5 is not made for threads: after the constructor that
-/// thread alone uses it, until all is written. At most two frames are held, the one being written
-/// and one that waits, and the last good state, which often is that of the latter.
+/// `work()`, which does the same on every rank and fails on all of them, if it does.
+template <class Work>
+auto alike(Work&& work) {
+  try {
+    return work();
+  } catch (const Error& error) {
+    throw AgreedError(error.code(), error.what());
+  }
+}
+
+/// One run from its plan to its summary, on one rank or on several: all step, and what is said and
+/// written is brought together on the first. Files are written on a thread of their own, while
+/// stepping goes on if a core is left for that. HDF5 is not made for threads: after the constructor
+/// that thread alone uses it, until all is written. At most two frames are held, the one being
+/// written and one that waits, and the last good state, which often is that of the latter.
 class Run {
  public:
-  Run(const RunOptions& options)
+  explicit Run(const RunOptions& options)
       : options_(options),
-        scene_(scene_with(options.overrides)),
-        device_(choose_device(scene_.solver.device, "device")),
-        begin_(find_checkpoint()),
-        model_(make_model(scene_, device_)),
-        backend_(make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads)),
-        plan_(plan_steps(scene_, model_, *backend_, options.overrides.unsafe_step)),
-        solver_(*backend_, begin_ ? resumed_state() : initial_state(model_, scene_, plan_.dt)),
+        scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
+        device_(ranks().agreed([&] { return choose_device(device_name(), "device"); })),
+        begin_(ranks().agreed([&] { return find_checkpoint(); })),
+        ensemble_(scene_, device_, options.cut),
+        backend_(ranks().agreed(
+            [&] { return make_backend(model(), scene_.solver.precision, device_, threads()); })),
+        plan_(alike(
+            [&] { return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step); })),
+        solver_(*backend_, alike([&] {
+          return begin_ ? resumed_state() : initial_state(model(), scene_, plan_.dt);
+        })),
         first_step_(solver_.steps()),
-        start_diagnostics_(diagnose(model_, *backend_, solver_.steps(), solver_.dt())),
-        // Last, because it replaces what an earlier run has left: all that could be refused, or
-        // find no memory, has been tried by now.
-        recorder_(model_, scene_, options.force,
-                  begin_ ? std::optional(begin_->info.frames_written) : std::nullopt) {
+        start_diagnostics_(diagnose(model(), *backend_, solver_.steps(), solver_.dt())) {
+    // Last, because it replaces what an earlier run has left: all that could be refused, or find no
+    // memory, has been tried by now.
+    ranks().together([&] {
+      if (!leads()) return;
+      recorder_.emplace(ensemble_.whole(), scene_, options.force,
+                        begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
+    });
+    has_surfels_ = ranks().sum(static_cast<std::int64_t>(model().surfels.position.size())) > 0;
     setup_seconds_ = seconds_since(start_);
   }
 
@@ -70,14 +91,15 @@ class Run {
     Diagnostics now = start_diagnostics_;
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
     peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
-    StabilityWatch watch(model_, now);
+    StabilityWatch watch(model(), now);
     good_ = good_state(now);
     // Without a rate only the last frame is wanted.
     if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
 
     StopSignal signals;
-    Progress progress(scene_.time.end, options_.quiet || options_.json ? nullptr : stderr,
-                      {.phyxels = model_.size()});
+    Progress progress(scene_.time.end,
+                      options_.quiet || options_.json || !leads() ? nullptr : stderr,
+                      {.phyxels = model().whole_size()});
     loop_start_ = Clock::now();
     auto last_checkpoint = Clock::now();
     try {
@@ -85,23 +107,24 @@ class Run {
       double look_seconds = 0;
       while (solver.steps() < plan_.steps) {
         solver.step();
-        writer_.check();
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
-        const bool stop = StopSignal::stop_requested() != 0;
-        const bool due = StopSignal::checkpoint_requested() ||
-                         (scene_.output.checkpoint_every > 0 &&
-                          seconds_since(last_checkpoint) > scene_.output.checkpoint_every);
         progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+        if (!frame && solver.steps() % agree_interval() != 0) continue;
+        ranks().together([&] { writer_.check(); });
+        const bool stop = anyone(StopSignal::stop_requested() != 0);
+        const bool due = anyone(StopSignal::checkpoint_requested() ||
+                                (scene_.output.checkpoint_every > 0 &&
+                                 seconds_since(last_checkpoint) > scene_.output.checkpoint_every));
         const bool watched = solver.steps() % watch_interval == 0 &&
-                             seconds_since(stepping_since) > watch_share * look_seconds;
+                             anyone(seconds_since(stepping_since) > watch_share * look_seconds);
         if (!frame && !stop && !due && !watched) continue;
 
         backend.wait();
         step_seconds_ += seconds_since(stepping_since);
-        if (frame) writer_.wait_for_room();
+        if (frame) ranks().together([&] { writer_.wait_for_room(); });
         const auto look_start = Clock::now();
-        now = diagnose(model_, backend, solver.steps(), solver.dt());
+        now = diagnose(model(), backend, solver.steps(), solver.dt());
         watch.check(now);
         peak_energy_ =
             std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
@@ -115,29 +138,38 @@ class Run {
           last_checkpoint = Clock::now();
         }
         if (stop && !last) {
-          writer_.finish();
+          ranks().together([&] { writer_.finish(); });
           progress.finish();
-          throw Error(ExitCode::stopped,
-                      fmt::format("stopped by signal {} at t = {:g} s (step {}); the checkpoint is "
-                                  "written, --resume auto continues",
-                                  StopSignal::stop_requested(), solver.time(), solver.steps()));
+          const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
+          throw AgreedError(ExitCode::stopped,
+                            fmt::format("stopped by signal {} at t = {:g} s (step {}); the "
+                                        "checkpoint is written, --resume auto continues",
+                                        signal, solver.time(), solver.steps()));
         }
         stepping_since = Clock::now();
       }
-    } catch (const DivergedError& error) {
-      throw DivergedError(with_last_good_state(error.what(), progress));
-    } catch (const DeviceError& error) {
+    } catch (const DivergedError& error) {  // on all ranks
+      throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
+    } catch (const DeviceError& error) {  // on this one
+      if (ranks().size() > 1) throw;
       throw DeviceError(with_last_good_state(error.what(), progress));
     } catch (const std::bad_alloc&) {
+      if (ranks().size() > 1) throw;
       throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
     }
-    writer_.finish();
+    ranks().together([&] { writer_.finish(); });
     progress.finish();
     loop_seconds_ = seconds_since(loop_start_);
-    if (scene_.render.pictures && !options_.no_pictures) {
-      pictures_ = render_directory(recorder_.directory(), scene_.render, true);
-    }
-    say_summary(now);
+    ranks().together([&] {
+      if (leads() && scene_.render.pictures && !options_.no_pictures) {
+        pictures_ = render_directory(recorder_->directory(), scene_.render, true);
+      }
+    });
+    std::int64_t bytes = 0;
+    for (const ArrayBytes& array : backend_->memory())
+      bytes += static_cast<std::int64_t>(array.bytes);
+    bytes = ranks().sum(bytes);
+    if (leads()) say_summary(now, bytes);
   }
 
  private:
@@ -145,12 +177,29 @@ class Run {
   static constexpr std::int64_t watch_interval = 250;
   static constexpr double watch_share = 50;
 
+  const Model& model() const { return ensemble_.here(); }
+  /// Whether this rank speaks and writes.
+  static bool leads() { return ranks().rank() == 0; }
+  /// Ranks ask each other now and then, and one alone itself after every step.
+  static std::int64_t agree_interval() { return ranks().size() > 1 ? 10 : 1; }
+  static bool anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
+
+  std::string device_name() const {
+    const bool chooses = scene_.solver.device == "auto" && ranks().size() > 1;
+    return chooses ? "cpu" : scene_.solver.device;
+  }
+  /// Ranks of one host that may use the same cores share them.
+  int threads() const {
+    if (scene_.solver.threads > 0 || ranks().size() == 1) return scene_.solver.threads;
+    return std::max(1, omp_get_max_threads() / ranks().host_size());
+  }
+
   /// Writes it, and says so.
   std::string with_last_good_state(const char* error, Progress& progress) {
     progress.finish();
     try {
       write_state();
-      writer_.finish();
+      ranks().together([&] { writer_.finish(); });
     } catch (const Error& writing) {
       return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
     }
@@ -186,7 +235,7 @@ class Run {
   }
 
   State resumed_state() const {
-    if (begin_->info.model_digest != model_digest(model_)) {
+    if (begin_->info.model_digest != ensemble_.digest()) {
       throw InputError(
           fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
                       "neighbourhoods, loads and "
@@ -200,11 +249,12 @@ class Run {
                       "leave time.step, time.safety and output.frames_per_second as they were",
                       options_.resume, begin_->state.dt, plan_.dt));
     }
-    return begin_->state;
+    return ensemble_.share_of(begin_->state);
   }
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const {
-    return std::make_shared<const GoodState>(GoodState{solver_.state(), now});
+    return std::make_shared<const GoodState>(
+        GoodState{ensemble_.whole_state(solver_.state()), now});
   }
 
   /// Whether one is left for the writer. Threads that step on all of them wait for one another
@@ -214,8 +264,9 @@ class Run {
     return backend_->threads() < omp_get_num_procs();
   }
 
-  /// What writes files, to the writer.
+  /// What writes files, to the writer of the first rank.
   void hand_over(std::function<void()> job) {
+    if (!leads()) return;
     writer_.submit(std::move(job));
     if (!core_is_left()) writer_.finish();
   }
@@ -226,8 +277,10 @@ class Run {
     Frame frame;
     frame.state = &good->state;
     frame.diagnostics = good->diagnostics;
-    if (scene_.output.surface && !model_.surfels.position.empty()) {
+    if (scene_.output.surface && has_surfels_) {
       backend_->advect_surfels(*surfels);
+      surfels->position = ensemble_.surfels(surfels->position);
+      surfels->normal = ensemble_.surfels(surfels->normal);
       frame.surfels = surfels.get();
     }
     const auto wanted = [&](const char* field) {
@@ -235,10 +288,12 @@ class Run {
       return std::find(fields.begin(), fields.end(), field) != fields.end();
     };
     if (wanted("von_mises") || wanted("volume_ratio")) {
-      stress_fields(model_, *backend_, wanted("von_mises") ? &frame.von_mises : nullptr,
+      stress_fields(model(), *backend_, wanted("von_mises") ? &frame.von_mises : nullptr,
                     wanted("volume_ratio") ? &frame.volume_ratio : nullptr);
+      if (wanted("von_mises")) frame.von_mises = ensemble_.phyxels(frame.von_mises);
+      if (wanted("volume_ratio")) frame.volume_ratio = ensemble_.phyxels(frame.volume_ratio);
     }
-    hand_over([this, good, surfels, frame = std::move(frame)] { recorder_.write(frame); });
+    hand_over([this, good, surfels, frame = std::move(frame)] { recorder_->write(frame); });
   }
 
   /// The last good one, in the background, after the frames handed over before.
@@ -248,20 +303,21 @@ class Run {
       info.program = program_version();
       info.precision = scene_.solver.precision;
       info.scene_text = scene_.text;
-      info.model_digest = model_digest(model_);
+      info.model_digest = ensemble_.digest();
       info.total_energy = good->diagnostics.total_energy();
       info.initial_energy = initial_energy_;
-      info.frames_written = recorder_.frames_written();
-      checkpoint_ = write_checkpoint(recorder_.directory(), good->state, info);
+      info.frames_written = recorder_->frames_written();
+      checkpoint_ = write_checkpoint(recorder_->directory(), good->state, info);
     });
   }
 
   void say_plan() const {
-    if (options_.json || options_.quiet) return;
+    if (options_.json || options_.quiet || !leads()) return;
     fmt::print("{}: {}\n", program_version(),
                scene_.title.empty() ? scene_.file.string() : scene_.title);
-    fmt::print("{}", describe_model(scene_, model_));
+    fmt::print("{}", describe_model(scene_, ensemble_.whole()));
     fmt::print("  device      {}\n", backend_->name());
+    if (ranks().size() > 1) fmt::print("  ranks       {}\n", ensemble_.description());
     fmt::print("  time step   {}\n", plan_.why);
     fmt::print(
         "  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
@@ -272,6 +328,7 @@ class Run {
 
   /// Not an error: a job script that resumes until it is done ends here.
   void say_finished_already() const {
+    if (!leads()) return;
     const std::string message = fmt::format(
         "the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
         solver_.time(), scene_.time.end);
@@ -284,24 +341,23 @@ class Run {
     }
   }
 
-  void say_summary(const Diagnostics& now) const {
+  void say_summary(const Diagnostics& now, std::int64_t bytes) const {
     const double steps = static_cast<double>(solver_.steps() - first_step_);
     const double energy_drift =
         (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
     const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
     const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
-    std::size_t bytes = 0;
-    for (const ArrayBytes& array : backend_->memory()) bytes += array.bytes;
+    const Model& whole = ensemble_.whole();
     if (options_.json) {
       nlohmann::ordered_json j = {
           {"program", program_version()},
           {"scene", scene_.file.string()},
           {"title", scene_.title},
           {"device", backend_->name()},
-          {"phyxels", model_.size()},
-          {"surfels", model_.surfels.position.size()},
-          {"neighbours_per_phyxel",
-           static_cast<double>(model_.pairs()) / std::max(1, model_.size())},
+          {"ranks", ranks().size()},
+          {"phyxels", whole.size()},
+          {"surfels", whole.surfels.position.size()},
+          {"neighbours_per_phyxel", static_cast<double>(whole.pairs()) / std::max(1, whole.size())},
           {"time_s", now.time},
           {"steps", solver_.steps()},
           {"time_step_s", plan_.dt},
@@ -311,17 +367,17 @@ class Run {
           {"loop_seconds", loop_seconds_},
           {"step_seconds", step_seconds_},
           {"steps_per_second", steps / step_seconds_},
-          {"phyxel_steps_per_second", steps * model_.size() / step_seconds_},
+          {"phyxel_steps_per_second", steps * whole.size() / step_seconds_},
           {"bytes", bytes},
           {"energy_j", now.total_energy()},
           {"energy_drift", energy_drift},
-          {"conservative", is_conservative(model_)},
+          {"conservative", is_conservative(whole)},
           {"internal_force_balance", force_balance},
           {"internal_torque_balance", torque_balance},
           {"inverted_phyxels", now.inverted},
-          {"warnings", model_.warnings},
-          {"frames", recorder_.frames_written()},
-          {"directory", recorder_.directory().string()},
+          {"warnings", whole.warnings},
+          {"frames", recorder_->frames_written()},
+          {"directory", recorder_->directory().string()},
           {"checkpoint", checkpoint_.string()}};
       fmt::print("{}\n", j.dump(2));
       return;
@@ -330,9 +386,9 @@ class Run {
         "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
         "with "
         "output; {:.0f} bytes per phyxel\n",
-        steps / step_seconds_, steps * model_.size() / step_seconds_, step_seconds_, loop_seconds_,
-        static_cast<double>(bytes) / std::max(1, model_.size()));
-    if (is_conservative(model_)) {
+        steps / step_seconds_, steps * whole.size() / step_seconds_, step_seconds_, loop_seconds_,
+        static_cast<double>(bytes) / std::max(1, whole.size()));
+    if (is_conservative(whole)) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
                  energy_drift, peak_energy_);
     } else {
@@ -349,8 +405,8 @@ class Run {
           "cure that: volume_stiffness or a stiffer material may\n",
           now.inverted);
     }
-    fmt::print("  written     {} frames: ", recorder_.frames_written());
-    const auto files = recorder_.files();
+    fmt::print("  written     {} frames: ", recorder_->frames_written());
+    const auto files = recorder_->files();
     for (std::size_t f = 0; f < files.size(); ++f)
       fmt::print("{}{}", f ? ", " : "", files[f].string());
     fmt::print("\n              {} (checkpoint)\n", checkpoint_.string());
@@ -365,13 +421,14 @@ class Run {
   Scene scene_;
   ChosenDevice device_;
   std::optional<Checkpoint> begin_;
-  Model model_;
+  Ensemble ensemble_;
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
   Solver solver_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_;
-  Recorder recorder_;
+  std::optional<Recorder> recorder_;  // on the first rank
+  bool has_surfels_ = false;
   std::shared_ptr<const GoodState> good_;  // the last one
   double initial_energy_ = 0, peak_energy_ = 0;
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
@@ -418,6 +475,13 @@ void add_run(CLI::App& program) {
   command->add_option(
       "--resume", options->resume,
       "Continue from a checkpoint file, or from the newest in the output folder (auto)");
+  command->add_option("--partitioner", options->cut.partitioner,
+                      "How mpirun's ranks cut the bodies: metis, curve or bisection");
+  command
+      ->add_option("--ghost-rings", options->cut.rings,
+                   "1: ranks exchange displacements and stresses; 2: displacements of two "
+                   "rings of neighbours, and stresses between are found twice")
+      ->check(CLI::Range(1, 2));
   command->add_flag("--force", options->force,
                     "Replace an earlier trajectory in the output folder");
   command->add_flag("--no-pictures", options->no_pictures,
@@ -428,7 +492,8 @@ void add_run(CLI::App& program) {
       "Examples:\n"
       "  phyxel run examples/dino/scene.toml --out out/dino\n"
       "  phyxel run scene.toml --precision double --until 0.5 --force\n"
-      "  phyxel run scene.toml --resume auto");
+      "  phyxel run scene.toml --resume auto\n"
+      "  mpirun -n 8 phyxel run scene.toml --device cpu");
   command->callback([options] { run(*options); });
 }
 

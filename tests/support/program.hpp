@@ -24,10 +24,13 @@ class Program : public Folder {
     if (chdir(folder_.c_str()) != 0) _exit(99);
     if (!freopen("stdout.txt", "w", stdout) || !freopen("stderr.txt", "w", stderr)) _exit(99);
     for (const auto& [name, value] : environment_) setenv(name.c_str(), value.c_str(), 1);
-    std::vector<char*> argv{const_cast<char*>(PHYXEL_PROGRAM)};
-    for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+    std::vector<std::string> words = launcher_;
+    words.push_back(PHYXEL_PROGRAM);
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
-    execv(PHYXEL_PROGRAM, argv.data());
+    execv(argv[0], argv.data());
     _exit(99);
   }
   Outcome finish(pid_t child) const {
@@ -38,6 +41,8 @@ class Program : public Folder {
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
 
+  /// What starts the program, e.g. mpirun and its options; empty: nothing.
+  std::vector<std::string> launcher_;
   /// Name and value, on top of the test's own.
   std::vector<std::pair<std::string, std::string>> environment_;
 };

@@ -1,0 +1,88 @@
+#include "ensemble.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mpi/halo.hpp"
+#include "partition/partition.hpp"
+#include "partition/share.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel::app {
+namespace {
+
+const Communicator* the_ranks = nullptr;
+
+}  // namespace
+
+const Communicator& ranks() {
+  static const Communicator alone;
+  return the_ranks ? *the_ranks : alone;
+}
+void set_ranks(const Communicator& ranks) { the_ranks = &ranks; }
+
+Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut) {
+  const int parts = ranks().size(), rank = ranks().rank();
+  if (parts == 1) {
+    whole_ = std::make_unique<Model>(make_model(scene, device));
+    digest_ = model_digest(*whole_);
+    return;
+  }
+  Graph graph;
+  std::vector<int> part_of;
+  ranks().together([&] {
+    if (device.gpu) {
+      throw InputError(fmt::format(
+          "device {}: {} ranks step on CPUs only, so far: allowed --device cpu, or one rank",
+          scene.solver.device, parts));
+    }
+    const Partitioner partitioner = partitioner_of(cut.partitioner);
+    whole_ = std::make_unique<Model>(build_model(scene));
+    digest_ = model_digest(*whole_);
+    graph = phyxel_graph(*whole_);
+    // METIS takes random numbers from the C library: one rank's answer serves all.
+    if (rank == 0) part_of = make_partition(graph, parts, partitioner);
+  });
+  part_of = ranks().broadcast(part_of);
+  ModelShare share =
+      phyxel::share_of(*whole_, make_halo_plans(graph, part_of, parts, cut.rings)[rank], part_of);
+  here_ = std::make_unique<Model>(connected(ranks(), std::move(share)));
+  if (rank > 0) whole_.reset();
+
+  std::vector<std::vector<Index>> numbers(static_cast<std::size_t>(parts)),
+      surfel_numbers(numbers.size());
+  for (Index i = 0; i < here_->size(); ++i) {
+    if (!here_->owns(i)) continue;
+    owned_.push_back(i);
+    numbers[0].push_back(here_->number(i));
+  }
+  surfel_numbers[0] = here_->share->surfel_number;
+  numbers_ = ranks().exchanged(numbers);
+  surfel_numbers_ = ranks().exchanged(surfel_numbers);
+
+  const auto own = static_cast<std::int64_t>(owned_.size());
+  const std::int64_t ghosts = here_->size() - own;
+  const std::int64_t fewest = ranks().smallest(own), most = ranks().largest(own),
+                     most_ghosts = ranks().largest(ghosts);
+  description_ = fmt::format(
+      "{} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} exchanged through MPI",
+      parts, cut.partitioner, fewest, most, most_ghosts,
+      cut.rings == 1 ? "displacements and stresses" : "displacements of two rings");
+}
+
+State Ensemble::whole_state(const State& local) const {
+  State state = local;
+  state.displacement = phyxels(local.displacement);
+  state.velocity = phyxels(local.velocity);
+  return state;
+}
+
+State Ensemble::share_of(State whole) const {
+  if (!here_) return whole;
+  whole.displacement = values_of(*here_->share, whole.displacement);
+  whole.velocity = values_of(*here_->share, whole.velocity);
+  return whole;
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,79 @@
+/// A model on the ranks of the program, and what they bring together on the first.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "device_option.hpp"
+#include "mpi/communicator.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/state.hpp"
+
+namespace phyxel::app {
+
+/// The ranks of this program.
+const Communicator& ranks();
+/// For main(): who they are. Until then there is one.
+void set_ranks(const Communicator& ranks);
+
+/// How a model is cut.
+struct CutOptions {
+  std::string partitioner = "metis";
+  int rings = 1;
+};
+
+/// The model of a scene, or this rank's share of it.
+class Ensemble {
+ public:
+  /// Collective.
+  Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut);
+
+  /// What this rank steps.
+  const Model& here() const { return here_ ? *here_ : *whole_; }
+  /// The whole; on the first rank only.
+  const Model& whole() const { return *whole_; }
+  std::uint64_t digest() const { return digest_; }  ///< Of the whole.
+  /// For summaries: how many ranks, what each has. "" if there is one.
+  const std::string& description() const { return description_; }
+
+  /// Values of all phyxels, or of all surfels, on the first rank; nothing on the others.
+  template <class T>
+  std::vector<T> phyxels(const std::vector<T>& local) const {
+    return brought_together(local, owned_, numbers_, whole_ ? whole_->position.size() : 0);
+  }
+  template <class T>
+  std::vector<T> surfels(const std::vector<T>& local) const {
+    return brought_together(local, {}, surfel_numbers_,
+                            whole_ ? whole_->surfels.position.size() : 0);
+  }
+  State whole_state(const State& local) const;
+  /// This rank's share of a state of the whole, which every rank has.
+  State share_of(State whole) const;
+
+ private:
+  /// @param chosen which of `local` are sent; empty: all
+  template <class T>
+  std::vector<T> brought_together(const std::vector<T>& local, const std::vector<Index>& chosen,
+                                  const std::vector<std::vector<Index>>& numbers,
+                                  std::size_t size) const {
+    if (!here_) return local;
+    std::vector<std::vector<T>> send(static_cast<std::size_t>(ranks().size()));
+    for (const Index i : chosen) send[0].push_back(local[i]);
+    if (chosen.empty()) send[0] = local;
+    const std::vector<std::vector<T>> received = ranks().exchanged(send);
+    std::vector<T> all(size);
+    for (std::size_t r = 0; r < numbers.size(); ++r) {
+      for (std::size_t k = 0; k < numbers[r].size(); ++k) all[numbers[r][k]] = received[r][k];
+    }
+    return all;
+  }
+
+  std::unique_ptr<const Model> whole_, here_;  // here_ null: the whole is here
+  std::uint64_t digest_ = 0;
+  std::vector<Index> owned_;                                  // here
+  std::vector<std::vector<Index>> numbers_, surfel_numbers_;  // [rank], on the first rank
+  std::string description_;
+};
+
+}  // namespace phyxel::app

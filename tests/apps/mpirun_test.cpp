@@ -1,0 +1,226 @@
+/// The program on several ranks, as mpirun starts it: one answer, one message, no hang.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include "phyxel/checkpoint.hpp"
+#include "support/program.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::text_of;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Mpirun : public test::Program {
+ protected:
+  /// Two bodies of which one is held, pulled and moved, with surfels and every field.
+  void write_scene(const std::string& end = "0.1") const {
+    write("scene.toml", "gravity = [0.0, 0.0, -9.81]\n[time]\nend = " + end + R"(
+[solver]
+threads = 1
+device = "cpu"
+[output]
+directory = "out"
+frames_per_second = 40
+fields = ["displacement", "velocity", "von_mises", "volume_ratio", "mass"]
+[[body]]
+name = "beam"
+shape = "beam"
+size = [0.8, 0.2, 0.2]
+spacing = 0.04
+jitter = 0.1
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+[body.neighbours]
+support = "adaptive"
+[[body.fixed]]
+region = "x-"
+[[body.load]]
+region = "x+"
+force = [0.0, 1.0, 0.0]
+ramp = 0.05
+[[body]]
+name = "bug"
+shape = "horn_bug"
+translation = [10.0, 0.0, 0.0]
+spin = [0.0, 1.0, 0.0]
+[body.material]
+young = 6e5
+poisson = 0.3
+density = 1000
+)");
+  }
+  void use_ranks(int count) {
+    launcher_ = {};
+    if (count == 0) return;
+    launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n",
+                 std::to_string(count)};
+    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI's own
+  }
+  Outcome run_on(int count, const std::vector<std::string>& arguments) {
+    use_ranks(count);
+    return run(arguments);
+  }
+  void wait_for(const std::string& file) const {
+    for (int wait = 0; wait < 4000 && !fs::exists(folder_ / file); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_TRUE(fs::exists(folder_ / file));
+  }
+  /// All files of an output folder, by name.
+  std::map<std::string, std::string> files_of(const std::string& directory) const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::directory_iterator(folder_ / directory)) {
+      if (entry.is_regular_file()) files[entry.path().filename().string()] = text_of(entry.path());
+    }
+    return files;
+  }
+  void expect_same_files(const std::string& a, const std::string& b) const {
+    const auto left = files_of(a), right = files_of(b);
+    EXPECT_GT(left.size(), 10u);
+    ASSERT_EQ(left.size(), right.size());
+    for (const auto& [name, content] : left) {
+      ASSERT_TRUE(right.contains(name)) << name;
+      EXPECT_TRUE(right.at(name) == content) << b << "/" << name;
+    }
+  }
+};
+
+TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
+  write_scene();
+  const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  const struct {
+    int ranks;
+    const char *partitioner, *rings, *precision;
+  } cases[] = {{1, "metis", "1", "float"},
+               {2, "metis", "1", "float"},
+               {2, "curve", "2", "float"},
+               {3, "bisection", "1", "float"},
+               {3, "metis", "2", "float"}};
+  for (const auto& c : cases) {
+    const std::string out = std::string(c.partitioner) + std::to_string(c.ranks) + c.rings;
+    const Outcome outcome = run_on(c.ranks, {"run", "scene.toml", "--out", out, "--partitioner",
+                                             c.partitioner, "--ghost-rings", c.rings});
+    ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+    if (c.ranks > 1) {
+      EXPECT_THAT(outcome.out, HasSubstr(std::to_string(c.ranks) + " ranks, cut by"));
+    }
+    expect_same_files("alone", out);
+  }
+}
+
+/// How often a text stands in another.
+int count_of(const std::string& what, const std::string& text) {
+  int count = 0;
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
+TEST_F(Mpirun, WrongInputIsToldOnce) {
+  write_scene();
+  write("kept", "precious");
+  const struct {
+    std::vector<std::string> arguments;
+    std::string message;
+  } cases[] = {{{"run", "missing.toml"}, "missing.toml"},
+               {{"run", "scene.toml", "--partitioner", "metiss"}, "metiss"},
+               {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
+               {{"run", "scene.toml", "--step", "1"}, "unstable"},
+               {{"run", "scene.toml", "--out", "kept"}, "kept"},
+               {{"check", "scene.toml"}, "2 ranks"}};
+  for (const auto& c : cases) {
+    const Outcome outcome = run_on(2, c.arguments);
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_EQ(count_of(c.message, outcome.err), 1) << outcome.err;
+  }
+  EXPECT_EQ(text_of(folder_ / "kept"), "precious");
+  EXPECT_EQ(count_of("Usage:", run_on(2, {"--help"}).out), 1);
+}
+
+TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {
+  write_scene("1.5");
+  const std::vector<std::string> arguments{"run", "scene.toml", "--out"};
+  const auto with = [&](const std::string& out, std::vector<std::string> more = {}) {
+    std::vector<std::string> all = arguments;
+    all.push_back(out);
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  ASSERT_EQ(run_on(0, with("alone")).code, 0);
+  use_ranks(2);
+  const pid_t child = start(with("parts"));
+  wait_for("parts/phyxels_000003.hdf");
+  kill(child, SIGUSR2);  // mpirun hands it on, where it follows SIGTERM by SIGKILL
+  const Outcome stopped = finish(child);
+  EXPECT_EQ(stopped.code, 75) << stopped.out << stopped.err;
+  EXPECT_EQ(count_of("--resume auto", stopped.err), 1) << stopped.err;
+  ASSERT_EQ(run_on(3, with("parts", {"--resume", "auto"})).code, 0);
+  const auto whole = latest_checkpoint(folder_ / "alone"),
+             parts = latest_checkpoint(folder_ / "parts");
+  ASSERT_TRUE(whole && parts);
+  const State a = read_checkpoint(*whole).state, b = read_checkpoint(*parts).state;
+  EXPECT_EQ(a.step, b.step);
+  EXPECT_TRUE(a.displacement == b.displacement);
+  EXPECT_TRUE(a.velocity == b.velocity);
+  EXPECT_EQ(text_of(folder_ / "alone" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
+}
+
+/// Processes that one has started.
+std::vector<pid_t> children_of(pid_t parent) {
+  std::vector<pid_t> children;
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const std::string name = entry.path().filename().string();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::ifstream stat(entry.path() / "stat");
+    const std::string line{std::istreambuf_iterator<char>(stat), {}};
+    const auto after_name = line.rfind(')');  // "pid (name) state parent ..."
+    if (after_name == std::string::npos) continue;
+    if (std::stoi(line.substr(after_name + 4)) == parent) children.push_back(std::stoi(name));
+  }
+  return children;
+}
+
+TEST_F(Mpirun, KilledRankEndsAllAndTheLastCheckpointIsWhole) {
+  write_scene("100");
+  std::string scene = text_of(folder_ / "scene.toml");
+  scene.replace(scene.find("frames_per_second"), 0, "checkpoint_every = 0.2\n");
+  write("scene.toml", scene);
+  use_ranks(2);
+  const pid_t mpirun = start({"run", "scene.toml", "--quiet"});
+  wait_for("out/phyxels_000003.hdf");
+  std::optional<fs::path> checkpoint;
+  for (int wait = 0; wait < 4000 && !checkpoint; ++wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    checkpoint = latest_checkpoint(folder_ / "out");
+  }
+  ASSERT_TRUE(checkpoint.has_value());
+  const std::vector<pid_t> ranks = children_of(mpirun);
+  ASSERT_GE(ranks.size(), 2u);
+  kill(ranks.back(), SIGKILL);
+  EXPECT_NE(finish(mpirun).code, 0);
+  checkpoint = latest_checkpoint(folder_ / "out");
+  ASSERT_TRUE(checkpoint.has_value());
+  const Checkpoint last = read_checkpoint(*checkpoint);
+  EXPECT_GT(last.state.step, 0);
+  // And it goes on from there.
+  const Outcome resumed = run_on(3, {"run", "scene.toml", "--resume", "auto", "--until",
+                                     std::to_string(last.state.time + 0.05)});
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+}
+
+}  // namespace
+}  // namespace phyxel
