@@ -1,6 +1,7 @@
 #include "mpi/halo.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 
 namespace phyxel {
@@ -36,7 +37,25 @@ Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
   }
 }
 
+namespace {
+
+/// Adds the time until it ends.
+class Timed {
+ public:
+  explicit Timed(double& seconds) : seconds_(seconds) {}
+  ~Timed() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
 void Halo::begin(const Records& records) const {
+  const Timed timed(traffic_.seconds);
   under_way_ = records;
   for (const Peer& peer : peers_) {
     peer.incoming.resize(peer.receive.size() * records.bytes);
@@ -50,10 +69,12 @@ void Halo::begin(const Records& records) const {
       to += records.bytes;
     }
     transfers_.send(peer.rank, peer.outgoing);
+    traffic_.bytes_sent += static_cast<std::int64_t>(peer.outgoing.size());
   }
 }
 
 void Halo::finish() const {
+  const Timed timed(traffic_.seconds);
   transfers_.wait();
   for (const Peer& peer : peers_) {
     const std::byte* from = peer.incoming.data();

@@ -20,6 +20,7 @@ class Halo final : public Others {
   double smallest(double value) const override { return ranks_.smallest(value); }
   void begin(const Records& records) const override;
   void finish() const override;
+  Traffic traffic() const override { return traffic_; }
 
  private:
   /// Phyxels here that one other rank gets, or that come from it; both sides have them in the order
@@ -32,6 +33,7 @@ class Halo final : public Others {
   const Communicator& ranks_;
   std::vector<Peer> peers_;
   mutable Records under_way_;
+  mutable Traffic traffic_;
   mutable Transfers transfers_;
 };
 

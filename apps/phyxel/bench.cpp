@@ -10,11 +10,13 @@
 #include <thread>
 
 #include "bench_page.hpp"
+#include "bench_scaling.hpp"
 #include "cantilever.hpp"
 #include "command.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
+#include "scaling_page.hpp"
 #include "setup.hpp"
 #include "setup/survey.hpp"
 #include "stopwatch.hpp"
@@ -496,13 +498,20 @@ void add_bench(CLI::App& program) {
                "Neighbour search: time per phyxel against the number of phyxels",
                {10648, 103823, 1000000, 9938375}, bench_neighbours);
   add_bench_cantilever(*bench);
+  add_bench_scaling(*bench);
 
-  CLI::App* page = bench->add_subcommand("page", "Write the page about the GPU from its tables");
+  CLI::App* page = bench->add_subcommand(
+      "page", "Write the pages about the GPU and about ranks from their tables");
   auto results = std::make_shared<std::string>("docs/results");
   auto out = std::make_shared<std::string>("docs/performance.md");
   page->add_option("--results", *results, "Folder of gpu_*.csv")->capture_default_str();
-  page->add_option("--out", *out, "The page")->capture_default_str();
-  page->callback([results, out] { write_bench_page(*results, *out); });
+  auto scaling = std::make_shared<std::string>("docs/scaling.md");
+  page->add_option("--out", *out, "The page about the GPU")->capture_default_str();
+  page->add_option("--scaling", *scaling, "The page about ranks")->capture_default_str();
+  page->callback([results, out, scaling] {
+    write_bench_page(*results, *out);
+    write_scaling_page(*results, *scaling);
+  });
 }
 
 }  // namespace phyxel::app

@@ -1,13 +1,8 @@
 #include "ensemble.hpp"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
 #include "mpi/halo.hpp"
 #include "partition/partition.hpp"
 #include "partition/share.hpp"
-#include "phyxel/error.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -22,23 +17,19 @@ const Communicator& ranks() {
 }
 void set_ranks(const Communicator& ranks) { the_ranks = &ranks; }
 
-Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut) {
+Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
   const int parts = ranks().size(), rank = ranks().rank();
   if (parts == 1) {
-    whole_ = std::make_unique<Model>(make_model(scene, device));
+    whole_ = std::make_unique<Model>(make());
     digest_ = model_digest(*whole_);
+    shares_ = {whole_->size(), whole_->size(), 0};
     return;
   }
   Graph graph;
   std::vector<int> part_of;
   ranks().together([&] {
-    if (device.gpu) {
-      throw InputError(fmt::format(
-          "device {}: {} ranks step on CPUs only, so far: allowed --device cpu, or one rank",
-          scene.solver.device, parts));
-    }
     const Partitioner partitioner = partitioner_of(cut.partitioner);
-    whole_ = std::make_unique<Model>(build_model(scene));
+    whole_ = std::make_unique<Model>(make());
     digest_ = model_digest(*whole_);
     graph = phyxel_graph(*whole_);
     // METIS takes random numbers from the C library: one rank's answer serves all.
@@ -63,12 +54,13 @@ Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOpti
 
   const auto own = static_cast<std::int64_t>(owned_.size());
   const std::int64_t ghosts = here_->size() - own;
-  const std::int64_t fewest = ranks().smallest(own), most = ranks().largest(own),
-                     most_ghosts = ranks().largest(ghosts);
-  description_ = fmt::format(
-      "{} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} exchanged through MPI",
-      parts, cut.partitioner, fewest, most, most_ghosts,
-      cut.rings == 1 ? "displacements and stresses" : "displacements of two rings");
+  shares_ = {ranks().smallest(own), ranks().largest(own), ranks().largest(ghosts)};
+}
+
+Traffic Ensemble::traffic() const {
+  if (!here_) return {};
+  const Traffic here = here_->share->others->traffic();
+  return {ranks().largest(here.bytes_sent), ranks().largest(here.seconds)};
 }
 
 State Ensemble::whole_state(const State& local) const {

@@ -1,11 +1,11 @@
 /// A model on the ranks of the program, and what they bring together on the first.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "device_option.hpp"
 #include "mpi/communicator.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
@@ -17,25 +17,30 @@ const Communicator& ranks();
 /// For main(): who they are. Until then there is one.
 void set_ranks(const Communicator& ranks);
 
-/// How a model is cut.
+/// How a model is cut, and what its parts exchange.
 struct CutOptions {
   std::string partitioner = "metis";
-  int rings = 1;
+  int rings = 1;  ///< See `Share`.
 };
 
 /// The model of a scene, or this rank's share of it.
 class Ensemble {
  public:
-  /// Collective.
-  Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut);
+  /// Collective. @param make builds the whole model, with lists if there are several ranks
+  Ensemble(const std::function<Model()>& make, const CutOptions& cut);
 
   /// What this rank steps.
   const Model& here() const { return here_ ? *here_ : *whole_; }
   /// The whole; on the first rank only.
   const Model& whole() const { return *whole_; }
   std::uint64_t digest() const { return digest_; }  ///< Of the whole.
-  /// For summaries: how many ranks, what each has. "" if there is one.
-  const std::string& description() const { return description_; }
+  /// Phyxels of each rank.
+  struct Shares {
+    std::int64_t fewest = 0, most = 0, most_ghosts = 0;
+  };
+  const Shares& shares() const { return shares_; }
+  /// Since the start, of the rank that had most; nothing if there is one rank. Collective.
+  Traffic traffic() const;
 
   /// Values of all phyxels, or of all surfels, on the first rank; nothing on the others.
   template <class T>
@@ -73,7 +78,7 @@ class Ensemble {
   std::uint64_t digest_ = 0;
   std::vector<Index> owned_;                                  // here
   std::vector<std::vector<Index>> numbers_, surfel_numbers_;  // [rank], on the first rank
-  std::string description_;
+  Shares shares_;
 };
 
 }  // namespace phyxel::app

@@ -30,13 +30,16 @@ int fail(phyxel::ExitCode code, const char* message, bool agreed = false) {
   return static_cast<int>(code);
 }
 
-/// One of several ranks can only run.
+/// What several ranks can do.
 void check_ranks(const CLI::App& program) {
-  if (ranks().size() == 1 || program.got_subcommand("run")) return;
-  throw phyxel::AgreedError(
-      phyxel::ExitCode::bad_input,
-      fmt::format("{} ranks: allowed with \"phyxel run\"; start all else without mpirun",
-                  ranks().size()));
+  if (ranks().size() == 1 || program.got_subcommand("run") ||
+      program.get_subcommand("bench")->got_subcommand("scaling")) {
+    return;
+  }
+  throw phyxel::AgreedError(phyxel::ExitCode::bad_input,
+                            fmt::format("{} ranks: allowed with \"phyxel run\" and \"phyxel bench "
+                                        "scaling\"; start all else without mpirun",
+                                        ranks().size()));
 }
 
 }  // namespace

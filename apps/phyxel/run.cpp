@@ -56,9 +56,9 @@ class Run {
   explicit Run(const RunOptions& options)
       : options_(options),
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
-        device_(ranks().agreed([&] { return choose_device(device_name(), "device"); })),
+        device_(ranks().agreed([&] { return device_of_ranks(); })),
         begin_(ranks().agreed([&] { return find_checkpoint(); })),
-        ensemble_(scene_, device_, options.cut),
+        ensemble_([&] { return make_model(scene_, device_); }, options.cut),
         backend_(ranks().agreed(
             [&] { return make_backend(model(), scene_.solver.precision, device_, threads()); })),
         plan_(alike(
@@ -169,7 +169,8 @@ class Run {
     for (const ArrayBytes& array : backend_->memory())
       bytes += static_cast<std::int64_t>(array.bytes);
     bytes = ranks().sum(bytes);
-    if (leads()) say_summary(now, bytes);
+    const Traffic traffic = ensemble_.traffic();
+    if (leads()) say_summary(now, bytes, traffic);
   }
 
  private:
@@ -184,9 +185,17 @@ class Run {
   static std::int64_t agree_interval() { return ranks().size() > 1 ? 10 : 1; }
   static bool anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
 
-  std::string device_name() const {
-    const bool chooses = scene_.solver.device == "auto" && ranks().size() > 1;
-    return chooses ? "cpu" : scene_.solver.device;
+  ChosenDevice device_of_ranks() const {
+    const std::string& wanted = scene_.solver.device;
+    if (ranks().size() == 1) return choose_device(wanted, "device");
+    const ChosenDevice device = choose_device(wanted == "auto" ? "cpu" : wanted, "device");
+    if (device.gpu) {
+      throw InputError(
+          fmt::format("device {}: {} ranks step on CPUs only, so far; allowed: cpu, "
+                      "auto, or one rank",
+                      wanted, ranks().size()));
+    }
+    return device;
   }
   /// Ranks of one host that may use the same cores share them.
   int threads() const {
@@ -317,7 +326,14 @@ class Run {
                scene_.title.empty() ? scene_.file.string() : scene_.title);
     fmt::print("{}", describe_model(scene_, ensemble_.whole()));
     fmt::print("  device      {}\n", backend_->name());
-    if (ranks().size() > 1) fmt::print("  ranks       {}\n", ensemble_.description());
+    if (ranks().size() > 1) {
+      const Ensemble::Shares& shares = ensemble_.shares();
+      fmt::print(
+          "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
+          "exchanged through MPI\n",
+          ranks().size(), options_.cut.partitioner, shares.fewest, shares.most, shares.most_ghosts,
+          options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings");
+    }
     fmt::print("  time step   {}\n", plan_.why);
     fmt::print(
         "  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
@@ -341,7 +357,7 @@ class Run {
     }
   }
 
-  void say_summary(const Diagnostics& now, std::int64_t bytes) const {
+  void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
     const double steps = static_cast<double>(solver_.steps() - first_step_);
     const double energy_drift =
         (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
@@ -369,6 +385,8 @@ class Run {
           {"steps_per_second", steps / step_seconds_},
           {"phyxel_steps_per_second", steps * whole.size() / step_seconds_},
           {"bytes", bytes},
+          {"exchange_bytes", traffic.bytes_sent},
+          {"exchange_seconds", traffic.seconds},
           {"energy_j", now.total_energy()},
           {"energy_drift", energy_drift},
           {"conservative", is_conservative(whole)},
@@ -388,6 +406,14 @@ class Run {
         "output; {:.0f} bytes per phyxel\n",
         steps / step_seconds_, steps * whole.size() / step_seconds_, step_seconds_, loop_seconds_,
         static_cast<double>(bytes) / std::max(1, whole.size()));
+    if (ranks().size() > 1) {
+      fmt::print(
+          "  exchange    at most {:.3g} kB a step and rank; {:.1f}% of the seconds above for "
+          "packing "
+          "and waiting\n",
+          1e-3 * static_cast<double>(traffic.bytes_sent) / steps,
+          100 * traffic.seconds / loop_seconds_);
+    }
     if (is_conservative(whole)) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
                  energy_drift, peak_energy_);

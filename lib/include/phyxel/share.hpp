@@ -22,6 +22,12 @@ struct Records {
   }
 };
 
+/// What exchanges have cost a rank.
+struct Traffic {
+  std::int64_t bytes_sent = 0;
+  double seconds = 0;  ///< For packing, waiting and unpacking.
+};
+
 /// The other ranks, as one of them sees them. Every function is collective: all ranks call it, in
 /// the same order.
 class Others {
@@ -37,6 +43,8 @@ class Others {
   /// values may be touched, and nothing else may begin.
   virtual void begin(const Records& records) const = 0;
   virtual void finish() const = 0;
+  /// Since the start. Of this rank: not collective.
+  virtual Traffic traffic() const = 0;
 };
 
 /// What a share knows of the whole. Of each body it has the phyxels that it owns, then ghosts whose

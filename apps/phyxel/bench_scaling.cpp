@@ -1,0 +1,158 @@
+#include "bench_scaling.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "csv.hpp"
+#include "ensemble.hpp"
+#include "partition/partition.hpp"
+#include "phyxel/phyxel.hpp"
+#include "setup.hpp"
+#include "stopwatch.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct Options {
+  std::vector<Index> sizes{8000, 50653, 195112};
+  std::vector<std::string> partitioners = partitioner_names();
+  std::vector<std::string> precisions{"float"};
+  std::vector<int> rings{1, 2};
+  double seconds = 1;
+  int repeats = 5;
+  std::string csv;
+  bool force = false;
+};
+
+/// A jittered cube of about so many phyxels, under gravity.
+Scene cube_scene(Index phyxels) {
+  Scene scene;
+  scene.time.end = 1;
+  scene.gravity = {0, 0, -9.81};
+  BodyRequest body;
+  body.name = "cube";
+  body.where = "phyxel bench scaling";
+  body.source.shape.name = "beam";
+  body.source.shape.size = {1, 1, 1};
+  body.source.shape.spacing = 1 / std::round(std::cbrt(phyxels));
+  body.source.shape.jitter = 0.1;
+  body.source.shape.surface = false;
+  body.material = {.young = 1e5, .poisson = 0.3, .density = 1000, .strain = Strain::green};
+  scene.bodies.push_back(body);
+  return scene;
+}
+
+struct Measured {
+  Median steps_per_s;
+  double bytes_per_step = 0, exchanging = 0;  // of the rank that has most; share of the time
+};
+
+Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precision,
+                 const Options& options) {
+  const Model& model = ensemble.here();
+  const auto backend = make_cpu_backend(model, precision, 1);
+  // A tenth of the sound step: any speed, no risk.
+  const BodyRequest& body = scene.bodies[0];
+  const double dt = 0.1 * body.source.shape.spacing / pressure_wave_speed(body.material);
+  Solver solver(*backend, initial_state(model, scene, dt));
+  // Ranks agree on numbers of steps, so that all take as many.
+  const auto timed = [&](std::int64_t steps) {
+    ranks().barrier();
+    const auto start = Clock::now();
+    for (std::int64_t s = 0; s < steps; ++s) solver.step();
+    return ranks().largest(seconds_since(start));
+  };
+  timed(2);
+  const double one = timed(5) / 5;
+  const auto steps = std::max<std::int64_t>(2, std::llround(options.seconds / one));
+  const Traffic before = ensemble.traffic();
+  std::vector<double> rates;
+  double total = 0;
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    const double seconds = timed(steps);
+    total += seconds;
+    rates.push_back(static_cast<double>(steps) / seconds);
+  }
+  const Traffic after = ensemble.traffic();
+  return {median_of(rates),
+          static_cast<double>(after.bytes_sent - before.bytes_sent) /
+              static_cast<double>(steps * options.repeats),
+          (after.seconds - before.seconds) / total};
+}
+
+void bench_scaling(const Options& options) {
+  const bool leads = ranks().rank() == 0, alone = ranks().size() == 1;
+  CsvTable table{machine_facts(),
+                 {"ranks", "threads_each", "partitioner", "rings", "precision", "phyxels",
+                  "neighbours", "fewest", "most", "most_ghosts", "steps_per_s",
+                  "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging"},
+                 {}};
+  ranks().together([&] {
+    if (!leads) return;
+    if (!options.csv.empty() && std::filesystem::exists(options.csv) && !options.force) {
+      throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
+    }
+    fmt::print("{}", csv_text(table));
+  });
+  for (const Index size : options.sizes) {
+    const Scene scene = cube_scene(size);
+    for (const std::string& partitioner : options.partitioners) {
+      for (const int rings : options.rings) {
+        const Ensemble ensemble([&] { return build_model(scene); }, {partitioner, rings});
+        const Ensemble::Shares& shares = ensemble.shares();
+        for (const std::string& precision : options.precisions) {
+          const Measured m = measure(ensemble, scene, precision_option(precision), options);
+          ranks().together([&] {
+            if (!leads) return;
+            const Model& whole = ensemble.whole();
+            const double n = whole.size();
+            table.rows.push_back(
+                {std::to_string(ranks().size()), "1", alone ? "none" : partitioner,
+                 alone ? "0" : std::to_string(rings), precision, std::to_string(whole.size()),
+                 fmt::format("{:.1f}", static_cast<double>(whole.pairs()) / n),
+                 std::to_string(shares.fewest), std::to_string(shares.most),
+                 std::to_string(shares.most_ghosts), fmt::format("{:.5g}", m.steps_per_s.value),
+                 fmt::format("{:.5g}", m.steps_per_s.value * n),
+                 fmt::format("{:.3f}", m.steps_per_s.spread),
+                 fmt::format("{:.0f}", m.bytes_per_step), fmt::format("{:.4f}", m.exchanging)});
+            fmt::print("{}\n", fmt::join(table.rows.back(), ","));
+            std::fflush(stdout);
+            if (!options.csv.empty()) write_csv(options.csv, table);
+          });
+        }
+        if (alone) break;
+      }
+      if (alone) break;
+    }
+  }
+}
+
+}  // namespace
+
+void add_bench_scaling(CLI::App& bench) {
+  CLI::App* command = bench.add_subcommand(
+      "scaling", "Steps per second of a cube on the ranks that mpirun has started, or on one");
+  auto options = std::make_shared<Options>();
+  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
+      ->delimiter(',')
+      ->check(CLI::Range(8, 2'000'000'000));
+  command->add_option("--partitioner", options->partitioners, "metis, curve, bisection")
+      ->delimiter(',')
+      ->check(CLI::IsMember(partitioner_names()));
+  command->add_option("--ghost-rings", options->rings, "1, 2")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 2));
+  command->add_option("--precision", options->precisions, "float, double, mixed")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"float", "double", "mixed"}));
+  command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
+      ->check(CLI::Range(0.01, 60.0));
+  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--csv", options->csv, "Also write the table to this file");
+  command->add_flag("--force", options->force, "Replace the CSV file");
+  command->callback([options] { bench_scaling(*options); });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,10 @@
+/// phyxel bench scaling: one body on the ranks that mpirun has started.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace phyxel::app {
+
+void add_bench_scaling(CLI::App& bench);
+
+}  // namespace phyxel::app
