@@ -1,6 +1,6 @@
 /// Sums without rounding: the same bits in whatever order, and on however many threads and ranks,
 /// the terms are added. Source: U. Kulisch's long accumulator; limbs of 32 bits in 64-bit words, so
-/// that two billion terms are added before a carry has to move.
+/// that a billion terms are added before a carry has to move.
 #pragma once
 
 #include <array>
@@ -56,25 +56,34 @@ class ExactSum {
     return words_;
   }
 
-  /// The sum, rounded; NaN if a term was not finite.
+  /// The double nearest to the sum; NaN if a term was not finite.
   double value() const {
     if (words_[limbs] != 0) return std::numeric_limits<double>::quiet_NaN();
     ExactSum whole = *this;
     whole.carry();
-    // Carries leave limbs of [0, 2^32) below one that has the sign: of a negative number, its
-    // complement. The magnitude has its leading bits in three limbs at most.
+    // Carries leave limbs of [0, 2^32) below one that has the sign.
     const bool negative = whole.words_[limbs - 1] < 0;
     if (negative) {
       for (int k = 0; k < limbs; ++k) whole.words_[k] = -whole.words_[k];
       whole.carry();
     }
     int top = limbs - 1;
-    while (top > 0 && whole.words_[top] == 0) --top;
-    double sum = 0;
-    for (int k = std::max(0, top - 3); k <= top; ++k) {
-      sum += std::ldexp(static_cast<double>(whole.words_[k]), lowest + k * limb_bits);
-    }
-    return negative ? -sum : sum;
+    while (top >= 0 && whole.words_[top] == 0) --top;
+    if (top < 0) return 0;
+    // The leading 64 bits; whether any is set below them goes into the last, so that the one
+    // rounding to a double is right.
+    const auto limb = [&](int k) {
+      return k < 0 ? 0 : static_cast<std::uint64_t>(whole.words_[k]);
+    };
+    const std::uint64_t below = limb(top - 1) << 32 | limb(top - 2);
+    const int zeros = std::countl_zero(static_cast<std::uint32_t>(limb(top)));
+    std::uint64_t leading = limb(top) << (32 + zeros) | below >> (32 - zeros);
+    bool more = below << (32 + zeros) != 0;
+    for (int k = top - 3; k >= 0; --k) more = more || whole.words_[k] != 0;
+    leading |= static_cast<std::uint64_t>(more);
+    const double magnitude =
+        std::ldexp(static_cast<double>(leading), lowest + (top - 2) * limb_bits + 32 - zeros);
+    return negative ? -magnitude : magnitude;
   }
 
  private:

@@ -1,8 +1,18 @@
 #include <fmt/format.h>
 
+#include <cstdlib>
+#include <new>
+
 #include "mpi/communicator.hpp"
 
 namespace phyxel {
+
+bool launched_as_rank() {
+  for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE"}) {
+    if (std::getenv(variable)) return true;
+  }
+  return false;
+}
 
 void Communicator::together(const std::function<void()>& work) const {
   if (size_ == 1) {
@@ -16,6 +26,9 @@ void Communicator::together(const std::function<void()>& work) const {
   } catch (const Error& error) {
     message = error.what();
     code = static_cast<int>(error.code());
+  } catch (const std::bad_alloc&) {
+    message = out_of_memory;
+    code = static_cast<int>(ExitCode::bad_input);
   } catch (const std::exception& error) {
     message = error.what();
     code = static_cast<int>(ExitCode::bad_input);

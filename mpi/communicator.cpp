@@ -133,13 +133,6 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
   return received;
 }
 
-bool launched_as_rank() {
-  for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"}) {
-    if (std::getenv(variable)) return true;
-  }
-  return false;
-}
-
 struct Transfers::Requests {
   std::vector<MPI_Request> list;
 };

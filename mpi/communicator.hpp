@@ -17,6 +17,10 @@
 
 namespace phyxel {
 
+/// What is said where std::bad_alloc ends a program.
+inline constexpr const char* out_of_memory =
+    "out of memory: fewer phyxels, or a machine with more memory, are needed";
+
 /// What every rank throws when one has failed: the message says which.
 class AgreedError : public Error {
  public:
@@ -29,7 +33,7 @@ class Communicator {
  public:
   /// One rank, without MPI.
   Communicator() = default;
-  /// @throws Error if MPI does not start
+  /// @throws Error if MPI does not start, or there are several ranks in a build without it
   Communicator(int& argc, char**& argv);
   ~Communicator();
   Communicator(const Communicator&) = delete;

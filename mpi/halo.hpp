@@ -14,7 +14,6 @@ class Halo final : public Others {
   /// Collective: tells the owners which of their phyxels are ghosts here.
   Halo(const Communicator& ranks, const ModelShare& share);
 
-  int ranks() const override { return ranks_.size(); }
   void add(std::span<std::int64_t> values) const override { ranks_.add(values); }
   double largest(double value) const override { return ranks_.largest(value); }
   double smallest(double value) const override { return ranks_.smallest(value); }

@@ -5,7 +5,14 @@
 
 namespace phyxel {
 
-Communicator::Communicator(int&, char**&) {}
+Communicator::Communicator(int&, char**&) {
+  for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"}) {
+    const char* count = std::getenv(variable);
+    if (count && std::atoi(count) > 1) {
+      throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
+    }
+  }
+}
 Communicator::~Communicator() = default;
 
 void Communicator::barrier() const {}
@@ -26,8 +33,6 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
     const std::vector<std::span<const std::byte>>& send) const {
   return {{send.at(0).begin(), send.at(0).end()}};
 }
-
-bool launched_as_rank() { return false; }
 
 struct Transfers::Requests {};
 Transfers::Transfers() = default;

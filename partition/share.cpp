@@ -76,6 +76,7 @@ class Maker {
         if (kind_[i] != kind) continue;
         here_[i] = present();
         out_.share.number.push_back(i);
+        out_.share.owned.push_back(kind == owned);
       }
       count[kind] = present() - first;
     }

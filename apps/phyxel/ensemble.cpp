@@ -17,6 +17,14 @@ const Communicator& ranks() {
 }
 void set_ranks(const Communicator& ranks) { the_ranks = &ranks; }
 
+void require_alike(std::uint64_t value, const char* what) {
+  const auto signed_value = static_cast<std::int64_t>(value);
+  if (ranks().smallest(signed_value) == ranks().largest(signed_value)) return;
+  throw AgreedError(ExitCode::bad_input,
+                    std::string("the ranks have different ") + what +
+                        ": allowed are the same files for all, on a file system that all see");
+}
+
 Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
   const int parts = ranks().size(), rank = ranks().rank();
   if (parts == 1) {
@@ -35,6 +43,7 @@ Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
     // METIS takes random numbers from the C library: one rank's answer serves all.
     if (rank == 0) part_of = make_partition(graph, parts, partitioner);
   });
+  require_alike(digest_, "bodies");
   part_of = ranks().broadcast(part_of);
   ModelShare share =
       phyxel::share_of(*whole_, make_halo_plans(graph, part_of, parts, cut.rings)[rank], part_of);

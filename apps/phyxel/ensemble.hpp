@@ -16,6 +16,8 @@ namespace phyxel::app {
 const Communicator& ranks();
 /// For main(): who they are. Until then there is one.
 void set_ranks(const Communicator& ranks);
+/// @throws AgreedError if it is not the same number on all ranks. Collective.
+void require_alike(std::uint64_t value, const char* what);
 
 /// How a model is cut, and what its parts exchange.
 struct CutOptions {

@@ -87,8 +87,7 @@ int main(int argc, char** argv) {
   } catch (const phyxel::Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {
-    return fail(ExitCode::bad_input,
-                "out of memory: fewer phyxels, or a machine with more memory, are needed");
+    return fail(ExitCode::bad_input, phyxel::out_of_memory);
   } catch (const std::exception& error) {
     return fail(ExitCode::bad_input, error.what());
   }

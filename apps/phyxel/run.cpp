@@ -3,12 +3,14 @@
 #include <omp.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "background_writer.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
 #include "ensemble.hpp"
+#include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -57,13 +59,13 @@ class Run {
       : options_(options),
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
         device_(ranks().agreed([&] { return device_of_ranks(); })),
-        begin_(ranks().agreed([&] { return find_checkpoint(); })),
+        begin_(checkpoint_for_all()),
         ensemble_([&] { return make_model(scene_, device_); }, options.cut),
         backend_(ranks().agreed(
             [&] { return make_backend(model(), scene_.solver.precision, device_, threads()); })),
         plan_(alike(
             [&] { return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step); })),
-        solver_(*backend_, alike([&] {
+        solver_(*backend_, ranks().agreed([&] {
           return begin_ ? resumed_state() : initial_state(model(), scene_, plan_.dt);
         })),
         first_step_(solver_.steps()),
@@ -91,7 +93,7 @@ class Run {
     Diagnostics now = start_diagnostics_;
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
     peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
-    StabilityWatch watch(model(), now);
+    StabilityWatch watch = alike([&] { return StabilityWatch(model(), now); });
     good_ = good_state(now);
     // Without a rate only the last frame is wanted.
     if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
@@ -197,10 +199,13 @@ class Run {
     }
     return device;
   }
-  /// Ranks of one host that may use the same cores share them.
+  /// Of this rank. Ranks of one host share its cores, unless someone has bound them or has said how
+  /// many threads each takes.
   int threads() const {
     if (scene_.solver.threads > 0 || ranks().size() == 1) return scene_.solver.threads;
-    return std::max(1, omp_get_max_threads() / ranks().host_size());
+    if (std::getenv("OMP_NUM_THREADS")) return 0;  // OpenMP's choice
+    const auto cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
+    return std::clamp(omp_get_num_procs(), 1, std::max(1, cores / ranks().host_size()));
   }
 
   /// Writes it, and says so.
@@ -243,6 +248,29 @@ class Run {
     return checkpoint;
   }
 
+  /// The first rank's: the others may not see its folder.
+  std::optional<Checkpoint> checkpoint_for_all() const {
+    require_alike(std::hash<std::string>{}(scene_.text), "scenes");
+    std::optional<Checkpoint> found;
+    ranks().together([&] {
+      if (leads()) found = find_checkpoint();
+    });
+    if (ranks().size() == 1) return found;
+    if (ranks().broadcast(std::vector<char>{found.has_value()}).front() == 0) return std::nullopt;
+    if (!found) found.emplace();
+    const auto share = [](auto& value) { value = ranks().broadcast(std::vector{value}).front(); };
+    share(found->info.model_digest);
+    share(found->info.initial_energy);
+    share(found->info.frames_written);
+    State& state = found->state;
+    share(state.step);
+    share(state.time);
+    share(state.dt);
+    state.displacement = ranks().broadcast(std::move(state.displacement));
+    state.velocity = ranks().broadcast(std::move(state.velocity));
+    return found;
+  }
+
   State resumed_state() const {
     if (begin_->info.model_digest != ensemble_.digest()) {
       throw InputError(
@@ -275,9 +303,11 @@ class Run {
 
   /// What writes files, to the writer of the first rank.
   void hand_over(std::function<void()> job) {
-    if (!leads()) return;
-    writer_.submit(std::move(job));
-    if (!core_is_left()) writer_.finish();
+    ranks().together([&] {
+      if (!leads()) return;
+      writer_.submit(std::move(job));
+      if (!core_is_left()) writer_.finish();
+    });
   }
 
   /// Takes what the frame needs from the backend now; it is written in the background.
@@ -501,8 +531,10 @@ void add_run(CLI::App& program) {
   command->add_option(
       "--resume", options->resume,
       "Continue from a checkpoint file, or from the newest in the output folder (auto)");
-  command->add_option("--partitioner", options->cut.partitioner,
-                      "How mpirun's ranks cut the bodies: metis, curve or bisection");
+  command
+      ->add_option("--partitioner", options->cut.partitioner,
+                   "How mpirun's ranks cut the bodies: metis, curve or bisection")
+      ->check(CLI::IsMember(partitioner_names()));
   command
       ->add_option("--ghost-rings", options->cut.rings,
                    "1: ranks exchange displacements and stresses; 2: displacements of two "

@@ -442,13 +442,6 @@ const Model& Model::with_lists() const {
   return *this;
 }
 
-bool Model::owns(Index i) const {
-  if (!share) return true;
-  const auto part = std::find_if(parts.begin(), parts.end(),
-                                 [&](const Part& p) { return i >= p.begin && i < p.end; });
-  return part != parts.end() && i < part->owned_end();
-}
-
 Offset Model::pairs() const {
   Offset sum = 0;
   for (const Part& part : parts) sum += part.lists.pairs;

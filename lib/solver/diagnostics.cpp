@@ -154,7 +154,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
     for (const Index i : motion.phyxels) moved[i] = 1;
   }
 
-#pragma omp parallel
+#pragma omp parallel num_threads(std::max(1, backend.threads()))
   {
     Totals own;
     for (const Part& part : model.parts) {

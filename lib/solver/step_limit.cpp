@@ -74,13 +74,13 @@ class CpuVibration final : public Vibration {
   template <class Each>
   void for_owned(Each&& each) const {
     for (const Part& part : model_.parts) {
-#pragma omp parallel for schedule(static) if (part.size > 1000)
+#pragma omp parallel for schedule(static) num_threads(backend_->threads())
       for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
     }
   }
   double product(const Vectors& a, const Vectors& b) const {
     ExactSum all;
-#pragma omp parallel
+#pragma omp parallel num_threads(backend_->threads())
     {
       ExactSum own;
       for (const Part& part : model_.parts) {

@@ -179,6 +179,50 @@ TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {
   EXPECT_EQ(text_of(folder_ / "alone" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
 }
 
+TEST_F(Mpirun, DivergedRunIsToldOnceAndItsLastGoodStateKept) {
+  write_scene("5");
+  const Outcome outcome =
+      run_on(2, {"run", "scene.toml", "--step", "0.004", "--unsafe-step", "--quiet"});
+  EXPECT_EQ(outcome.code, 3) << outcome.err;
+  EXPECT_EQ(count_of("the simulation diverged", outcome.err), 1) << outcome.err;
+  EXPECT_TRUE(latest_checkpoint(folder_ / "out").has_value());
+}
+
+TEST_F(Mpirun, FailedWriteEndsAllRanksOnce) {
+  write_scene("100");
+  use_ranks(2);
+  const pid_t mpirun = start({"run", "scene.toml", "--quiet"});
+  wait_for("out/phyxels_000002.hdf");
+  fs::remove_all(folder_ / "out");
+  const Outcome outcome = finish(mpirun);
+  EXPECT_EQ(outcome.code, 74) << outcome.err;
+  EXPECT_EQ(count_of("phyxel: error", outcome.err), 1) << outcome.err;
+}
+
+TEST_F(Mpirun, MoreRanksThanPhyxelsIsOneAnswer) {
+  write("scene.toml", R"(
+gravity = [0.0, 0.0, -9.81]
+[time]
+end = 0.05
+[output]
+directory = "out"
+frames_per_second = 200
+[[body]]
+name = "stick"
+shape = "beam"
+size = [0.2, 0.1, 0.1]
+spacing = 0.1
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+)");
+  ASSERT_EQ(run_on(0, {"run", "scene.toml", "--device", "cpu", "--out", "alone"}).code, 0);
+  const Outcome outcome = run_on(3, {"run", "scene.toml", "--device", "cpu", "--out", "three"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  expect_same_files("alone", "three");
+}
+
 /// Processes that one has started.
 std::vector<pid_t> children_of(pid_t parent) {
   std::vector<pid_t> children;

@@ -108,7 +108,7 @@ struct Model {
   /// Which phyxel of the whole model phyxel i is.
   Index number(Index i) const { return share ? share->number[i] : i; }
   /// Whether phyxel i is no ghost.
-  bool owns(Index i) const;
+  bool owns(Index i) const { return !share || share->owned[i]; }
   bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
   /// This model, for whoever needs the lists. @throws InputError if they were left to a device.
   const Model& with_lists() const;

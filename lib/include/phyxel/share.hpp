@@ -33,7 +33,6 @@ struct Traffic {
 class Others {
  public:
   virtual ~Others() = default;
-  virtual int ranks() const = 0;
   /// Over all ranks, element by element.
   virtual void add(std::span<std::int64_t> values) const = 0;
   virtual double largest(double value) const = 0;
@@ -52,6 +51,7 @@ class Others {
 struct Share {
   Index whole = 0;                   ///< Phyxels of the whole model.
   std::vector<Index> number;         ///< Which of them each phyxel is, shape [n].
+  std::vector<char> owned;           ///< Whether each is no ghost, shape [n].
   std::vector<Index> surfel_number;  ///< Which of the whole model's surfels each surfel is.
   /// 1: ghosts' stresses come from their owners. 2: displacements of two rings of ghosts do, and
   /// the inner ring's stresses are found twice.

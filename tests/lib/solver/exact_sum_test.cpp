@@ -34,6 +34,13 @@ TEST(ExactSum, CancelsWithoutATrace) {
   EXPECT_EQ(sum_of({-5, 3}), -2);
 }
 
+TEST(ExactSum, IsRoundedOnceToTheNearest) {
+  EXPECT_EQ(sum_of({1, 0x1p-53}), 1);  // half way: to the even one
+  EXPECT_EQ(sum_of({1, 0x1p-53, 0x1p-140}), 1 + 0x1p-52);
+  EXPECT_EQ(sum_of({-1, -0x1p-53, -0x1p-300}), -1 - 0x1p-52);
+  EXPECT_EQ(sum_of({1 + 0x1p-52, 0x1p-53, -0x1p-200}), 1 + 0x1p-52);
+}
+
 /// Of numbers over a hundred powers of ten, against sums of integers.
 TEST(ExactSum, IsTheSameInAnyOrderAndInParts) {
   std::mt19937_64 engine(4);
