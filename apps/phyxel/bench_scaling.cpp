@@ -1,7 +1,10 @@
 #include "bench_scaling.hpp"
 
 #include <fmt/format.h>
+#include <omp.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "csv.hpp"
@@ -83,7 +86,10 @@ Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precisi
 
 void bench_scaling(const Options& options) {
   const bool leads = ranks().rank() == 0, alone = ranks().size() == 1;
-  CsvTable table{machine_facts(),
+  // Of all ranks, which may be bound to some.
+  const auto cores = static_cast<int>(std::min<std::int64_t>(
+      ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
+  CsvTable table{machine_facts(cores),
                  {"ranks", "threads_each", "partitioner", "rings", "precision", "phyxels",
                   "neighbours", "fewest", "most", "most_ghosts", "steps_per_s",
                   "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging"},

@@ -49,9 +49,10 @@ std::string processor_name() {
   return "unknown processor";
 }
 
-Facts machine_facts() {
+Facts machine_facts(int cores) {
   return {{"program", program_version()},
-          {"hardware", fmt::format("{}, {} cores", processor_name(), omp_get_num_procs())},
+          {"hardware",
+           fmt::format("{}, {} cores", processor_name(), cores > 0 ? cores : omp_get_num_procs())},
           {"compiler", compiler_name()},
           {"date", today()}};
 }

@@ -8,9 +8,11 @@
 
 namespace phyxel::app {
 
-/// What every measurement is labelled with, in order: program, hardware, compiler, date.
+/// Names and values.
 using Facts = std::vector<std::pair<std::string, std::string>>;
-Facts machine_facts();
+/// What every measurement is labelled with, in order: program, hardware, compiler, date.
+/// @param cores 0: those that this process may use
+Facts machine_facts(int cores = 0);
 
 /// "model name" of /proc/cpuinfo.
 std::string processor_name();
