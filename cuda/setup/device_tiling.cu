@@ -498,7 +498,12 @@ Tiling fetched_tiling(const DeviceTiling& on_device) {
   const auto lists = [](const DeviceTileLists& l) {
     return TileLists{fetched(l.halo), l.halo_stride, fetched(l.rows), fetched(l.entries)};
   };
-  Tiling tiling{on_device.phyxel, on_device.place, on_device.part, lists(on_device.neighbours), {}};
+  Tiling tiling{on_device.phyxel,
+                on_device.place,
+                on_device.part,
+                on_device.tiles(),
+                lists(on_device.neighbours),
+                {}};
   if (on_device.inverse) tiling.inverse = lists(*on_device.inverse);
   return tiling;
 }

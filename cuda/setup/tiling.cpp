@@ -11,10 +11,15 @@
 #include "model/space_filling_curve.hpp"
 #include "phyxel/error.hpp"
 #include "setup/wait_free.hpp"
-#include "sort_unique.hpp"
 
 namespace phyxel::cuda {
 namespace {
+
+void find_places(Tiling& tiling) {
+  for (Index place = 0; place < tiling.places(); ++place) {
+    if (tiling.phyxel[place] >= 0) tiling.place[tiling.phyxel[place]] = place;
+  }
+}
 
 /// Bodies one after the other, each from the start of a tile. Within a tile long lists come first,
 /// so that the lanes of a warp have about equally many neighbours.
@@ -35,9 +40,54 @@ void place_phyxels(const Model& model, Tiling& tiling) {
       tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
     }
   }
-  for (Index place = 0; place < tiling.places(); ++place) {
-    if (tiling.phyxel[place] >= 0) tiling.place[tiling.phyxel[place]] = place;
+  tiling.own_tiles = tiling.tiles();
+  find_places(tiling);
+}
+
+/// The places of the whole, as far as they are here, moved together; then ghosts, body by body.
+void place_share(const Model& model, Tiling& tiling) {
+  const std::vector<Index>& whole = model.share->place;
+  tiling.place.resize(static_cast<std::size_t>(model.size()));
+  const auto sorted = [&](Index begin, Index end) {
+    std::vector<Index> phyxels(static_cast<std::size_t>(end - begin));
+    std::iota(phyxels.begin(), phyxels.end(), begin);
+    std::sort(phyxels.begin(), phyxels.end(),
+              [&](Index a, Index b) { return whole[a] < whole[b]; });
+    return phyxels;
+  };
+  const auto add_tile = [&](std::size_t part) {
+    tiling.part.push_back(static_cast<Index>(part));
+    tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
+  };
+  for (std::size_t p = 0; p < model.parts.size(); ++p) {
+    Index tile = -1;  // of the whole
+    for (const Index i : sorted(model.parts[p].begin, model.parts[p].owned_end())) {
+      if (whole[i] / tile_size != tile) add_tile(p);
+      tile = whole[i] / tile_size;
+      tiling.phyxel[(tiling.part.size() - 1) * tile_size +
+                    static_cast<std::size_t>(whole[i] % tile_size)] = i;
+    }
   }
+  tiling.own_tiles = tiling.tiles();
+  for (std::size_t p = 0; p < model.parts.size(); ++p) {
+    std::size_t next = 0;  // in the last tile
+    for (const Index i : sorted(model.parts[p].owned_end(), model.parts[p].end)) {
+      if (next % tile_size == 0) add_tile(p);
+      tiling.phyxel[(tiling.part.size() - 1) * tile_size + next++ % tile_size] = i;
+    }
+  }
+  find_places(tiling);
+}
+
+/// What tells the order of halos: of each place, that in the whole model.
+std::vector<Index> orders_of(const Model& model, const Tiling& tiling) {
+  std::vector<Index> order(tiling.phyxel.size());
+  std::iota(order.begin(), order.end(), 0);
+  if (!model.share) return order;
+  for (std::size_t place = 0; place < order.size(); ++place) {
+    if (tiling.phyxel[place] >= 0) order[place] = model.share->place[tiling.phyxel[place]];
+  }
+  return order;
 }
 
 /// One tile's halo and lists.
@@ -47,7 +97,9 @@ struct TileRows {
                                                             ///< long within a warp.
 };
 
-TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
+/// @param order of each place, in which halos are
+TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, const std::vector<Index>& order,
+                      Index tile) {
   const Index begin = tile * tile_size, end = begin + tile_size;
   TileRows rows;
   for (Index place = begin; place < end; ++place) {
@@ -57,11 +109,13 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
       if (other < begin || other >= end) rows.halo.push_back(other);
     }
   }
-  sort_unique(rows.halo);
+  const auto earlier = [&](Index a, Index b) { return order[a] < order[b]; };
+  std::sort(rows.halo.begin(), rows.halo.end(), earlier);
+  rows.halo.erase(std::unique(rows.halo.begin(), rows.halo.end()), rows.halo.end());
   if (rows.halo.size() > most_halo) refuse_halo(static_cast<int>(rows.halo.size()));
   const auto slot_of = [&](Index place) {
     if (place >= begin && place < end) return static_cast<std::uint16_t>(place - begin);
-    const auto at = std::lower_bound(rows.halo.begin(), rows.halo.end(), place);
+    const auto at = std::lower_bound(rows.halo.begin(), rows.halo.end(), place, earlier);
     return static_cast<std::uint16_t>(tile_size + far_slots + (at - rows.halo.begin()));
   };
   for (int first = 0; first < tile_size; first += team) {
@@ -99,10 +153,10 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, Index tile) {
   return rows;
 }
 
-TileLists make_lists(const Csr& lists, const Tiling& tiling) {
+TileLists make_lists(const Csr& lists, const Tiling& tiling, const std::vector<Index>& order) {
   constexpr int warps = tile_size / warp_size;
   constexpr Index batch = 4096;  // tiles; their rows take some 40 kB each before they are packed
-  const Index tiles = tiling.tiles();
+  const Index tiles = tiling.own_tiles;
   TileLists out;
   std::vector<std::vector<Index>> halos(static_cast<std::size_t>(tiles));
   std::int32_t chunks = 0;
@@ -113,7 +167,7 @@ TileLists make_lists(const Csr& lists, const Tiling& tiling) {
 #pragma omp parallel for schedule(dynamic, 16)
     for (Index tile = first; tile < last; ++tile) {
       try {
-        rows[tile - first] = rows_of_tile(lists, tiling, tile);
+        rows[tile - first] = rows_of_tile(lists, tiling, order, tile);
         halos[tile] = rows[tile - first].halo;  // a copy has no room to spare
       } catch (...) {
 #pragma omp critical
@@ -167,12 +221,19 @@ void refuse_halo(int points) {
 
 Tiling make_tiling(const Model& model) {
   Tiling tiling;
-  place_phyxels(model, tiling);
-  tiling.neighbours = make_lists(model.neighbourhood.neighbours, tiling);
+  model.share ? place_share(model, tiling) : place_phyxels(model, tiling);
+  const std::vector<Index> order = orders_of(model, tiling);
+  tiling.neighbours = make_lists(model.neighbourhood.neighbours, tiling, order);
   if (!model.neighbourhood.symmetric) {
-    tiling.inverse = make_lists(model.neighbourhood.inverse(), tiling);
+    tiling.inverse = make_lists(model.neighbourhood.inverse(), tiling, order);
   }
   return tiling;
+}
+
+std::vector<Index> whole_places(const Model& model) {
+  Tiling tiling;
+  place_phyxels(model, tiling);
+  return std::move(tiling.place);
 }
 
 }  // namespace phyxel::cuda

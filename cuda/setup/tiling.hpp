@@ -72,6 +72,7 @@ struct Tiling {
   std::vector<Index> phyxel;  ///< Which phyxel is at a place; -1: none, shape [tiles · tile_size].
   std::vector<Index> place;   ///< Where a phyxel is, shape [n].
   std::vector<Index> part;    ///< Body of a tile, shape [tiles].
+  Index own_tiles = 0;        ///< The first ones have lists; the rest are a share's ghosts.
   TileLists neighbours;       ///< For the first pass.
   TileLists inverse;          ///< For the second pass; empty if the neighbours serve both.
 
@@ -80,7 +81,12 @@ struct Tiling {
   const TileLists& second() const { return inverse.rows.empty() ? neighbours : inverse; }
 };
 
+/// Of a share, own tiles are those of the whole model, phyxel by phyxel and entry by entry, so that
+/// sums run alike; they must be whole (see `curve_groups`). Ghosts follow, in tiles of their own.
 /// @throws InputError if a tile reaches more points than 16-bit slots can name.
 Tiling make_tiling(const Model& model);
+
+/// Where each phyxel of a whole model is in its tiles: for shares, whose ranks cannot tell.
+std::vector<Index> whole_places(const Model& model);
 
 }  // namespace phyxel::cuda

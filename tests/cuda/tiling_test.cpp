@@ -8,6 +8,8 @@
 #include <map>
 
 #include "model/space_filling_curve.hpp"
+#include "partition/partition.hpp"
+#include "partition/share.hpp"
 #include "phyxel/error.hpp"
 #include "solver/resident_plan.hpp"
 #include "support/clouds.hpp"
@@ -130,6 +132,59 @@ TEST_P(Tiling, ListsHoldEveryNeighbourOnce) {
   expect_complete(tiling, tiling.neighbours, model.neighbourhood.neighbours);
   EXPECT_EQ(tiling.inverse.rows.empty(), model.neighbourhood.symmetric);
   expect_complete(tiling, tiling.second(), model.neighbourhood.inverse());
+}
+
+TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
+  const Model whole = GetParam().make();
+  const cuda::Tiling expected = make_tiling(whole);
+  const std::vector<Index> places = whole_places(whole);
+  const Graph graph = phyxel_graph(whole);
+  const Groups groups = curve_groups(whole, tile_size);
+  for (const int parts : {1, 2, 5}) {
+    std::vector<int> part_of_tile;
+    for (Index g = 0; g < groups.count; ++g) part_of_tile.push_back((7 * g + 3) % parts);
+    const std::vector<int> part_of = ungrouped(part_of_tile, groups);
+    Index own = 0;
+    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
+      ModelShare made = share_of(whole, plan, part_of);
+      made.share.place = values_of(made.share, places);
+      Model& model = made.model;
+      model.share = std::make_shared<Share>(made.share);
+      const cuda::Tiling tiling = make_tiling(model);
+      own += tiling.own_tiles;
+      const auto number = [&](Index place) {
+        return tiling.phyxel[place] < 0 ? -1 : model.number(tiling.phyxel[place]);
+      };
+      for (Index i = 0; i < model.size(); ++i) ASSERT_EQ(tiling.phyxel[tiling.place[i]], i);
+      for (Index tile = 0; tile < tiling.own_tiles; ++tile) {
+        const Index first = tile * tile_size;
+        const auto somebody =
+            *std::find_if(tiling.phyxel.begin() + first, tiling.phyxel.begin() + first + tile_size,
+                          [](Index i) { return i >= 0; });
+        const Index other = places[model.number(somebody)] / tile_size;
+        EXPECT_EQ(tiling.part[tile], expected.part[other]);
+        for (Index lane = 0; lane < tile_size; ++lane) {
+          ASSERT_EQ(number(first + lane), expected.phyxel[other * tile_size + lane]);
+          ASSERT_EQ(slots_at(tiling.neighbours, first + lane),
+                    slots_at(expected.neighbours, other * tile_size + lane));
+          ASSERT_EQ(slots_at(tiling.second(), first + lane),
+                    slots_at(expected.second(), other * tile_size + lane));
+        }
+        const auto halo = [&](const TileLists& lists, Index of) {
+          std::vector<Index> there;
+          for (int h = 0; h < lists.halo_stride; ++h) {
+            const Index place = lists.halo[static_cast<std::size_t>(of) * lists.halo_stride + h];
+            if (place >= 0) there.push_back(place);
+          }
+          return there;
+        };
+        std::vector<Index> here;
+        for (const Index place : halo(tiling.second(), tile)) here.push_back(places[number(place)]);
+        EXPECT_EQ(here, halo(expected.second(), other));
+      }
+    }
+    EXPECT_EQ(own, expected.own_tiles);
+  }
 }
 
 TEST_P(Tiling, EightLanesNeverWaitForAColumn) {

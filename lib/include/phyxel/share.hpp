@@ -49,9 +49,12 @@ class Others {
 /// What a share knows of the whole. Of each body it has the phyxels that it owns, then ghosts whose
 /// stresses are found here, too, then ghosts whose stresses are not (see `Part`).
 struct Share {
-  Index whole = 0;                   ///< Phyxels of the whole model.
-  std::vector<Index> number;         ///< Which of them each phyxel is, shape [n].
-  std::vector<char> owned;           ///< Whether each is no ghost, shape [n].
+  Index whole = 0;            ///< Phyxels of the whole model.
+  std::vector<Index> number;  ///< Which of them each phyxel is, shape [n].
+  std::vector<char> owned;    ///< Whether each is no ghost, shape [n].
+  /// Where each is in the whole model's tiles (`whole_places`), shape [n]; empty: no GPU steps
+  /// this.
+  std::vector<Index> place;
   std::vector<Index> surfel_number;  ///< Which of the whole model's surfels each surfel is.
   /// 1: ghosts' stresses come from their owners. 2: displacements of two rings of ghosts do, and
   /// the inner ring's stresses are found twice.
