@@ -30,7 +30,18 @@ build() {
   cmake --preset "$1" "${generator[@]}" "${@:2}" && cmake --build --preset "$1" --parallel "$jobs"
 }
 
-tested() { build "$1" -DPHYXEL_TESTS=ON && ctest --preset "$1" --parallel "$jobs"; }
+# ctest keeps the names of what failed in a file, which the summary repeats: the list of a stage is
+# far above when the last stage ends.
+tested() {
+  local failed=build/$1/Testing/Temporary/LastTestsFailed.log
+  rm -f "$failed"
+  build "$1" -DPHYXEL_TESTS=ON && ctest --preset "$1" --parallel "$jobs"
+}
+
+failed_tests() {
+  local log=build/$1/Testing/Temporary/LastTestsFailed.log
+  [[ ! -f $log ]] || sed 's/^[0-9]*:/          /' "$log"
+}
 
 # GCC's libgomp does not tell the thread sanitizer about its barriers, so every parallel loop would
 # look like a race. LLVM's does, through its tool Archer, which says so on request (verbose=1).
@@ -92,6 +103,7 @@ for stage in "${stages[@]}"; do
     worst=1
   fi
   summary+=("$(printf '  %-5s %5d s  %s' "$stage" $((SECONDS - start)) "$result")")
+  if [[ $result == FAILED ]]; then summary+=("$(failed_tests "$stage")"); fi
 done
 
 echo
