@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <span>
 
@@ -20,15 +21,19 @@ class ExactSum {
   static constexpr int limbs = (1024 - lowest) / limb_bits + 3;  // two more for the carry
 
  public:
-  /// Words that ranks may add element by element.
+  /// Words that ranks, and threads of a GPU, may add element by element: up to 2^30 terms before
+  /// a carry has to move.
   static constexpr int words = limbs + 1;
 
-  void add(double value) {
-    const auto bits = std::bit_cast<std::uint64_t>(value);
+  /// What a term adds to `words`, as calls add(word, number).
+  template <class Add>
+  PHYXEL_HD static void split(double value, Add&& add) {
+    std::uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
     const int exponent = static_cast<int>(bits >> 52 & 0x7FF);
     std::uint64_t mantissa = bits & ((std::uint64_t{1} << 52) - 1);
     if (exponent == 0x7FF) {
-      ++words_[limbs];
+      add(limbs, 1);
       return;
     }
     if (exponent > 0) mantissa |= std::uint64_t{1} << 52;
@@ -37,9 +42,13 @@ class ExactSum {
     const std::uint64_t low = mantissa << shift;  // 53 + 31 bits: the top ones are added apart
     const std::uint64_t top = shift ? mantissa >> (64 - shift) : 0;
     const std::int64_t sign = bits >> 63 ? -1 : 1;
-    words_[limb] += sign * static_cast<std::int64_t>(low & 0xFFFF'FFFF);
-    words_[limb + 1] += sign * static_cast<std::int64_t>(low >> 32);
-    words_[limb + 2] += sign * static_cast<std::int64_t>(top);
+    add(limb, sign * static_cast<std::int64_t>(low & 0xFFFF'FFFF));
+    add(limb + 1, sign * static_cast<std::int64_t>(low >> 32));
+    add(limb + 2, sign * static_cast<std::int64_t>(top));
+  }
+
+  void add(double value) {
+    split(value, [&](int word, std::int64_t number) { words_[word] += number; });
     if (++terms_ == most_terms) carry();
   }
   void add(const ExactSum& other) {

@@ -56,6 +56,10 @@ Communicator::Communicator(int& argc, char**& argv) {
       MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host));
   PHYXEL_MPI_CALL(MPI_Comm_rank(host, &host_rank_));
   PHYXEL_MPI_CALL(MPI_Comm_size(host, &host_size_));
+  int first = rank_;  // of this host
+  PHYXEL_MPI_CALL(MPI_Bcast(&first, 1, MPI_INT, 0, host));
+  hosts_.resize(static_cast<std::size_t>(size_));
+  PHYXEL_MPI_CALL(MPI_Allgather(&first, 1, MPI_INT, hosts_.data(), 1, MPI_INT, MPI_COMM_WORLD));
   MPI_Comm_free(&host);
 }
 

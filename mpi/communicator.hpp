@@ -44,6 +44,8 @@ class Communicator {
   /// Ranks of this host, and which of them this is: for the choice of a GPU.
   int host_size() const { return host_size_; }
   int host_rank() const { return host_rank_; }
+  /// Ranks of one host have the same number, whatever it is.
+  int host_of(int rank) const { return hosts_[rank]; }
 
   void barrier() const;
 
@@ -116,6 +118,7 @@ class Communicator {
       const std::vector<std::span<const std::byte>>& send) const;
 
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
+  std::vector<int> hosts_{0};  // of each rank
   bool started_here_ = false;
 };
 

@@ -30,11 +30,23 @@ Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
     if (ghosts[r].empty() && asked[r].empty()) continue;
     Peer& peer = peers_.emplace_back();
     peer.rank = static_cast<int>(r);
+    peer.same_host = ranks.host_of(peer.rank) == ranks.host_of(ranks.rank());
     peer.receive = ghosts[r];
     for (const Index n : asked[r]) {
       peer.send.push_back(std::lower_bound(own.begin(), own.end(), std::pair{n, Index{0}})->second);
     }
   }
+  outgoing_.resize(peers_.size());
+  incoming_.resize(peers_.size());
+}
+
+std::vector<std::vector<std::byte>> Halo::told(
+    const std::vector<std::vector<std::byte>>& words) const {
+  std::vector<std::vector<std::byte>> by_rank(static_cast<std::size_t>(ranks_.size())), heard;
+  for (std::size_t p = 0; p < peers_.size(); ++p) by_rank[peers_[p].rank] = words[p];
+  by_rank = ranks_.exchanged(by_rank);
+  for (const Peer& peer : peers_) heard.push_back(std::move(by_rank[peer.rank]));
+  return heard;
 }
 
 namespace {
@@ -54,35 +66,46 @@ class Timed {
 
 }  // namespace
 
-void Halo::begin(const Records& records) const {
+void Halo::begin(const Bytes& outgoing, const Bytes& incoming) const {
   const Timed timed(traffic_.seconds);
-  under_way_ = records;
-  for (const Peer& peer : peers_) {
-    peer.incoming.resize(peer.receive.size() * records.bytes);
-    transfers_.receive(peer.rank, peer.incoming);
+  for (std::size_t p = 0; p < peers_.size(); ++p) {
+    transfers_.receive(peers_[p].rank, incoming[p]);
   }
-  for (const Peer& peer : peers_) {
-    peer.outgoing.resize(peer.send.size() * records.bytes);
-    std::byte* to = peer.outgoing.data();
-    for (const Index i : peer.send) {
-      std::memcpy(to, records.of(i), records.bytes);
-      to += records.bytes;
+  for (std::size_t p = 0; p < peers_.size(); ++p) {
+    transfers_.send(peers_[p].rank, outgoing[p]);
+    traffic_.bytes_sent += static_cast<std::int64_t>(outgoing[p].size());
+  }
+}
+
+void Halo::begin(const Records& records) const {
+  {
+    const Timed timed(traffic_.seconds);
+    under_way_ = records;
+    for (std::size_t p = 0; p < peers_.size(); ++p) {
+      incoming_[p].resize(peers_[p].receive.size() * records.bytes);
+      outgoing_[p].resize(peers_[p].send.size() * records.bytes);
+      std::byte* to = outgoing_[p].data();
+      for (const Index i : peers_[p].send) {
+        std::memcpy(to, records.of(i), records.bytes);
+        to += records.bytes;
+      }
     }
-    transfers_.send(peer.rank, peer.outgoing);
-    traffic_.bytes_sent += static_cast<std::int64_t>(peer.outgoing.size());
   }
+  begin(Bytes(outgoing_.begin(), outgoing_.end()), Bytes(incoming_.begin(), incoming_.end()));
 }
 
 void Halo::finish() const {
   const Timed timed(traffic_.seconds);
   transfers_.wait();
-  for (const Peer& peer : peers_) {
-    const std::byte* from = peer.incoming.data();
-    for (const Index i : peer.receive) {
+  if (!under_way_.base) return;
+  for (std::size_t p = 0; p < peers_.size(); ++p) {
+    const std::byte* from = incoming_[p].data();
+    for (const Index i : peers_[p].receive) {
       std::memcpy(under_way_.of(i), from, under_way_.bytes);
       from += under_way_.bytes;
     }
   }
+  under_way_ = {};
 }
 
 Model connected(const Communicator& ranks, ModelShare share) {

@@ -8,7 +8,7 @@
 
 namespace phyxel {
 
-/// On CPU ranks, by MPI.
+/// By MPI, from host memory to host memory.
 class Halo final : public Others {
  public:
   /// Collective: tells the owners which of their phyxels are ghosts here.
@@ -17,21 +17,19 @@ class Halo final : public Others {
   void add(std::span<std::int64_t> values) const override { ranks_.add(values); }
   double largest(double value) const override { return ranks_.largest(value); }
   double smallest(double value) const override { return ranks_.smallest(value); }
+  const std::vector<Peer>& peers() const override { return peers_; }
+  std::vector<std::vector<std::byte>> told(
+      const std::vector<std::vector<std::byte>>& words) const override;
+  void begin(const Bytes& outgoing, const Bytes& incoming) const override;
   void begin(const Records& records) const override;
   void finish() const override;
   Traffic traffic() const override { return traffic_; }
 
  private:
-  /// Phyxels here that one other rank gets, or that come from it; both sides have them in the order
-  /// of their numbers in the whole model.
-  struct Peer {
-    int rank = 0;
-    std::vector<Index> send, receive;
-    mutable std::vector<std::byte> outgoing, incoming;
-  };
   const Communicator& ranks_;
   std::vector<Peer> peers_;
-  mutable Records under_way_;
+  mutable std::vector<std::vector<std::byte>> outgoing_, incoming_;  // of each peer, packed
+  mutable Records under_way_;                                        // to be unpacked
   mutable Traffic traffic_;
   mutable Transfers transfers_;
 };

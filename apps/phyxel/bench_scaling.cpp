@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "csv.hpp"
+#include "device_option.hpp"
 #include "ensemble.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
@@ -26,6 +27,7 @@ struct Options {
   int repeats = 5;
   std::string csv;
   bool force = false;
+  std::string device = "cpu", transport = "auto";
 };
 
 /// A jittered cube of about so many phyxels, under gravity.
@@ -49,12 +51,20 @@ Scene cube_scene(Index phyxels) {
 struct Measured {
   Median steps_per_s;
   double bytes_per_step = 0, exchanging = 0;  // of the rank that has most; share of the time
+  std::string transport;
 };
 
+/// What exchanges have cost the rank that had most.
+Traffic most_traffic(const Backend& backend) {
+  const auto here = backend.exchanges();
+  if (!here) return {};
+  return {ranks().largest(here->traffic.bytes_sent), ranks().largest(here->traffic.seconds)};
+}
+
 Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precision,
-                 const Options& options) {
+                 const ChosenDevice& device, const Options& options) {
   const Model& model = ensemble.here();
-  const auto backend = make_cpu_backend(model, precision, 1);
+  const auto backend = make_backend(model, precision, device, 1, options.transport);
   // A tenth of the sound step: any speed, no risk.
   const BodyRequest& body = scene.bodies[0];
   const double dt = 0.1 * body.source.shape.spacing / pressure_wave_speed(body.material);
@@ -64,12 +74,13 @@ Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precisi
     ranks().barrier();
     const auto start = Clock::now();
     for (std::int64_t s = 0; s < steps; ++s) solver.step();
+    backend->wait();
     return ranks().largest(seconds_since(start));
   };
-  timed(2);
-  const double one = timed(5) / 5;
+  timed(device.gpu ? 64 : 2);  // two graphs of steps, and the step before them
+  const double one = device.gpu ? timed(64) / 64 : timed(5) / 5;
   const auto steps = std::max<std::int64_t>(2, std::llround(options.seconds / one));
-  const Traffic before = ensemble.traffic();
+  const Traffic before = most_traffic(*backend);
   std::vector<double> rates;
   double total = 0;
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
@@ -77,22 +88,24 @@ Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precisi
     total += seconds;
     rates.push_back(static_cast<double>(steps) / seconds);
   }
-  const Traffic after = ensemble.traffic();
+  const Traffic after = most_traffic(*backend);
   return {median_of(rates),
           static_cast<double>(after.bytes_sent - before.bytes_sent) /
               static_cast<double>(steps * options.repeats),
-          (after.seconds - before.seconds) / total};
+          (after.seconds - before.seconds) / total,
+          backend->exchanges() ? backend->exchanges()->transport : "none"};
 }
 
 void bench_scaling(const Options& options) {
   const bool leads = ranks().rank() == 0, alone = ranks().size() == 1;
+  const ChosenDevice device = choose_device_of_rank(options.device);
   // Of all ranks, which may be bound to some.
   const auto cores = static_cast<int>(std::min<std::int64_t>(
       ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
   CsvTable table{machine_facts(cores),
                  {"ranks", "threads_each", "partitioner", "rings", "precision", "phyxels",
                   "neighbours", "fewest", "most", "most_ghosts", "steps_per_s",
-                  "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging"},
+                  "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging", "transport"},
                  {}};
   ranks().together([&] {
     if (!leads) return;
@@ -105,10 +118,13 @@ void bench_scaling(const Options& options) {
     const Scene scene = cube_scene(size);
     for (const std::string& partitioner : options.partitioners) {
       for (const int rings : options.rings) {
-        const Ensemble ensemble([&] { return build_model(scene); }, {partitioner, rings});
+        if (device.gpu && rings != 1) continue;
+        const Ensemble ensemble(
+            [&] { return alone ? make_model(scene, device) : build_model(scene); },
+            {partitioner, rings, device.gpu.has_value()});
         const Ensemble::Shares& shares = ensemble.shares();
         for (const std::string& precision : options.precisions) {
-          const Measured m = measure(ensemble, scene, precision_option(precision), options);
+          const Measured m = measure(ensemble, scene, precision_option(precision), device, options);
           ranks().together([&] {
             if (!leads) return;
             const Model& whole = ensemble.whole();
@@ -121,7 +137,8 @@ void bench_scaling(const Options& options) {
                  std::to_string(shares.most_ghosts), fmt::format("{:.5g}", m.steps_per_s.value),
                  fmt::format("{:.5g}", m.steps_per_s.value * n),
                  fmt::format("{:.3f}", m.steps_per_s.spread),
-                 fmt::format("{:.0f}", m.bytes_per_step), fmt::format("{:.4f}", m.exchanging)});
+                 fmt::format("{:.0f}", m.bytes_per_step), fmt::format("{:.4f}", m.exchanging),
+                 m.transport});
             fmt::print("{}\n", fmt::join(table.rows.back(), ","));
             std::fflush(stdout);
             if (!options.csv.empty()) write_csv(options.csv, table);
@@ -146,7 +163,10 @@ void add_bench_scaling(CLI::App& bench) {
   command->add_option("--partitioner", options->partitioners, "metis, curve, bisection")
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_names()));
-  command->add_option("--ghost-rings", options->rings, "1, 2")
+  command->add_option("--device", options->device, device_help);
+  command->add_option("--transport", options->transport, "auto, direct, host: between GPUs")
+      ->check(CLI::IsMember(transport_names()));
+  command->add_option("--ghost-rings", options->rings, "1, 2; GPUs: 1")
       ->delimiter(',')
       ->check(CLI::Range(1, 2));
   command->add_option("--precision", options->precisions, "float, double, mixed")

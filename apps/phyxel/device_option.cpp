@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "ensemble.hpp"
 #include "phyxel/error.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
@@ -47,6 +48,37 @@ ChosenDevice choose_device(const std::string& name, const std::string& where) {
   return chosen;
 }
 
+ChosenDevice choose_device_of_rank(const std::string& name, const std::string& where) {
+  const Communicator& all = ranks();
+  if (all.size() == 1) return choose_device(name, where);
+  if (name == "cuda") {
+    return all.agreed([&] {
+      const auto found = static_cast<int>(cuda_devices().size());
+      // None is an error that names the reason.
+      return choose_device(fmt::format("cuda:{}", all.host_rank() % std::max(1, found)), where);
+    });
+  }
+  if (name != "auto") return all.agreed([&] { return choose_device(name, where); });
+  ChosenDevice chosen;
+  const auto found = static_cast<int>(cuda_devices(&chosen.why_no_gpu).size());
+  if (found > 0) {
+    try {
+      chosen.gpu = use_cuda_device(all.host_rank() % found);
+    } catch (const DeviceError& error) {
+      chosen.why_no_gpu = error.what();
+    }
+  }
+  if (all.smallest(std::int64_t{chosen.gpu.has_value()}) == 1) return chosen;
+  if (chosen.gpu) chosen.why_no_gpu = "another rank has none";
+  chosen.gpu.reset();
+  return chosen;
+}
+
+const std::vector<std::string>& transport_names() {
+  static const std::vector<std::string> names{"auto", "direct", "host"};
+  return names;
+}
+
 Model make_model(const Scene& scene, const ChosenDevice& device) {
   return device.gpu && can_survey_on_cuda(scene)
              ? build_model(scene, cuda_surveyor(device.gpu->index))
@@ -60,9 +92,13 @@ Model make_model(const Scene& scene, std::span<const Cloud> clouds, const Chosen
 }
 
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
-                                      const ChosenDevice& device, int threads) {
-  return device.gpu ? make_cuda_backend(model, precision, device.gpu->index)
-                    : make_cpu_backend(model, precision, threads);
+                                      const ChosenDevice& device, int threads,
+                                      const std::string& transport) {
+  if (!device.gpu) return make_cpu_backend(model, precision, threads);
+  const auto& names = transport_names();
+  const auto which = std::find(names.begin(), names.end(), transport) - names.begin();
+  return make_cuda_backend(model, precision, device.gpu->index, CudaPath::automatic,
+                           static_cast<Transport>(which));
 }
 
 }  // namespace phyxel::app

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "device.hpp"
 #include "phyxel/backend.hpp"
@@ -24,13 +25,22 @@ void check_device_name(const std::string& name, const std::string& where);
 /// @throws InputError for another name; DeviceError if a GPU is asked for and cannot be used.
 ChosenDevice choose_device(const std::string& name, const std::string& where = "--device");
 
+/// The device of this rank: each rank of a host takes the next of its GPUs, unless one is named,
+/// and "auto" is GPUs only if all ranks find one. Collective.
+ChosenDevice choose_device_of_rank(const std::string& name, const std::string& where = "--device");
+
 /// The model of a scene, its neighbours sought on the device that will step it.
 Model make_model(const Scene& scene, const ChosenDevice& device);
 /// The same from clouds in place.
 Model make_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device);
 
+/// Names of `Transport`: "auto", "direct", "host".
+const std::vector<std::string>& transport_names();
+
 /// @param threads of the CPU
+/// @param transport of ranks' GPUs
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
-                                      const ChosenDevice& device, int threads);
+                                      const ChosenDevice& device, int threads,
+                                      const std::string& transport = "auto");
 
 }  // namespace phyxel::app

@@ -3,11 +3,19 @@
 #include "mpi/halo.hpp"
 #include "partition/partition.hpp"
 #include "partition/share.hpp"
+#include "setup/tiling.hpp"
 
 namespace phyxel::app {
 namespace {
 
 const Communicator* the_ranks = nullptr;
+
+std::vector<int> partition_of(const Model& model, const Graph& graph, int parts,
+                              Partitioner partitioner, bool between_tiles) {
+  if (!between_tiles) return make_partition(graph, parts, partitioner);
+  const Groups tiles = curve_groups(model, cuda::tile_size);
+  return ungrouped(make_partition(grouped_graph(graph, tiles), parts, partitioner), tiles);
+}
 
 }  // namespace
 
@@ -41,12 +49,13 @@ Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
     digest_ = model_digest(*whole_);
     graph = phyxel_graph(*whole_);
     // METIS takes random numbers from the C library: one rank's answer serves all.
-    if (rank == 0) part_of = make_partition(graph, parts, partitioner);
+    if (rank == 0) part_of = partition_of(*whole_, graph, parts, partitioner, cut.between_tiles);
   });
   require_alike(digest_, "bodies");
   part_of = ranks().broadcast(part_of);
   ModelShare share =
       phyxel::share_of(*whole_, make_halo_plans(graph, part_of, parts, cut.rings)[rank], part_of);
+  if (cut.between_tiles) share.share.place = values_of(share.share, cuda::whole_places(*whole_));
   here_ = std::make_unique<Model>(connected(ranks(), std::move(share)));
   if (rank > 0) whole_.reset();
 
@@ -64,12 +73,6 @@ Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
   const auto own = static_cast<std::int64_t>(owned_.size());
   const std::int64_t ghosts = here_->size() - own;
   shares_ = {ranks().smallest(own), ranks().largest(own), ranks().largest(ghosts)};
-}
-
-Traffic Ensemble::traffic() const {
-  if (!here_) return {};
-  const Traffic here = here_->share->others->traffic();
-  return {ranks().largest(here.bytes_sent), ranks().largest(here.seconds)};
 }
 
 State Ensemble::whole_state(const State& local) const {

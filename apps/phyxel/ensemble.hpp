@@ -22,7 +22,8 @@ void require_alike(std::uint64_t value, const char* what);
 /// How a model is cut, and what its parts exchange.
 struct CutOptions {
   std::string partitioner = "metis";
-  int rings = 1;  ///< See `Share`.
+  int rings = 1;               ///< See `Share`.
+  bool between_tiles = false;  ///< For GPUs, which keep tiles whole.
 };
 
 /// The model of a scene, or this rank's share of it.
@@ -41,9 +42,6 @@ class Ensemble {
     std::int64_t fewest = 0, most = 0, most_ghosts = 0;
   };
   const Shares& shares() const { return shares_; }
-  /// Since the start, of the rank that had most; nothing if there is one rank. Collective.
-  Traffic traffic() const;
-
   /// Values of all phyxels, or of all surfels, on the first rank; nothing on the others.
   template <class T>
   std::vector<T> phyxels(const std::vector<T>& local) const {

@@ -1,5 +1,6 @@
 /// phyxel run: a scene, simulated, written and drawn.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <omp.h>
 #include <unistd.h>
 
@@ -25,6 +26,7 @@ namespace {
 struct RunOptions {
   Overrides overrides;
   CutOptions cut;
+  std::string transport = "auto";
   std::string resume;  // "", "auto" or a checkpoint file
   bool force = false;
   bool no_pictures = false;
@@ -58,11 +60,10 @@ class Run {
   explicit Run(const RunOptions& options)
       : options_(options),
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
-        device_(ranks().agreed([&] { return device_of_ranks(); })),
+        device_(device_of_ranks()),
         begin_(checkpoint_for_all()),
-        ensemble_([&] { return make_model(scene_, device_); }, options.cut),
-        backend_(ranks().agreed(
-            [&] { return make_backend(model(), scene_.solver.precision, device_, threads()); })),
+        ensemble_([&] { return whole_model(); }, cut()),
+        backend_(make_backend_of_rank()),
         plan_(alike(
             [&] { return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step); })),
         solver_(*backend_, ranks().agreed([&] {
@@ -78,6 +79,8 @@ class Run {
                         begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
     });
     has_surfels_ = ranks().sum(static_cast<std::int64_t>(model().surfels.position.size())) > 0;
+    if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
+    if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
     setup_seconds_ = seconds_since(start_);
   }
 
@@ -171,7 +174,11 @@ class Run {
     for (const ArrayBytes& array : backend_->memory())
       bytes += static_cast<std::int64_t>(array.bytes);
     bytes = ranks().sum(bytes);
-    const Traffic traffic = ensemble_.traffic();
+    Traffic traffic;  // of the rank that had most
+    if (const auto exchanges = backend_->exchanges()) {
+      traffic = {ranks().largest(exchanges->traffic.bytes_sent),
+                 ranks().largest(exchanges->traffic.seconds)};
+    }
     if (leads()) say_summary(now, bytes, traffic);
   }
 
@@ -188,16 +195,22 @@ class Run {
   static bool anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
 
   ChosenDevice device_of_ranks() const {
-    const std::string& wanted = scene_.solver.device;
-    if (ranks().size() == 1) return choose_device(wanted, "device");
-    const ChosenDevice device = choose_device(wanted == "auto" ? "cpu" : wanted, "device");
-    if (device.gpu) {
-      throw InputError(
-          fmt::format("device {}: {} ranks step on CPUs only, so far; allowed: cpu, "
-                      "auto, or one rank",
-                      wanted, ranks().size()));
+    ChosenDevice device = choose_device_of_rank(scene_.solver.device, "device");
+    if (device.gpu && ranks().size() > 1 && options_.cut.rings != 1) {
+      throw AgreedError(ExitCode::bad_input,
+                        "--ghost-rings 2: GPUs exchange displacements and stresses; allowed: 1, or "
+                        "--device cpu");
     }
     return device;
+  }
+  /// Whoever cuts it needs its lists.
+  Model whole_model() const {
+    return ranks().size() > 1 ? build_model(scene_) : make_model(scene_, device_);
+  }
+  CutOptions cut() const {
+    CutOptions cut = options_.cut;
+    cut.between_tiles = device_.gpu.has_value();
+    return cut;
   }
   /// Of this rank. Ranks of one host share its cores, unless someone has bound them or has said how
   /// many threads each takes.
@@ -206,6 +219,14 @@ class Run {
     if (std::getenv("OMP_NUM_THREADS")) return 0;  // OpenMP's choice
     const auto cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
     return std::clamp(omp_get_num_procs(), 1, std::max(1, cores / ranks().host_size()));
+  }
+
+  /// Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
+  std::unique_ptr<Backend> make_backend_of_rank() const {
+    const auto make = [&] {
+      return make_backend(model(), scene_.solver.precision, device_, threads(), options_.transport);
+    };
+    return device_.gpu ? make() : ranks().agreed(make);
   }
 
   /// Writes it, and says so.
@@ -360,9 +381,11 @@ class Run {
       const Ensemble::Shares& shares = ensemble_.shares();
       fmt::print(
           "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
-          "exchanged through MPI\n",
+          "exchanged through {}\n",
           ranks().size(), options_.cut.partitioner, shares.fewest, shares.most, shares.most_ghosts,
-          options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings");
+          options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings",
+          transport_);
+      if (!gpus_.empty()) fmt::print("  gpus        {}, by rank\n", fmt::join(gpus_, ", "));
     }
     fmt::print("  time step   {}\n", plan_.why);
     fmt::print(
@@ -415,6 +438,8 @@ class Run {
           {"steps_per_second", steps / step_seconds_},
           {"phyxel_steps_per_second", steps * whole.size() / step_seconds_},
           {"bytes", bytes},
+          {"transport", transport_},
+          {"gpus", gpus_},
           {"exchange_bytes", traffic.bytes_sent},
           {"exchange_seconds", traffic.seconds},
           {"energy_j", now.total_energy()},
@@ -485,6 +510,8 @@ class Run {
   Diagnostics start_diagnostics_;
   std::optional<Recorder> recorder_;  // on the first rank
   bool has_surfels_ = false;
+  std::string transport_;                  // between ranks
+  std::vector<int> gpus_;                  // of the ranks
   std::shared_ptr<const GoodState> good_;  // the last one
   double initial_energy_ = 0, peak_energy_ = 0;
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
@@ -540,6 +567,11 @@ void add_run(CLI::App& program) {
                    "1: ranks exchange displacements and stresses; 2: displacements of two "
                    "rings of neighbours, and stresses between are found twice")
       ->check(CLI::Range(1, 2));
+  command
+      ->add_option("--transport", options->transport,
+                   "How ranks' GPUs exchange: direct (stores into each other's memory), host "
+                   "(MPI), or auto")
+      ->check(CLI::IsMember(transport_names()));
   command->add_flag("--force", options->force,
                     "Replace an earlier trajectory in the output folder");
   command->add_flag("--no-pictures", options->no_pictures,
@@ -551,7 +583,7 @@ void add_run(CLI::App& program) {
       "  phyxel run examples/dino/scene.toml --out out/dino\n"
       "  phyxel run scene.toml --precision double --until 0.5 --force\n"
       "  phyxel run scene.toml --resume auto\n"
-      "  mpirun -n 8 phyxel run scene.toml --device cpu");
+      "  mpirun -n 8 phyxel run scene.toml");
   command->callback([options] { run(*options); });
 }
 

@@ -36,6 +36,8 @@ DeviceTiling send_tiling(const Model& model) {
   out.phyxel = std::move(tiling.phyxel);
   out.place = std::move(tiling.place);
   out.part = std::move(tiling.part);
+  out.own_tiles = tiling.own_tiles;
+  out.interior_tiles = tiling.interior_tiles;
   return out;
 }
 
@@ -138,6 +140,7 @@ class Finder {
       }
     }
     tile_begin.push_back(n);
+    out_.own_tiles = out_.interior_tiles = out_.tiles();
     const DeviceArray<Index> begins = sent(tile_begin, "tiles");
     const auto places = out_.part.size() * tile_size;
     out_.phyxel_at = {places, "places"};
@@ -501,7 +504,8 @@ Tiling fetched_tiling(const DeviceTiling& on_device) {
   Tiling tiling{on_device.phyxel,
                 on_device.place,
                 on_device.part,
-                on_device.tiles(),
+                on_device.own_tiles,
+                on_device.interior_tiles,
                 lists(on_device.neighbours),
                 {}};
   if (on_device.inverse) tiling.inverse = lists(*on_device.inverse);

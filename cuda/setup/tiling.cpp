@@ -7,6 +7,7 @@
 #include <exception>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "model/space_filling_curve.hpp"
 #include "phyxel/error.hpp"
@@ -40,11 +41,21 @@ void place_phyxels(const Model& model, Tiling& tiling) {
       tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
     }
   }
-  tiling.own_tiles = tiling.tiles();
+  tiling.own_tiles = tiling.interior_tiles = tiling.tiles();
   find_places(tiling);
 }
 
-/// The places of the whole, as far as they are here, moved together; then ghosts, body by body.
+/// Whether a phyxel needs a ghost in either pass.
+bool reaches_ghosts(const Model& model, Index phyxel) {
+  const auto is_ghost = [&](Index j) { return !model.owns(j); };
+  const auto near = model.neighbourhood.neighbours.row(phyxel),
+             inverse = model.neighbourhood.inverse().row(phyxel);
+  return std::any_of(near.begin(), near.end(), is_ghost) ||
+         std::any_of(inverse.begin(), inverse.end(), is_ghost);
+}
+
+/// The tiles of the whole, as far as they are here, those that reach ghosts last; then ghosts, body
+/// by body.
 void place_share(const Model& model, Tiling& tiling) {
   const std::vector<Index>& whole = model.share->place;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
@@ -59,14 +70,30 @@ void place_share(const Model& model, Tiling& tiling) {
     tiling.part.push_back(static_cast<Index>(part));
     tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
   };
+  struct OwnTile {
+    std::size_t part;
+    std::vector<Index> phyxels;
+    bool reaches_ghosts = false;
+  };
+  std::vector<OwnTile> own;
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     Index tile = -1;  // of the whole
     for (const Index i : sorted(model.parts[p].begin, model.parts[p].owned_end())) {
-      if (whole[i] / tile_size != tile) add_tile(p);
-      tile = whole[i] / tile_size;
-      tiling.phyxel[(tiling.part.size() - 1) * tile_size +
-                    static_cast<std::size_t>(whole[i] % tile_size)] = i;
+      if (std::exchange(tile, whole[i] / tile_size) != whole[i] / tile_size) own.push_back({p, {}});
+      own.back().phyxels.push_back(i);
+      if (reaches_ghosts(model, i)) own.back().reaches_ghosts = true;
     }
+  }
+  for (const bool boundary : {false, true}) {
+    for (const OwnTile& of : own) {
+      if (of.reaches_ghosts != boundary) continue;
+      add_tile(of.part);
+      for (const Index i : of.phyxels) {
+        tiling.phyxel[(tiling.part.size() - 1) * tile_size +
+                      static_cast<std::size_t>(whole[i] % tile_size)] = i;
+      }
+    }
+    if (!boundary) tiling.interior_tiles = tiling.tiles();
   }
   tiling.own_tiles = tiling.tiles();
   for (std::size_t p = 0; p < model.parts.size(); ++p) {

@@ -72,9 +72,11 @@ struct Tiling {
   std::vector<Index> phyxel;  ///< Which phyxel is at a place; -1: none, shape [tiles · tile_size].
   std::vector<Index> place;   ///< Where a phyxel is, shape [n].
   std::vector<Index> part;    ///< Body of a tile, shape [tiles].
-  Index own_tiles = 0;        ///< The first ones have lists; the rest are a share's ghosts.
-  TileLists neighbours;       ///< For the first pass.
-  TileLists inverse;          ///< For the second pass; empty if the neighbours serve both.
+  /// The first tiles have lists; the rest are a share's ghosts. Of those with lists, the first ones
+  /// name no ghost.
+  Index own_tiles = 0, interior_tiles = 0;
+  TileLists neighbours;  ///< For the first pass.
+  TileLists inverse;     ///< For the second pass; empty if the neighbours serve both.
 
   Index places() const { return static_cast<Index>(phyxel.size()); }
   Index tiles() const { return static_cast<Index>(part.size()); }

@@ -20,12 +20,20 @@ using namespace cuda;
 template <class Real, class StateReal>
 class CudaBackend final : public Backend {
  public:
-  CudaBackend(const Model& model, int device, CudaPath path)
-      : m_(model, device), boundary_(m_), passes_(m_) {
-    if (path == CudaPath::automatic && !boundary_.changes()) {
-      residence_ = Residence<Real, StateReal>::of(m_);
-      recorded_ = !residence_ && m_.size() <= most_recorded;
+  CudaBackend(const Model& model, int device, CudaPath path, Transport transport)
+      : m_(model, device),
+        halo_(m_.share() ? std::make_unique<DeviceHalo<Real, StateReal>>(m_, transport) : nullptr),
+        boundary_(m_),
+        passes_(m_, halo_.get()) {
+    bool recordable = path == CudaPath::automatic && !boundary_.changes();
+    if (recordable && !m_.share()) residence_ = Residence<Real, StateReal>::of(m_);
+    recordable = recordable && !residence_ && m_.size() <= most_recorded;
+    // Ranks launch alike, or one would wait for what another has not launched yet.
+    if (m_.share()) {
+      recordable = recordable && halo_->is_direct();
+      recordable = m_.share()->others->smallest(recordable) > 0;
     }
+    recorded_ = recordable;
   }
 
   std::string name() const override {
@@ -41,12 +49,17 @@ class CudaBackend final : public Backend {
   int threads() const override { return 0; }
 
   void upload(const State& state) override {
-    wait();
+    settle();
+    passes_.receive_displacements();
+    m_.wait();
+    if (m_.share()) m_.share()->others->largest(0);  // the others have come as far
     fresh_ = true;
     m_.put(state);
   }
   void download(State& state) const override {
-    wait();
+    settle();
+    passes_.receive_displacements();
+    m_.wait();
     m_.take(state);
   }
 
@@ -72,6 +85,8 @@ class CudaBackend final : public Backend {
     passes_.advance(dt);
     boundary_.follow_paths(time, dt);
     if (fresh_) boundary_.put_held_at_rest();
+    passes_.send_displacements();
+    if (halo_) halo_->count_steps(1);
     fresh_ = false;
     bound_queue(1);
   }
@@ -85,38 +100,23 @@ class CudaBackend final : public Backend {
     settle();
     boundary_.sum_loads(time);
     const DeviceArray<Real> forces = passes_.forces(), gradients = passes_.gradients();
-    const auto tiles = static_cast<unsigned>(m_.tiles());
-    const DeviceArray<Totals> each(tiles, "sums of " + m_.subject()), all(1, "sums");
-    diagnose_tiles<<<tiles, diagnose_threads, 0, m_.stream()>>>(m_.fields(), m_.materials(),
-                                                                boundary_.moved(), forces.data(),
-                                                                gradients.data(), dt, each.data());
-    m_.launched("diagnose_tiles", tiles, diagnose_threads);
-    add_tiles<<<1, diagnose_threads, 0, m_.stream()>>>(each.data(), m_.tiles(), all.data());
-    m_.launched("add_tiles", 1, diagnose_threads);
-    wait();
-    const Totals t = fetched(all)[0];
-    const auto vector = [&](int first) {
-      return Vec3d{t.sum[first], t.sum[first + 1], t.sum[first + 2]};
-    };
-    const auto phyxel = [&](Index place) { return place < 0 ? -1 : m_.tiling().phyxel[place]; };
-    Diagnostics d;
-    d.kinetic_energy = t.sum[kinetic_energy];
-    d.strain_energy = t.sum[strain_energy];
-    d.volume_energy = t.sum[volume_energy];
-    d.gravity_energy = t.sum[gravity_energy];
-    d.load_energy = t.sum[load_energy];
-    d.momentum = vector(momentum);
-    d.angular_momentum = vector(angular_momentum);
-    d.internal_force = vector(internal_force);
-    d.internal_torque = vector(internal_torque);
-    d.force_scale = t.sum[force_scale];
-    d.torque_scale = t.sum[torque_scale];
-    d.inverted = static_cast<Index>(t.sum[inverted]);
-    d.largest_displacement = t.largest_displacement;
-    d.largest_speed = t.largest_speed;
-    d.fastest_phyxel = phyxel(t.fastest);
-    d.bad_phyxel = phyxel(t.first_bad);
-    return d;
+    const Index tiles = m_.tiles();
+    const DeviceArray<TileTotals> each(static_cast<std::size_t>(tiles), "sums of " + m_.subject());
+    ExactTotals none{};
+    none.fastest = none.first_bad = no_phyxel;
+    const DeviceArray<ExactTotals> all = sent(std::vector{none}, "sums");
+    if (tiles > 0) {
+      diagnose_tiles<<<tiles, diagnose_threads, 0, m_.stream()>>>(
+          m_.fields(), m_.materials(), boundary_.moved(), forces.data(), gradients.data(),
+          m_.number_at(), dt, each.data());
+      m_.launched("diagnose_tiles", static_cast<unsigned>(tiles), diagnose_threads);
+      m_.launch_each("add_tiles", add_tiles, tiles, each.data(), tiles, all.data());
+      m_.launch_each("find_fastest", find_fastest, tiles, each.data(), tiles, all.data());
+    }
+    m_.wait();
+    Totals totals = totals_of(fetched(all)[0]);
+    if (m_.share()) totals.add_others(*m_.share()->others);
+    return totals.values();
   }
 
   void internal_forces(std::vector<Vec3d>& force) override {
@@ -178,10 +178,16 @@ class CudaBackend final : public Backend {
     m_.add_memory(list);
     if (residence_) list.push_back({"what stays in shared memory", residence_->bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
+    if (halo_) list.push_back({"exchange", halo_->bytes()});
     list.push_back({"while energies are summed", 12 * sizeof(Real) * m_.places()});
     return list;
   }
   std::size_t step_traffic() const override { return m_.step_traffic(); }
+  std::optional<Exchanges> exchanges() const override {
+    if (!halo_) return std::nullopt;
+    settle();
+    return Exchanges{halo_->describe(), halo_->traffic()};
+  }
 
  private:
   /// Steps of a graph or of a trail, and bodies for which a graph is worth while: a step of more
@@ -208,24 +214,31 @@ class CudaBackend final : public Backend {
     m_.use_device();
     const int steps = std::exchange(pending_, 0);  // once, whatever happens
     bound_queue(steps);
+    if (halo_) halo_->count_steps(steps);
     const bool surfels = pending_then_ == Then::surfels;
     if (residence_) {
       residence_->launch(m_.dt(), steps, surfels ? surfels_->trail() : Trail<Real, StateReal>{});
       if (surfels) surfels_->launch_trail(steps);
       return;
     }
-    const auto launch = [&] {
-      for (int s = 0; s < steps; ++s) {
+    const auto launch = [&](int count) {
+      for (int s = 0; s < count; ++s) {
         passes_.stress();
         passes_.advance(m_.dt());
+        passes_.send_displacements();
         if (surfels) surfels_->launch(passes_);
       }
     };
-    if (steps == steps_together && !launches_are_waited_for()) {
-      graphs_[surfels].launch(m_.stream(), launch);
-    } else {
-      launch();
+    // Surfels of a share are brought together by the host.
+    const bool recorded =
+        steps == steps_together && !launches_are_waited_for() && !(surfels && m_.share());
+    if (!recorded) return launch(steps);
+    // A graph begins as it ends: with displacements on their way.
+    if (halo_ && !halo_->is_under_way(Sent::displacements)) {
+      launch(1);
+      return launch(steps - 1);
     }
+    graphs_[surfels].launch(m_.stream(), [&] { launch(steps); });
   }
   /// Makes this device the current one and launches the steps that wait for it.
   void settle() const {
@@ -248,6 +261,7 @@ class CudaBackend final : public Backend {
   }
 
   DeviceModel<Real, StateReal> m_;
+  std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // of a share
   Boundary<Real, StateReal> boundary_;
   Passes<Real, StateReal> passes_;
   std::unique_ptr<Residence<Real, StateReal>> residence_;
@@ -267,16 +281,19 @@ class CudaBackend final : public Backend {
 }  // namespace
 
 std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
-                                           CudaPath path) {
+                                           CudaPath path, Transport transport) {
+  if (model.share && (model.share->place.empty() || model.share->rings != 1)) {
+    throw InputError("a GPU steps shares that are cut between tiles and have one ring of ghosts");
+  }
   switch (precision) {
     case Precision::single:
-      return std::make_unique<CudaBackend<float, float>>(model, device, path);
+      return std::make_unique<CudaBackend<float, float>>(model, device, path, transport);
     case Precision::mixed:
-      return std::make_unique<CudaBackend<float, double>>(model, device, path);
+      return std::make_unique<CudaBackend<float, double>>(model, device, path, transport);
     case Precision::double_:
       break;
   }
-  return std::make_unique<CudaBackend<double, double>>(model, device, path);
+  return std::make_unique<CudaBackend<double, double>>(model, device, path, transport);
 }
 
 }  // namespace phyxel

@@ -64,6 +64,7 @@ class DeviceModel {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
+    if (share()) own_supports_ = share()->others->largest(own_supports_) > 0;
     last_launch_.subject = subject_ = std::to_string(model.size()) + " phyxels";
     lists_ = view_of(tiling_.neighbours);
     second_lists_ = view_of(tiling_.second());
@@ -75,9 +76,14 @@ class DeviceModel {
   const Model& model() const { return model_; }
   const Device& device() const { return device_; }
   const DeviceTiling& tiling() const { return tiling_; }
+  /// Null: the model is whole.
+  const Share* share() const { return model_.share.get(); }
   Index size() const { return model_.size(); }
+  /// Of a share, with ghosts', which come after all that is stepped here.
   std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
-  Index tiles() const { return tiling_.tiles(); }
+  Index tiles() const { return tiling_.own_tiles; }  ///< That are stepped here.
+  /// Of those, the first ones, which reach no ghost.
+  Index interior_tiles() const { return tiling_.interior_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
@@ -86,6 +92,11 @@ class DeviceModel {
   const DeviceLists& lists() const { return lists_; }
   const DeviceLists& second_lists() const { return second_lists_; }
   const TileMaterial* materials() const { return materials_.data(); }
+  /// Of each place, the number of its phyxel in the whole model; -1: nobody.
+  const Index* number_at() const { return share() ? number_at_.data() : tiling_.phyxel_at.data(); }
+  /// What `Fields::points` and `stresses` lie in (see `Points::in`).
+  void* points_memory() const { return points_.data(); }
+  void* stresses_memory() const { return stresses_.data(); }
 
   /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
   /// digits in float.
@@ -120,16 +131,16 @@ class DeviceModel {
   void put(const State& state) {
     const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
                              v = sent(state.velocity, "velocities of " + subject_);
-    launch_tiles("put_state", put_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
-                 u.data(), v.data());
+    launch_places("put_state", put_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
+                  u.data(), v.data());
     wait();
   }
   void take(State& state) const {
     const auto n = static_cast<std::size_t>(size());
     const DeviceArray<Vec3d> u(n, "displacements of " + subject_),
         v(n, "velocities of " + subject_);
-    launch_tiles("take_state", take_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
-                 u.data(), v.data());
+    launch_places("take_state", take_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
+                  u.data(), v.data());
     state.displacement = fetched(u);
     state.velocity = fetched(v);
   }
@@ -145,10 +156,16 @@ class DeviceModel {
     last_launch_.threads = threads;
     check_launch(last_launch_);
   }
-  /// A thread a place.
+  /// A thread for each place of what is stepped here.
   template <class... Parameters, class... Arguments>
   void launch_tiles(const char* name, void (*kernel)(Parameters...), Arguments... arguments) const {
     launch(name, kernel, static_cast<unsigned>(tiles()), arguments...);
+  }
+  /// A thread for each place, with ghosts'.
+  template <class... Parameters, class... Arguments>
+  void launch_places(const char* name, void (*kernel)(Parameters...),
+                     Arguments... arguments) const {
+    launch(name, kernel, static_cast<unsigned>(tiling_.tiles()), arguments...);
   }
   /// A thread each of `count`.
   template <class... Parameters, class... Arguments>
@@ -162,6 +179,7 @@ class DeviceModel {
   template <class... Parameters, class... Arguments>
   void launch_blocks(const char* name, void (*kernel)(Parameters...), dim3 blocks, int shared_bytes,
                      bool overlapping, Arguments... arguments) const {
+    if (blocks.x == 0 || blocks.y == 0) return;
     allow_shared_memory(reinterpret_cast<const void*>(kernel));
     cudaLaunchAttribute overlap = overlap_attribute();
     cudaLaunchConfig_t config{};
@@ -222,6 +240,7 @@ class DeviceModel {
   template <class... Parameters, class... Arguments>
   void launch(const char* name, void (*kernel)(Parameters...), unsigned blocks,
               Arguments... arguments) const {
+    if (blocks == 0) return;  // a rank may have nothing
     kernel<<<blocks, tile_size, 0, stream()>>>(arguments...);
     launched(name, blocks, tile_size);
   }
@@ -254,20 +273,10 @@ class DeviceModel {
 
   void make_fields() {
     const std::string of = " of " + subject_;
-    if constexpr (sizeof(Real) == 4) {
-      quads_ = {places(), "points" + of};
-      pairs_ = {places(), "points" + of};
-      fields_.points = {quads_.data(), pairs_.data()};
-      stress_words_ = {3 * places(), "stresses" + of};
-      fields_.stresses = {stress_words_.data(), stress_words_.data() + places(),
-                          stress_words_.data() + 2 * places()};
-    } else {
-      point_words_ = {3 * places(), "points" + of};
-      fields_.points = {point_words_.data(), point_words_.data() + places(),
-                        point_words_.data() + 2 * places()};
-      stress_words_ = {6 * places(), "stresses" + of};
-      for (int k = 0; k < 6; ++k) fields_.stresses.word[k] = stress_words_.data() + k * places();
-    }
+    points_ = {Points<Real>::bytes * places(), "points" + of};
+    fields_.points = Points<Real>::in(points_.data(), places());
+    stresses_ = {Stresses<Real>::bytes * places(), "stresses" + of};
+    fields_.stresses = Stresses<Real>::in(stresses_.data(), places());
     moment_constants_ = {7 * places(), "inverse moments" + of};
     force_constants_ = {4 * places(), "masses" + of};
     if (own_supports_) supports_ = {places(), "supports" + of};
@@ -291,6 +300,11 @@ class DeviceModel {
     fields_.tiles = tiles_.data();
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
+    if (share()) {
+      std::vector<Index> number;
+      for (const Index i : tiling_.phyxel) number.push_back(i < 0 ? -1 : share()->number[i]);
+      number_at_ = sent(number, "places");
+    }
     send_constants(0);
     put_all_constants();
     PHYXEL_CUDA(cudaMemset(velocity_.data(), 0, velocity_.bytes()));
@@ -316,8 +330,8 @@ class DeviceModel {
                               tiling_.inverse_moment.data(),
                               tiling_.moment_offset.data(),
                               origin.data()};
-    launch_tiles("put_constants", put_constants<Real, StateReal>, fields_, constants,
-                 moment_constants_.data(), force_constants_.data(), supports_.data());
+    launch_places("put_constants", put_constants<Real, StateReal>, fields_, constants,
+                  moment_constants_.data(), force_constants_.data(), supports_.data());
     wait();
     tiling_.inverse_moment = {};
     tiling_.moment_offset = {};
@@ -337,8 +351,6 @@ class DeviceModel {
             m.damping > 0};
   }
 
-  using Word = std::conditional_t<sizeof(Real) == 4, float4, double2>;
-
   const Model& model_;
   Device device_;
   DeviceTiling tiling_;
@@ -352,14 +364,12 @@ class DeviceModel {
 
   AllFields fields_{};
   DeviceLists lists_{}, second_lists_{};
-  DeviceArray<float4> quads_;  // points, where Real is float
-  DeviceArray<float2> pairs_;
-  DeviceArray<double2> point_words_;  // points, where it is double
-  DeviceArray<Word> stress_words_;
+  DeviceArray<std::byte> points_, stresses_;
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;
+  DeviceArray<Index> number_at_;  // of shares
 };
 
 }  // namespace phyxel::cuda

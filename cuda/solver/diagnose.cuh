@@ -1,8 +1,13 @@
-/// Energies, momenta and finiteness, summed where the state is. Sums run in double: over a tile in
-/// a fixed tree, over tiles in a fixed tree, so that they do not depend on anything but the model.
+/// Energies, momenta and finiteness, summed where the state is. Sums run in double over a tile in a
+/// fixed tree, and over tiles without rounding, so that they depend on nothing but the model: not
+/// on the order of tiles, nor on which rank has which.
 #pragma once
 
+#include <cstdint>
+
+#include "exact_sum.hpp"
 #include "solver/kernels.cuh"
+#include "solver/totals.hpp"
 
 namespace phyxel::cuda {
 
@@ -13,43 +18,45 @@ struct TileMaterial {
   int green;
 };
 
-/// Everything that adds up.
+/// Everything that adds up, in the order of `Totals::for_each_sum`.
 enum Sum : int {
   kinetic_energy,
   strain_energy,
   volume_energy,
   gravity_energy,
   load_energy,
+  force_scale,
+  torque_scale,
   momentum,  // three components each
   angular_momentum = momentum + 3,
   internal_force = angular_momentum + 3,
   internal_torque = internal_force + 3,
-  force_scale = internal_torque + 3,
-  torque_scale,
-  inverted,
+  inverted = internal_torque + 3,  // last: a number of phyxels
   sums
 };
 
-/// One tile's, or all tiles', sums and extremes.
-struct Totals {
+inline constexpr Index no_phyxel = INT32_MAX;
+
+/// Sums and extremes of phyxels of one tile. Phyxels go by their numbers in the whole model.
+struct TileTotals {
   double sum[sums];
   double largest_displacement, largest_speed;
-  Index fastest, first_bad;  ///< Places; -1: none.
+  Index fastest, first_bad;  ///< `no_phyxel` if there is none. Of equals the first.
 };
 
-__device__ inline Totals combined(const Totals& a, const Totals& b) {
-  Totals t;
+__device__ inline TileTotals combined(const TileTotals& a, const TileTotals& b) {
+  TileTotals t;
   for (int k = 0; k < sums; ++k) t.sum[k] = a.sum[k] + b.sum[k];
   t.largest_displacement = fmax(a.largest_displacement, b.largest_displacement);
-  const bool b_is_faster = b.largest_speed > a.largest_speed;
-  t.largest_speed = b_is_faster ? b.largest_speed : a.largest_speed;
-  t.fastest = b_is_faster ? b.fastest : a.fastest;
-  t.first_bad = a.first_bad < 0 ? b.first_bad : a.first_bad;
+  t.largest_speed = fmax(a.largest_speed, b.largest_speed);
+  t.fastest = min(a.largest_speed == t.largest_speed ? a.fastest : no_phyxel,
+                  b.largest_speed == t.largest_speed ? b.fastest : no_phyxel);
+  t.first_bad = min(a.first_bad, b.first_bad);
   return t;
 }
 
 /// The block's totals in thread 0, by halving.
-__device__ inline Totals of_block(Totals mine, Totals* shared) {
+__device__ inline TileTotals of_block(TileTotals mine, TileTotals* shared) {
   shared[threadIdx.x] = mine;
   for (unsigned half = blockDim.x / 2; half > 0; half /= 2) {
     __syncthreads();
@@ -58,6 +65,19 @@ __device__ inline Totals of_block(Totals mine, Totals* shared) {
     }
   }
   return shared[0];
+}
+
+/// Sums without rounding (`ExactSum`), and extremes as what atomic operations compare.
+struct ExactTotals {
+  unsigned long long word[sums][ExactSum::words];
+  unsigned long long displacement_bits, speed_bits;  ///< Of doubles that are not negative.
+  Index fastest, first_bad;
+};
+
+__device__ inline void add_exactly(unsigned long long* words, double value) {
+  ExactSum::split(value, [&](int word, std::int64_t number) {
+    if (number != 0) atomicAdd(words + word, static_cast<unsigned long long>(number));
+  });
 }
 
 template <class T>
@@ -70,19 +90,20 @@ inline constexpr int diagnose_threads = 128;
 
 /// @param force,gradient of the present displacements
 /// @param moved phyxels on a path, or null
+/// @param number_at of each place: its phyxel's number
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
                                const TileMaterial* materials, const char* moved, const Real* force,
-                               const Real* gradient, double dt, Totals* totals) {
-  __shared__ Totals shared[diagnose_threads];
-  Totals both{};
-  both.fastest = both.first_bad = -1;
+                               const Real* gradient, const Index* number_at, double dt,
+                               TileTotals* totals) {
+  __shared__ TileTotals shared[diagnose_threads];
+  TileTotals both{};
   for (int part = 0; part < tile_size / diagnose_threads; ++part) {
     const std::size_t place =
         static_cast<std::size_t>(blockIdx.x) * tile_size + part * diagnose_threads + threadIdx.x;
     const Real inverse_mass = f.force_constants[3 * f.places + place];
-    Totals t{};
-    t.fastest = t.first_bad = -1;
+    TileTotals t{};
+    t.fastest = t.first_bad = no_phyxel;
     if (inverse_mass != Real(0)) {  // somebody is there
       const TileMaterial m = materials[blockIdx.x];
       const bool held = inverse_mass < Real(0);
@@ -105,7 +126,7 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       }
       const double finite = trace_of_all + u.x + u.y + u.z + internal.x + internal.y + internal.z +
                             half_step_velocity.x + half_step_velocity.y + half_step_velocity.z;
-      if (!isfinite(finite)) t.first_bad = static_cast<Index>(place);
+      if (!isfinite(finite)) t.first_bad = number_at[place];
 
       const Vec3<double> acceleration =
           (1 / mass) * (internal + load) + gravity - m.damping * half_step_velocity;
@@ -130,28 +151,53 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       t.sum[force_scale] = sqrt(dot(internal, internal));
       t.sum[torque_scale] = sqrt(dot(x, x)) * t.sum[force_scale];
       t.largest_displacement = sqrt(dot(u, u));
-      t.largest_speed = sqrt(dot(v, v));
-      t.fastest = static_cast<Index>(place);
+      t.largest_speed = fmax(sqrt(dot(v, v)), 0.0);  // not NaN
+      if (t.largest_speed > 0) t.fastest = number_at[place];
     }
     both = part == 0 ? t : combined(both, t);
   }
-  const Totals all = of_block(both, shared);
+  const TileTotals all = of_block(both, shared);
   if (threadIdx.x == 0) totals[blockIdx.x] = all;
 }
 
-/// One block: totals of all tiles, into `result`.
-__global__ inline void add_tiles(const Totals* tiles, int count, Totals* result) {
-  __shared__ Totals shared[diagnose_threads];
-  Totals mine{};
-  mine.fastest = mine.first_bad = -1;
-  // Each thread takes a run of tiles, so that what comes first stays first.
-  const int run = (count + diagnose_threads - 1) / diagnose_threads;
-  const int begin = static_cast<int>(threadIdx.x) * run;
-  for (int k = begin; k < begin + run && k < count; ++k) {
-    mine = k == begin ? tiles[k] : combined(mine, tiles[k]);
+/// A thread a tile: adds it to `all`.
+__global__ inline void add_tiles(const TileTotals* tiles, int count, ExactTotals* all) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  const TileTotals& t = tiles[k];
+  for (int s = 0; s < sums; ++s) add_exactly(all->word[s], t.sum[s]);
+  const auto bits = [](double value) {
+    return static_cast<unsigned long long>(__double_as_longlong(value));
+  };
+  atomicMax(&all->displacement_bits, bits(t.largest_displacement));
+  atomicMax(&all->speed_bits, bits(t.largest_speed));
+  atomicMin(&all->first_bad, t.first_bad);
+}
+/// After `add_tiles`: who is the fastest.
+__global__ inline void find_fastest(const TileTotals* tiles, int count, ExactTotals* all) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  if (tiles[k].largest_speed == __longlong_as_double(static_cast<long long>(all->speed_bits))) {
+    atomicMin(&all->fastest, tiles[k].fastest);
   }
-  const Totals all = of_block(mine, shared);
-  if (threadIdx.x == 0) *result = all;
+}
+
+/// On the host.
+inline Totals totals_of(const ExactTotals& device) {
+  Totals t;
+  int s = 0;
+  const auto put = [&](ExactSum& sum) {
+    std::copy_n(device.word[s++], ExactSum::words, sum.ready().begin());
+  };
+  t.for_each_sum(put);
+  ExactSum turned;
+  put(turned);
+  t.inverted = static_cast<std::int64_t>(turned.value());
+  t.largest_displacement = std::bit_cast<double>(device.displacement_bits);
+  t.largest_speed = std::bit_cast<double>(device.speed_bits);
+  t.fastest = device.fastest == no_phyxel ? -1 : device.fastest;
+  t.first_bad = device.first_bad;
+  return t;
 }
 
 }  // namespace phyxel::cuda

@@ -1,7 +1,8 @@
-/// The two passes of a step as launches: one for all tiles of bodies of one law side by side.
+/// The two passes of a step as launches: one for all tiles of bodies of one law side by side. Of a
+/// share, with the exchanges that they need.
 #pragma once
 
-#include "solver/device_model.cuh"
+#include "solver/device_halo.cuh"
 
 namespace phyxel::cuda {
 
@@ -12,7 +13,9 @@ class Passes {
   using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*);
 
  public:
-  explicit Passes(const DeviceModel<Real, StateReal>& model) : m_(model) {
+  /// @param halo of a share, or null
+  Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo)
+      : m_(model), halo_(halo) {
     const auto add = [](auto& runs, auto kernel, Index tile) {
       if (!runs.empty() && runs.back().kernel == kernel) {
         ++runs.back().tiles;
@@ -22,46 +25,67 @@ class Passes {
     };
     for (Index tile = 0; tile < m_.tiles(); ++tile) {
       const Material& material = m_.model().parts[m_.tiling().part[tile]].material;
-      add(stress_runs_, pass_1_of(material), tile);
-      add(advance_runs_, m_.own_supports() ? pass_2_of<true>(material) : pass_2_of<false>(material),
+      Runs& runs = tile < m_.interior_tiles() ? interior_ : boundary_;
+      add(runs.stress, pass_1_of(material), tile);
+      add(runs.advance, m_.own_supports() ? pass_2_of<true>(material) : pass_2_of<false>(material),
           tile);
     }
   }
 
+  /// What ghosts are not needed for is launched before they are waited for.
   void stress() const {
-    for (const Run<Pass1>& run : stress_runs_) launch_pass_1(m_.fields(), run, {});
+    launch_stress(interior_);
+    receive(Sent::displacements);
+    launch_stress(boundary_);
+    send(Sent::stresses);
   }
   void advance(double dt) const {
-    for (const Run<Pass2>& run : advance_runs_) {
-      launch_pass_2(run, static_cast<StateReal>(dt), nullptr);
-    }
+    launch_advance(interior_, dt);
+    receive(Sent::stresses);
+    launch_advance(boundary_, dt);
   }
+  /// After displacements have changed: other ranks get theirs.
+  void send_displacements() const { send(Sent::displacements); }
+  /// Ghosts' displacements are there for what is launched from now on.
+  void receive_displacements() const { receive(Sent::displacements); }
+
+  /// Values of phyxels, to those who have them as ghosts, through the host. Of shares only.
+  template <class Records>
+  void exchange(const Records& records) const {
+    halo_->exchange(records);
+  }
+
   /// Pass 1 of every body by the linear law of `constants`, which volume conservation is part of.
   void linear_stress(const TileConstants<Real, StateReal>* constants) const {
     AllFields fields = m_.fields();
     fields.tiles = constants;
+    receive(Sent::displacements);
     launch_pass_1(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, {});
+    send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
   void gather(Real* forces) const {
+    receive(Sent::stresses);
     launch_pass_2({m_.own_supports() ? pass_2<Real, StateReal, true, false, false, true>
                                      : pass_2<Real, StateReal, false, false, false, true>,
                    0, m_.tiles()},
                   StateReal(0), forces);
   }
+  /// Of ghosts: zero.
   DeviceArray<Real> forces() const {
+    DeviceArray<Real> forces = without_ghosts(3, "forces of ");
     stress();
-    DeviceArray<Real> forces(3 * m_.places(), "forces of " + m_.subject());
     gather(forces.data());
     return forces;
   }
   DeviceArray<Real> gradients() const {
-    DeviceArray<Real> gradients(9 * m_.places(), "displacement gradients of " + m_.subject());
+    DeviceArray<Real> gradients = without_ghosts(9, "displacement gradients of ");
     put_gradients({gradients.data(), m_.places(), nullptr}, m_.tiles());
     return gradients;
   }
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
+    receive(Sent::displacements);
     launch_pass_1(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, tiles}, gradients);
   }
 
@@ -72,6 +96,30 @@ class Passes {
     Kernel kernel;
     Index first_tile, tiles;
   };
+  struct Runs {
+    std::vector<Run<Pass1>> stress;
+    std::vector<Run<Pass2>> advance;
+  };
+
+  void send(Sent what) const {
+    if (halo_) halo_->begin(what);
+  }
+  void receive(Sent what) const {
+    if (halo_) halo_->finish(what);
+  }
+  void launch_stress(const Runs& runs) const {
+    for (const Run<Pass1>& run : runs.stress) launch_pass_1(m_.fields(), run, {});
+  }
+  void launch_advance(const Runs& runs, double dt) const {
+    for (const Run<Pass2>& run : runs.advance) {
+      launch_pass_2(run, static_cast<StateReal>(dt), nullptr);
+    }
+  }
+  DeviceArray<Real> without_ghosts(std::size_t rows, const char* what) const {
+    DeviceArray<Real> array(rows * m_.places(), what + m_.subject());
+    if (m_.share()) PHYXEL_CUDA(cudaMemsetAsync(array.data(), 0, array.bytes(), m_.stream()));
+    return array;
+  }
 
   /// Terms chosen at run time become kernels: the one place.
   static Pass1 pass_1_of(const Material& m) {
@@ -107,8 +155,8 @@ class Passes {
   }
 
   const DeviceModel<Real, StateReal>& m_;
-  std::vector<Run<Pass1>> stress_runs_;
-  std::vector<Run<Pass2>> advance_runs_;
+  const DeviceHalo<Real, StateReal>* halo_;
+  Runs interior_, boundary_;
 };
 
 }  // namespace phyxel::cuda

@@ -47,6 +47,10 @@ struct Points<float> {
   static constexpr int bytes = 24;
   float4* x_u;  ///< x, y, z, u_x
   float2* u;    ///< u_y, u_z
+  static Points in(void* memory, std::size_t places) {
+    auto* words = static_cast<float4*>(memory);
+    return {words, reinterpret_cast<float2*>(words + places)};
+  }
 
   struct Value {
     Vec3<float> x, u;
@@ -79,6 +83,10 @@ template <>
 struct Points<double> {
   static constexpr int bytes = 48;
   double2 *xy, *z_u, *u;
+  static Points in(void* memory, std::size_t places) {
+    auto* words = static_cast<double2*>(memory);
+    return {words, words + places, words + 2 * places};
+  }
 
   struct Value {
     Vec3<double> x, u;
@@ -121,11 +129,18 @@ template <>
 struct Stresses<float> {
   static constexpr int bytes = 48;
   float4 *x_q, *q_a, *q_b;  ///< x, y, z, q8; q0 to q3; q4 to q7
+  static Stresses in(void* memory, std::size_t places) {
+    auto* words = static_cast<float4*>(memory);
+    return {words, words + places, words + 2 * places};
+  }
 
   struct Value {
     Vec3<float> x;
     Mat3<float> q;
   };
+  __device__ Value get(std::size_t place) const {
+    return value(x_q[place], q_a[place], q_b[place]);
+  }
   __device__ void set(std::size_t place, const Value& v) const {
     x_q[place] = {v.x.x, v.x.y, v.x.z, v.q(2, 2)};
     q_a[place] = {v.q(0, 0), v.q(0, 1), v.q(0, 2), v.q(1, 0)};
@@ -147,9 +162,13 @@ struct Stresses<float> {
   }
   __device__ static Value at(const char* image, int slots, unsigned offset) {
     const char* word = image + offset;
-    const auto x = *reinterpret_cast<const float4*>(word);
-    const auto a = *reinterpret_cast<const float4*>(word + 16 * slots);
-    const auto b = *reinterpret_cast<const float4*>(word + 32 * slots);
+    return value(*reinterpret_cast<const float4*>(word),
+                 *reinterpret_cast<const float4*>(word + 16 * slots),
+                 *reinterpret_cast<const float4*>(word + 32 * slots));
+  }
+
+ private:
+  __device__ static Value value(float4 x, float4 a, float4 b) {
     return {{x.x, x.y, x.z}, {{{a.x, a.y, a.z}, {a.w, b.x, b.y}, {b.z, b.w, x.w}}}};
   }
 };
@@ -158,11 +177,22 @@ template <>
 struct Stresses<double> {
   static constexpr int bytes = 96;
   double2* word[6];  ///< x, y; z, q8; q0, q1; q2, q3; q4, q5; q6, q7
+  static Stresses in(void* memory, std::size_t places) {
+    Stresses s;
+    for (int k = 0; k < 6; ++k) s.word[k] = static_cast<double2*>(memory) + k * places;
+    return s;
+  }
 
   struct Value {
     Vec3<double> x;
     Mat3<double> q;
   };
+  __device__ Value get(std::size_t place) const {
+    double2 w[6];
+#pragma unroll
+    for (int k = 0; k < 6; ++k) w[k] = word[k][place];
+    return value(w);
+  }
   __device__ void set(std::size_t place, const Value& v) const {
     word[0][place] = {v.x.x, v.x.y};
     word[1][place] = {v.x.z, v.q(2, 2)};
@@ -193,6 +223,11 @@ struct Stresses<double> {
     for (int k = 0; k < 6; ++k) {
       w[k] = *reinterpret_cast<const double2*>(image + offset + 16 * k * slots);
     }
+    return value(w);
+  }
+
+ private:
+  __device__ static Value value(const double2 (&w)[6]) {
     return {{w[0].x, w[0].y, w[1].x},
             {{{w[2].x, w[2].y, w[3].x}, {w[3].y, w[4].x, w[4].y}, {w[5].x, w[5].y, w[1].y}}}};
   }

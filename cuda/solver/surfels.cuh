@@ -104,6 +104,37 @@ __global__ void __launch_bounds__(surfel_block)
   s.moved_normal[out] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
 
+/// What the owner of a phyxel that carries surfels of other ranks sends them.
+template <class Real, class StateReal>
+struct CarrierRecords {
+  Real* gradients;  ///< [9, places]
+  Fields<Real, StateReal> fields;
+
+  struct Value {
+    Vec3<StateReal> u;
+    Real gradient[9];
+  };
+  __device__ Value get(std::size_t place) const {
+    Value v;
+    if constexpr (std::is_same_v<Real, StateReal>) {
+      v.u = fields.points.get(place).u;
+    } else {
+      v.u = column3(fields.displacement, fields.places, place);
+    }
+    for (int e = 0; e < 9; ++e) v.gradient[e] = gradients[e * fields.places + place];
+    return v;
+  }
+  __device__ void set(std::size_t place, const Value& v) const {
+    auto point = fields.points.get(place);
+    point.u = to<Real>(v.u);
+    fields.points.set(place, point);
+    if constexpr (!std::is_same_v<Real, StateReal>) {
+      set_column3(fields.displacement, fields.places, place, v.u);
+    }
+    for (int e = 0; e < 9; ++e) gradients[e * fields.places + place] = v.gradient[e];
+  }
+};
+
 template <class Real, class StateReal>
 class SurfelAdvection {
  public:
@@ -115,7 +146,10 @@ class SurfelAdvection {
 
   /// As the phyxels are now. Steps may be under way.
   void launch(const Passes<Real, StateReal>& passes) const {
-    if (tiles_.size()) {
+    if (m_.share()) {
+      passes.put_gradients({gradients_.data(), stride_, nullptr}, m_.tiles());
+      passes.exchange(CarrierRecords<Real, StateReal>{gradients_.data(), m_.fields()});
+    } else if (tiles_.size()) {
       passes.put_gradients({gradients_.data(), stride_, tiles_.data()},
                            static_cast<Index>(tiles_.size()));
     } else {
@@ -175,7 +209,9 @@ class SurfelAdvection {
     const std::string what = std::to_string(order_.size()) + " surfels";
     blocks_ = sent(blocks, what);
     place_ = sent(plan.place, what);
-    if (trail_steps > 0) {
+    if (m_.share()) {
+      stride_ = m_.places();  // carriers may be ghosts
+    } else if (trail_steps > 0) {
       stride_ = m_.places();
       displacements_ = {static_cast<std::size_t>(trail_steps) * 3 * stride_, what};
     } else {

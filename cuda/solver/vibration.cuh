@@ -1,5 +1,8 @@
-/// Vectors of three numbers a place, for the largest eigenfrequency. One thread a place.
+/// Vectors of three numbers a place, for the largest eigenfrequency. One thread a place. Products
+/// do not depend on the order of tiles, nor on which rank has which.
 #pragma once
+
+#include <limits>
 
 #include "solver/passes.cuh"
 #include "solver/start_vector.hpp"
@@ -7,9 +10,9 @@
 namespace phyxel::cuda {
 
 template <class Real>
-__global__ void start_vector(Real* vector, std::size_t places, const Index* phyxel_at) {
+__global__ void start_vector(Real* vector, std::size_t places, const Index* number_at) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
-  const Index i = phyxel_at[place];
+  const Index i = number_at[place];
   set_column3(vector, places, place, i >= 0 ? to<Real>(start_component(i)) : Vec3<Real>{});
 }
 
@@ -42,25 +45,34 @@ __global__ void stiffness_times(Fields<Real, StateReal> f, const Real* force, co
 
 /// y -= alpha x
 template <class Real>
-__global__ void subtract_multiple(Real* y, const Real* x, Real alpha) {
-  const std::size_t k = 3 * (static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x);
-  for (int e = 0; e < 3; ++e) y[k + e] -= alpha * x[k + e];
+__global__ void subtract_multiple(Real* y, const Real* x, std::size_t places, Real alpha) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  for (int e = 0; e < 3; ++e) y[e * places + place] -= alpha * x[e * places + place];
 }
 
 template <class Real>
-__global__ void scale_vector(Real* x, Real factor) {
-  const std::size_t k = 3 * (static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x);
-  for (int e = 0; e < 3; ++e) x[k + e] *= factor;
+__global__ void scale_vector(Real* x, std::size_t places, Real factor) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  for (int e = 0; e < 3; ++e) x[e * places + place] *= factor;
 }
 
-/// The terms of a scalar product.
+/// a · b, over a tile in a fixed tree, over tiles without rounding into an `ExactSum`'s words.
 template <class Real>
-struct Product {
-  const Real *a, *b;
-  __device__ double operator()(std::int64_t k) const {
-    return static_cast<double>(a[k]) * static_cast<double>(b[k]);
+__global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
+                               unsigned long long* words) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  double sum = 0;
+  for (int e = 0; e < 3; ++e) {
+    sum += static_cast<double>(a[e * places + place]) * static_cast<double>(b[e * places + place]);
   }
-};
+  __shared__ double shared[tile_size];
+  shared[threadIdx.x] = sum;
+  for (int half = tile_size / 2; half > 0; half /= 2) {
+    __syncthreads();
+    if (static_cast<int>(threadIdx.x) < half) shared[threadIdx.x] += shared[threadIdx.x + half];
+  }
+  if (threadIdx.x == 0) add_exactly(words, shared[0]);
+}
 
 /// M^-1/2 K M^-1/2 at rest, by the linear law that every material has there.
 template <class Real, class StateReal>
@@ -70,7 +82,8 @@ class CudaVibration final : public Vibration {
       : m_(model),
         passes_(passes),
         amplitude_(amplitude_at_rest(model.model())),
-        tiles_(model.rest_constants()) {
+        tiles_(model.rest_constants()),
+        product_(ExactSum::words, "sums") {
     const std::string what = "vectors of " + m_.subject();
     const std::size_t count = 3 * m_.places();
     previous_ = {count, what};
@@ -79,12 +92,13 @@ class CudaVibration final : public Vibration {
     force_ = {count, what};
     PHYXEL_CUDA(cudaMemset(previous_.data(), 0, previous_.bytes()));
     m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), m_.places(),
-                    m_.tiling().phyxel_at.data());
+                    m_.number_at());
     scale(current_, 1 / std::sqrt(product(current_, current_)));
   }
   double apply(double beta) override {
     m_.use_device();
     m_.launch_tiles("bend", bend<Real, StateReal>, m_.fields(), current_.data(), amplitude_);
+    passes_.send_displacements();
     passes_.linear_stress(tiles_.data());
     passes_.gather(force_.data());
     m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
@@ -93,7 +107,7 @@ class CudaVibration final : public Vibration {
   }
   double subtract(double alpha) override {
     m_.use_device();
-    m_.launch_tiles("subtract", subtract_multiple<Real>, next_.data(), current_.data(),
+    m_.launch_tiles("subtract", subtract_multiple<Real>, next_.data(), current_.data(), m_.places(),
                     static_cast<Real>(alpha));
     return std::sqrt(product(next_, next_));
   }
@@ -115,21 +129,37 @@ class CudaVibration final : public Vibration {
       if (h > 0 && (support == 0 || h < support)) support = h;
       if (m > 0 && (mass == 0 || m < mass)) mass = m;
     }
+    if (model.share) {
+      // Of all ranks; a rank may have nobody.
+      const auto smallest = [&](double value) {
+        const double nobody = std::numeric_limits<double>::infinity();
+        const double all = model.share->others->smallest(value > 0 ? value : nobody);
+        return all < nobody ? all : 0;
+      };
+      support = smallest(support);
+      mass = smallest(mass);
+    }
     return support > 0 && mass > 0 ? static_cast<Real>(support * std::sqrt(mass)) : Real(1);
   }
-  static double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) {
-    const thrust::transform_iterator products(thrust::counting_iterator<std::int64_t>(0),
-                                              Product<Real>{a.data(), b.data()});
-    return reduce(products, static_cast<std::int64_t>(a.size()), 0.0, Plus{});
+  double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) const {
+    PHYXEL_CUDA(cudaMemsetAsync(product_.data(), 0, product_.bytes(), m_.stream()));
+    m_.launch_tiles("multiply_tiles", multiply_tiles<Real>, a.data(), b.data(), m_.places(),
+                    product_.data());
+    m_.wait();
+    ExactSum sum;
+    std::ranges::copy(fetched(product_), sum.ready().begin());
+    if (m_.share()) m_.share()->others->add(sum.ready());
+    return sum.value();
   }
   void scale(DeviceArray<Real>& a, double factor) {
-    m_.launch_tiles("scale", scale_vector<Real>, a.data(), static_cast<Real>(factor));
+    m_.launch_tiles("scale", scale_vector<Real>, a.data(), m_.places(), static_cast<Real>(factor));
   }
 
   const DeviceModel<Real, StateReal>& m_;
   const Passes<Real, StateReal>& passes_;
   Real amplitude_;
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
+  DeviceArray<unsigned long long> product_;
   DeviceArray<Real> previous_, current_, next_, force_;
 };
 

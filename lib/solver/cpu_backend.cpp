@@ -176,6 +176,11 @@ class CpuBackend final : public Backend {
     surfels_->advect(records, threads_, out);
   }
 
+  std::optional<Exchanges> exchanges() const override {
+    if (!model_.share) return std::nullopt;
+    return Exchanges{"MPI", model_.share->others->traffic()};
+  }
+
   std::vector<ArrayBytes> memory() const override {
     std::vector<ArrayBytes> list{
         {"point records", points_.size() * sizeof(Real)},

@@ -178,6 +178,12 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
           }
           return there;
         };
+        const auto is_ghost = [&](Index place) { return place >= tiling.own_tiles * tile_size; };
+        const std::vector<Index> near = halo(tiling.neighbours, tile),
+                                 inverse = halo(tiling.second(), tile);
+        EXPECT_EQ(std::any_of(near.begin(), near.end(), is_ghost) ||
+                      std::any_of(inverse.begin(), inverse.end(), is_ghost),
+                  tile >= tiling.interior_tiles);
         std::vector<Index> here;
         for (const Index place : halo(tiling.second(), tile)) here.push_back(places[number(place)]);
         EXPECT_EQ(here, halo(expected.second(), other));

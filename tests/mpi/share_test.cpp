@@ -5,11 +5,14 @@
 #include <random>
 
 #include "../partition/bodies.hpp"
+#include "device.hpp"
 #include "mpi/halo.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/solver.hpp"
 #include "ranks.hpp"
+#include "setup/tiling.hpp"
+#include "solver/cuda_backend.hpp"
 
 namespace phyxel {
 namespace {
@@ -59,17 +62,35 @@ const Model& whole_of(const ShareCase& c) {
   return found != made.end() ? found->second : made.emplace(c.name, c.make()).first->second;
 }
 
-class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, int>> {
+/// What steps a share, and how values travel.
+enum class Way { one_ring, two_rings, gpu_direct, gpu_host };
+
+class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
  protected:
-  Shares() {
-    const int rings = std::get<1>(GetParam());
+  bool on_gpus() const { return way_ == Way::gpu_direct || way_ == Way::gpu_host; }
+  void SetUp() override {
+    if (on_gpus() && world().smallest(std::int64_t{!cuda_devices().empty()}) == 0) {
+      GTEST_SKIP() << "no CUDA device";
+    }
+    const int rings = way_ == Way::two_rings ? 2 : 1, parts = world().size();
     const Graph graph = phyxel_graph(whole_);
+    const Groups tiles = curve_groups(whole_, cuda::tile_size);
     // METIS asks the C library for random numbers: one rank's answer serves all.
-    const auto partitioner = static_cast<Partitioner>((rings + world().size()) % 3);
-    part_of_ = world().broadcast(make_partition(graph, world().size(), partitioner));
-    ModelShare share = share_of(
-        whole_, make_halo_plans(graph, part_of_, world().size(), rings)[world().rank()], part_of_);
+    const auto partitioner = static_cast<Partitioner>((static_cast<int>(way_) + parts) % 3);
+    part_of_ = world().broadcast(
+        on_gpus()
+            ? ungrouped(make_partition(grouped_graph(graph, tiles), parts, partitioner), tiles)
+            : make_partition(graph, parts, partitioner));
+    ModelShare share =
+        share_of(whole_, make_halo_plans(graph, part_of_, parts, rings)[world().rank()], part_of_);
+    if (on_gpus()) share.share.place = values_of(share.share, cuda::whole_places(whole_));
     model_ = connected(world(), std::move(share));
+  }
+  std::unique_ptr<Backend> backend(const Model& model, Precision precision) const {
+    if (!on_gpus()) return make_cpu_backend(model, precision, 1);
+    const auto devices = static_cast<int>(cuda_devices().size());
+    return make_cuda_backend(model, precision, world().host_rank() % devices, CudaPath::automatic,
+                             way_ == Way::gpu_direct ? Transport::direct : Transport::host);
   }
   State start(const Model& model) const {
     State state;
@@ -84,6 +105,7 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, int>> {
   }
 
   const Model& whole_ = whole_of(std::get<0>(GetParam()));
+  const Way way_ = std::get<1>(GetParam());
   std::vector<int> part_of_;
   Model model_;
 };
@@ -97,8 +119,7 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     const int steps =
         std::get<0>(GetParam()).name == std::string("Cube") && precision == Precision::single ? 1000
                                                                                               : 30;
-    const auto alone = make_cpu_backend(whole_, precision, 1),
-               here = make_cpu_backend(model_, precision, 1);
+    const auto alone = backend(whole_, precision), here = backend(model_, precision);
     Solver whole(*alone, start_of_whole), share(*here, start_of_share);
     for (int s = 0; s < steps; ++s) {
       whole.step();
@@ -141,18 +162,44 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     EXPECT_THAT(different, ::testing::IsEmpty());
     EXPECT_EQ(world().sum(static_cast<std::int64_t>(q.position.size())),
               static_cast<std::int64_t>(p.position.size()));
+    world().barrier();  // before memory that others store into goes
   }
 }
 
+/// Each step's surfels, and diagnostics between steps, change nothing: exchanges keep their order.
+TEST_P(Shares, MayBeLookedAtAtAnyTime) {
+  const State start_of_share = start(model_);
+  const auto here = backend(model_, Precision::single),
+             watched = backend(model_, Precision::single);
+  Solver a(*here, start_of_share), b(*watched, start_of_share);
+  for (int s = 0; s < 40; ++s) {
+    a.step();
+    b.step();
+    if (s % 3 == 0) watched->update_surfels();
+    if (s % 7 == 2) diagnose(model_, *watched, s, start_of_share.dt);
+    if (s % 11 == 5) b.state();
+  }
+  const State x = a.state(), y = b.state();
+  std::vector<Index> different;
+  for (Index i = 0; i < model_.size(); ++i) {
+    if (model_.owns(i) && !(x.displacement[i] == y.displacement[i])) different.push_back(i);
+  }
+  EXPECT_THAT(different, ::testing::IsEmpty());
+  world().barrier();
+}
+
 TEST_P(Shares, AreAsStiffAsTheWholeToTheLastBit) {
-  const StepLimit one = step_limit(whole_, 1), all = step_limit(model_, 1);
+  const auto alone = backend(whole_, Precision::double_),
+             here = backend(model_, Precision::double_);
+  const StepLimit one = step_limit(whole_, *alone), all = step_limit(model_, *here);
+  world().barrier();
   EXPECT_EQ(one.omega_max, all.omega_max);
   EXPECT_EQ(one.iterations, all.iterations);
   EXPECT_EQ(one.sound_step, all.sound_step);
 }
 
 TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
-  const auto here = make_cpu_backend(model_, Precision::single, 1);
+  const auto here = backend(model_, Precision::single);
   State state = start(model_);
   const Index broken = whole_.size() - 1;
   for (Index i = 0; i < model_.size(); ++i) {
@@ -160,18 +207,22 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
   }
   here->upload(state);
   const Diagnostics d = diagnose(model_, *here, 0, state.dt);
+  world().barrier();
   ASSERT_GE(d.bad_phyxel, 0);  // it, or a neighbour that its NaN has reached
   EXPECT_LE(norm(whole_.position[d.bad_phyxel] - whole_.position[broken]),
             2 * whole_.neighbourhood.support[broken]);
 }
 
+std::string name_of(const ::testing::TestParamInfo<std::tuple<ShareCase, Way>>& test) {
+  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuHost"};
+  const auto& [body, way] = test.param;
+  return std::string(body.name) + ways[static_cast<int>(way)];
+}
 INSTANTIATE_TEST_SUITE_P(Bodies, Shares,
                          ::testing::Combine(::testing::ValuesIn(share_cases()),
-                                            ::testing::Values(1, 2)),
-                         [](const auto& test) {
-                           return std::string(std::get<0>(test.param).name) +
-                                  (std::get<1>(test.param) == 1 ? "OneRing" : "TwoRings");
-                         });
+                                            ::testing::Values(Way::one_ring, Way::two_rings,
+                                                              Way::gpu_direct, Way::gpu_host)),
+                         name_of);
 
 }  // namespace
 }  // namespace phyxel

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/share.hpp"
 #include "phyxel/state.hpp"
 
 namespace phyxel {
@@ -15,6 +16,12 @@ namespace phyxel {
 struct ArrayBytes {
   std::string name;
   std::size_t bytes = 0;
+};
+
+/// How a share's values travel between ranks.
+struct Exchanges {
+  std::string transport;  ///< e.g. "MPI".
+  Traffic traffic;        ///< Of this rank, since the start.
 };
 
 /// A model at rest as Lanczos' iteration sees it: three vectors of three numbers a phyxel, on one
@@ -74,6 +81,9 @@ class Backend {
   /// For the step limit; nothing where that is left to the host. It may use the arrays of this
   /// backend: a state is to be uploaded after.
   virtual std::unique_ptr<Vibration> vibration() { return nullptr; }
+
+  /// Of a share: how it exchanges values with the others, and what that has cost it.
+  virtual std::optional<Exchanges> exchanges() const { return std::nullopt; }
 
   virtual std::vector<ArrayBytes> memory() const = 0;
   /// Bytes one step must move at the least: each array once for every pass that reads or writes it.

@@ -28,8 +28,18 @@ struct Traffic {
   double seconds = 0;  ///< For packing, waiting and unpacking.
 };
 
-/// The other ranks, as one of them sees them. Every function is collective: all ranks call it, in
-/// the same order.
+/// Another rank that has ghosts of this one, or of which this one has ghosts: if A is one of B's,
+/// then B is one of A's.
+struct Peer {
+  int rank = 0;
+  bool same_host = false;
+  /// Phyxels here that it gets, and that come from it; both sides have them in the order of their
+  /// numbers in the whole model.
+  std::vector<Index> send, receive;
+};
+
+/// The other ranks, as one of them sees them. Every function but `peers` and `traffic` is
+/// collective: all ranks call it, in the same order.
 class Others {
  public:
   virtual ~Others() = default;
@@ -37,12 +47,22 @@ class Others {
   virtual void add(std::span<std::int64_t> values) const = 0;
   virtual double largest(double value) const = 0;
   virtual double smallest(double value) const = 0;
+
+  virtual const std::vector<Peer>& peers() const = 0;
+  /// What each peer is told, by peer, and so what they tell.
+  virtual std::vector<std::vector<std::byte>> told(
+      const std::vector<std::vector<std::byte>>& words) const = 0;
+
+  /// Sends `outgoing` of each peer to it, and takes `incoming` from it. Between `begin` and
+  /// `finish` neither may be touched, and nothing else may begin.
+  using Bytes = std::vector<std::span<std::byte>>;
+  virtual void begin(const Bytes& outgoing, const Bytes& incoming) const = 0;
   /// Copies values from the ranks that own phyxels to those that have them as ghosts: `begin`
   /// takes them, and `finish` puts them there. Between the two, neither what is sent nor ghosts'
   /// values may be touched, and nothing else may begin.
   virtual void begin(const Records& records) const = 0;
   virtual void finish() const = 0;
-  /// Since the start. Of this rank: not collective.
+  /// Of those two, since the start.
   virtual Traffic traffic() const = 0;
 };
 

@@ -1,0 +1,484 @@
+/// What GPUs send each other: values of phyxels, from the ranks that own them to those that have
+/// them as ghosts.
+///
+/// Two ways. *Direct*: a kernel stores the records where the other ranks' kernels read them, in
+/// memory that CUDA IPC has opened, then raises a flag there; the other side's queue waits for the
+/// flag. The host takes no part. *Host*: a kernel packs, the host copies, MPI carries. Either way
+/// `begin` and `finish` only queue what the device does, so that what is launched in between
+/// overlaps.
+///
+/// Nothing says that an array may be written again, because the order of a step says it: who sends
+/// stresses has received displacements, which their owner sends after it has read the stresses of
+/// the step before; and the other way round. Whoever leaves that order (`upload`) has to meet the
+/// others on the host first.
+#pragma once
+
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "solver/cuda_backend.hpp"
+#include "solver/device_model.cuh"
+
+namespace phyxel::cuda {
+
+/// What a step sends, in this order.
+enum class Sent : int { stresses, displacements };
+inline constexpr int kinds_sent = 2;
+
+/// One record's way: from a place here to a place of a peer.
+struct Crossing {
+  Index here, there;
+  int peer;
+};
+
+__device__ inline void raise(unsigned* flag, unsigned value) {
+  asm volatile("st.release.sys.global.u32 [%0], %1;" ::"l"(flag), "r"(value) : "memory");
+}
+__device__ inline unsigned look_at(const unsigned* flag) {
+  unsigned value;
+  asm volatile("ld.acquire.sys.global.u32 %0, [%1];" : "=r"(value) : "l"(flag) : "memory");
+  return value;
+}
+
+/// Flags and counters of one kind of exchange.
+struct Signals {
+  unsigned* const* there;  ///< The flag of this rank in each peer's memory.
+  unsigned* here;          ///< Those of the peers, in this rank's.
+  int peers;
+  unsigned *sent, *received, *blocks_done;  ///< Exchanges so far; blocks of the one under way.
+  unsigned long long* waited;               ///< [ns]
+};
+
+/// Stores the records of `crossings` with the peers; the last block then tells them.
+template <class Records>
+__global__ void store_at_peers(const __grid_constant__ Records records, const Records* peers,
+                               const Crossing* crossings, int count,
+                               const __grid_constant__ Signals signals) {
+  const int stride = static_cast<int>(gridDim.x * blockDim.x);
+  for (int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); k < count; k += stride) {
+    const Crossing c = crossings[k];
+    peers[c.peer].set(static_cast<std::size_t>(c.there),
+                      records.get(static_cast<std::size_t>(c.here)));
+  }
+  __threadfence_system();
+  __syncthreads();
+  __shared__ bool last;
+  if (threadIdx.x == 0) last = atomicAdd(signals.blocks_done, 1U) == gridDim.x - 1;
+  __syncthreads();
+  if (!last) return;
+  const unsigned exchanges = *signals.sent + 1;
+  __threadfence_system();
+  __syncthreads();
+  if (threadIdx.x == 0) {
+    *signals.blocks_done = 0;
+    *signals.sent = exchanges;
+  }
+  for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
+       p += static_cast<int>(blockDim.x)) {
+    raise(signals.there[p], exchanges);
+  }
+}
+
+/// One block: waits until every peer has told of the next exchange.
+__global__ inline void wait_for_peers(const __grid_constant__ Signals signals) {
+  const unsigned next = *signals.received + 1;
+  unsigned long long start = 0, end = 0;
+  asm volatile("mov.u64 %0, %globaltimer;" : "=l"(start));
+  for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
+       p += static_cast<int>(blockDim.x)) {
+    while (static_cast<int>(look_at(signals.here + p) - next) < 0) __nanosleep(50);
+  }
+  __syncthreads();
+  if (threadIdx.x > 0) return;
+  asm volatile("mov.u64 %0, %globaltimer;" : "=l"(end));
+  *signals.received = next;
+  *signals.waited += end - start;
+}
+
+template <class Records>
+__global__ void pack(const __grid_constant__ Records records, const Index* place, int count,
+                     typename Records::Value* packed) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k < count) packed[k] = records.get(static_cast<std::size_t>(place[k]));
+}
+template <class Records>
+__global__ void unpack(const __grid_constant__ Records records, const Index* place, int count,
+                       const typename Records::Value* packed) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k < count) records.set(static_cast<std::size_t>(place[k]), packed[k]);
+}
+
+/// Host memory that copies to and from the device need not stage.
+class PinnedBytes {
+ public:
+  PinnedBytes() = default;
+  PinnedBytes(const PinnedBytes&) = delete;
+  PinnedBytes& operator=(const PinnedBytes&) = delete;
+  ~PinnedBytes() { cudaFreeHost(data_); }
+  std::byte* data() const { return data_; }
+  void reserve(std::size_t bytes) {
+    if (bytes <= size_) return;
+    cudaFreeHost(std::exchange(data_, nullptr));
+    size_ = 0;
+    void* memory = nullptr;
+    PHYXEL_CUDA(cudaMallocHost(&memory, bytes));
+    data_ = static_cast<std::byte*>(memory);
+    size_ = bytes;
+  }
+
+ private:
+  std::byte* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// Where each peer's records are, one peer after the other.
+class PeerLists {
+ public:
+  PeerLists(const std::vector<Peer>& peers, std::vector<Index> Peer::*list,
+            const std::vector<Index>& place_of) {
+    for (const Peer& peer : peers) {
+      for (const Index i : peer.*list) places.push_back(place_of[i]);
+      counts.push_back((peer.*list).size());
+    }
+    on_device = sent(places, "places that ranks exchange");
+  }
+  int count() const { return static_cast<int>(places.size()); }
+  /// The bytes of each peer in `memory`.
+  Others::Bytes in(std::byte* memory, std::size_t bytes_each) const {
+    Others::Bytes bytes;
+    for (const std::size_t count : counts) {
+      bytes.emplace_back(memory, count * bytes_each);
+      memory += count * bytes_each;
+    }
+    return bytes;
+  }
+
+  std::vector<Index> places;
+  std::vector<std::size_t> counts;
+  DeviceArray<Index> on_device;
+};
+
+/// Exchanges through host memory.
+template <class Model>
+class HostExchange {
+ public:
+  HostExchange(const Model& model, const PeerLists& send, const PeerLists& receive)
+      : m_(model), send_(send), receive_(receive) {}
+
+  template <class Records>
+  void begin(const Records& records) {
+    using Value = typename Records::Value;
+    reserve(sizeof(Value));
+    m_.launch_each("pack", pack<Records>, send_.count(), records, send_.on_device.data(),
+                   send_.count(), reinterpret_cast<Value*>(packed_.data()));
+    // Copies have a queue of their own; it begins when all before has been packed.
+    PHYXEL_CUDA(cudaEventRecord(packed_now_.get(), m_.stream()));
+    PHYXEL_CUDA(cudaStreamWaitEvent(copies_.get(), packed_now_.get()));
+    PHYXEL_CUDA(cudaMemcpyAsync(outgoing_.data(), packed_.data(), send_.count() * sizeof(Value),
+                                cudaMemcpyDeviceToHost, copies_.get()));
+  }
+  template <class Records>
+  void finish(const Records& records) {
+    using Value = typename Records::Value;
+    PHYXEL_CUDA(cudaStreamSynchronize(copies_.get()));
+    const Others& others = *m_.share()->others;
+    others.begin(send_.in(outgoing_.data(), sizeof(Value)),
+                 receive_.in(incoming_.data(), sizeof(Value)));
+    others.finish();
+    PHYXEL_CUDA(cudaMemcpyAsync(arrived_.data(), incoming_.data(), receive_.count() * sizeof(Value),
+                                cudaMemcpyHostToDevice, copies_.get()));
+    PHYXEL_CUDA(cudaEventRecord(arrived_now_.get(), copies_.get()));
+    PHYXEL_CUDA(cudaStreamWaitEvent(m_.stream(), arrived_now_.get()));
+    m_.launch_each("unpack", unpack<Records>, receive_.count(), records, receive_.on_device.data(),
+                   receive_.count(), reinterpret_cast<const Value*>(arrived_.data()));
+  }
+  std::size_t bytes() const { return packed_.bytes() + arrived_.bytes(); }
+
+ private:
+  /// Only between exchanges: nothing is under way.
+  void reserve(std::size_t bytes_each) {
+    if (bytes_each <= bytes_each_) return;
+    m_.wait();
+    bytes_each_ = bytes_each;
+    packed_ = {send_.places.size() * bytes_each, "what other ranks get"};
+    arrived_ = {receive_.places.size() * bytes_each, "what other ranks send"};
+    outgoing_.reserve(packed_.size());
+    incoming_.reserve(arrived_.size());
+  }
+
+  const Model& m_;
+  const PeerLists &send_, &receive_;
+  std::size_t bytes_each_ = 0;
+  DeviceArray<std::byte> packed_, arrived_;
+  PinnedBytes outgoing_, incoming_;
+  Stream copies_;
+  Event packed_now_, arrived_now_;
+};
+
+/// Memory of another rank, opened here.
+class OpenedMemory {
+ public:
+  explicit OpenedMemory(const cudaIpcMemHandle_t& handle) {
+    PHYXEL_CUDA(cudaIpcOpenMemHandle(&data_, handle, cudaIpcMemLazyEnablePeerAccess));
+  }
+  OpenedMemory(OpenedMemory&& other) noexcept : data_(std::exchange(other.data_, nullptr)) {}
+  OpenedMemory& operator=(OpenedMemory&&) = delete;
+  ~OpenedMemory() {
+    if (data_) cudaIpcCloseMemHandle(data_);
+  }
+  void* data() const { return data_; }
+
+ private:
+  void* data_ = nullptr;
+};
+
+/// Exchanges by stores into the memory of other ranks' GPUs.
+template <class Real, class StateReal>
+class DirectExchange {
+  using Model = DeviceModel<Real, StateReal>;
+
+ public:
+  /// Collective. @throws DeviceError if memory cannot be shared or opened; on this rank alone, and
+  ///   after all that is collective
+  DirectExchange(const Model& model, const PeerLists& receive) : m_(model) {
+    const std::size_t count = m_.share()->others->peers().size();
+    std::vector<std::vector<std::byte>> words(count);
+    std::string trouble;
+    try {
+      make_flags(count);
+      words = invitations(receive, count);
+    } catch (const DeviceError& error) {
+      trouble = error.what();
+    }
+    const std::vector<std::vector<std::byte>> heard = m_.share()->others->told(words);
+    if (!trouble.empty()) throw DeviceError(trouble);
+    open(heard);
+  }
+
+  void begin(Sent what) const {
+    if (what == Sent::stresses) {
+      store(m_.fields().stresses, stresses_.data(), what);
+    } else {
+      store(m_.fields().points, points_.data(), what);
+    }
+  }
+  void finish(Sent what) const {
+    if (signals_[0].peers == 0) return;
+    wait_for_peers<<<1, warp_size, 0, m_.stream()>>>(signals_[static_cast<int>(what)]);
+    m_.launched("wait_for_peers", 1, warp_size);
+  }
+  double waited_seconds() const {
+    m_.wait();
+    double sum = 0;
+    for (const unsigned long long ns : fetched(waited_)) sum += 1e-9 * static_cast<double>(ns);
+    return sum;
+  }
+  std::size_t bytes() const {
+    return flags_.bytes() + counters_.bytes() + crossings_.bytes() + points_.bytes() +
+           stresses_.bytes();
+  }
+
+ private:
+  /// What a peer needs to store here; then the places of what it sends.
+  struct Invitation {
+    cudaIpcMemHandle_t points, stresses, flags;
+    std::uint64_t places;
+    std::int32_t flag, of_flags;  ///< Its own among those of a kind, and how many those are.
+  };
+
+  void make_flags(std::size_t count) {
+    flags_ = {kinds_sent * count, "flags of ranks"};
+    counters_ = {3 * kinds_sent, "counts of exchanges"};
+    waited_ = {kinds_sent, "waiting times"};
+    PHYXEL_CUDA(cudaMemset(flags_.data(), 0, flags_.bytes()));
+    PHYXEL_CUDA(cudaMemset(counters_.data(), 0, counters_.bytes()));
+    PHYXEL_CUDA(cudaMemset(waited_.data(), 0, waited_.bytes()));
+    PHYXEL_CUDA(cudaDeviceSynchronize());  // before anyone may raise a flag
+  }
+  std::vector<std::vector<std::byte>> invitations(const PeerLists& receive,
+                                                  std::size_t count) const {
+    std::vector<std::vector<std::byte>> words(count);
+    std::size_t first = 0;
+    for (std::size_t p = 0; p < count; ++p) {
+      Invitation invitation{};
+      PHYXEL_CUDA(cudaIpcGetMemHandle(&invitation.points, m_.points_memory()));
+      PHYXEL_CUDA(cudaIpcGetMemHandle(&invitation.stresses, m_.stresses_memory()));
+      PHYXEL_CUDA(cudaIpcGetMemHandle(&invitation.flags, flags_.data()));
+      invitation.places = m_.places();
+      invitation.flag = static_cast<std::int32_t>(p);
+      invitation.of_flags = static_cast<std::int32_t>(count);
+      const std::size_t places = receive.counts[p] * sizeof(Index);
+      words[p].resize(sizeof(Invitation) + places);
+      std::memcpy(words[p].data(), &invitation, sizeof(Invitation));
+      if (places) std::memcpy(words[p].data() + sizeof(Invitation), &receive.places[first], places);
+      first += receive.counts[p];
+    }
+    return words;
+  }
+  void open(const std::vector<std::vector<std::byte>>& heard) {
+    const std::vector<Peer>& peers = m_.share()->others->peers();
+    std::vector<Points<Real>> points;
+    std::vector<Stresses<Real>> stresses;
+    std::vector<unsigned*> their_flags[kinds_sent];
+    std::vector<Crossing> crossings;
+    for (std::size_t p = 0; p < peers.size(); ++p) {
+      if (heard[p].size() < sizeof(Invitation)) {
+        throw DeviceError("rank " + std::to_string(peers[p].rank) + " cannot share its memory");
+      }
+      Invitation invitation;
+      std::memcpy(&invitation, heard[p].data(), sizeof(Invitation));
+      std::vector<Index> there(peers[p].send.size());
+      if (!there.empty()) {
+        std::memcpy(there.data(), heard[p].data() + sizeof(Invitation),
+                    there.size() * sizeof(Index));
+      }
+      for (std::size_t k = 0; k < there.size(); ++k) {
+        crossings.push_back({m_.tiling().place[peers[p].send[k]], there[k], static_cast<int>(p)});
+      }
+      const auto opened = [&](const cudaIpcMemHandle_t& handle) {
+        return opened_.emplace_back(handle).data();
+      };
+      const auto places = static_cast<std::size_t>(invitation.places);
+      points.push_back(Points<Real>::in(opened(invitation.points), places));
+      stresses.push_back(Stresses<Real>::in(opened(invitation.stresses), places));
+      auto* at = static_cast<unsigned*>(opened(invitation.flags));
+      for (int kind = 0; kind < kinds_sent; ++kind) {
+        their_flags[kind].push_back(at + kind * invitation.of_flags + invitation.flag);
+      }
+    }
+    points_ = sent(points, "peers");
+    stresses_ = sent(stresses, "peers");
+    crossings_ = sent(crossings, "what other ranks get");
+    for (int kind = 0; kind < kinds_sent; ++kind) {
+      their_flags_[kind] = sent(their_flags[kind], "peers");
+      unsigned* const counter = counters_.data() + 3 * kind;
+      signals_[kind] = {their_flags_[kind].data(),
+                        flags_.data() + static_cast<std::size_t>(kind) * peers.size(),
+                        static_cast<int>(peers.size()),
+                        counter,
+                        counter + 1,
+                        counter + 2,
+                        waited_.data() + kind};
+    }
+  }
+  template <class Records>
+  void store(const Records& own, const Records* peers, Sent what) const {
+    const Signals& signals = signals_[static_cast<int>(what)];
+    if (signals.peers == 0) return;
+    const auto count = static_cast<int>(crossings_.size());
+    const unsigned blocks = std::clamp(blocks_for(count), 1U, 4U * m_.device().multiprocessors);
+    store_at_peers<Records>
+        <<<blocks, tile_size, 0, m_.stream()>>>(own, peers, crossings_.data(), count, signals);
+    m_.launched("store_at_peers", blocks, tile_size);
+  }
+
+  const Model& m_;
+  std::vector<OpenedMemory> opened_;
+  DeviceArray<unsigned> flags_, counters_;
+  DeviceArray<unsigned long long> waited_;
+  DeviceArray<Crossing> crossings_;
+  DeviceArray<Points<Real>> points_;
+  DeviceArray<Stresses<Real>> stresses_;
+  DeviceArray<unsigned*> their_flags_[kinds_sent];
+  Signals signals_[kinds_sent]{};
+};
+
+/// The exchanges of one share.
+template <class Real, class StateReal>
+class DeviceHalo {
+  using Model = DeviceModel<Real, StateReal>;
+
+ public:
+  /// Collective. @throws DeviceError on all ranks if `wanted` cannot be had on one
+  DeviceHalo(const Model& model, Transport wanted)
+      : m_(model),
+        send_(others().peers(), &Peer::send, model.tiling().place),
+        receive_(others().peers(), &Peer::receive, model.tiling().place),
+        host_(model, send_, receive_) {
+    if (wanted != Transport::host) open_direct(wanted == Transport::direct);
+  }
+
+  /// What follows on the device may be launched at once, except for what changes what is sent.
+  void begin(Sent what) const {
+    under_way_[static_cast<int>(what)] = true;
+    if (direct_) {
+      direct_->begin(what);
+    } else if (what == Sent::stresses) {
+      host_.begin(m_.fields().stresses);
+    } else {
+      host_.begin(m_.fields().points);
+    }
+  }
+  /// What is launched from now on sees ghosts' values. Nothing happens if nothing is under way.
+  void finish(Sent what) const {
+    if (!std::exchange(under_way_[static_cast<int>(what)], false)) return;
+    if (direct_) {
+      direct_->finish(what);
+    } else if (what == Sent::stresses) {
+      host_.finish(m_.fields().stresses);
+    } else {
+      host_.finish(m_.fields().points);
+    }
+  }
+  bool is_under_way(Sent what) const { return under_way_[static_cast<int>(what)]; }
+  /// Other values, at once, through the host.
+  template <class Records>
+  void exchange(const Records& records) const {
+    host_.begin(records);
+    host_.finish(records);
+  }
+
+  bool is_direct() const { return direct_ != nullptr; }
+  /// For `traffic`: graphs pass `begin` by.
+  void count_steps(int steps) const {
+    bytes_sent_ += static_cast<std::int64_t>(send_.places.size()) * steps *
+                   (Stresses<Real>::bytes + Points<Real>::bytes);
+  }
+  std::string describe() const {
+    return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : "host memory and MPI";
+  }
+  Traffic traffic() const {
+    return {bytes_sent_, direct_ ? direct_->waited_seconds() : others().traffic().seconds};
+  }
+  std::size_t bytes() const {
+    return send_.on_device.bytes() + receive_.on_device.bytes() + host_.bytes() +
+           (direct_ ? direct_->bytes() : 0);
+  }
+
+ private:
+  const Others& others() const { return *m_.share()->others; }
+  void open_direct(bool insist) {
+    std::string trouble;
+    const std::vector<Peer>& peers = others().peers();
+    bool one_host = true;
+    for (const Peer& peer : peers) one_host = one_host && peer.same_host;
+    // All ranks take the same way.
+    if (others().smallest(one_host) > 0) {
+      try {
+        direct_ = std::make_unique<DirectExchange<Real, StateReal>>(m_, receive_);
+      } catch (const DeviceError& error) {
+        trouble = error.what();
+        cudaGetLastError();  // it is told of below
+      }
+    } else {
+      trouble = "ranks of several hosts";
+    }
+    if (others().smallest(direct_ != nullptr) > 0) return;
+    direct_.reset();
+    if (!insist) return;
+    if (trouble.empty()) trouble = "another rank's memory cannot be opened";
+    throw DeviceError("--transport direct: " + trouble + "; allowed here: host, auto");
+  }
+
+  const Model& m_;
+  PeerLists send_, receive_;
+  mutable HostExchange<Model> host_;
+  std::unique_ptr<DirectExchange<Real, StateReal>> direct_;
+  mutable bool under_way_[kinds_sent]{};
+  mutable std::int64_t bytes_sent_ = 0;
+};
+
+}  // namespace phyxel::cuda

@@ -1,0 +1,92 @@
+/// What `Diagnostics` are made of: in whatever order, and on however many threads and ranks,
+/// phyxels are added, the same bits come out.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/share.hpp"
+
+namespace phyxel {
+
+/// Sums and extremes of phyxels. Phyxels go by their numbers in the whole model.
+struct Totals {
+  ExactSum kinetic_energy, strain_energy, volume_energy, gravity_energy, load_energy;
+  ExactSum force_scale, torque_scale;
+  ExactVector momentum, angular_momentum, internal_force, internal_torque;
+  std::int64_t inverted = 0;
+  double largest_displacement = 0, largest_speed = 0;
+  Index fastest = -1, first_bad = std::numeric_limits<Index>::max();
+
+  template <class Each>
+  void for_each_sum(Each&& each) {
+    each(kinetic_energy), each(strain_energy), each(volume_energy), each(gravity_energy);
+    each(load_energy), each(force_scale), each(torque_scale);
+    for (ExactVector* v : {&momentum, &angular_momentum, &internal_force, &internal_torque}) {
+      each(v->x), each(v->y), each(v->z);
+    }
+  }
+  /// Of equally fast ones the first.
+  void look_at_speed(double speed, Index phyxel) {
+    if (speed > largest_speed || (speed == largest_speed && fastest >= 0 && phyxel < fastest)) {
+      largest_speed = speed;
+      fastest = phyxel;
+    }
+  }
+  void add(Totals other) {
+    std::vector<ExactSum*> own;
+    for_each_sum([&](ExactSum& sum) { own.push_back(&sum); });
+    std::size_t k = 0;
+    other.for_each_sum([&](const ExactSum& sum) { own[k++]->add(sum); });
+    inverted += other.inverted;
+    largest_displacement = std::max(largest_displacement, other.largest_displacement);
+    if (other.fastest >= 0) look_at_speed(other.largest_speed, other.fastest);
+    first_bad = std::min(first_bad, other.first_bad);
+  }
+  void add_others(const Others& others) {
+    std::vector<std::int64_t> words{inverted};
+    for_each_sum([&](ExactSum& sum) {
+      const auto ready = sum.ready();
+      words.insert(words.end(), ready.begin(), ready.end());
+    });
+    others.add(words);
+    auto from = words.begin();
+    inverted = *from++;
+    for_each_sum([&](ExactSum& sum) {
+      for (std::int64_t& word : sum.ready()) word = *from++;
+    });
+    largest_displacement = others.largest(largest_displacement);
+    const double fastest_of_all = others.largest(largest_speed);
+    const double nobody = std::numeric_limits<double>::infinity();
+    const double who = others.smallest(
+        largest_speed == fastest_of_all && fastest >= 0 ? static_cast<double>(fastest) : nobody);
+    largest_speed = fastest_of_all;
+    fastest = who < nobody ? static_cast<Index>(who) : -1;
+    first_bad = static_cast<Index>(others.smallest(static_cast<double>(first_bad)));
+  }
+  Diagnostics values() const {
+    Diagnostics d;
+    d.kinetic_energy = kinetic_energy.value();
+    d.strain_energy = strain_energy.value();
+    d.volume_energy = volume_energy.value();
+    d.gravity_energy = gravity_energy.value();
+    d.load_energy = load_energy.value();
+    d.momentum = momentum.value();
+    d.angular_momentum = angular_momentum.value();
+    d.internal_force = internal_force.value();
+    d.internal_torque = internal_torque.value();
+    d.force_scale = force_scale.value();
+    d.torque_scale = torque_scale.value();
+    d.inverted = static_cast<Index>(inverted);
+    d.largest_displacement = largest_displacement;
+    d.largest_speed = largest_speed;
+    d.fastest_phyxel = fastest;
+    d.bad_phyxel = first_bad < std::numeric_limits<Index>::max() ? first_bad : -1;
+    return d;
+  }
+};
+
+}  // namespace phyxel
