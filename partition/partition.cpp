@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 #include <set>
 
 #include "model/space_filling_curve.hpp"
@@ -161,10 +162,16 @@ PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of,
     }
   }
   q.cut /= 2;  // seen from both ends
+  const double each = static_cast<double>(graph.total_weight()) / std::max(1, graph.vertices());
   const double mean = static_cast<double>(graph.total_weight()) / parts;
   if (mean > 0) {
     q.imbalance =
         static_cast<double>(*std::max_element(weight.begin(), weight.end())) / mean - 1;
+    q.slowest = 0;
+    for (std::size_t p = 0; p < weight.size(); ++p) {
+      const double work = static_cast<double>(weight[p]) + ghost_cost * each * ghosts[p];
+      q.slowest = std::max(q.slowest, work / mean);
+    }
   }
   q.ghosts = std::accumulate(ghosts.begin(), ghosts.end(), std::int64_t{0});
   q.most_ghosts = *std::max_element(ghosts.begin(), ghosts.end());
@@ -180,6 +187,25 @@ std::vector<int> ungrouped(const std::vector<int>& part_of_group, const Groups& 
   part_of.reserve(groups.of.size());
   for (const Index g : groups.of) part_of.push_back(part_of_group[g]);
   return part_of;
+}
+
+ChosenPartition choose_partition(const Graph& phyxels, const Groups* groups, int parts,
+                                 const std::vector<Partitioner>& candidates) {
+  const Graph coarse = groups ? grouped_graph(phyxels, *groups) : Graph{};
+  std::optional<ChosenPartition> best;
+  for (const Partitioner partitioner : candidates) {
+    ChosenPartition made{partitioner, {}, {}};
+    try {
+      made.part_of = groups ? ungrouped(make_partition(coarse, parts, partitioner), *groups)
+                            : make_partition(phyxels, parts, partitioner);
+    } catch (const InputError&) {
+      if (!best && partitioner == candidates.back()) throw;
+      continue;
+    }
+    made.quality = quality_of(phyxels, made.part_of, parts);
+    if (!best || made.quality.slowest < best->quality.slowest) best = std::move(made);
+  }
+  return std::move(*best);
 }
 
 }  // namespace phyxel

@@ -35,12 +35,33 @@ struct PartitionQuality {
   Index most_ghosts = 0;        ///< Of one part.
   int most_peers = 0;           ///< Parts that one part needs anything of.
   int empty = 0;                ///< Parts without vertices.
+  /// What the part with most to do has to do, over the mean weight: its own vertices, and for each
+  /// ghost `ghost_cost` of a vertex.
+  double slowest = 1;
 };
+/// An estimate: what a ghost costs, which is packed, sent and unpacked twice a step, of what a phyxel
+/// with its neighbours does.
+inline constexpr double ghost_cost = 0.3;
 
 /// @param graph the phyxels' own, so that ghosts are phyxels whatever was cut
 PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts);
 
 /// The part of each phyxel from that of its group.
 std::vector<int> ungrouped(const std::vector<int>& part_of_group, const Groups& groups);
+
+/// A partition of phyxels, and who made it.
+struct ChosenPartition {
+  Partitioner partitioner = Partitioner::metis;
+  std::vector<int> part_of;
+  PartitionQuality quality;
+};
+
+/// The partition whose slowest part has least to do; of equals the first candidate's. Partitioners
+/// that refuse the graph are passed over, unless all do.
+/// @param groups that stay whole, or null
+/// @param candidates at least one
+/// @throws InputError as `make_partition`
+ChosenPartition choose_partition(const Graph& phyxels, const Groups* groups, int parts,
+                                 const std::vector<Partitioner>& candidates);
 
 }  // namespace phyxel

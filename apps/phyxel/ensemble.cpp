@@ -10,11 +10,9 @@ namespace {
 
 const Communicator* the_ranks = nullptr;
 
-std::vector<int> partition_of(const Model& model, const Graph& graph, int parts,
-                              Partitioner partitioner, bool between_tiles) {
-  if (!between_tiles) return make_partition(graph, parts, partitioner);
-  const Groups tiles = curve_groups(model, cuda::tile_size);
-  return ungrouped(make_partition(grouped_graph(graph, tiles), parts, partitioner), tiles);
+std::vector<Partitioner> candidates_of(const std::string& name) {
+  if (name != "auto") return {partitioner_of(name)};
+  return {Partitioner::bisection, Partitioner::curve, Partitioner::metis};
 }
 
 }  // namespace
@@ -44,12 +42,17 @@ Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
   Graph graph;
   std::vector<int> part_of;
   ranks().together([&] {
-    const Partitioner partitioner = partitioner_of(cut.partitioner);
+    const std::vector<Partitioner> candidates = candidates_of(cut.partitioner);
     whole_ = std::make_unique<Model>(make());
     digest_ = model_digest(*whole_);
     graph = phyxel_graph(*whole_);
     // METIS takes random numbers from the C library: one rank's answer serves all.
-    if (rank == 0) part_of = partition_of(*whole_, graph, parts, partitioner, cut.between_tiles);
+    if (rank > 0) return;
+    const Groups tiles = cut.between_tiles ? curve_groups(*whole_, cuda::tile_size) : Groups{};
+    ChosenPartition chosen =
+        choose_partition(graph, cut.between_tiles ? &tiles : nullptr, parts, candidates);
+    partitioner_ = partitioner_name(chosen.partitioner);
+    part_of = std::move(chosen.part_of);
   });
   require_alike(digest_, "bodies");
   part_of = ranks().broadcast(part_of);

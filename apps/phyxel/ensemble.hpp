@@ -21,7 +21,8 @@ void require_alike(std::uint64_t value, const char* what);
 
 /// How a model is cut, and what its parts exchange.
 struct CutOptions {
-  std::string partitioner = "metis";
+  /// "metis", "curve", "bisection", or "auto": the one whose slowest part has least to do.
+  std::string partitioner = "auto";
   int rings = 1;               ///< See `Share`.
   bool between_tiles = false;  ///< For GPUs, which keep tiles whole.
 };
@@ -42,6 +43,7 @@ class Ensemble {
     std::int64_t fewest = 0, most = 0, most_ghosts = 0;
   };
   const Shares& shares() const { return shares_; }
+  const std::string& partitioner() const { return partitioner_; }  ///< On the first rank.
   /// Values of all phyxels, or of all surfels, on the first rank; nothing on the others.
   template <class T>
   std::vector<T> phyxels(const std::vector<T>& local) const {
@@ -79,6 +81,7 @@ class Ensemble {
   std::vector<Index> owned_;                                  // here
   std::vector<std::vector<Index>> numbers_, surfel_numbers_;  // [rank], on the first rank
   Shares shares_;
+  std::string partitioner_;
 };
 
 }  // namespace phyxel::app

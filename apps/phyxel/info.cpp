@@ -226,7 +226,7 @@ void add_info(CLI::App& program) {
     fs::path file;
     bool json = false;
     std::optional<int> parts;
-    std::string partitioner = "metis";
+    std::string partitioner = "auto";
   };
   auto options = std::make_shared<Options>();
   command->add_option("file", options->file, "File or folder")->required();
@@ -239,7 +239,7 @@ void add_info(CLI::App& program) {
           ->check(CLI::Range(1, 100'000));
   command
       ->add_option("--partitioner", options->partitioner,
-                   "Whose plan is shown: metis, curve, bisection")
+                   "Whose plan is shown: metis, curve, bisection, or auto, the best of them")
       ->needs(partition)
       ->capture_default_str();
   command->footer(

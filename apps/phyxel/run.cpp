@@ -382,7 +382,7 @@ class Run {
       fmt::print(
           "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
           "exchanged through {}\n",
-          ranks().size(), options_.cut.partitioner, shares.fewest, shares.most, shares.most_ghosts,
+          ranks().size(), ensemble_.partitioner(), shares.fewest, shares.most, shares.most_ghosts,
           options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings",
           transport_);
       if (!gpus_.empty()) fmt::print("  gpus        {}, by rank\n", fmt::join(gpus_, ", "));
@@ -560,8 +560,9 @@ void add_run(CLI::App& program) {
       "Continue from a checkpoint file, or from the newest in the output folder (auto)");
   command
       ->add_option("--partitioner", options->cut.partitioner,
-                   "How mpirun's ranks cut the bodies: metis, curve or bisection")
-      ->check(CLI::IsMember(partitioner_names()));
+                   "How mpirun's ranks cut the bodies: metis, curve, bisection, or auto, the best of "
+                   "the three")
+      ->check(CLI::IsMember(partitioner_names()) | CLI::IsMember({"auto"}));
   command
       ->add_option("--ghost-rings", options->cut.rings,
                    "1: ranks exchange displacements and stresses; 2: displacements of two "

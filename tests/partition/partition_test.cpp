@@ -15,7 +15,7 @@ namespace {
 
 using namespace phyxel::testing;
 
-constexpr Partitioner all_partitioners[] = {Partitioner::metis, Partitioner::curve,
+const std::vector<Partitioner> all_partitioners = {Partitioner::metis, Partitioner::curve,
                                             Partitioner::bisection};
 
 class Cut : public ::testing::TestWithParam<CutCase> {};
@@ -165,6 +165,32 @@ TEST(Partition, MetisFollowsTheWireOfACoil) {
   };
   EXPECT_LT(ghosts(Partitioner::metis), ghosts(Partitioner::bisection));
   EXPECT_LT(ghosts(Partitioner::metis), ghosts(Partitioner::curve));
+}
+
+TEST(Partition, TheChosenOneHasTheLeastSlowPart) {
+  for (const Model& model : {coil(), cube()}) {
+    const Graph graph = phyxel_graph(model);
+    const Groups groups = curve_groups(model, 32);
+    for (const Groups* whole : {static_cast<const Groups*>(nullptr), &groups}) {
+      const ChosenPartition chosen = choose_partition(graph, whole, 5, all_partitioners);
+      EXPECT_EQ(chosen.quality.slowest, quality_of(graph, chosen.part_of, 5).slowest);
+      EXPECT_GT(chosen.quality.slowest, 1);  // somebody has the mean, and ghosts
+      for (const Partitioner each : all_partitioners) {
+        EXPECT_LE(chosen.quality.slowest,
+                  choose_partition(graph, whole, 5, {each}).quality.slowest);
+      }
+      if (!whole) continue;
+      std::vector<int> part_of_group(static_cast<std::size_t>(groups.count), -1);
+      for (Index v = 0; v < graph.vertices(); ++v) {
+        int& part = part_of_group[groups.of[v]];
+        if (part < 0) part = chosen.part_of[v];
+        ASSERT_EQ(part, chosen.part_of[v]);
+      }
+    }
+  }
+  // METIS follows a wire, whose pieces have the fewest ghosts.
+  EXPECT_EQ(choose_partition(phyxel_graph(coil()), nullptr, 16, all_partitioners).partitioner,
+            Partitioner::metis);
 }
 
 TEST(Partition, HeavyVerticesAreSharedOut) {
