@@ -99,6 +99,12 @@ Device use_cuda_device(int index) {
   return devices[index];
 }
 
+bool cuda_peers(int from, int to) {
+  int can = 0;
+  PHYXEL_CUDA(cudaDeviceCanAccessPeer(&can, from, to));
+  return can != 0;
+}
+
 std::size_t cuda_free_memory() {
   std::size_t free = 0, total = 0;
   PHYXEL_CUDA(cudaMemGetInfo(&free, &total));

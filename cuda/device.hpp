@@ -24,6 +24,9 @@ std::vector<Device> cuda_devices(std::string* why = nullptr);
 ///   driver is too old, or if the program holds no kernels for the device's architecture.
 Device use_cuda_device(int index = 0);
 
+/// Whether kernels of one device may read and write another's memory.
+bool cuda_peers(int from, int to);
+
 /// Bytes free on the current device.
 std::size_t cuda_free_memory();
 

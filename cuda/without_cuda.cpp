@@ -23,6 +23,8 @@ Device use_cuda_device(int) {
                     ": allowed is the CPU, or a build with -DPHYXEL_CUDA=ON where nvcc is");
 }
 
+bool cuda_peers(int, int) { return false; }
+
 std::size_t cuda_free_memory() { return 0; }
 
 std::size_t cuda_measured_allocation(std::size_t, const std::string&) { return 0; }

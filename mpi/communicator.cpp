@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 #include <mpi.h>
+#if __has_include(<mpi-ext.h>)
+#include <mpi-ext.h>  // Open MPI's: whether it takes device memory
+#endif
 
 #include <algorithm>
 #include <cstdlib>
@@ -163,6 +166,18 @@ void Transfers::wait() {
   std::vector<MPI_Request>& list = requests_->list;
   PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(list.size()), list.data(), MPI_STATUSES_IGNORE));
   list.clear();
+}
+
+std::string mpi_description() {
+  char text[MPI_MAX_LIBRARY_VERSION_STRING] = "";
+  int length = 0;
+  MPI_Get_library_version(text, &length);
+  std::string name(text);
+  name = name.substr(0, name.find_first_of(",\n"));  // Open MPI goes on about who built it
+#ifdef MPIX_CUDA_AWARE_SUPPORT
+  name += MPIX_Query_cuda_support() ? ", CUDA-aware" : ", not CUDA-aware";
+#endif
+  return name;
 }
 
 void Communicator::abort(ExitCode code) const {

@@ -125,6 +125,9 @@ class Communicator {
 /// Whether mpirun, srun or another launcher has started this program as one of several.
 bool launched_as_rank();
 
+/// e.g. "Open MPI v4.1.4, not CUDA-aware", or that there is none.
+std::string mpi_description();
+
 /// Messages under way between this rank and others, whose lengths both sides know. Not collective.
 class Transfers {
  public:

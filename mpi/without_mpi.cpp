@@ -41,6 +41,8 @@ void Transfers::receive(int, std::span<std::byte>) {}  // there is nobody
 void Transfers::send(int, std::span<const std::byte>) {}
 void Transfers::wait() {}
 
+std::string mpi_description() { return "none: this program was built without it"; }
+
 void Communicator::abort(ExitCode code) const { std::_Exit(static_cast<int>(code)); }
 
 }  // namespace phyxel

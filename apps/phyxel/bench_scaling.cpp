@@ -160,9 +160,9 @@ void add_bench_scaling(CLI::App& bench) {
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
-  command->add_option("--partitioner", options->partitioners, "metis, curve, bisection")
+  command->add_option("--partitioner", options->partitioners, "metis, curve, bisection, auto")
       ->delimiter(',')
-      ->check(CLI::IsMember(partitioner_names()));
+      ->check(CLI::IsMember(partitioner_choices()));
   command->add_option("--device", options->device, device_help);
   command->add_option("--transport", options->transport, "auto, direct, host: between GPUs")
       ->check(CLI::IsMember(transport_names()));

@@ -14,5 +14,6 @@ void add_export(CLI::App& program);
 void add_render(CLI::App& program);
 void add_bench(CLI::App& program);
 void add_paper(CLI::App& program);
+void add_doctor(CLI::App& program);
 
 }  // namespace phyxel::app

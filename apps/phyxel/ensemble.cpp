@@ -23,6 +23,12 @@ const Communicator& ranks() {
 }
 void set_ranks(const Communicator& ranks) { the_ranks = &ranks; }
 
+std::vector<std::string> partitioner_choices() {
+  std::vector<std::string> names = partitioner_names();
+  names.push_back("auto");
+  return names;
+}
+
 void require_alike(std::uint64_t value, const char* what) {
   const auto signed_value = static_cast<std::int64_t>(value);
   if (ranks().smallest(signed_value) == ranks().largest(signed_value)) return;

@@ -19,6 +19,9 @@ void set_ranks(const Communicator& ranks);
 /// @throws AgreedError if it is not the same number on all ranks. Collective.
 void require_alike(std::uint64_t value, const char* what);
 
+/// Names of partitioners, and "auto".
+std::vector<std::string> partitioner_choices();
+
 /// How a model is cut, and what its parts exchange.
 struct CutOptions {
   /// "metis", "curve", "bisection", or "auto": the one whose slowest part has least to do.

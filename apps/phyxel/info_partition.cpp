@@ -106,13 +106,13 @@ std::string partition_tables(const Facts& facts) {
   for (const Facts& cut : facts["cuts"]) {
     const auto ghosts = cut["ghosts"].get<std::int64_t>();
     const int empty = cut["empty parts"].get<int>();
-    text += fmt::format("  {:<8} {:<10} {:>8.2f}% {:>12} {:>12} {:>6.1f}% {:>9} {:>7} {:>8.3f} {:>8.3f}{}\n",
-                        cut["cut"].get<std::string>(), cut["partitioner"].get<std::string>(),
-                        100 * cut["imbalance"].get<double>(), cut["cut pairs"].get<std::int64_t>(),
-                        ghosts, n > 0 ? 100 * static_cast<double>(ghosts) / n : 0,
-                        cut["most ghosts"].get<Index>(), cut["most peers"].get<int>(),
-                        cut["slowest"].get<double>(), cut["seconds"].get<double>(),
-                        empty > 0 ? fmt::format("  ({} parts empty)", empty) : "");
+    text += fmt::format(
+        "  {:<8} {:<10} {:>8.2f}% {:>12} {:>12} {:>6.1f}% {:>9} {:>7} {:>8.3f} {:>8.3f}{}\n",
+        cut["cut"].get<std::string>(), cut["partitioner"].get<std::string>(),
+        100 * cut["imbalance"].get<double>(), cut["cut pairs"].get<std::int64_t>(), ghosts,
+        n > 0 ? 100 * static_cast<double>(ghosts) / n : 0, cut["most ghosts"].get<Index>(),
+        cut["most peers"].get<int>(), cut["slowest"].get<double>(), cut["seconds"].get<double>(),
+        empty > 0 ? fmt::format("  ({} parts empty)", empty) : "");
   }
   for (const Facts& note : facts["notes"]) text += "  " + note.get<std::string>() + "\n";
   text += fmt::format(

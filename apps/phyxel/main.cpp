@@ -9,6 +9,7 @@
 
 #include "command.hpp"
 #include "ensemble.hpp"
+#include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
 #include "version.hpp"
 
@@ -32,14 +33,15 @@ int fail(phyxel::ExitCode code, const char* message, bool agreed = false) {
 
 /// What several ranks can do.
 void check_ranks(const CLI::App& program) {
-  if (ranks().size() == 1 || program.got_subcommand("run") ||
+  if (ranks().size() == 1 || program.got_subcommand("run") || program.got_subcommand("doctor") ||
       program.get_subcommand("bench")->got_subcommand("scaling")) {
     return;
   }
-  throw phyxel::AgreedError(phyxel::ExitCode::bad_input,
-                            fmt::format("{} ranks: allowed with \"phyxel run\" and \"phyxel bench "
-                                        "scaling\"; start all else without mpirun",
-                                        ranks().size()));
+  throw phyxel::AgreedError(
+      phyxel::ExitCode::bad_input,
+      fmt::format("{} ranks: allowed with \"phyxel run\", \"phyxel doctor\" and "
+                  "\"phyxel bench scaling\"; start all else without mpirun",
+                  ranks().size()));
 }
 
 }  // namespace
@@ -69,10 +71,12 @@ int main(int argc, char** argv) {
   phyxel::app::add_export(program);
   phyxel::app::add_bench(program);
   phyxel::app::add_paper(program);
+  phyxel::app::add_doctor(program);
   std::optional<phyxel::Communicator> world;
   try {
     if (phyxel::launched_as_rank()) {
       phyxel::app::set_ranks(world.emplace(argc, argv));
+      phyxel::share_host_memory(world->host_size());
       program.parse_complete_callback([&] { check_ranks(program); });
     }
     program.parse(argc, argv);

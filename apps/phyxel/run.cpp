@@ -11,7 +11,6 @@
 #include "command.hpp"
 #include "device_option.hpp"
 #include "ensemble.hpp"
-#include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -559,10 +558,11 @@ void add_run(CLI::App& program) {
       "--resume", options->resume,
       "Continue from a checkpoint file, or from the newest in the output folder (auto)");
   command
-      ->add_option("--partitioner", options->cut.partitioner,
-                   "How mpirun's ranks cut the bodies: metis, curve, bisection, or auto, the best of "
-                   "the three")
-      ->check(CLI::IsMember(partitioner_names()) | CLI::IsMember({"auto"}));
+      ->add_option(
+          "--partitioner", options->cut.partitioner,
+          "How mpirun's ranks cut the bodies: metis, curve, bisection, or auto, the best of "
+          "the three")
+      ->check(CLI::IsMember(partitioner_choices()));
   command
       ->add_option("--ghost-rings", options->cut.rings,
                    "1: ranks exchange displacements and stresses; 2: displacements of two "

@@ -402,4 +402,10 @@ PHYXEL_HDF5_TYPE(std::int64_t)
 PHYXEL_HDF5_TYPE(std::uint8_t)
 #undef PHYXEL_HDF5_TYPE
 
+std::string hdf5_version() {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  return fmt::format("{}.{}.{}", major, minor, release);
+}
+
 }  // namespace phyxel

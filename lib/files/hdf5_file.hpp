@@ -103,4 +103,7 @@ class Hdf5Reader {
   std::int64_t file_ = -1;
 };
 
+/// Of the library that is linked, e.g. "1.10.8".
+std::string hdf5_version();
+
 }  // namespace phyxel

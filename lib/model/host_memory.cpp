@@ -20,24 +20,29 @@ double limit_in(const char* file) {
   return std::ifstream(file) >> bytes ? bytes : HUGE_VAL;
 }
 
-/// Memory this process may use [bytes]: the machine's, or less inside a container.
+int programs_of_host = 1;
+
+}  // namespace
+
+void share_host_memory(int programs) { programs_of_host = programs; }
+
 double usable_memory() {
   const double machine =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
-  return std::min({machine, limit_in("/sys/fs/cgroup/memory.max"),
-                   limit_in("/sys/fs/cgroup/memory/memory.limit_in_bytes")});
+  const double host = std::min({machine, limit_in("/sys/fs/cgroup/memory.max"),
+                                limit_in("/sys/fs/cgroup/memory/memory.limit_in_bytes")});
+  return host / programs_of_host;
 }
-
-}  // namespace
 
 void require_host_memory(const std::string& what, double phyxels, double bytes_per_phyxel) {
   const double most_index = std::numeric_limits<Index>::max();
   const double memory = usable_memory();
   if (phyxels <= most_index && phyxels * bytes_per_phyxel <= memory) return;
   throw InputError(fmt::format(
-      "{}: {:.0f} phyxels need about {:.3g} GiB of memory, but {:.3g} GiB are available: at most "
+      "{}: {:.0f} phyxels need about {:.3g} GiB of memory, but {:.3g} GiB are available{}: at most "
       "{:.0f} phyxels are allowed",
       what, phyxels, phyxels * bytes_per_phyxel / 0x1p30, memory / 0x1p30,
+      programs_of_host > 1 ? fmt::format(" to each of {} ranks", programs_of_host) : "",
       std::floor(std::min(most_index, memory / bytes_per_phyxel))));
 }
 

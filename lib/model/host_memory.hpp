@@ -5,9 +5,15 @@
 
 namespace phyxel {
 
+/// From now on this program counts on an equal share of the memory that so many of the host use.
+void share_host_memory(int programs);
+
+/// Memory this program may use [bytes]: the machine's, or less inside a container, and its share of
+/// that.
+double usable_memory();
+
 /// @throws InputError naming `what`, how much its phyxels take, how much there is (in a container:
-/// its
-///   limit), and how many would do; or if they are more than an index counts.
+///   its limit), and how many would do; or if they are more than an index counts.
 void require_host_memory(const std::string& what, double phyxels, double bytes_per_phyxel);
 
 }  // namespace phyxel

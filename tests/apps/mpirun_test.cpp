@@ -7,9 +7,11 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 
+#include "device.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "support/program.hpp"
 
@@ -123,6 +125,38 @@ TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
   }
 }
 
+TEST_F(Mpirun, GpusWriteTheSameBytesOnAnyNumberOfRanks) {
+  if (cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
+  write_scene();
+  ASSERT_EQ(run_on(0, {"run", "scene.toml", "--device", "cuda", "--out", "alone"}).code, 0);
+  for (const int count : {2, 3}) {
+    for (const std::string transport : {"direct", "host"}) {
+      const std::string out = transport + std::to_string(count);
+      const Outcome outcome = run_on(
+          count, {"run", "scene.toml", "--device", "cuda", "--out", out, "--transport", transport});
+      ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+      EXPECT_THAT(outcome.out, HasSubstr(transport == "host" ? "MPI" : "CUDA IPC"));
+      expect_same_files("alone", out);
+    }
+  }
+}
+
+TEST_F(Mpirun, DoctorListsTheRanksOnce) {
+  const Outcome outcome = run_on(2, {"doctor", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto found = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(found["ranks"].size(), 2u);
+  EXPECT_EQ(found["gpus"].empty(), cuda_devices().empty());
+  EXPECT_EQ(found["device"] == "cpu", cuda_devices().empty());
+  EXPECT_NE(found["transport"], "none: one rank");
+  EXPECT_THAT(found["mpi"].get<std::string>(), HasSubstr("MPI"));
+  const auto alone = nlohmann::json::parse(run_on(0, {"doctor", "--json"}).out);
+  EXPECT_EQ(alone["ranks"].size(), 1u);
+  EXPECT_EQ(alone["transport"], "none: one rank");
+  // Ranks of one host share its memory.
+  EXPECT_EQ(alone["memory_bytes"].get<double>(), 2 * found["memory_bytes"].get<double>());
+}
+
 /// How often a text stands in another.
 int count_of(const std::string& what, const std::string& text) {
   int count = 0;
@@ -133,6 +167,21 @@ int count_of(const std::string& what, const std::string& text) {
 TEST_F(Mpirun, WrongInputIsToldOnce) {
   write_scene();
   write("kept", "precious");
+  write("huge.toml", R"(
+[time]
+end = 1.0
+[output]
+directory = "out"
+[[body]]
+name = "huge"
+shape = "beam"
+size = [1.0, 1.0, 1.0]
+spacing = 1e-4
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+)");
   const struct {
     std::vector<std::string> arguments;
     std::string message;
@@ -140,6 +189,8 @@ TEST_F(Mpirun, WrongInputIsToldOnce) {
                {{"run", "scene.toml", "--partitioner", "metiss"}, "metiss"},
                {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
                {{"run", "scene.toml", "--step", "1"}, "unstable"},
+               {{"run", "scene.toml", "--transport", "pigeon"}, "pigeon"},
+               {{"run", "huge.toml"}, "to each of 2 ranks"},
                {{"run", "scene.toml", "--out", "kept"}, "kept"},
                {{"check", "scene.toml"}, "2 ranks"}};
   for (const auto& c : cases) {

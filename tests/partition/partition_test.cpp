@@ -16,7 +16,7 @@ namespace {
 using namespace phyxel::testing;
 
 const std::vector<Partitioner> all_partitioners = {Partitioner::metis, Partitioner::curve,
-                                            Partitioner::bisection};
+                                                   Partitioner::bisection};
 
 class Cut : public ::testing::TestWithParam<CutCase> {};
 
