@@ -60,6 +60,10 @@ class DeviceArray {
   void upload(const T* from) const {
     if (count_) PHYXEL_CUDA(cudaMemcpy(data_, from, bytes(), cudaMemcpyHostToDevice));
   }
+  /// All bits zero.
+  void clear(cudaStream_t stream = nullptr) const {
+    if (count_) PHYXEL_CUDA(cudaMemsetAsync(data_, 0, bytes(), stream));
+  }
   void download(T* to) const { download(to, 0, count_); }
   void download(T* to, std::size_t first, std::size_t count) const {
     if (count)

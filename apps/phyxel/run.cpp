@@ -39,11 +39,14 @@ struct GoodState {
   Diagnostics diagnostics;
 };
 
-/// `work()`, which does the same on every rank and fails on all of them, if it does.
+/// `work()`, which does the same on every rank and fails on all of them, if it does; unless a GPU
+/// fails, which ends all.
 template <class Work>
 auto alike(Work&& work) {
   try {
     return work();
+  } catch (const DeviceError&) {  // of this rank's GPU
+    throw;
   } catch (const Error& error) {
     throw AgreedError(error.code(), error.what());
   }

@@ -88,6 +88,26 @@ struct HashView {
   }
 };
 
+/// Calls visit(j) with every index that each(offer) offers, ascending: the order in which the host
+/// sums, so that both get the same bits.
+template <class Each, class Visit>
+__device__ void in_ascending_order(Each&& each, Visit&& visit) {
+  constexpr int most = 64;  // at once; where there are more, they are sought again
+  Index found[most], after = -1;
+  for (;;) {
+    int count = 0;
+    each([&](Index j) {
+      if (j <= after || (count == most && j > found[most - 1])) return;
+      int k = count < most ? count++ : most - 1;
+      for (; k > 0 && found[k - 1] > j; --k) found[k] = found[k - 1];
+      found[k] = j;
+    });
+    for (int k = 0; k < count; ++k) visit(found[k]);
+    if (count < most) return;
+    after = found[most - 1];
+  }
+}
+
 class DeviceHash {
  public:
   struct Body {

@@ -164,12 +164,16 @@ class Finder {
                Vec3d offset;
                if (i >= 0) {
                  const double inverse_h_squared = 1 / (support[i] * support[i]);
-                 visit_neighbours(hash, hash.body_of(i), i, position[i], support, nullptr,
-                                  [&](Index, Vec3d x) {
-                                    const double w = weight_shape(dot(x, x), inverse_h_squared);
-                                    moment += moment_term(x, w);
-                                    offset += w * x;
-                                  });
+                 const auto each = [&](auto&& offer) {
+                   visit_neighbours(hash, hash.body_of(i), i, position[i], support, nullptr,
+                                    [&](Index j, Vec3d) { offer(j); });
+                 };
+                 in_ascending_order(each, [&](Index j) {
+                   const Vec3d x = position[j] - position[i];
+                   const double w = weight_shape(dot(x, x), inverse_h_squared);
+                   moment += moment_term(x, w);
+                   offset += w * x;
+                 });
                }
                inverse_moment[place] = pseudo_inverse(moment).matrix;
                moment_offset[place] = offset;

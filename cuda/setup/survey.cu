@@ -135,30 +135,40 @@ Survey survey_on_device(std::span<const Vec3d> host_position, const Neighbourhoo
   {
     const DeviceHash table(position, {{0, static_cast<Index>(n), middle}});
     const HashView hash = table.view();
-    for_each("survey", static_cast<std::int64_t>(n),
-             [hash, findings = findings.data(), support = support.data(), spacing = spacing.data(),
-              kernel_sum = kernel_sum.data()] __device__(std::int64_t at) {
-               const auto self = static_cast<std::uint32_t>(at);
-               const Index i = hash.index[self];
-               const Vec3d here = hash.entries[self].position;
-               const double h = support[i], inverse_h_squared = 1 / (h * h);
-               const auto cube = [&](Index j) { return spacing[j] * spacing[j] * spacing[j]; };
-               Sym3d moment;
-               double sum = kernel_sum && h > 0 ? cube(i) * weight(0, h) : 0;
-               Finding f{};
-               hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
-                 const Vec3d x = p - here;
-                 const double d2 = dot(x, x);
-                 if (k == self || !(d2 < h * h)) return;
-                 ++f.length;
-                 moment += moment_term(x, weight_shape(d2, inverse_h_squared));
-                 if (d2 <= 1e-20 * h * h) f.coincident = 1;
-                 if (kernel_sum) sum += cube(hash.index[k]) * weight(sqrt(d2), h);
-               });
-               f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
-               findings[i] = f;
-               if (kernel_sum) kernel_sum[i] = sum;
-             });
+    for_each(
+        "survey", static_cast<std::int64_t>(n),
+        [hash, findings = findings.data(), support = support.data(), spacing = spacing.data(),
+         kernel_sum = kernel_sum.data(), position = position.data()] __device__(std::int64_t at) {
+          const auto self = static_cast<std::uint32_t>(at);
+          const Index i = hash.index[self];
+          const Vec3d here = hash.entries[self].position;
+          const double h = support[i], inverse_h_squared = 1 / (h * h);
+          const auto cube = [&](Index j) { return spacing[j] * spacing[j] * spacing[j]; };
+          Sym3d moment;
+          Finding f{};
+          hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
+            const Vec3d x = p - here;
+            const double d2 = dot(x, x);
+            if (k == self || !(d2 < h * h)) return;
+            ++f.length;
+            moment += moment_term(x, weight_shape(d2, inverse_h_squared));
+            if (d2 <= 1e-20 * h * h) f.coincident = 1;
+          });
+          f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
+          findings[i] = f;
+          if (!kernel_sum) return;
+          double sum = h > 0 ? cube(i) * weight(0, h) : 0;
+          const auto each = [&](auto&& offer) {
+            hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
+              if (k != self && dot(p - here, p - here) < h * h) offer(hash.index[k]);
+            });
+          };
+          in_ascending_order(each, [&](Index j) {
+            const Vec3d x = position[j] - here;
+            sum += cube(j) * weight(sqrt(dot(x, x)), h);
+          });
+          kernel_sum[i] = sum;
+        });
   }
   const thrust::transform_iterator lengths(findings.data(), AsLengths{});
   const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),

@@ -34,6 +34,8 @@ class CudaBackend final : public Backend {
       recordable = m_.share()->others->smallest(recordable) > 0;
     }
     recorded_ = recordable;
+    has_surfels_ = !model.surfels.position.empty();
+    if (m_.share()) has_surfels_ = m_.share()->others->largest(has_surfels_) > 0;
   }
 
   std::string name() const override {
@@ -147,11 +149,12 @@ class CudaBackend final : public Backend {
 
   std::unique_ptr<Vibration> vibration() override {
     settle();
+    passes_.receive_displacements();
     return std::make_unique<CudaVibration<Real, StateReal>>(m_, passes_);
   }
 
   void update_surfels() override {
-    if (m_.model().surfels.position.empty()) return;
+    if (!has_surfels_) return;
     if (!surfels_) {
       settle();
       surfels_.emplace(m_, residence_ ? steps_together : 0);
@@ -251,8 +254,8 @@ class CudaBackend final : public Backend {
   /// takes: a signal would wait for them all.
   void bound_queue(int steps) const {
     const int most = residence_ ? 2 * residence_->most_steps : 128;
-    const auto ahead = static_cast<int>(
-        std::clamp<std::size_t>(50'000'000 / m_.places(), 1, static_cast<std::size_t>(most)));
+    const auto ahead = static_cast<int>(std::clamp<std::size_t>(
+        50'000'000 / std::max<std::size_t>(m_.places(), 1), 1, static_cast<std::size_t>(most)));
     if ((steps_since_mark_ += steps) < ahead) return;
     steps_since_mark_ = 0;
     const Event& mark = marks_[batches_++ % 2];
@@ -266,6 +269,7 @@ class CudaBackend final : public Backend {
   Passes<Real, StateReal> passes_;
   std::unique_ptr<Residence<Real, StateReal>> residence_;
   std::optional<SurfelAdvection<Real, StateReal>> surfels_;  // once they have been asked for
+  bool has_surfels_ = false;                                 // this or another rank
   bool recorded_ = false;                                    // steps go through a graph
   bool fresh_ = true;  // no step has been taken since the last upload
   // Steps that wait to be launched: whole ones, and one of which it is not known what follows.

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <cstring>
+#include <exception>
 #include <memory>
 #include <string>
 #include <utility>
@@ -63,10 +64,12 @@ __global__ void store_at_peers(const __grid_constant__ Records records, const Re
     peers[c.peer].set(static_cast<std::size_t>(c.there),
                       records.get(static_cast<std::size_t>(c.here)));
   }
-  __threadfence_system();
   __syncthreads();
   __shared__ bool last;
-  if (threadIdx.x == 0) last = atomicAdd(signals.blocks_done, 1U) == gridDim.x - 1;
+  if (threadIdx.x == 0) {
+    __threadfence_system();  // for all of this block, which the barrier has brought together
+    last = atomicAdd(signals.blocks_done, 1U) == gridDim.x - 1;
+  }
   __syncthreads();
   if (!last) return;
   const unsigned exchanges = *signals.sent + 1;
@@ -117,12 +120,11 @@ class PinnedBytes {
   PinnedBytes() = default;
   PinnedBytes(const PinnedBytes&) = delete;
   PinnedBytes& operator=(const PinnedBytes&) = delete;
-  ~PinnedBytes() { cudaFreeHost(data_); }
+  ~PinnedBytes() { release(); }
   std::byte* data() const { return data_; }
   void reserve(std::size_t bytes) {
     if (bytes <= size_) return;
-    cudaFreeHost(std::exchange(data_, nullptr));
-    size_ = 0;
+    release();
     void* memory = nullptr;
     PHYXEL_CUDA(cudaMallocHost(&memory, bytes));
     data_ = static_cast<std::byte*>(memory);
@@ -130,6 +132,10 @@ class PinnedBytes {
   }
 
  private:
+  void release() {
+    if (data_) cudaFreeHost(std::exchange(data_, nullptr));
+    size_ = 0;
+  }
   std::byte* data_ = nullptr;
   std::size_t size_ = 0;
 };
@@ -177,8 +183,7 @@ class HostExchange {
     // Copies have a queue of their own; it begins when all before has been packed.
     PHYXEL_CUDA(cudaEventRecord(packed_now_.get(), m_.stream()));
     PHYXEL_CUDA(cudaStreamWaitEvent(copies_.get(), packed_now_.get()));
-    PHYXEL_CUDA(cudaMemcpyAsync(outgoing_.data(), packed_.data(), send_.count() * sizeof(Value),
-                                cudaMemcpyDeviceToHost, copies_.get()));
+    copy(outgoing_.data(), packed_.data(), send_.count() * sizeof(Value), cudaMemcpyDeviceToHost);
   }
   template <class Records>
   void finish(const Records& records) {
@@ -198,6 +203,9 @@ class HostExchange {
   std::size_t bytes() const { return packed_.bytes() + arrived_.bytes(); }
 
  private:
+  void copy(std::byte* to, const std::byte* from, std::size_t bytes, cudaMemcpyKind kind) const {
+    if (bytes > 0) PHYXEL_CUDA(cudaMemcpyAsync(to, from, bytes, kind, copies_.get()));
+  }
   /// Only between exchanges: nothing is under way.
   void reserve(std::size_t bytes_each) {
     if (bytes_each <= bytes_each_) return;
@@ -270,6 +278,8 @@ class DirectExchange {
     wait_for_peers<<<1, warp_size, 0, m_.stream()>>>(signals_[static_cast<int>(what)]);
     m_.launched("wait_for_peers", 1, warp_size);
   }
+  /// Other ranks' memory is no longer used here, and may be freed once all have done this.
+  void close() { opened_.clear(); }
   double waited_seconds() const {
     m_.wait();
     double sum = 0;
@@ -290,12 +300,13 @@ class DirectExchange {
   };
 
   void make_flags(std::size_t count) {
-    flags_ = {kinds_sent * count, "flags of ranks"};
+    // A whole page of the device, as all memory that is shared: CUDA shares no less.
+    flags_ = {shared_page / sizeof(unsigned) + kinds_sent * count, "flags of ranks"};
     counters_ = {3 * kinds_sent, "counts of exchanges"};
     waited_ = {kinds_sent, "waiting times"};
-    PHYXEL_CUDA(cudaMemset(flags_.data(), 0, flags_.bytes()));
-    PHYXEL_CUDA(cudaMemset(counters_.data(), 0, counters_.bytes()));
-    PHYXEL_CUDA(cudaMemset(waited_.data(), 0, waited_.bytes()));
+    flags_.clear();
+    counters_.clear();
+    waited_.clear();
     PHYXEL_CUDA(cudaDeviceSynchronize());  // before anyone may raise a flag
   }
   std::vector<std::vector<std::byte>> invitations(const PeerLists& receive,
@@ -376,7 +387,6 @@ class DirectExchange {
   }
 
   const Model& m_;
-  std::vector<OpenedMemory> opened_;
   DeviceArray<unsigned> flags_, counters_;
   DeviceArray<unsigned long long> waited_;
   DeviceArray<Crossing> crossings_;
@@ -384,6 +394,7 @@ class DirectExchange {
   DeviceArray<Stresses<Real>> stresses_;
   DeviceArray<unsigned*> their_flags_[kinds_sent];
   Signals signals_[kinds_sent]{};
+  std::vector<OpenedMemory> opened_;
 };
 
 /// The exchanges of one share.
@@ -399,6 +410,12 @@ class DeviceHalo {
         receive_(others().peers(), &Peer::receive, model.tiling().place),
         host_(model, send_, receive_) {
     if (wanted != Transport::host) open_direct(wanted == Transport::direct);
+  }
+  DeviceHalo(const DeviceHalo&) = delete;
+  DeviceHalo& operator=(const DeviceHalo&) = delete;
+  /// Collective, unless an error is on its way, which may be of this rank alone.
+  ~DeviceHalo() {
+    if (std::uncaught_exceptions() == 0) close();
   }
 
   /// What follows on the device may be launched at once, except for what changes what is sent.
@@ -450,6 +467,11 @@ class DeviceHalo {
 
  private:
   const Others& others() const { return *m_.share()->others; }
+  /// Memory is freed when nobody has it open.
+  void close() {
+    if (direct_) direct_->close();
+    others().largest(0);
+  }
   void open_direct(bool insist) {
     std::string trouble;
     const std::vector<Peer>& peers = others().peers();
@@ -467,6 +489,7 @@ class DeviceHalo {
       trouble = "ranks of several hosts";
     }
     if (others().smallest(direct_ != nullptr) > 0) return;
+    close();
     direct_.reset();
     if (!insist) return;
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";

@@ -47,6 +47,10 @@ class Event {
   cudaEvent_t event_ = nullptr;
 };
 
+/// CUDA allocates and shares memory in pages of this size [bytes]; smaller allocations lie
+/// together.
+inline constexpr std::size_t shared_page = std::size_t{2} << 20;
+
 inline unsigned blocks_for(int count) {
   return static_cast<unsigned>((count + tile_size - 1) / tile_size);
 }
@@ -273,9 +277,11 @@ class DeviceModel {
 
   void make_fields() {
     const std::string of = " of " + subject_;
-    points_ = {Points<Real>::bytes * places(), "points" + of};
+    // What other ranks may open is shared by whole pages, and never empty.
+    const std::size_t more = share() ? shared_page : 0;
+    points_ = {Points<Real>::bytes * places() + more, "points" + of};
     fields_.points = Points<Real>::in(points_.data(), places());
-    stresses_ = {Stresses<Real>::bytes * places(), "stresses" + of};
+    stresses_ = {Stresses<Real>::bytes * places() + more, "stresses" + of};
     fields_.stresses = Stresses<Real>::in(stresses_.data(), places());
     moment_constants_ = {7 * places(), "inverse moments" + of};
     force_constants_ = {4 * places(), "masses" + of};
@@ -307,8 +313,8 @@ class DeviceModel {
     }
     send_constants(0);
     put_all_constants();
-    PHYXEL_CUDA(cudaMemset(velocity_.data(), 0, velocity_.bytes()));
-    if constexpr (mixed) PHYXEL_CUDA(cudaMemset(displacement_.data(), 0, displacement_.bytes()));
+    velocity_.clear();
+    if constexpr (mixed) displacement_.clear();
   }
 
   void put_all_constants() {

@@ -150,8 +150,8 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       put3(t.sum + internal_torque, cross(x, internal));
       t.sum[force_scale] = sqrt(dot(internal, internal));
       t.sum[torque_scale] = sqrt(dot(x, x)) * t.sum[force_scale];
-      t.largest_displacement = sqrt(dot(u, u));
-      t.largest_speed = fmax(sqrt(dot(v, v)), 0.0);  // not NaN
+      t.largest_displacement = fmax(sqrt(dot(u, u)), 0.0);  // not NaN
+      t.largest_speed = fmax(sqrt(dot(v, v)), 0.0);
       if (t.largest_speed > 0) t.fastest = number_at[place];
     }
     both = part == 0 ? t : combined(both, t);

@@ -117,7 +117,7 @@ class Passes {
   }
   DeviceArray<Real> without_ghosts(std::size_t rows, const char* what) const {
     DeviceArray<Real> array(rows * m_.places(), what + m_.subject());
-    if (m_.share()) PHYXEL_CUDA(cudaMemsetAsync(array.data(), 0, array.bytes(), m_.stream()));
+    if (m_.share()) array.clear(m_.stream());
     return array;
   }
 

@@ -1,6 +1,7 @@
 #include "solver/surfel_plan.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <unordered_set>
 
 #include "model/space_filling_curve.hpp"
@@ -12,33 +13,41 @@ namespace {
 
 int filled_up(int count, int group) { return (count + group - 1) / group * group; }
 
-/// The places of the phyxels that carry the surfels from `first` on, as many of these as a block
-/// takes, ascending, so that surfels side by side name the same one at the same time; and where the
-/// next block begins.
+/// What decides the order of phyxels: their places in the whole model, so that sums run alike
+/// whatever share of it this is.
+const std::vector<Index>& order_of(const Model& model, const std::vector<Index>& place) {
+  return model.share ? model.share->place : place;
+}
+
+/// The phyxels that carry the surfels from `first` on, as many of these as a block takes, in order
+/// of places, so that surfels side by side name the same one at the same time; and where the next
+/// block begins.
 struct Taken {
-  std::vector<Index> places;
+  std::vector<Index> phyxels;
   Index next;
 };
 Taken take_surfels(const Model& model, const std::vector<Index>& place,
                    const std::vector<Index>& order, Index first, Index end) {
-  std::unordered_set<Index> places;
+  std::unordered_set<Index> phyxels;
   Index next = first;
   for (; next < end && next - first < surfel_block; ++next) {
     const auto row = model.surfels.carriers.row(order[next]);
     const auto fresh =
-        std::count_if(row.begin(), row.end(), [&](Index i) { return places.count(place[i]) == 0; });
-    if (next > first && places.size() + static_cast<std::size_t>(fresh) > block_slots) break;
-    for (const Index i : row) places.insert(place[i]);
+        std::count_if(row.begin(), row.end(), [&](Index i) { return phyxels.count(i) == 0; });
+    if (next > first && phyxels.size() + static_cast<std::size_t>(fresh) > block_slots) break;
+    phyxels.insert(row.begin(), row.end());
   }
-  std::vector<Index> ascending(places.begin(), places.end());
-  std::sort(ascending.begin(), ascending.end());
-  return {std::move(ascending), next};
+  std::vector<Index> sorted(phyxels.begin(), phyxels.end());
+  const std::vector<Index>& whole = order_of(model, place);
+  std::sort(sorted.begin(), sorted.end(), [&](Index a, Index b) { return whole[a] < whole[b]; });
+  return {std::move(sorted), next};
 }
 
 void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place, Index first,
                const Taken& taken) {
   const Csr& carriers = model.surfels.carriers;
-  const std::vector<Index>& places = taken.places;
+  const std::vector<Index>& phyxels = taken.phyxels;
+  const std::vector<Index>& whole = order_of(model, place);
   SurfelBlock block;
   block.first_surfel = first;
   block.surfels = taken.next - first;
@@ -48,12 +57,14 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
     block.carriers = std::max(block.carriers, static_cast<int>(carriers.row(surfel(s)).size()));
   }
   block.carriers = filled_up(block.carriers, carrier_group);
-  block.slots = static_cast<int>(places.size());
-  block.tile = places.front() / tile_size;
+  block.slots = static_cast<int>(phyxels.size());
+  block.tile = place[phyxels.front()] / tile_size;
   block.first_slot = static_cast<Offset>(plan.place.size());
-  plan.place.insert(plan.place.end(), places.begin(), places.end());
+  for (const Index i : phyxels) {
+    plan.place.push_back(place[i]);
+    plan.tiles.push_back(place[i] / tile_size);
+  }
   plan.most_slots = std::max(plan.most_slots, block.slots);
-  for (const Index p : places) plan.tiles.push_back(p / tile_size);
 
   block.first_carrier = static_cast<Offset>(plan.carriers.size());
   plan.carriers.resize(plan.carriers.size() +
@@ -63,8 +74,9 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
     const std::vector<double> weights = carrier_weights(model, surfel(s));
     std::vector<Carrier> own;
     for (std::size_t k = 0; k < row.size(); ++k) {
-      const auto at = std::lower_bound(places.begin(), places.end(), place[row[k]]);
-      own.push_back({weights[k], static_cast<int>(at - places.begin())});
+      const auto at = std::lower_bound(phyxels.begin(), phyxels.end(), row[k],
+                                       [&](Index a, Index b) { return whole[a] < whole[b]; });
+      own.push_back({weights[k], static_cast<int>(at - phyxels.begin())});
     }
     std::sort(own.begin(), own.end(),
               [](const Carrier& a, const Carrier& b) { return a.slot < b.slot; });
@@ -79,14 +91,27 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
 }  // namespace
 
 SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place) {
+  const Surfels& surfels = model.surfels;
+  // Blocks take surfels of one tile, which is that of their first carrier: who owns that has the
+  // whole tile and all its surfels, and makes the blocks that one rank would make.
+  const auto count = static_cast<Index>(surfels.position.size());
+  std::vector<Index> by_tile(static_cast<std::size_t>(count)), tile(by_tile.size());
+  std::iota(by_tile.begin(), by_tile.end(), 0);
+  for (Index s = 0; s < count; ++s) tile[s] = place[surfels.carriers.row(s).front()] / tile_size;
+  std::stable_sort(by_tile.begin(), by_tile.end(),
+                   [&](Index a, Index b) { return tile[a] < tile[b]; });
+
   SurfelPlan plan;
-  for (const Part& part : model.parts) {
-    if (part.surfel_begin == part.surfel_end) continue;
-    const std::vector<Index> order =
-        curve_order(model.surfels.position, part.surfel_begin, part.surfel_end);
-    plan.order.insert(plan.order.end(), order.begin(), order.end());
-    for (Index first = part.surfel_begin; first < part.surfel_end;) {
-      const Taken taken = take_surfels(model, place, plan.order, first, part.surfel_end);
+  for (Index begin = 0, end = 0; begin < count; begin = end) {
+    std::vector<Vec3d> position;
+    for (; end < count && tile[by_tile[end]] == tile[by_tile[begin]]; ++end) {
+      position.push_back(surfels.position[by_tile[end]]);
+    }
+    for (const Index k : curve_order(position, 0, end - begin)) {
+      plan.order.push_back(by_tile[begin + k]);
+    }
+    for (Index first = begin; first < end;) {
+      const Taken taken = take_surfels(model, place, plan.order, first, end);
       add_block(plan, model, place, first, taken);
       first = taken.next;
     }

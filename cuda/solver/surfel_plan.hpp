@@ -22,7 +22,7 @@ struct SurfelBlock {
   /// Carrier k of surfel s: first_carrier + k * surfel_block + s; filled up to whole groups.
   Offset first_carrier = 0;
   int carriers = 0;  ///< Of a surfel, at most.
-  Index tile = 0;    ///< One of its body's.
+  Index tile = 0;    ///< One of its body's (not more: of its carriers').
   Vec3d centre;      ///< Of its surfels at rest [m].
 };
 
@@ -41,6 +41,7 @@ struct SurfelPlan {
   int most_slots = 0;
 };
 
+/// Of a share, blocks are those of the whole model, surfel by surfel and carrier by carrier.
 /// @param place of each phyxel, as in `Tiling`
 SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place);
 

@@ -90,7 +90,7 @@ class CudaVibration final : public Vibration {
     current_ = {count, what};
     next_ = {count, what};
     force_ = {count, what};
-    PHYXEL_CUDA(cudaMemset(previous_.data(), 0, previous_.bytes()));
+    previous_.clear();
     m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), m_.places(),
                     m_.number_at());
     scale(current_, 1 / std::sqrt(product(current_, current_)));
@@ -142,7 +142,7 @@ class CudaVibration final : public Vibration {
     return support > 0 && mass > 0 ? static_cast<Real>(support * std::sqrt(mass)) : Real(1);
   }
   double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) const {
-    PHYXEL_CUDA(cudaMemsetAsync(product_.data(), 0, product_.bytes(), m_.stream()));
+    product_.clear(m_.stream());
     m_.launch_tiles("multiply_tiles", multiply_tiles<Real>, a.data(), b.data(), m_.places(),
                     product_.data());
     m_.wait();

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <map>
 
+#include "partition/partition.hpp"
+#include "partition/share.hpp"
 #include "solver/carrier_weights.hpp"
 #include "support/clouds.hpp"
 
@@ -29,6 +31,7 @@ Model coarse_mesh() {
   Surface sparse;
   for (std::size_t s = 0; s < cloud.surface.position.size(); s += 9) {
     sparse.position.push_back(cloud.surface.position[s]);
+    sparse.normal.push_back(cloud.surface.normal[s]);
   }
   for (Index s = 0; s + 2 < static_cast<Index>(sparse.position.size()); s += 3) {
     sparse.triangle.push_back({s, s + 1, s + 2});
@@ -76,6 +79,54 @@ TEST_P(SurfelPlans, HaveEverySurfelOnceWithItsCarriers) {
     }
   }
   EXPECT_EQ(next, static_cast<int>(count));
+}
+
+/// All that the sums of a block's surfels depend on, in terms of the whole model.
+struct Described {
+  Vec3d centre;
+  std::vector<Index> surfels;
+  std::vector<std::pair<Index, double>> carriers;  ///< Of one surfel after the other.
+  bool operator==(const Described&) const = default;
+};
+/// By first surfel.
+std::map<Index, Described> described(const Model& model, const Tiling& tiling) {
+  const SurfelPlan plan = make_surfel_plan(model, tiling.place);
+  std::map<Index, Described> blocks;
+  for (const SurfelBlock& block : plan.blocks) {
+    Described d{block.centre, {}, {}};
+    for (int s = 0; s < block.surfels; ++s) {
+      const Index surfel = plan.order[block.first_surfel + s];
+      d.surfels.push_back(model.share ? model.share->surfel_number[surfel] : surfel);
+      for (int k = 0; k < block.carriers; ++k) {
+        const Carrier& c = plan.carriers[block.first_carrier + k * surfel_block + s];
+        const Index place = plan.place[block.first_slot + c.slot];
+        d.carriers.emplace_back(model.number(tiling.phyxel[place]), c.weight);
+      }
+    }
+    EXPECT_TRUE(blocks.emplace(d.surfels.front(), d).second);
+  }
+  return blocks;
+}
+
+TEST_P(SurfelPlans, OfSharesHaveTheBlocksOfTheWhole) {
+  const Model whole = GetParam()();
+  const auto expected = described(whole, make_tiling(whole));
+  const Graph graph = phyxel_graph(whole);
+  const Groups tiles = curve_groups(whole, tile_size);
+  for (const int parts : {2, 3}) {
+    std::vector<int> part_of_tile;
+    for (Index t = 0; t < tiles.count; ++t) part_of_tile.push_back((5 * t + 1) % parts);
+    const std::vector<int> part_of = ungrouped(part_of_tile, tiles);
+    std::map<Index, Described> found;
+    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
+      ModelShare made = share_of(whole, plan, part_of);
+      made.share.place = values_of(made.share, whole_places(whole));
+      made.model.share = std::make_shared<Share>(made.share);
+      found.merge(described(made.model, make_tiling(made.model)));
+    }
+    ASSERT_EQ(found.size(), expected.size());
+    for (const auto& [first, block] : expected) EXPECT_TRUE(found.at(first) == block) << first;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Bodies, SurfelPlans, ::testing::Values(two_bodies, coarse_mesh),
