@@ -10,6 +10,8 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "mpi/pulse.hpp"
+
 namespace phyxel {
 namespace {
 
@@ -30,6 +32,7 @@ template <class T>
 T reduced(int ranks, T value, MPI_Datatype type, MPI_Op operation) {
   if (ranks == 1) return value;
   T result{};
+  const Waiting waiting;
   PHYXEL_MPI_CALL(MPI_Allreduce(&value, &result, 1, type, operation, MPI_COMM_WORLD));
   return result;
 }
@@ -71,6 +74,7 @@ Communicator::~Communicator() {
 }
 
 void Communicator::barrier() const {
+  const Waiting waiting;
   if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(MPI_COMM_WORLD));
 }
 
@@ -93,6 +97,7 @@ std::int64_t Communicator::smallest(std::int64_t value) const {
 
 void Communicator::add(std::span<std::int64_t> values) const {
   if (size_ == 1) return;
+  const Waiting waiting;
   PHYXEL_MPI_CALL(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()),
                                 MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD));
 }
@@ -107,6 +112,7 @@ std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> b
 
 void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
   if (size_ == 1) return;
+  const Waiting waiting;
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
     PHYXEL_MPI_CALL(MPI_Bcast(bytes.data() + at, count, MPI_BYTE, from, MPI_COMM_WORLD));
   });
@@ -115,6 +121,7 @@ void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
 std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
     const std::vector<std::span<const std::byte>>& send) const {
   if (size_ == 1) return {{send.at(0).begin(), send.at(0).end()}};
+  const Waiting waiting;
   const auto ranks = static_cast<std::size_t>(size_);
   std::vector<std::int64_t> sizes(ranks), coming(ranks);
   for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send.at(r).size());
@@ -163,6 +170,7 @@ void Transfers::send(int to, std::span<const std::byte> bytes) {
   });
 }
 void Transfers::wait() {
+  const Waiting waiting;
   std::vector<MPI_Request>& list = requests_->list;
   PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(list.size()), list.data(), MPI_STATUSES_IGNORE));
   list.clear();

@@ -11,6 +11,7 @@
 #include "command.hpp"
 #include "device_option.hpp"
 #include "ensemble.hpp"
+#include "mpi/watchdog.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
@@ -104,6 +105,7 @@ class Run {
     if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
 
     StopSignal signals;
+    const Watchdog watchdog(ranks(), watchdog_seconds());
     Progress progress(scene_.time.end,
                       options_.quiet || options_.json || !leads() ? nullptr : stderr,
                       {.phyxels = model().whole_size()});
@@ -113,6 +115,7 @@ class Run {
       auto stepping_since = Clock::now();
       double look_seconds = 0;
       while (solver.steps() < plan_.steps) {
+        watchdog.beat(solver.steps());
         solver.step();
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
@@ -213,6 +216,11 @@ class Run {
     CutOptions cut = options_.cut;
     cut.between_tiles = device_.gpu.has_value();
     return cut;
+  }
+  /// How long a rank may stay where it is before it is named.
+  static double watchdog_seconds() {
+    const char* said = std::getenv("PHYXEL_WATCHDOG_SECONDS");
+    return said ? std::atof(said) : 60;
   }
   /// Of this rank. Ranks of one host share its cores, unless someone has bound them or has said how
   /// many threads each takes.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -275,7 +276,7 @@ density = 1000
   expect_same_files("alone", "three");
 }
 
-/// Processes that one has started.
+/// Processes that one has started, by number.
 std::vector<pid_t> children_of(pid_t parent) {
   std::vector<pid_t> children;
   for (const auto& entry : fs::directory_iterator("/proc")) {
@@ -287,7 +288,33 @@ std::vector<pid_t> children_of(pid_t parent) {
     if (after_name == std::string::npos) continue;
     if (std::stoi(line.substr(after_name + 4)) == parent) children.push_back(std::stoi(name));
   }
+  std::sort(children.begin(), children.end());
   return children;
+}
+
+TEST_F(Mpirun, StuckRankIsNamedAndMayComeOn) {
+  write_scene("0.4");
+  for (const std::size_t which : {0U, 1U}) {
+    const std::string out = "stuck" + std::to_string(which);
+    use_ranks(2);
+    environment_.emplace_back("PHYXEL_WATCHDOG_SECONDS", "2");
+    const pid_t mpirun = start({"run", "scene.toml", "--quiet", "--out", out});
+    wait_for(out + "/phyxels_000001.hdf");
+    const std::vector<pid_t> ranks = children_of(mpirun);
+    ASSERT_EQ(ranks.size(), 2u);
+    kill(ranks[which], SIGSTOP);
+    const std::string name = "rank " + std::to_string(which) + " of 2 has not come on";
+    std::string said;
+    for (int wait = 0; wait < 2000 && count_of(name, said) == 0; ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      said = text_of(folder_ / "stderr.txt");
+    }
+    kill(ranks[which], SIGCONT);
+    const Outcome outcome = finish(mpirun);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(count_of(name, outcome.err), 1) << outcome.err;
+    EXPECT_EQ(count_of("has not come on", outcome.err), 1) << outcome.err;
+  }
 }
 
 TEST_F(Mpirun, KilledRankEndsAllAndTheLastCheckpointIsWhole) {
