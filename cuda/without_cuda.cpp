@@ -40,7 +40,8 @@ Surveyor cuda_surveyor(int device) {
 
 bool can_survey_on_cuda(const Scene&) { return false; }
 
-std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device, CudaPath) {
+std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device, CudaPath,
+                                           Transport) {
   use_cuda_device(device);
   return nullptr;
 }
