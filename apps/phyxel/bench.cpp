@@ -183,11 +183,6 @@ class Table {
   CsvTable table_;
 };
 
-/// What a table says of the GPU it was measured on.
-Facts gpu_facts(const ChosenDevice& device) {
-  return device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{};
-}
-
 /// How a backend steps: what follows its precision in its name.
 std::string path_of(const Backend& backend) {
   std::string name = backend.name();
@@ -228,7 +223,7 @@ void bench_step(const BenchOptions& options) {
                "surfels", "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s",
                "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
                "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
-              gpu_facts(device));
+              device_facts(device));
   // A GPU has no thread counts: 0 stands for it.
   const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
   std::vector<double> copy;
@@ -333,7 +328,7 @@ void bench_setup(const BenchOptions& options) {
   Table table(options,
               {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s", "backend_s",
                "limit_s", "omega_max", "iterations"},
-              gpu_facts(device));
+              device_facts(device));
   for (const Index size : options.sizes) {
     const Scene scene = bench_scene("green");
     const Cloud cloud = cube(size);
@@ -388,7 +383,7 @@ void bench_cantilever(const BenchOptions& options) {
               {"across", "factor", "precision", "path", "threads", "phyxels", "neighbours", "steps",
                "seconds", "phyxel_steps_per_s", "deflection_m", "over_timoshenko",
                "discretisation_error", "rounding_error", "last_change"},
-              gpu_facts(device));
+              device_facts(device));
   for (const int across : options.across) {
     for (const double factor : options.factors) {
       const Scene scene = cantilever_scene(across, factor);
@@ -504,7 +499,7 @@ void add_bench(CLI::App& program) {
       "page", "Write the pages about the GPU and about ranks from their tables");
   auto results = std::make_shared<std::string>("docs/results");
   auto out = std::make_shared<std::string>("docs/performance.md");
-  page->add_option("--results", *results, "Folder of gpu_*.csv")->capture_default_str();
+  page->add_option("--results", *results, "Folder of the tables")->capture_default_str();
   auto scaling = std::make_shared<std::string>("docs/scaling.md");
   page->add_option("--out", *out, "The page about the GPU")->capture_default_str();
   page->add_option("--scaling", *scaling, "The page about ranks")->capture_default_str();

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <span>
 
 #include "csv.hpp"
 #include "device_option.hpp"
@@ -28,6 +30,7 @@ struct Options {
   std::string csv;
   bool force = false;
   std::string device = "cpu", transport = "auto";
+  bool weak = false;  ///< Sizes are of one rank.
 };
 
 /// A jittered cube of about so many phyxels, under gravity.
@@ -46,6 +49,14 @@ Scene cube_scene(Index phyxels) {
   body.material = {.young = 1e5, .poisson = 0.3, .density = 1000, .strain = Strain::green};
   scene.bodies.push_back(body);
   return scene;
+}
+
+/// Distinct ones. Collective.
+std::size_t gpus_of_ranks(const ChosenDevice& device) {
+  const std::vector<int> indices = ranks().gathered(std::span<const int>(&device.gpu->index, 1));
+  std::set<std::pair<int, int>> gpus;
+  for (int r = 0; r < ranks().size(); ++r) gpus.emplace(ranks().host_of(r), indices[r]);
+  return gpus.size();
 }
 
 struct Measured {
@@ -102,7 +113,10 @@ void bench_scaling(const Options& options) {
   // Of all ranks, which may be bound to some.
   const auto cores = static_cast<int>(std::min<std::int64_t>(
       ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
-  CsvTable table{machine_facts(cores),
+  Facts facts = machine_facts(cores);
+  for (const auto& fact : device_facts(device)) facts.push_back(fact);
+  if (device.gpu) facts.emplace_back("gpus", std::to_string(gpus_of_ranks(device)));
+  CsvTable table{facts,
                  {"ranks", "threads_each", "partitioner", "rings", "precision", "phyxels",
                   "neighbours", "fewest", "most", "most_ghosts", "steps_per_s",
                   "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging", "transport"},
@@ -115,7 +129,7 @@ void bench_scaling(const Options& options) {
     fmt::print("{}", csv_text(table));
   });
   for (const Index size : options.sizes) {
-    const Scene scene = cube_scene(size);
+    const Scene scene = cube_scene(options.weak ? size * ranks().size() : size);
     for (const std::string& partitioner : options.partitioners) {
       for (const int rings : options.rings) {
         if (device.gpu && rings != 1) continue;
@@ -160,6 +174,7 @@ void add_bench_scaling(CLI::App& bench) {
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
+  command->add_flag("--weak", options->weak, "Sizes are those of a rank, not of the body");
   command->add_option("--partitioner", options->partitioners, "metis, curve, bisection, auto")
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_choices()));

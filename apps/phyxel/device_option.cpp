@@ -79,6 +79,10 @@ const std::vector<std::string>& transport_names() {
   return names;
 }
 
+Facts device_facts(const ChosenDevice& device) {
+  return device.gpu ? Facts{{"gpu", device.gpu->describe()}, {"cuda", cuda_version()}} : Facts{};
+}
+
 Model make_model(const Scene& scene, const ChosenDevice& device) {
   return device.gpu && can_survey_on_cuda(scene)
              ? build_model(scene, cuda_surveyor(device.gpu->index))

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "csv.hpp"
 #include "device.hpp"
 #include "phyxel/backend.hpp"
 
@@ -28,6 +29,9 @@ ChosenDevice choose_device(const std::string& name, const std::string& where = "
 /// The device of this rank: each rank of a host takes the next of its GPUs, unless one is named,
 /// and "auto" is GPUs only if all ranks find one. Collective.
 ChosenDevice choose_device_of_rank(const std::string& name, const std::string& where = "--device");
+
+/// What measurements on it are labelled with; nothing for the CPU.
+Facts device_facts(const ChosenDevice& device);
 
 /// The model of a scene, its neighbours sought on the device that will step it.
 Model make_model(const Scene& scene, const ChosenDevice& device);
