@@ -108,10 +108,4 @@ void Halo::finish() const {
   under_way_ = {};
 }
 
-Model connected(const Communicator& ranks, ModelShare share) {
-  share.share.others = std::make_shared<Halo>(ranks, share);
-  share.model.share = std::make_shared<Share>(std::move(share.share));
-  return std::move(share.model);
-}
-
 }  // namespace phyxel

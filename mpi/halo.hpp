@@ -34,7 +34,4 @@ class Halo final : public Others {
   mutable Transfers transfers_;
 };
 
-/// This rank's share of a model, connected to the others. Collective.
-Model connected(const Communicator& ranks, ModelShare share);
-
 }  // namespace phyxel

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <numeric>
 #include <optional>
-#include <set>
 
 #include "model/space_filling_curve.hpp"
 #include "partition/metis.hpp"
@@ -138,48 +137,67 @@ std::vector<int> make_partition(const Graph& graph, int parts, Partitioner parti
   return cut_in_order(graph, curve_order(graph.centre, 0, n), parts);
 }
 
-PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts) {
+PartCounts::PartCounts(int parts)
+    : parts_(parts), words_(static_cast<std::size_t>(3 * parts + 1) +
+                            static_cast<std::size_t>(parts) * static_cast<std::size_t>(parts)) {}
+
+void PartCounts::add(int part, std::int64_t own_weight,
+                     std::span<const std::pair<int, std::int64_t>> others) {
+  weight(part) += own_weight;
+  ++vertices(part);
+  others_.clear();
+  for (const auto& [other, edge] : others) {
+    if (other == part) continue;
+    cut() += edge;
+    others_.push_back(other);
+  }
+  sort_unique(others_);
+  for (const int other : others_) {
+    ++ghosts(other);
+    ++needed(part, other);
+  }
+}
+
+PartitionQuality PartCounts::quality() const {
+  PartCounts counts = *this;
   PartitionQuality q;
-  const std::vector<std::int64_t> weight = part_weights(graph, part_of, parts);
-  std::vector<Index> ghosts(static_cast<std::size_t>(parts), 0);
-  std::vector<std::set<int>> peers(static_cast<std::size_t>(parts));
-  std::vector<int> others;  // parts that need a vertex
-  std::vector<char> used(static_cast<std::size_t>(parts), 0);
+  double total = 0, vertices = 0;
+  for (int p = 0; p < parts_; ++p) {
+    total += static_cast<double>(counts.weight(p));
+    vertices += static_cast<double>(counts.vertices(p));
+  }
+  const double each = total / std::max(1.0, vertices), mean = total / parts_;
+  q.cut = counts.cut() / 2;  // seen from both ends
+  if (mean > 0) q.imbalance = -1, q.slowest = 0;
+  for (int p = 0; p < parts_; ++p) {
+    const auto weight = static_cast<double>(counts.weight(p));
+    const std::int64_t ghosts = counts.ghosts(p);
+    if (mean > 0) {
+      q.imbalance = std::max(q.imbalance, weight / mean - 1);
+      q.slowest = std::max(
+          q.slowest, (weight + ghost_cost * each * static_cast<double>(ghosts)) / mean);
+    }
+    q.ghosts += ghosts;
+    q.most_ghosts = std::max(q.most_ghosts, static_cast<Index>(ghosts));
+    q.empty += counts.vertices(p) == 0;
+    int peers = 0;
+    for (int other = 0; other < parts_; ++other) peers += counts.needed(other, p) > 0;
+    q.most_peers = std::max(q.most_peers, peers);
+  }
+  return q;
+}
+
+PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts) {
+  PartCounts counts(parts);
+  std::vector<std::pair<int, std::int64_t>> others;
   for (Index v = 0; v < graph.vertices(); ++v) {
-    const int own = part_of[v];
-    used[own] = 1;
     others.clear();
     for (Offset e = graph.offsets[v]; e < graph.offsets[v + 1]; ++e) {
-      const int other = part_of[graph.neighbours[e]];
-      if (other == own) continue;
-      q.cut += graph.weight_of_edge(e);
-      others.push_back(other);
+      others.emplace_back(part_of[graph.neighbours[e]], graph.weight_of_edge(e));
     }
-    sort_unique(others);
-    for (const int other : others) {
-      ++ghosts[other];
-      peers[other].insert(own);
-    }
+    counts.add(part_of[v], graph.vertex_weight[v], others);
   }
-  q.cut /= 2;  // seen from both ends
-  const double each = static_cast<double>(graph.total_weight()) / std::max(1, graph.vertices());
-  const double mean = static_cast<double>(graph.total_weight()) / parts;
-  if (mean > 0) {
-    q.imbalance =
-        static_cast<double>(*std::max_element(weight.begin(), weight.end())) / mean - 1;
-    q.slowest = 0;
-    for (std::size_t p = 0; p < weight.size(); ++p) {
-      const double work = static_cast<double>(weight[p]) + ghost_cost * each * ghosts[p];
-      q.slowest = std::max(q.slowest, work / mean);
-    }
-  }
-  q.ghosts = std::accumulate(ghosts.begin(), ghosts.end(), std::int64_t{0});
-  q.most_ghosts = *std::max_element(ghosts.begin(), ghosts.end());
-  for (const auto& of_part : peers) {
-    q.most_peers = std::max(q.most_peers, static_cast<int>(of_part.size()));
-  }
-  q.empty = static_cast<int>(std::count(used.begin(), used.end(), 0));
-  return q;
+  return counts.quality();
 }
 
 std::vector<int> ungrouped(const std::vector<int>& part_of_group, const Groups& groups) {

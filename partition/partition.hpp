@@ -1,7 +1,9 @@
 /// A graph cut into parts of equal weight: three ways behind one function. No ranks are needed.
 #pragma once
 
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "partition/graph.hpp"
@@ -42,6 +44,31 @@ struct PartitionQuality {
 /// An estimate: what a ghost costs, which is packed, sent and unpacked twice a step, of what a phyxel
 /// with its neighbours does.
 inline constexpr double ghost_cost = 0.3;
+
+/// What the quality of a partition follows from, vertex by vertex; ranks may add their words.
+class PartCounts {
+ public:
+  explicit PartCounts(int parts);
+  /// A vertex of a part, and what it shares an edge with. Once for each vertex.
+  /// @param others part and weight of the edge to each
+  void add(int part, std::int64_t weight, std::span<const std::pair<int, std::int64_t>> others);
+  std::span<std::int64_t> words() { return words_; }
+  PartitionQuality quality() const;
+
+ private:
+  std::int64_t& weight(int part) { return words_[static_cast<std::size_t>(part)]; }
+  std::int64_t& ghosts(int part) { return words_[static_cast<std::size_t>(parts_ + part)]; }
+  std::int64_t& vertices(int part) { return words_[static_cast<std::size_t>(2 * parts_ + part)]; }
+  std::int64_t& cut() { return words_[static_cast<std::size_t>(3 * parts_)]; }
+  std::int64_t& needed(int part, int by) {
+    return words_[static_cast<std::size_t>(3 * parts_ + 1) +
+                  static_cast<std::size_t>(by) * static_cast<std::size_t>(parts_) +
+                  static_cast<std::size_t>(part)];
+  }
+  int parts_;
+  std::vector<std::int64_t> words_;
+  std::vector<int> others_;  // of the vertex that is added
+};
 
 /// @param graph the phyxels' own, so that ghosts are phyxels whatever was cut
 PartitionQuality quality_of(const Graph& graph, const std::vector<int>& part_of, int parts);

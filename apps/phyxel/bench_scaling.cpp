@@ -133,20 +133,18 @@ void bench_scaling(const Options& options) {
     for (const std::string& partitioner : options.partitioners) {
       for (const int rings : options.rings) {
         if (device.gpu && rings != 1) continue;
-        const Ensemble ensemble(
-            [&] { return alone ? make_model(scene, device) : build_model(scene); },
-            {partitioner, rings, device.gpu.has_value()});
+        const Ensemble ensemble(scene, device, {partitioner, rings});
         const Ensemble::Shares& shares = ensemble.shares();
         for (const std::string& precision : options.precisions) {
           const Measured m = measure(ensemble, scene, precision_option(precision), device, options);
           ranks().together([&] {
             if (!leads) return;
-            const Model& whole = ensemble.whole();
-            const double n = whole.size();
+            const Model& model = ensemble.here();
+            const double n = model.whole_size();
             table.rows.push_back(
                 {std::to_string(ranks().size()), "1", alone ? "none" : partitioner,
-                 alone ? "0" : std::to_string(rings), precision, std::to_string(whole.size()),
-                 fmt::format("{:.1f}", static_cast<double>(whole.pairs()) / n),
+                 alone ? "0" : std::to_string(rings), precision, std::to_string(model.whole_size()),
+                 fmt::format("{:.1f}", static_cast<double>(model.pairs()) / n),
                  std::to_string(shares.fewest), std::to_string(shares.most),
                  std::to_string(shares.most_ghosts), fmt::format("{:.5g}", m.steps_per_s.value),
                  fmt::format("{:.5g}", m.steps_per_s.value * n),

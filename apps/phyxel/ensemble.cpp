@@ -1,6 +1,8 @@
 #include "ensemble.hpp"
 
-#include "mpi/halo.hpp"
+#include <algorithm>
+
+#include "mpi/build_share.hpp"
 #include "partition/partition.hpp"
 #include "partition/share.hpp"
 #include "setup/tiling.hpp"
@@ -37,51 +39,93 @@ void require_alike(std::uint64_t value, const char* what) {
                         ": allowed are the same files for all, on a file system that all see");
 }
 
-Ensemble::Ensemble(const std::function<Model()>& make, const CutOptions& cut) {
-  const int parts = ranks().size(), rank = ranks().rank();
-  if (parts == 1) {
-    whole_ = std::make_unique<Model>(make());
-    digest_ = model_digest(*whole_);
-    shares_ = {whole_->size(), whole_->size(), 0};
+Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut) {
+  if (ranks().size() == 1) {
+    here_ = make_model(scene, device);
+    shares_ = {here_.size(), here_.size(), 0};
+    digest_ = model_digest(here_);
     return;
   }
-  Graph graph;
-  std::vector<int> part_of;
-  ranks().together([&] {
-    const std::vector<Partitioner> candidates = candidates_of(cut.partitioner);
-    whole_ = std::make_unique<Model>(make());
-    digest_ = model_digest(*whole_);
-    graph = phyxel_graph(*whole_);
-    // METIS takes random numbers from the C library: one rank's answer serves all.
-    if (rank > 0) return;
-    const Groups tiles = cut.between_tiles ? curve_groups(*whole_, cuda::tile_size) : Groups{};
-    ChosenPartition chosen =
-        choose_partition(graph, cut.between_tiles ? &tiles : nullptr, parts, candidates);
-    partitioner_ = partitioner_name(chosen.partitioner);
-    part_of = std::move(chosen.part_of);
-  });
-  require_alike(digest_, "bodies");
-  part_of = ranks().broadcast(part_of);
-  ModelShare share =
-      phyxel::share_of(*whole_, make_halo_plans(graph, part_of, parts, cut.rings)[rank], part_of);
-  if (cut.between_tiles) share.share.place = values_of(share.share, cuda::whole_places(*whole_));
-  here_ = std::make_unique<Model>(connected(ranks(), std::move(share)));
-  if (rank > 0) whole_.reset();
-
-  std::vector<std::vector<Index>> numbers(static_cast<std::size_t>(parts)),
-      surfel_numbers(numbers.size());
-  for (Index i = 0; i < here_->size(); ++i) {
-    if (!here_->owns(i)) continue;
-    owned_.push_back(i);
-    numbers[0].push_back(here_->number(i));
+  // GPUs keep tiles whole.
+  BuiltShare built =
+      build_share(ranks(), scene,
+                  {candidates_of(cut.partitioner), cut.rings, device.gpu ? cuda::tile_size : 0});
+  here_ = std::move(built.model);
+  surfaces_ = std::move(built.surfaces);
+  partitioner_ = partitioner_name(built.partitioner);
+  digest_ = model_digest(here_);
+  for (Index i = 0; i < here_.size(); ++i) {
+    if (here_.owns(i)) owned_.push_back(i);
   }
-  surfel_numbers[0] = here_->share->surfel_number;
+  const auto own = static_cast<std::int64_t>(owned_.size());
+  const std::int64_t ghosts = here_.size() - own;
+  shares_ = {ranks().smallest(own), ranks().largest(own), ranks().largest(ghosts)};
+}
+
+void Ensemble::bring_together() {
+  if (!here_.share) return;
+  const auto parts = static_cast<std::size_t>(ranks().size());
+  std::vector<std::vector<Index>> numbers(parts), surfel_numbers(parts);
+  for (const Index i : owned_) numbers[0].push_back(here_.number(i));
+  surfel_numbers[0] = here_.share->surfel_number;
   numbers_ = ranks().exchanged(numbers);
   surfel_numbers_ = ranks().exchanged(surfel_numbers);
 
-  const auto own = static_cast<std::int64_t>(owned_.size());
-  const std::int64_t ghosts = here_->size() - own;
-  shares_ = {ranks().smallest(own), ranks().largest(own), ranks().largest(ghosts)};
+  auto whole = std::make_unique<Model>();
+  Surfels& surfels = whole->surfels;
+  whole->position.resize(static_cast<std::size_t>(here_.whole_size()));
+  for (const Surface& surface : surfaces_) {
+    const auto shift = static_cast<Index>(surfels.position.size());
+    surfels.position.insert(surfels.position.end(), surface.position.begin(),
+                            surface.position.end());
+    surfels.normal.insert(surfels.normal.end(), surface.normal.begin(), surface.normal.end());
+    for (const Triangle& t : surface.triangle) {
+      surfels.triangle.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+    }
+  }
+  surfels.unreached = here_.surfels.unreached;
+  whole_ = std::move(whole);  // `phyxels` asks for its size
+  Model model = *whole_;
+  model.position = phyxels(here_.position);
+  model.mass = phyxels(here_.mass);
+  model.volume = phyxels(here_.volume);
+  model.neighbourhood.support = phyxels(here_.neighbourhood.support);
+  model.neighbourhood.symmetric = here_.neighbourhood.symmetric;
+  model.gravity = here_.gravity;
+  model.degenerate = here_.degenerate;
+  model.warnings = here_.warnings;
+  Index begin = 0, surfel_begin = 0;
+  for (std::size_t b = 0; b < here_.parts.size(); ++b) {
+    Part& part = model.parts.emplace_back(here_.parts[b]);
+    part.begin = begin;
+    part.end = begin += part.size;
+    part.ghosts = part.far_ghosts = 0;
+    part.surfel_begin = surfel_begin;
+    part.surfel_end = surfel_begin += static_cast<Index>(surfaces_[b].position.size());
+  }
+  const auto whole_list = [&](const std::vector<Index>& phyxels) {
+    std::vector<std::vector<Index>> send(parts);
+    for (const Index i : phyxels) {
+      if (here_.owns(i)) send[0].push_back(here_.number(i));
+    }
+    std::vector<Index> all;
+    for (const std::vector<Index>& from : ranks().exchanged(send)) {
+      all.insert(all.end(), from.begin(), from.end());
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+  };
+  for (const Motion& motion : here_.motions) {
+    model.motions.push_back(motion);
+    model.motions.back().phyxels = whole_list(motion.phyxels);
+  }
+  for (const Load& load : here_.loads) {
+    model.loads.push_back(load);
+    model.loads.back().phyxels = whole_list(load.phyxels);
+    model.loads.back().force.clear();  // wanted where phyxels are stepped
+  }
+  whole_ = ranks().rank() == 0 ? std::make_unique<Model>(std::move(model)) : nullptr;
+  surfaces_.clear();
 }
 
 State Ensemble::whole_state(const State& local) const {
@@ -92,9 +136,9 @@ State Ensemble::whole_state(const State& local) const {
 }
 
 State Ensemble::share_of(State whole) const {
-  if (!here_) return whole;
-  whole.displacement = values_of(*here_->share, whole.displacement);
-  whole.velocity = values_of(*here_->share, whole.velocity);
+  if (!here_.share) return whole;
+  whole.displacement = values_of(*here_.share, whole.displacement);
+  whole.velocity = values_of(*here_.share, whole.velocity);
   return whole;
 }
 

@@ -1,11 +1,11 @@
 /// A model on the ranks of the program, and what they bring together on the first.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "device_option.hpp"
 #include "mpi/communicator.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
@@ -26,28 +26,31 @@ std::vector<std::string> partitioner_choices();
 struct CutOptions {
   /// "metis", "curve", "bisection", or "auto": the one whose slowest part has least to do.
   std::string partitioner = "auto";
-  int rings = 1;               ///< See `Share`.
-  bool between_tiles = false;  ///< For GPUs, which keep tiles whole.
+  int rings = 1;  ///< See `Share`.
 };
 
 /// The model of a scene, or this rank's share of it.
 class Ensemble {
  public:
-  /// Collective. @param make builds the whole model, with lists if there are several ranks
-  Ensemble(const std::function<Model()>& make, const CutOptions& cut);
+  /// Builds it on the device that will step it, if there is one rank. Collective.
+  Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut);
 
   /// What this rank steps.
-  const Model& here() const { return here_ ? *here_ : *whole_; }
-  /// The whole; on the first rank only.
-  const Model& whole() const { return *whole_; }
+  const Model& here() const { return here_; }
   std::uint64_t digest() const { return digest_; }  ///< Of the whole.
   /// Phyxels of each rank.
   struct Shares {
     std::int64_t fewest = 0, most = 0, most_ghosts = 0;
   };
   const Shares& shares() const { return shares_; }
-  const std::string& partitioner() const { return partitioner_; }  ///< On the first rank.
-  /// Values of all phyxels, or of all surfels, on the first rank; nothing on the others.
+  const std::string& partitioner() const { return partitioner_; }
+
+  /// Gives the first rank what frames and summaries are written from: the whole model without lists
+  /// and moments. Collective.
+  void bring_together();
+  /// The whole; on the first rank, once it has been brought together.
+  const Model& whole() const { return here_.share ? *whole_ : here_; }
+  /// Values of all phyxels, or of all surfels, on the first rank, likewise; nothing on the others.
   template <class T>
   std::vector<T> phyxels(const std::vector<T>& local) const {
     return brought_together(local, owned_, numbers_, whole_ ? whole_->position.size() : 0);
@@ -67,7 +70,7 @@ class Ensemble {
   std::vector<T> brought_together(const std::vector<T>& local, const std::vector<Index>& chosen,
                                   const std::vector<std::vector<Index>>& numbers,
                                   std::size_t size) const {
-    if (!here_) return local;
+    if (!here_.share) return local;
     std::vector<std::vector<T>> send(static_cast<std::size_t>(ranks().size()));
     for (const Index i : chosen) send[0].push_back(local[i]);
     if (chosen.empty()) send[0] = local;
@@ -79,7 +82,9 @@ class Ensemble {
     return all;
   }
 
-  std::unique_ptr<const Model> whole_, here_;  // here_ null: the whole is here
+  Model here_;
+  std::vector<Surface> surfaces_;  // of a share's whole bodies, until they are brought together
+  std::unique_ptr<const Model> whole_;
   std::uint64_t digest_ = 0;
   std::vector<Index> owned_;                                  // here
   std::vector<std::vector<Index>> numbers_, surfel_numbers_;  // [rank], on the first rank

@@ -65,7 +65,7 @@ class Run {
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
         device_(device_of_ranks()),
         begin_(checkpoint_for_all()),
-        ensemble_([&] { return whole_model(); }, cut()),
+        ensemble_(scene_, device_, options_.cut),
         backend_(make_backend_of_rank()),
         plan_(alike(
             [&] { return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step); })),
@@ -76,6 +76,7 @@ class Run {
         start_diagnostics_(diagnose(model(), *backend_, solver_.steps(), solver_.dt())) {
     // Last, because it replaces what an earlier run has left: all that could be refused, or find no
     // memory, has been tried by now.
+    ensemble_.bring_together();
     ranks().together([&] {
       if (!leads()) return;
       recorder_.emplace(ensemble_.whole(), scene_, options.force,
@@ -207,15 +208,6 @@ class Run {
                         "--device cpu");
     }
     return device;
-  }
-  /// Whoever cuts it needs its lists.
-  Model whole_model() const {
-    return ranks().size() > 1 ? build_model(scene_) : make_model(scene_, device_);
-  }
-  CutOptions cut() const {
-    CutOptions cut = options_.cut;
-    cut.between_tiles = device_.gpu.has_value();
-    return cut;
   }
   /// How long a rank may stay where it is before it is named.
   static double watchdog_seconds() {

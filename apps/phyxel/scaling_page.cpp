@@ -45,18 +45,9 @@ std::optional<std::size_t> alone(const CsvTable& one, const CsvTable& many, std:
   return std::nullopt;
 }
 
-const std::vector<std::string> head{"phyxels",
-                                    "precision",
-                                    "cut by",
-                                    "ghost rings",
-                                    "transport",
-                                    "10⁶ phyxel-steps/s",
-                                    "speed-up",
-                                    "efficiency",
-                                    "spread",
-                                    "most ghosts",
-                                    "kB sent a step",
-                                    "exchanging"};
+const std::vector<std::string> head{
+    "phyxels",  "precision",  "cut by", "ghost rings", "transport",      "10⁶ phyxel-steps/s",
+    "speed-up", "efficiency", "spread", "most ghosts", "kB sent a step", "exchanging"};
 
 std::vector<std::string> cells(const CsvTable& many, std::size_t r, double speed_up, int ranks) {
   return {many.text(r, "phyxels"),

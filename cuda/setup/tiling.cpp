@@ -22,8 +22,7 @@ void find_places(Tiling& tiling) {
   }
 }
 
-/// Bodies one after the other, each from the start of a tile. Within a tile long lists come first,
-/// so that the lanes of a warp have about equally many neighbours.
+/// Bodies one after the other, each from the start of a tile.
 void place_phyxels(const Model& model, Tiling& tiling) {
   const Csr& lists = model.neighbourhood.neighbours;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
@@ -34,8 +33,7 @@ void place_phyxels(const Model& model, Tiling& tiling) {
       const auto first = order.begin() + static_cast<std::ptrdiff_t>(begin);
       const auto last =
           order.begin() + static_cast<std::ptrdiff_t>(std::min(begin + tile_size, order.size()));
-      std::stable_sort(first, last,
-                       [&](Index a, Index b) { return lists.length(a) > lists.length(b); });
+      order_in_tile({first, last}, [&](Index i) { return lists.length(i); });
       tiling.part.push_back(static_cast<Index>(p));
       tiling.phyxel.insert(tiling.phyxel.end(), first, last);
       tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
@@ -255,12 +253,6 @@ Tiling make_tiling(const Model& model) {
     tiling.inverse = make_lists(model.neighbourhood.inverse(), tiling, order);
   }
   return tiling;
-}
-
-std::vector<Index> whole_places(const Model& model) {
-  Tiling tiling;
-  place_phyxels(model, tiling);
-  return std::move(tiling.place);
 }
 
 }  // namespace phyxel::cuda

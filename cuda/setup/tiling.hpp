@@ -88,7 +88,4 @@ struct Tiling {
 /// @throws InputError if a tile reaches more points than 16-bit slots can name.
 Tiling make_tiling(const Model& model);
 
-/// Where each phyxel of a whole model is in its tiles: for shares, whose ranks cannot tell.
-std::vector<Index> whole_places(const Model& model);
-
 }  // namespace phyxel::cuda

@@ -1,5 +1,6 @@
 #include <xxhash.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -13,33 +14,59 @@ void add(XXH3_state_t* state, const std::vector<T>& values) {
   XXH3_64bits_update(state, values.data(), values.size() * sizeof(T));
 }
 
+/// A sum over phyxels, so that ranks may each add theirs.
+std::uint64_t digest_of_phyxels(const Model& model) {
+  std::uint64_t sum = 0;
+  const auto digest_of = [](const auto& values) {
+    return XXH3_64bits(values.data(), values.size() * sizeof(values[0]));
+  };
+  for (const Part& part : model.parts) {
+    const Index end = part.owned_end();
+#pragma omp parallel for schedule(static) reduction(+ : sum)
+    for (Index i = part.begin; i < end; ++i) {
+      const Vec3d& x = model.position[i];
+      // Kernel volumes are sums, whose last bits depend on who summed.
+      sum += digest_of(std::array{static_cast<double>(model.number(i)), x.x, x.y, x.z,
+                                  model.neighbourhood.support[i],
+                                  part.kernel_volumes ? 0.0 : model.volume[i]});
+    }
+  }
+  std::int64_t entry = 0;
+  const auto add_entry = [&](const std::vector<Index>& phyxels) {
+    ++entry;
+    for (const Index i : phyxels) {
+      if (model.owns(i)) sum += digest_of(std::array{entry, std::int64_t{model.number(i)}});
+    }
+  };
+  for (const Motion& motion : model.motions) add_entry(motion.phyxels);
+  for (const Load& load : model.loads) add_entry(load.phyxels);
+  if (model.share) {
+    auto whole = static_cast<std::int64_t>(sum);
+    model.share->others->add({&whole, 1});
+    sum = static_cast<std::uint64_t>(whole);
+  }
+  return sum;
+}
+
 }  // namespace
 
 std::uint64_t model_digest(const Model& model) {
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
                                                                        &XXH3_freeState);
   XXH3_64bits_reset(state.get());
-  add(state.get(), model.position);
-  add(state.get(), model.neighbourhood.support);
+  add(state.get(), std::vector<std::uint64_t>{digest_of_phyxels(model)});
   for (const Part& part : model.parts) {
     const Material& m = part.material;
-    // Kernel volumes are sums, whose last bits depend on who summed.
-    if (!part.kernel_volumes) {
-      add(state.get(),
-          std::vector<double>(model.volume.begin() + part.begin, model.volume.begin() + part.end));
-    }
     add(state.get(), std::vector<char>(part.neighbourhood.begin(), part.neighbourhood.end()));
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0});
   }
   for (const Motion& motion : model.motions) {
-    add(state.get(), motion.phyxels);
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
     add(state.get(), std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z,
                                          motion.duration, motion.frequency});
   }
   for (const Load& load : model.loads) {
-    add(state.get(), load.phyxels);
     add(state.get(), std::vector<Vec3d>{load.total, load.density});
     add(state.get(), std::vector<double>{load.ramp});
   }

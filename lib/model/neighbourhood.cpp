@@ -8,6 +8,7 @@
 
 #include "model/box.hpp"
 #include "model/nearest_distances.hpp"
+#include "model/neighbour_search.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
@@ -59,24 +60,14 @@ SpatialHash roomy_hash(std::span<const Vec3d> position) {
   }
 }
 
-/// Support radius of every phyxel by the rule [m].
-std::vector<double> support_radii(std::span<const double> spacing, const NeighbourhoodRule& rule) {
-  std::vector<double> support(spacing.size());
-  if (rule.radius) {
-    std::fill(support.begin(), support.end(), *rule.radius);
-  } else if (rule.support == NeighbourhoodRule::Support::adaptive) {
-    std::transform(spacing.begin(), spacing.end(), support.begin(),
-                   [&](double r) { return rule.factor * r; });
-  } else if (!spacing.empty()) {
-    std::vector<double> sorted(spacing.begin(), spacing.end());
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    std::fill(support.begin(), support.end(), rule.factor * *middle);
-  }
-  return support;
-}
-
 }  // namespace
+
+double median_of(std::span<const double> values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
 
 Csr transpose(const Csr& csr, Index columns) {
   Csr result;
@@ -91,7 +82,22 @@ Csr transpose(const Csr& csr, Index columns) {
   return result;
 }
 
+std::vector<double> support_radii(std::span<const double> spacing, const NeighbourhoodRule& rule,
+                                  double median) {
+  if (!rule.radius && rule.support == NeighbourhoodRule::Support::adaptive) {
+    std::vector<double> support;
+    support.reserve(spacing.size());
+    for (const double r : spacing) support.push_back(rule.factor * r);
+    return support;
+  }
+  return std::vector<double>(spacing.size(), rule.radius ? *rule.radius : rule.factor * median);
+}
+
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
+  return mean_spacing(position, nearest, nullptr);
+}
+
+std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, double* farthest) {
   const Index n = static_cast<Index>(position.size());
   std::vector<double> spacing(position.size(), 0);
   if (n < 2) return spacing;
@@ -111,6 +117,7 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
           found, hash.farthest_ring(here), hash.cell_size(),
           [&](int ring) { hash.visit_ring(here, ring, offer); }, [&] { hash.visit_all(offer); });
       spacing[i] = found.mean_distance();
+      if (farthest) farthest[i] = std::sqrt(found.largest());
     }
   }
   return spacing;
@@ -118,15 +125,18 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
 
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule) {
+  return neighbours_within(
+      position, support_radii(spacing, rule, spacing.empty() ? 0 : median_of(spacing)), rule);
+}
+
+Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<double> support,
+                                const NeighbourhoodRule& rule) {
   const Index n = static_cast<Index>(position.size());
   Neighbourhood result;
-  result.support = support_radii(spacing, rule);
+  result.support = std::move(support);
+  result.symmetric = !rule.one_sided();
   if (n == 0) return result;
-
-  std::vector<double> sorted = result.support;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  const SpatialHash hash(position, *middle);
+  const SpatialHash hash(position, median_of(result.support));
 
   using Candidate = std::pair<double, Index>;
   result.neighbours = build_rows(n, [&](Index i, std::vector<Index>& row) {
@@ -153,45 +163,60 @@ Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const d
                       candidates.end());
     for (std::size_t k = 0; k < kept; ++k) row.push_back(candidates[k].second);
   });
-  result.symmetric = !rule.one_sided();
   if (!result.symmetric) result.inverse_lists = transpose(result.neighbours, n);
   return result;
 }
 
+Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,
+                     std::span<const double> support) {
+  Csr csr;
+  if (position.empty()) {
+    csr.offsets.assign(point.size() + 1, 0);
+    return csr;
+  }
+  const double largest = *std::max_element(support.begin(), support.end());
+  const SpatialHash hash(position, median_of(support));
+  const int rings = static_cast<int>(std::ceil(largest / hash.cell_size()));
+  return build_rows(static_cast<Index>(point.size()), [&](Index s, std::vector<Index>& row) {
+    const Vec3d here = point[s];
+    hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+      const double h = support[e.index];
+      if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
+    });
+  });
+}
+
+std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position) {
+  std::pair<double, Index> nearest{std::numeric_limits<double>::infinity(), -1};
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    const double d2 = dot(position[i] - point, position[i] - point);
+    if (d2 < nearest.first) nearest = {d2, static_cast<Index>(i)};
+  }
+  return nearest;
+}
+
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached) {
+  const Csr reaching = phyxels_reaching(point, position, support);
+  std::vector<Index> nearest(point.size(), -1);
   Index lost = 0;
-  Csr csr;
   if (!position.empty()) {
-    std::vector<double> sorted(support.begin(), support.end());
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double largest = *std::max_element(middle, sorted.end());
-    const SpatialHash hash(position, *middle);
-    const int rings = static_cast<int>(std::ceil(largest / hash.cell_size()));
-    const auto rows = static_cast<Index>(point.size());
-    std::vector<char> missed(point.size(), 0);
-    csr = build_rows(rows, [&](Index s, std::vector<Index>& row) {
-      const Vec3d here = point[s];
-      hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
-        const double h = support[e.index];
-        if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
-      });
-      if (!row.empty()) return;
-      missed[s] = 1;
-      Index nearest = 0;
-      double smallest = std::numeric_limits<double>::infinity();
-      for (Index i = 0; i < static_cast<Index>(position.size()); ++i) {
-        const double d2 = dot(position[i] - here, position[i] - here);
-        if (d2 < smallest) smallest = d2, nearest = i;
-      }
-      row.push_back(nearest);
-    });
-    lost = static_cast<Index>(std::count(missed.begin(), missed.end(), 1));
-  } else {
-    csr.offsets.assign(point.size() + 1, 0);
+#pragma omp parallel for schedule(dynamic, 64) reduction(+ : lost)
+    for (Index s = 0; s < reaching.rows(); ++s) {
+      if (reaching.length(s) > 0) continue;
+      nearest[s] = nearest_to(point[s], position).second;
+      ++lost;
+    }
   }
   if (unreached) *unreached = lost;
+  if (lost == 0) return reaching;
+  Csr csr;
+  for (Index s = 0; s < reaching.rows(); ++s) {
+    const auto row = reaching.row(s);
+    csr.indices.insert(csr.indices.end(), row.begin(), row.end());
+    if (row.empty()) csr.indices.push_back(nearest[s]);
+    csr.offsets.push_back(static_cast<Offset>(csr.indices.size()));
+  }
   return csr;
 }
 

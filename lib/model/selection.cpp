@@ -32,49 +32,55 @@ std::vector<Index> of_region(const Selection& selection, const Cloud& cloud,
                                names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
 }
 
-std::vector<Index> of_indices(const Selection& selection, const Cloud& cloud,
-                              const std::string& body) {
-  std::vector<Index> chosen = *selection.indices;
-  for (const Index i : chosen) {
-    if (i < 0 || static_cast<std::size_t>(i) >= cloud.position.size()) {
+std::vector<Index> of_indices(const Selection& selection, const SomePhyxels& body,
+                              const std::string& name) {
+  for (const Index i : *selection.indices) {
+    if (i < 0 || i >= body.size) {
       throw InputError(fmt::format("{}: phyxel {} is not in body \"{}\": allowed 0 to {}",
-                                   selection.where, i, body, cloud.position.size() - 1));
+                                   selection.where, i, name, body.size - 1));
     }
   }
+  std::vector<Index> chosen = *selection.indices;
   sort_unique(chosen);
-  return chosen;
+  if (body.number.empty()) return chosen;
+  std::vector<Index> here;
+  for (const Index i : chosen) {
+    const auto at = std::lower_bound(body.number.begin(), body.number.end(), i);
+    if (at != body.number.end() && *at == i) {
+      here.push_back(static_cast<Index>(at - body.number.begin()));
+    }
+  }
+  return here;
 }
 
 }  // namespace
 
-std::vector<Index> select(const Selection& selection, const Cloud& cloud, const std::string& body) {
-  std::vector<Index> chosen;
-  if (selection.region) {
-    chosen = of_region(selection, cloud, body);
-  } else if (selection.indices) {
-    chosen = of_indices(selection, cloud, body);
-  } else if (selection.box) {
+std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
+                          const std::string& name) {
+  const Cloud& cloud = body.cloud;
+  if (selection.region) return of_region(selection, cloud, name);
+  if (selection.indices) return of_indices(selection, body, name);
+  if (selection.box) {
     const Vec3d low = selection.box->low, high = selection.box->high;
-    chosen = indices_where(cloud, [&](Vec3d p) {
+    return indices_where(cloud, [&](Vec3d p) {
       return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y && p.z >= low.z &&
              p.z <= high.z;
     });
-  } else if (selection.ball) {
+  }
+  if (selection.ball) {
     const double r2 = selection.ball->radius * selection.ball->radius;
-    chosen = indices_where(cloud, [&](Vec3d p) {
+    return indices_where(cloud, [&](Vec3d p) {
       return dot(p - selection.ball->centre, p - selection.ball->centre) <= r2;
     });
-  } else {
-    chosen = indices_where(cloud, [](Vec3d) { return true; });
   }
-  if (chosen.empty()) {
-    const auto [low, high] = box_around(cloud.position);
-    throw InputError(fmt::format(
-        "{}: this selects no phyxel of body \"{}\", whose phyxels lie in [{:g}, {:g}, {:g}] to "
-        "[{:g}, {:g}, {:g}] m",
-        selection.where, body, low.x, low.y, low.z, high.x, high.y, high.z));
-  }
-  return chosen;
+  return indices_where(cloud, [](Vec3d) { return true; });
+}
+
+void refuse_selection(const Selection& selection, const std::string& name, const Box& box) {
+  throw InputError(fmt::format(
+      "{}: this selects no phyxel of body \"{}\", whose phyxels lie in [{:g}, {:g}, {:g}] to "
+      "[{:g}, {:g}, {:g}] m",
+      selection.where, name, box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z));
 }
 
 }  // namespace phyxel

@@ -1,15 +1,31 @@
 /// Which phyxels of a body a scene means.
 #pragma once
 
+#include <span>
+#include <string>
 #include <vector>
 
+#include "model/box.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/scene.hpp"
 
 namespace phyxel {
 
-/// Sorted indices of the selected phyxels within the cloud (already placed).
-/// @throws InputError if nothing is selected, a region is unknown or an index out of range.
-std::vector<Index> select(const Selection& selection, const Cloud& cloud, const std::string& body);
+/// A body of `size` phyxels, or those of it that the cloud has (already placed).
+struct SomePhyxels {
+  const Cloud& cloud;
+  std::span<const Index> number;  ///< Which ones, ascending; empty: all.
+  Index size = 0;
+  Index number_of(Index i) const { return number.empty() ? i : number[i]; }
+};
+
+/// The selected phyxels, ascending, counted in the cloud; there may be none.
+/// @throws InputError if a region is unknown or an index out of range.
+std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
+                          const std::string& name);
+
+/// For a selection of nothing. @param box around the body @throws InputError
+[[noreturn]] void refuse_selection(const Selection& selection, const std::string& name,
+                                   const Box& box);
 
 }  // namespace phyxel

@@ -68,4 +68,13 @@ struct HilbertFrame {
 /// indices.
 std::vector<Index> curve_order(std::span<const Vec3d> position, Index begin, Index end);
 
+/// Brings phyxels that follow each other along the curve into the order of their places in a GPU's
+/// tile: long lists first, so that the lanes of a warp have about equally many neighbours.
+/// @param length length(i): of the list of phyxel i
+template <class Length>
+void order_in_tile(std::span<Index> phyxels, Length&& length) {
+  std::stable_sort(phyxels.begin(), phyxels.end(),
+                   [&](Index a, Index b) { return length(a) > length(b); });
+}
+
 }  // namespace phyxel

@@ -40,20 +40,26 @@ class Filling {
     }
   }
 
-  Cloud run() {
+  /// The blocks whose first phyxels are in the piece.
+  CloudPiece run(Piece piece) {
     find_blocks();
-    Cloud cloud;
-    const auto phyxels = static_cast<std::size_t>(first_.back());
+    const Offset whole = first_.back();
+    const auto begins = [&](int k) {
+      return std::lower_bound(first_.begin(), first_.end(), whole * k / piece.of) - first_.begin();
+    };
+    const std::ptrdiff_t begin = begins(piece.number), end = begins(piece.number + 1);
+    CloudPiece made{{}, static_cast<Index>(first_[begin]), static_cast<Index>(whole)};
+    Cloud& cloud = made.cloud;
+    const auto phyxels = static_cast<std::size_t>(first_[end] - first_[begin]);
     cloud.position.resize(phyxels);
-    cloud.volume.assign(phyxels, lattice_.volume() / static_cast<double>(phyxels));
-    const auto n = static_cast<std::ptrdiff_t>(block_.size());
+    cloud.volume.assign(phyxels, lattice_.volume() / static_cast<double>(whole));
 #pragma omp parallel for schedule(dynamic, 16)
-    for (std::ptrdiff_t b = 0; b < n; ++b) {
-      Vec3d* next = cloud.position.data() + first_[b];
+    for (std::ptrdiff_t b = begin; b < end; ++b) {
+      Vec3d* next = cloud.position.data() + (first_[b] - first_[begin]);
       visit_inside(b, [&](const Cell& c, Vec3d centre) { *next++ = jittered(c, centre); });
     }
-    add_regions(cloud);
-    return cloud;
+    add_regions(cloud, begin, end);
+    return made;
   }
 
  private:
@@ -113,17 +119,17 @@ class Filling {
   }
 
   /// The outermost layer of cells on each side that is flat.
-  void add_regions(Cloud& cloud) const {
+  void add_regions(Cloud& cloud, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     if (lattice_.solid == Lattice::Solid::sphere) return;
     static constexpr const char* names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
     for (int axis = lattice_.solid == Lattice::Solid::box ? 0 : 2; axis < 3; ++axis) {
       std::vector<Index>& low = cloud.regions[names[axis][0]];
       std::vector<Index>& high = cloud.regions[names[axis][1]];
-      for (std::size_t b = 0; b < block_.size(); ++b) {
+      for (std::ptrdiff_t b = begin; b < end; ++b) {
         const std::int64_t layer = block_[b][axis];
         if (layer != 0 && layer != block_end_[axis] - 1) continue;
-        Offset i = first_[b];
-        visit_inside(static_cast<std::ptrdiff_t>(b), [&](const Cell& c, Vec3d) {
+        Offset i = first_[b] - first_[begin];
+        visit_inside(b, [&](const Cell& c, Vec3d) {
           if (c[axis] == 0) low.push_back(static_cast<Index>(i));
           if (c[axis] == end_[axis] - 1) high.push_back(static_cast<Index>(i));
           ++i;
@@ -207,8 +213,8 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
   return lattice;
 }
 
-Cloud fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed) {
-  return Filling(lattice, jitter, seed).run();
+CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed, Piece piece) {
+  return Filling(lattice, jitter, seed).run(piece);
 }
 
 }  // namespace phyxel

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "model/cloud_piece.hpp"
 #include "phyxel/shapes.hpp"
 
 namespace phyxel {
@@ -31,10 +32,15 @@ Lattice make_lattice(const ShapeRequest& request, double spacing);
 /// A phyxel in each cell whose centre is inside the solid, all with the same volume, in the order
 /// of a Morton curve over the cells; with regions. Phyxels are moved by up to `jitter` cells in
 /// each direction, but not out of the solid.
-Cloud fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed);
+CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed,
+                        Piece piece = {});
 
 /// The closed surface of the solid with vertices about `spacing` [m] apart, or more where that
 /// would be over a million.
 Surface lattice_surface(const Lattice& lattice, double spacing);
+
+/// A shape that is a lattice, or a piece of it with all of its surface. @throws InputError as
+/// `make_shape`
+CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece = {});
 
 }  // namespace phyxel

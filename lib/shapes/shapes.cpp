@@ -44,9 +44,9 @@ void check_size(const ShapeRequest& request) {
 }
 
 /// What filling a shape takes at any time: positions, volumes, their order, a copy of each.
-void require_memory_for_cloud(const std::string& shape, double phyxels) {
+void require_memory_for_cloud(const std::string& shape, double phyxels, Piece piece = {}) {
   constexpr double bytes_per_phyxel = 120;
-  require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel);
+  require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel / piece.of);
 }
 
 void check_lattice(const ShapeRequest& request) {
@@ -107,12 +107,16 @@ Cloud make_shape(const ShapeRequest& request) {
   if (const PaperBody* body = find_paper_body(request.name)) {
     return make_paper_body(*body, request.surface);
   }
+  return make_lattice_shape(request).cloud;
+}
+
+CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
   check_lattice(request);
   const Lattice lattice = make_lattice(request, request.spacing);
-  require_memory_for_cloud(request.name, lattice.phyxels());
-  Cloud cloud = fill_lattice(lattice, request.jitter, request.seed);
-  if (request.surface) cloud.surface = lattice_surface(lattice, request.spacing);
-  return cloud;
+  require_memory_for_cloud(request.name, lattice.phyxels(), piece);
+  CloudPiece made = fill_lattice(lattice, request.jitter, request.seed, piece);
+  if (request.surface) made.cloud.surface = lattice_surface(lattice, request.spacing);
+  return made;
 }
 
 }  // namespace phyxel

@@ -120,7 +120,7 @@ TEST_P(SurfelPlans, OfSharesHaveTheBlocksOfTheWhole) {
     std::map<Index, Described> found;
     for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
       ModelShare made = share_of(whole, plan, part_of);
-      made.share.place = values_of(made.share, whole_places(whole));
+      made.share.place = values_of(made.share, make_tiling(whole).place);
       made.model.share = std::make_shared<Share>(made.share);
       found.merge(described(made.model, make_tiling(made.model)));
     }

@@ -137,7 +137,7 @@ TEST_P(Tiling, ListsHoldEveryNeighbourOnce) {
 TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
   const Model whole = GetParam().make();
   const cuda::Tiling expected = make_tiling(whole);
-  const std::vector<Index> places = whole_places(whole);
+  const std::vector<Index> places = make_tiling(whole).place;
   const Graph graph = phyxel_graph(whole);
   const Groups groups = curve_groups(whole, tile_size);
   for (const int parts : {1, 2, 5}) {

@@ -72,7 +72,7 @@ struct Share {
   Index whole = 0;            ///< Phyxels of the whole model.
   std::vector<Index> number;  ///< Which of them each phyxel is, shape [n].
   std::vector<char> owned;    ///< Whether each is no ghost, shape [n].
-  /// Where each is in the whole model's tiles (`whole_places`), shape [n]; empty: no GPU steps
+  /// Where each is in the whole model's tiles (`Tiling::place`), shape [n]; empty: no GPU steps
   /// this.
   std::vector<Index> place;
   std::vector<Index> surfel_number;  ///< Which of the whole model's surfels each surfel is.

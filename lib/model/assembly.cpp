@@ -1,0 +1,267 @@
+#include "model/assembly.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "model/selection.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/weight.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Rotation by |r| degrees about r (Rodrigues).
+Mat3d rotation_matrix(Vec3d degrees) {
+  const double angle = norm(degrees) * std::numbers::pi / 180;
+  if (angle == 0) return identity<double>();
+  const Vec3d a = normalised(degrees);
+  Mat3d k;
+  k(0, 1) = -a.z, k(0, 2) = a.y, k(1, 0) = a.z, k(1, 2) = -a.x, k(2, 0) = -a.y, k(2, 1) = a.x;
+  return identity<double>() + std::sin(angle) * k + (1 - std::cos(angle)) * (k * k);
+}
+
+}  // namespace
+
+void place(Cloud& cloud, const BodyRequest& request) {
+  const Mat3d rotation = rotation_matrix(request.rotation);
+  const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
+  for (Vec3d& p : cloud.position) p = placed(p);
+  for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
+  for (Vec3d& p : cloud.surface.position) p = placed(p);
+  for (Vec3d& n : cloud.surface.normal) n = rotation * n;
+}
+
+bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {
+  const bool kernel = request.volume_rule == VolumeRule::kernel ||
+                      (request.volume_rule == VolumeRule::automatic && !has_volumes);
+  if (kernel && phyxels < 2) {
+    throw InputError(
+        fmt::format("{}: body \"{}\" has a single phyxel: the kernel rule cannot tell its volume",
+                    request.where, request.name));
+  }
+  if (!kernel && !has_volumes) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" carries no volumes, so volumes = \"geometry\" is impossible: allowed "
+        "\"kernel\" or \"automatic\"",
+        request.where, request.name));
+  }
+  return kernel;
+}
+
+std::vector<double> kernel_sums(std::span<const Vec3d> position, const Neighbourhood& hood,
+                                const std::vector<double>& spacing, Index begin) {
+  const auto cube = [&](Index i) {
+    const double r = spacing[i - begin];
+    return r * r * r;
+  };
+  const Index end = begin + static_cast<Index>(spacing.size());
+  std::vector<double> sums(spacing.size());
+#pragma omp parallel for
+  for (Index i = begin; i < end; ++i) {
+    const double h = hood.support[i];
+    double& sum = sums[i - begin];
+    sum = h > 0 ? cube(i) * weight(0, h) : 0;
+    for (const Index j : hood.neighbours.row(i)) {
+      sum += cube(j) * weight(norm(position[j] - position[i]), h);
+    }
+  }
+  return sums;
+}
+
+Masses kernel_masses(const std::vector<double>& spacing, const std::vector<double>& kernel_sum,
+                     double mean, double density) {
+  const std::size_t n = spacing.size();
+  Masses result{std::vector<double>(n), std::vector<double>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = spacing[i];
+    result.mass[i] = r * r * r * density / mean;
+    result.volume[i] = result.mass[i] / (kernel_sum[i] / mean * density);
+  }
+  return result;
+}
+
+Masses geometric_masses(const std::vector<double>& volume, double density) {
+  Masses result{std::vector<double>(volume.size()), volume};
+  std::transform(volume.begin(), volume.end(), result.mass.begin(),
+                 [&](double v) { return v * density; });
+  return result;
+}
+
+std::string in_words(const NeighbourhoodRule& rule) {
+  std::string words;
+  if (rule.radius) {
+    words = fmt::format("support radius {:g} m", *rule.radius);
+    // Kernel volumes still follow from the nearest.
+    if (rule.nearest != NeighbourhoodRule{}.nearest) {
+      words += fmt::format(", {} nearest", rule.nearest);
+    }
+  } else {
+    words =
+        fmt::format("{} support, {:g} x the mean distance to the {} nearest",
+                    rule.support == NeighbourhoodRule::Support::uniform ? "uniform" : "adaptive",
+                    rule.factor, rule.nearest);
+  }
+  if (rule.max_neighbours) words += fmt::format(", at most {} neighbours", *rule.max_neighbours);
+  return words;
+}
+
+void append_rows(Csr& to, const Csr& rows, Index shift) {
+  const Offset base = to.entries();
+  for (std::size_t r = 1; r < rows.offsets.size(); ++r)
+    to.offsets.push_back(base + rows.offsets[r]);
+  to.indices.reserve(to.indices.size() + rows.indices.size());
+  for (const Index j : rows.indices) to.indices.push_back(j + shift);
+}
+
+void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift) {
+  if (all.symmetric && !hood.symmetric) {
+    all.inverse_lists = all.neighbours;
+    all.symmetric = false;
+  }
+  append_rows(all.neighbours, hood.neighbours, shift);
+  if (!all.symmetric) append_rows(all.inverse_lists, hood.inverse(), shift);
+}
+
+void find_moments(Model& model) {
+  if (!model.has_lists()) return;
+  const Index n = model.size();
+  model.inverse_moment.resize(static_cast<std::size_t>(n));
+  model.moment_offset.resize(static_cast<std::size_t>(n));
+  std::vector<signed char> rank(static_cast<std::size_t>(n));
+  std::vector<char> coincident(static_cast<std::size_t>(n), 0);
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < n; ++i) {
+    Sym3d moment;
+    Vec3d offset;
+    const double h = model.neighbourhood.support[i];
+    const double inverse_h_squared = 1 / (h * h);
+    for (const Index j : model.neighbourhood.neighbours.row(i)) {
+      const Vec3d x = model.position[j] - model.position[i];
+      const double w = weight_shape(dot(x, x), inverse_h_squared);
+      moment += moment_term(x, w);
+      offset += w * x;
+      if (dot(x, x) <= 1e-20 * h * h) coincident[i] = 1;
+    }
+    const PseudoInverse<double> inverse = pseudo_inverse(moment);
+    model.inverse_moment[i] = inverse.matrix;
+    model.moment_offset[i] = offset;
+    rank[i] = static_cast<signed char>(inverse.rank);
+  }
+  for (Index i = 0; i < n; ++i) {
+    if (coincident[i]) model.degenerate.coincident.push_back(i);
+    if (rank[i] == 0) model.degenerate.isolated.push_back(i);
+    if (rank[i] == 1) model.degenerate.collinear.push_back(i);
+    if (rank[i] == 2) model.degenerate.coplanar.push_back(i);
+  }
+}
+
+void add_warnings(Model& model, std::size_t surfels) {
+  if (!model.degenerate.none()) {
+    model.warnings.push_back(model.degenerate.describe() +
+                             "; such phyxels resist only in the directions their neighbours span. "
+                             "A larger neighbours.factor, or support = \"adaptive\", helps");
+  }
+  if (model.surfels.unreached > 0) {
+    model.warnings.push_back(
+        fmt::format("{} of {} surfels lie outside every phyxel's support and follow the nearest "
+                    "phyxel; more phyxels or a larger neighbours.factor reach them",
+                    model.surfels.unreached, surfels));
+  }
+}
+
+void BodySums::tell(Part& part) const {
+  part.mass = mass.value();
+  part.volume = volume.value();
+  if (part.mass > 0) part.centre = moment.value() / part.mass;
+}
+
+BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
+                               std::span<const Index> number, Index size) {
+  BoundaryChoice choice;
+  std::vector<char> moved(cloud.position.size(), 0);
+  const SomePhyxels here{cloud, number, size};
+  const auto claim = [&](const Selection& selection) {
+    const std::vector<Index>& chosen =
+        choice.chosen.emplace_back(select(selection, here, request.name));
+    for (const Index i : chosen) {
+      if (moved[i]++) {
+        throw InputError(fmt::format(
+            "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry",
+            selection.where, here.number_of(i), request.name));
+      }
+    }
+  };
+  for (const FixRequest& fix : request.fixed) claim(fix.select);
+  for (const MotionRequest& motion : request.motions) claim(motion.select);
+  choice.first_load = choice.chosen.size();
+  for (const LoadRequest& load : request.loads) {
+    choice.chosen.push_back(select(load.select, here, request.name));
+  }
+  return choice;
+}
+
+std::vector<std::int64_t> BoundaryChoice::counts() const {
+  std::vector<std::int64_t> counts;
+  for (const std::vector<Index>& phyxels : chosen) {
+    counts.push_back(static_cast<std::int64_t>(phyxels.size()));
+  }
+  return counts;
+}
+
+std::vector<ExactSum> BoundaryChoice::loaded_masses(const Model& model, Index shift) const {
+  std::vector<ExactSum> sums;
+  for (std::size_t entry = first_load; entry < chosen.size(); ++entry) {
+    ExactSum& sum = sums.emplace_back();
+    for (const Index i : chosen[entry]) sum.add(model.mass[shift + i]);
+  }
+  return sums;
+}
+
+void BoundaryChoice::refuse_empty(const BodyRequest& request,
+                                  const std::vector<std::int64_t>& counts, const Box& box) const {
+  std::vector<const Selection*> selections;
+  for (const FixRequest& fix : request.fixed) selections.push_back(&fix.select);
+  for (const MotionRequest& motion : request.motions) selections.push_back(&motion.select);
+  for (const LoadRequest& load : request.loads) selections.push_back(&load.select);
+  for (std::size_t entry = 0; entry < selections.size(); ++entry) {
+    if (counts[entry] == 0) refuse_selection(*selections[entry], request.name, box);
+  }
+}
+
+void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shift,
+                            const std::vector<double>& loaded) const {
+  auto entry = chosen.begin();
+  const auto next = [&] {
+    std::vector<Index> phyxels = *entry++;
+    for (Index& i : phyxels) i += shift;
+    return phyxels;
+  };
+  for (std::size_t f = 0; f < request.fixed.size(); ++f) {
+    model.motions.push_back({.phyxels = next()});
+  }
+  for (const MotionRequest& m : request.motions) {
+    model.motions.push_back({.phyxels = next(),
+                             .displacement = m.displacement,
+                             .duration = m.duration,
+                             .velocity = m.velocity,
+                             .amplitude = m.amplitude,
+                             .frequency = m.frequency});
+  }
+  for (std::size_t l = 0; l < request.loads.size(); ++l) {
+    const LoadRequest& asked = request.loads[l];
+    Load& load = model.loads.emplace_back();
+    load.phyxels = next();
+    load.total = asked.force;
+    load.density = asked.force_density;
+    load.ramp = asked.ramp;
+    for (const Index i : load.phyxels) {
+      load.force.push_back((model.mass[i] / loaded[l]) * asked.force +
+                           model.volume[i] * asked.force_density);
+    }
+  }
+}
+
+}  // namespace phyxel

@@ -1,0 +1,94 @@
+/// What models are put together from, by whoever has all of a body or a part of it.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "model/box.hpp"
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// The rest cloud of a source, before it is scaled and moved.
+Cloud rest_cloud(const BodySource& source);
+/// The lattice that a source is, with its spacing, if it is one.
+std::optional<ShapeRequest> lattice_of(const BodySource& source);
+
+/// Scales, turns and moves a cloud as asked.
+void place(Cloud& cloud, const BodyRequest& request);
+
+/// Whether the volumes of a body follow from the kernel.
+/// @throws InputError if it can have none as asked
+bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels);
+
+/// r̄_i³ w_ii + Σ_j r̄_j³ w_ij of each phyxel [begin, begin + spacing.size()) of a neighbourhood.
+std::vector<double> kernel_sums(std::span<const Vec3d> position, const Neighbourhood& hood,
+                                const std::vector<double>& spacing, Index begin = 0);
+
+struct Masses {
+  std::vector<double> mass, volume;
+};
+/// The 2004 rule: m_i = s r̄_i³ ρ with s such that the mean kernel density Σ_j m_j w_ij is ρ
+/// (the phyxel itself included), v_i = m_i / ρ_i. Source: Mueller et al. 2004, section 4.2.
+/// @param kernel_sum kernel density over ρ, for s = 1. @param mean of those of the body
+Masses kernel_masses(const std::vector<double>& spacing, const std::vector<double>& kernel_sum,
+                     double mean, double density);
+Masses geometric_masses(const std::vector<double>& volume, double density);
+
+/// "uniform support, 1.8 x the mean distance to the 10 nearest"
+std::string in_words(const NeighbourhoodRule& rule);
+
+/// @param shift what the indices of the rows are counted from
+void append_rows(Csr& to, const Csr& rows, Index shift);
+/// A body's lists. Inverse ones are stored for all bodies as soon as one needs them.
+void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift);
+
+/// Moments A_i, their pseudo-inverses and the offsets b_i; notes what is degenerate. Nothing where
+/// the lists are left to a device.
+void find_moments(Model& model);
+
+/// What the summary shall warn of, once all bodies are in. @param surfels of the whole model
+void add_warnings(Model& model, std::size_t surfels);
+
+/// Mass, volume and centre of a body, in exact sums.
+struct BodySums {
+  ExactSum mass, volume;
+  ExactVector moment;
+  void add(const Model& model, Index begin, Index end) {
+    for (Index i = begin; i < end; ++i) add(model.mass[i], model.volume[i], model.position[i]);
+  }
+  void add(double m, double v, Vec3d x) {
+    mass.add(m);
+    volume.add(v);
+    moment.add(m * x);
+  }
+  void tell(Part& part) const;
+};
+
+/// Which phyxels of a cloud the boundary of its body concerns: entries are what is fixed, then
+/// motions, then loads, as the scene has them.
+struct BoundaryChoice {
+  std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
+  std::size_t first_load = 0;
+
+  std::vector<std::int64_t> counts() const;
+  /// Of each load.
+  std::vector<ExactSum> loaded_masses(const Model& model, Index shift) const;
+  /// @param counts of each entry, in the whole body. @throws InputError for one of nothing
+  void refuse_empty(const BodyRequest& request, const std::vector<std::int64_t>& counts,
+                    const Box& box) const;
+  /// @param loaded masses of each load, in the whole body
+  void add_to(Model& model, const BodyRequest& request, Index shift,
+              const std::vector<double>& loaded) const;
+};
+
+/// @param number which phyxels of a body of `size` the cloud has, ascending; empty: all
+/// @throws InputError naming the scene's line for unknown regions, indices out of range, and
+///   phyxels that two entries move
+BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
+                               std::span<const Index> number, Index size);
+
+}  // namespace phyxel

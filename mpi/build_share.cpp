@@ -1,0 +1,831 @@
+#include "mpi/build_share.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include "exact_sum.hpp"
+#include "model/assembly.hpp"
+#include "model/cell_grid.hpp"
+#include "model/cloud_piece.hpp"
+#include "model/host_memory.hpp"
+#include "model/neighbour_search.hpp"
+#include "model/space_filling_curve.hpp"
+#include "mpi/halo.hpp"
+#include "mpi/spread.hpp"
+#include "partition/share.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Graphs of more groups than these are not brought together on one rank.
+constexpr Index most_groups = 200'000;
+/// Up to so many phyxels are partitioned one by one, where nothing has to stay together.
+constexpr Index most_single = 50'000;
+
+/// A little more than asked for, so that rounding leaves nothing out.
+constexpr double margin = 1 + 1e-9;
+
+using Pieces = std::function<CloudPiece(std::size_t body)>;
+
+/// What all ranks know of a body.
+struct Body {
+  Index size = 0;   ///< Phyxels.
+  Index base = 0;   ///< Number of its first one in the whole model.
+  Index group = 0;  ///< Of its first one.
+  Index tile = 0;
+  Vec3d origin;
+  bool kernel_volumes = false;
+  std::vector<std::string> regions;  ///< Names; those used have the first bits.
+  std::size_t used_regions = 0;
+  double reach = 0;  ///< The largest support [m].
+};
+
+std::vector<const Selection*> selections_of(const BodyRequest& request) {
+  std::vector<const Selection*> all;
+  for (const FixRequest& fix : request.fixed) all.push_back(&fix.select);
+  for (const MotionRequest& motion : request.motions) all.push_back(&motion.select);
+  for (const LoadRequest& load : request.loads) all.push_back(&load.select);
+  return all;
+}
+
+/// Own phyxels and those around, with lists: `whole` where `share_of` is concerned. Lists are whole
+/// for own phyxels, and for all that are their neighbours.
+struct Local {
+  SpreadPhyxels phyxels;
+  std::vector<int> owner;
+  Model model;
+};
+
+class Builder {
+ public:
+  Builder(const Communicator& ranks, const Scene& scene, const ShareOptions& options)
+      : ranks_(ranks), scene_(scene), options_(options), bodies_(scene.bodies.size()) {}
+
+  BuiltShare build(const Pieces& piece) {
+    SpreadPhyxels own = make_pieces(piece);
+    boxes_ = boxes_of(ranks_, own, bodies_.size());
+    const Index size = count_bodies();
+    own = spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size(size));
+    find_spacings(own);
+    find_supports(own);
+    Local local = surroundings_of(own);
+    const std::vector<int> owner = partition(local);
+    const auto stay = std::all_of(owner.begin(), owner.end(),
+                                  [&](int part) { return part == ranks_.rank(); });
+    if (ranks_.smallest(std::int64_t{stay}) == 0) {
+      SpreadPhyxels mine;
+      for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
+        if (local.owner[i] == ranks_.rank()) mine.push_back(local.phyxels[i]);
+      }
+      local = {};
+      own = sent_to_owners(ranks_, mine, owner);
+      SpreadPhyxels().swap(mine);
+      local = surroundings_of(own);
+    }
+    SpreadPhyxels().swap(own);
+    finish(local);
+    return share_out_of(local);
+  }
+
+ private:
+  std::vector<Index> sizes() const {
+    std::vector<Index> sizes;
+    for (const Body& body : bodies_) sizes.push_back(body.size);
+    return sizes;
+  }
+  bool owns(const Local& local, std::size_t i) const { return local.owner[i] == ranks_.rank(); }
+
+  // --- phyxels, as they are made -----------------------------------------------------------------
+
+  SpreadPhyxels make_pieces(const Pieces& piece) {
+    SpreadPhyxels own;
+    surfaces_.resize(bodies_.size());
+    std::vector<std::int64_t> with_volumes(bodies_.size());
+    struct Origin {
+      std::size_t body;
+      Vec3d at;
+    };
+    std::vector<Origin> origins;
+    ranks_.together([&] {
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        CloudPiece made = piece(b);
+        Cloud& cloud = made.cloud;
+        Body& body = bodies_[b];
+        body.size = made.whole;
+        with_volumes[b] = !cloud.volume.empty();
+        if (made.first == 0 && !cloud.position.empty()) origins.push_back({b, cloud.position[0]});
+        std::vector<std::uint32_t> bits = region_bits(b, cloud);
+        for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+          SpreadPhyxel& p = own.emplace_back();
+          p.position = cloud.position[i];
+          p.volume = cloud.volume.empty() ? 0 : cloud.volume[i];
+          p.body = static_cast<Index>(b);
+          p.number = made.first + static_cast<Index>(i);
+          if (!bits.empty()) p.regions = bits[i];
+        }
+        surfaces_[b] = std::move(cloud.surface);
+      }
+    });
+    ranks_.add(with_volumes);
+    for (const Origin& origin : ranks_.gathered(std::span(std::as_const(origins)))) {
+      bodies_[origin.body].origin = origin.at;
+    }
+    ranks_.together([&] {
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        bodies_[b].kernel_volumes =
+            wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
+                                 static_cast<std::size_t>(bodies_[b].size));
+      }
+    });
+    return own;
+  }
+
+  /// Of each phyxel of a piece; empty if the scene names no region.
+  std::vector<std::uint32_t> region_bits(std::size_t b, const Cloud& cloud) {
+    Body& body = bodies_[b];
+    std::vector<std::uint32_t> bits;
+    for (const Selection* selection : selections_of(scene_.bodies[b])) {
+      if (!selection->region) continue;
+      const auto found = cloud.regions.find(*selection->region);
+      // One that is not there is refused once phyxels are chosen.
+      if (found == cloud.regions.end() ||
+          std::count(body.regions.begin(), body.regions.end(), found->first) > 0) {
+        continue;
+      }
+      if (body.regions.size() == 32) {
+        throw InputError(fmt::format(
+            "{}: body \"{}\" has more than 32 regions that are fixed, moved or loaded: allowed "
+            "are 32 where several ranks share it",
+            selection->where, scene_.bodies[b].name));
+      }
+      bits.resize(cloud.position.size(), 0);
+      for (const Index i : found->second) bits[i] |= std::uint32_t{1} << body.regions.size();
+      body.regions.push_back(found->first);
+    }
+    body.used_regions = body.regions.size();
+    for (const auto& [name, members] : cloud.regions) {
+      if (std::count(body.regions.begin(), body.regions.end(), name) == 0) {
+        body.regions.push_back(name);
+      }
+    }
+    return bits;
+  }
+
+  /// Numbers, groups and tiles of bodies. @returns phyxels of all
+  Index count_bodies() {
+    Offset size = 0;
+    for (const Body& body : bodies_) size += body.size;
+    // At any time, with lists: those around and the copy that a share is included.
+    ranks_.together([&] {
+      require_host_memory("the scene", static_cast<double>(size), 1700.0 / ranks_.size());
+    });
+    const Index group = group_size(static_cast<Index>(size));
+    Body next;
+    for (Body& body : bodies_) {
+      body.base = next.base;
+      body.group = next.group;
+      body.tile = next.tile;
+      next.base += body.size;
+      next.group += (body.size + group - 1) / group;
+      if (options_.tile > 0) next.tile += (body.size + options_.tile - 1) / options_.tile;
+    }
+    groups_ = next.group;
+    group_size_ = group;
+    return static_cast<Index>(size);
+  }
+  Index group_size(Index size) const {
+    if (options_.tile == 0) return size <= most_single ? 1 : size / most_single;
+    const Index tiles = size / options_.tile;
+    return options_.tile * (1 + tiles / most_groups);
+  }
+
+  // --- supports ----------------------------------------------------------------------------------
+
+  /// Asks farther and farther around until the nearest are there for sure.
+  void find_spacings(SpreadPhyxels& own) {
+    const std::size_t n = bodies_.size();
+    const auto wants = [&](std::size_t b) {
+      return !scene_.bodies[b].neighbourhood.radius || bodies_[b].kernel_volumes;
+    };
+    std::vector<double> reach(n, 0);
+    for (std::size_t b = 0; b < n; ++b) {
+      if (!wants(b) || bodies_[b].size < 2) continue;
+      // Of evenly spread phyxels that would be half as far again as is needed.
+      reach[b] = roomy_cell_size(boxes_[b].low, boxes_[b].high,
+                                 static_cast<std::size_t>(bodies_[b].size)) *
+                 1.6 * std::cbrt(scene_.bodies[b].neighbourhood.nearest / 10.0);
+    }
+    for (;;) {
+      const Surrounded all = surrounded(ranks_, own, reach, boxes_);
+      std::vector<double> needed(n, 0);
+      std::size_t at = 0;  // in own, which is in the order of bodies, but not of numbers
+      std::vector<Index> own_at(own.size());
+      std::iota(own_at.begin(), own_at.end(), 0);
+      std::sort(own_at.begin(), own_at.end(), [&](Index a, Index b) {
+        return std::tie(own[a].body, own[a].number) < std::tie(own[b].body, own[b].number);
+      });
+      for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
+        const auto b = static_cast<std::size_t>(all.phyxels[first].body);
+        std::vector<Vec3d> position;
+        for (; last < all.phyxels.size() && all.phyxels[last].body == all.phyxels[first].body;
+             ++last) {
+          position.push_back(all.phyxels[last].position);
+        }
+        const int nearest = scene_.bodies[b].neighbourhood.nearest;
+        std::vector<double> spacing(position.size()), farthest(position.size(), 0);
+        if (wants(b)) spacing = mean_spacing(position, nearest, farthest.data());
+        const auto enough = std::min<Index>(nearest + 1, bodies_[b].size);
+        for (std::size_t i = 0; i < position.size(); ++i) {
+          if (all.owner[first + i] != ranks_.rank()) continue;
+          own[own_at[at++]].spacing = spacing[i];
+          if (!wants(b)) continue;
+          needed[b] = std::max(needed[b], static_cast<Index>(position.size()) < enough
+                                              ? 2 * reach[b] + 1e-300
+                                              : farthest[i] * margin);
+        }
+      }
+      needed = largest_of(ranks_, needed);
+      bool done = true;
+      for (std::size_t b = 0; b < n; ++b) {
+        if (needed[b] <= reach[b]) continue;
+        reach[b] = needed[b];
+        done = false;
+      }
+      if (done) return;
+    }
+  }
+
+  void find_supports(SpreadPhyxels& own) {
+    std::vector<std::vector<double>> spacings(bodies_.size());
+    const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
+      return scene_.bodies[b].neighbourhood;
+    };
+    for (const SpreadPhyxel& p : own) {
+      const auto b = static_cast<std::size_t>(p.body);
+      if (!rule(b).radius && rule(b).support == NeighbourhoodRule::Support::uniform) {
+        spacings[b].push_back(p.spacing);
+      }
+    }
+    const std::vector<double> medians = medians_of(ranks_, std::move(spacings));
+    std::vector<double> reach(bodies_.size(), 0);
+    for (SpreadPhyxel& p : own) {
+      const auto b = static_cast<std::size_t>(p.body);
+      p.support = support_radii({&p.spacing, 1}, rule(b), medians[b])[0];
+      reach[b] = std::max(reach[b], p.support);
+    }
+    reach = largest_of(ranks_, reach);
+    for (std::size_t b = 0; b < bodies_.size(); ++b) bodies_[b].reach = reach[b];
+  }
+
+  // --- lists -------------------------------------------------------------------------------------
+
+  /// Twice the largest support around: as far as a neighbour's neighbours, and a surfel's carriers.
+  Local surroundings_of(const SpreadPhyxels& own) const {
+    std::vector<double> reach;
+    for (const Body& body : bodies_) reach.push_back(2 * margin * body.reach);
+    Surrounded all = surrounded(ranks_, own, reach, boxes_);
+    Local local{std::move(all.phyxels), std::move(all.owner), {}};
+    Model& m = local.model;
+    ranks_.together([&] {
+      std::size_t at = 0;
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        Part part;
+        part.begin = m.size();
+        std::vector<double> support;
+        for (; at < local.phyxels.size() && local.phyxels[at].body == static_cast<Index>(b); ++at) {
+          m.position.push_back(local.phyxels[at].position);
+          support.push_back(local.phyxels[at].support);
+        }
+        part.end = m.size();
+        const std::span<const Vec3d> position = std::span(m.position).subspan(
+            static_cast<std::size_t>(part.begin), support.size());
+        const Neighbourhood hood =
+            neighbours_within(position, std::move(support), scene_.bodies[b].neighbourhood);
+        append_lists(m.neighbourhood, hood, part.begin);
+        m.neighbourhood.support.insert(m.neighbourhood.support.end(), hood.support.begin(),
+                                       hood.support.end());
+        m.parts.push_back(part);
+      }
+    });
+    return local;
+  }
+
+  // --- parts -------------------------------------------------------------------------------------
+
+  Index group_of(const SpreadPhyxel& p) const {
+    return bodies_[p.body].group + p.along / group_size_;
+  }
+
+  /// What own groups are, as the first rank gets to know it.
+  struct GroupRecord {
+    Index group = 0;
+    std::int64_t weight = 0;
+    Vec3d centre;
+  };
+  struct EdgeRecord {
+    Index group = 0, other = 0;
+    std::int64_t weight = 0;
+  };
+
+  /// The part of each own phyxel, in the order in which `local` has them.
+  std::vector<int> partition(const Local& local) {
+    const Graph graph = gathered_graph(local);
+    const int parts = ranks_.size();
+    std::optional<PartitionQuality> best;
+    std::vector<int> part_of;
+    std::string refusal;
+    for (const Partitioner candidate : options_.candidates) {
+      std::vector<int> made;
+      ranks_.together([&] {
+        if (ranks_.rank() > 0) return;
+        try {
+          made = make_partition(graph, parts, candidate);
+        } catch (const InputError& error) {
+          refusal = error.what();
+        }
+      });
+      // METIS takes random numbers from the C library: one rank's answer serves all.
+      made = ranks_.broadcast(made);
+      if (made.empty() && groups_ > 0) continue;
+      const PartitionQuality quality = quality_of_groups(local, made);
+      if (best && quality.slowest >= best->slowest) continue;
+      best = quality;
+      part_of = std::move(made);
+      partitioner_ = candidate;
+    }
+    ranks_.together([&] {
+      if (!best) throw InputError(refusal);
+    });
+    quality_ = *best;
+    std::vector<int> owner;
+    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
+      if (owns(local, i)) owner.push_back(part_of[group_of(local.phyxels[i])]);
+    }
+    return owner;
+  }
+
+  /// Calls visit(j) for all that share an edge with phyxel i.
+  template <class Visit>
+  static void visit_edges(const Neighbourhood& hood, Index i, Visit&& visit) {
+    const auto near = hood.neighbours.row(i);
+    for (const Index j : near) visit(j);
+    if (hood.symmetric) return;
+    for (const Index j : hood.inverse().row(i)) {
+      if (!std::binary_search(near.begin(), near.end(), j)) visit(j);
+    }
+  }
+  static std::int64_t weight_of(const Neighbourhood& hood, Index i) {
+    return 1 + hood.neighbours.length(i);
+  }
+
+  PartitionQuality quality_of_groups(const Local& local, const std::vector<int>& part_of) const {
+    PartCounts counts(ranks_.size());
+    const Neighbourhood& hood = local.model.neighbourhood;
+    std::vector<std::pair<int, std::int64_t>> others;
+    const auto part = [&](std::size_t i) { return part_of[group_of(local.phyxels[i])]; };
+    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
+      if (!owns(local, i)) continue;
+      others.clear();
+      visit_edges(hood, static_cast<Index>(i), [&](Index j) {
+        others.emplace_back(part(static_cast<std::size_t>(j)), 1);
+      });
+      counts.add(part(i), weight_of(hood, static_cast<Index>(i)), others);
+    }
+    ranks_.add(counts.words());
+    return counts.quality();
+  }
+
+  /// Of all groups, on the first rank.
+  Graph gathered_graph(const Local& local) const {
+    const Neighbourhood& hood = local.model.neighbourhood;
+    std::vector<Index> by_group;  // own phyxels
+    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
+      if (owns(local, i)) by_group.push_back(static_cast<Index>(i));
+    }
+    std::stable_sort(by_group.begin(), by_group.end(), [&](Index a, Index b) {
+      return group_of(local.phyxels[a]) < group_of(local.phyxels[b]);
+    });
+    const auto each = static_cast<std::size_t>(ranks_.size());
+    std::vector<std::vector<GroupRecord>> records(each);
+    std::vector<std::vector<EdgeRecord>> edges(each);
+    std::vector<Index> crossing;
+    for (std::size_t first = 0, last = 0; first < by_group.size(); first = last) {
+      const Index group = group_of(local.phyxels[by_group[first]]);
+      crossing.clear();
+      GroupRecord record{group, 0, {}};
+      for (; last < by_group.size() && group_of(local.phyxels[by_group[last]]) == group; ++last) {
+        const Index i = by_group[last];
+        record.weight += weight_of(hood, i);
+        record.centre += local.phyxels[i].position;
+        visit_edges(hood, i, [&](Index j) {
+          const Index other = group_of(local.phyxels[j]);
+          if (other != group) crossing.push_back(other);
+        });
+      }
+      record.centre = 1.0 / static_cast<double>(last - first) * record.centre;
+      records[0].push_back(record);
+      std::sort(crossing.begin(), crossing.end());
+      for (std::size_t k = 0; k < crossing.size(); ++k) {
+        if (k == 0 || crossing[k] != crossing[k - 1]) edges[0].push_back({group, crossing[k], 0});
+        ++edges[0].back().weight;
+      }
+    }
+    records = ranks_.exchanged(records);
+    edges = ranks_.exchanged(edges);
+    Graph graph;
+    if (ranks_.rank() > 0) return graph;
+    // Ranks have stretches of the curve, so that their groups follow each other.
+    for (std::size_t r = 0; r < each; ++r) {
+      std::size_t e = 0;
+      for (const GroupRecord& record : records[r]) {
+        for (; e < edges[r].size() && edges[r][e].group == record.group; ++e) {
+          graph.neighbours.push_back(edges[r][e].other);
+          graph.edge_weight.push_back(edges[r][e].weight);
+        }
+        graph.offsets.push_back(static_cast<Offset>(graph.neighbours.size()));
+        graph.vertex_weight.push_back(record.weight);
+        graph.centre.push_back(record.centre);
+      }
+    }
+    return graph;
+  }
+
+  // --- the model around own phyxels --------------------------------------------------------------
+
+  /// Over all ranks, in place.
+  void total(const std::vector<ExactSum*>& sums) const {
+    std::vector<std::int64_t> words;
+    for (ExactSum* sum : sums) {
+      const std::span<std::int64_t> ready = sum->ready();
+      words.insert(words.end(), ready.begin(), ready.end());
+    }
+    ranks_.add(words);
+    const std::int64_t* from = words.data();
+    for (ExactSum* sum : sums) {
+      std::copy_n(from, ExactSum::words, sum->ready().begin());
+      from += ExactSum::words;
+    }
+  }
+
+  void finish(Local& local) {
+    Model& m = local.model;
+    m.gravity = scene_.gravity;
+    find_masses(local);
+    describe_parts(local);
+    add_boundary(local);
+    find_moments(m);
+    gather_degenerate(local);
+    add_surfels(local);
+    std::size_t surfels = 0;
+    for (const Surface& surface : surfaces_) surfels += surface.position.size();
+    add_warnings(m, surfels);
+  }
+
+  void find_masses(Local& local) const {
+    Model& m = local.model;
+    std::vector<std::vector<double>> kernel(bodies_.size());
+    std::vector<ExactSum> sums(bodies_.size());
+    const auto values_of = [&](const Part& part, double SpreadPhyxel::*value) {
+      std::vector<double> values;
+      for (Index i = part.begin; i < part.end; ++i) values.push_back(local.phyxels[i].*value);
+      return values;
+    };
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      if (!bodies_[b].kernel_volumes) continue;
+      const Part& part = m.parts[b];
+      kernel[b] = kernel_sums(m.position, m.neighbourhood,
+                              values_of(part, &SpreadPhyxel::spacing), part.begin);
+      for (Index i = part.begin; i < part.end; ++i) {
+        if (owns(local, static_cast<std::size_t>(i))) sums[b].add(kernel[b][i - part.begin]);
+      }
+    }
+    std::vector<ExactSum*> all;
+    for (ExactSum& sum : sums) all.push_back(&sum);
+    total(all);
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const Part& part = m.parts[b];
+      const double density = scene_.bodies[b].material.density;
+      const Masses masses =
+          bodies_[b].kernel_volumes
+              ? kernel_masses(values_of(part, &SpreadPhyxel::spacing), kernel[b],
+                              sums[b].value() / bodies_[b].size, density)
+              : geometric_masses(values_of(part, &SpreadPhyxel::volume), density);
+      m.mass.insert(m.mass.end(), masses.mass.begin(), masses.mass.end());
+      m.volume.insert(m.volume.end(), masses.volume.begin(), masses.volume.end());
+    }
+  }
+
+  void describe_parts(Local& local) const {
+    Model& m = local.model;
+    std::vector<BodySums> sums(bodies_.size());
+    std::vector<ListLengths> lists(bodies_.size());
+    std::vector<ExactSum*> all;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const BodyRequest& request = scene_.bodies[b];
+      Part& part = m.parts[b];
+      part.name = request.name;
+      part.material = request.material;
+      part.neighbourhood = in_words(request.neighbourhood);
+      part.kernel_volumes = bodies_[b].kernel_volumes;
+      part.size = bodies_[b].size;
+      part.origin = bodies_[b].origin;
+      lists[b].fewest = bodies_[b].size;
+      for (Index i = part.begin; i < part.end; ++i) {
+        if (!owns(local, static_cast<std::size_t>(i))) continue;
+        sums[b].add(m.mass[i], m.volume[i], m.position[i]);
+        const Index length = m.neighbourhood.neighbours.length(i);
+        lists[b].pairs += length;
+        lists[b].fewest = std::min(lists[b].fewest, length);
+        lists[b].most = std::max(lists[b].most, length);
+      }
+      BodySums& s = sums[b];
+      all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z});
+    }
+    total(all);
+    const std::vector<ListLengths> of_ranks = ranks_.gathered(std::span(std::as_const(lists)));
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      Part& part = m.parts[b];
+      sums[b].tell(part);
+      part.lists.fewest = bodies_[b].size;
+      for (std::size_t k = b; k < of_ranks.size(); k += bodies_.size()) {
+        part.lists.pairs += of_ranks[k].pairs;
+        part.lists.fewest = std::min(part.lists.fewest, of_ranks[k].fewest);
+        part.lists.most = std::max(part.lists.most, of_ranks[k].most);
+      }
+    }
+  }
+
+  void add_boundary(Local& local) const {
+    Model& m = local.model;
+    std::vector<BoundaryChoice> choices(bodies_.size());
+    std::vector<std::int64_t> counts;
+    std::vector<ExactSum> masses;
+    ranks_.together([&] {
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        const Part& part = m.parts[b];
+        Cloud cloud;
+        std::vector<Index> number;
+        for (const std::string& name : bodies_[b].regions) cloud.regions[name];
+        for (Index i = part.begin; i < part.end; ++i) {
+          const SpreadPhyxel& p = local.phyxels[i];
+          cloud.position.push_back(p.position);
+          number.push_back(p.number);
+          for (std::size_t r = 0; r < bodies_[b].used_regions; ++r) {
+            if (p.regions >> r & 1) cloud.regions[bodies_[b].regions[r]].push_back(i - part.begin);
+          }
+        }
+        BoundaryChoice& choice = choices[b];
+        // No phyxel here: an empty list of numbers would mean all.
+        if (number.empty()) number.push_back(bodies_[b].size);
+        choice = choose_boundary(scene_.bodies[b], cloud, number, bodies_[b].size);
+        BoundaryChoice own = choice;
+        for (std::vector<Index>& chosen : own.chosen) {
+          std::erase_if(chosen, [&](Index i) {
+            return !owns(local, static_cast<std::size_t>(part.begin + i));
+          });
+        }
+        for (const std::int64_t count : own.counts()) counts.push_back(count);
+        for (const ExactSum& mass : own.loaded_masses(m, part.begin)) masses.push_back(mass);
+      }
+    });
+    ranks_.add(counts);
+    std::vector<ExactSum*> sums;
+    for (ExactSum& mass : masses) sums.push_back(&mass);
+    total(sums);
+    ranks_.together([&] {
+      auto count = counts.begin();
+      auto mass = masses.begin();
+      for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        const BodyRequest& request = scene_.bodies[b];
+        const auto entries = static_cast<std::ptrdiff_t>(choices[b].chosen.size());
+        choices[b].refuse_empty(request, {count, count + entries}, boxes_[b]);
+        count += entries;
+        std::vector<double> loaded;
+        for (std::size_t l = 0; l < request.loads.size(); ++l) loaded.push_back((mass++)->value());
+        choices[b].add_to(m, request, m.parts[b].begin, loaded);
+      }
+    });
+  }
+
+  /// Of own phyxels, by their numbers in the whole; then of all ranks.
+  void gather_degenerate(Local& local) const {
+    Degenerate& d = local.model.degenerate;
+    for (std::vector<Index>* kind : {&d.isolated, &d.collinear, &d.coplanar, &d.coincident}) {
+      std::vector<Index> own;
+      for (const Index i : *kind) {
+        if (owns(local, static_cast<std::size_t>(i))) own.push_back(number_of(local, i));
+      }
+      *kind = ranks_.gathered(std::span(std::as_const(own)));
+      std::sort(kind->begin(), kind->end());
+    }
+  }
+  Index number_of(const Local& local, Index i) const {
+    return bodies_[local.phyxels[i].body].base + local.phyxels[i].number;
+  }
+
+  /// Surfels that this rank moves.
+  void add_surfels(Local& local) {
+    Model& m = local.model;
+    Index base = 0;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const Surface& surface = surfaces_[b];
+      Part& part = m.parts[b];
+      const auto all = static_cast<Index>(surface.position.size());
+      part.surfel_begin = static_cast<Index>(surfel_number_.size());
+      if (all > 0) {
+        const auto size = static_cast<std::size_t>(part.end - part.begin);
+        const auto begin = static_cast<std::size_t>(part.begin);
+        const std::span<const Vec3d> position = std::span(m.position).subspan(begin, size);
+        Csr rows = phyxels_reaching(
+            surface.position, position,
+            std::span(m.neighbourhood.support).subspan(begin, size));
+        // Who has a surfel's first carrier knows all of them.
+        std::vector<char> here(static_cast<std::size_t>(all), 0);
+        std::int64_t found = 0;
+        for (Index s = 0; s < all; ++s) {
+          here[s] = rows.length(s) > 0 &&
+                    owns(local, begin + static_cast<std::size_t>(rows.row(s).front()));
+          found += here[s];
+        }
+        const std::vector<Index> nearest = ranks_.sum(found) < all
+                                               ? carriers_of_unreached(local, b, here)
+                                               : std::vector<Index>();
+        for (Index s = 0; s < all; ++s) {
+          const bool lone = !nearest.empty() && nearest[s] >= 0;
+          if (!here[s] && !lone) continue;
+          surfel_number_.push_back(base + s);
+          m.surfels.position.push_back(surface.position[s]);
+          m.surfels.normal.push_back(surface.normal[s]);
+          if (lone) m.surfels.carriers.indices.push_back(nearest[s]);
+          if (!lone) {
+            for (const Index i : rows.row(s)) {
+              m.surfels.carriers.indices.push_back(part.begin + i);
+            }
+          }
+          m.surfels.carriers.offsets.push_back(
+              static_cast<Offset>(m.surfels.carriers.indices.size()));
+        }
+      }
+      part.surfel_end = static_cast<Index>(surfel_number_.size());
+      base += all;
+    }
+  }
+
+  /// For surfels beyond every support, of which the nearest phyxel is here: that phyxel; else -1.
+  std::vector<Index> carriers_of_unreached(Local& local, std::size_t b,
+                                           const std::vector<char>& here) const {
+    const Surface& surface = surfaces_[b];
+    const Part& part = local.model.parts[b];
+    std::vector<std::int64_t> reached(here.begin(), here.end());
+    ranks_.add(reached);
+    std::vector<Vec3d> own;
+    std::vector<Index> own_at;
+    for (Index i = part.begin; i < part.end; ++i) {
+      if (!owns(local, static_cast<std::size_t>(i))) continue;
+      own.push_back(local.phyxels[i].position);
+      own_at.push_back(i);
+    }
+    struct Nearest {
+      double squared;
+      std::int64_t number;  ///< In the whole model.
+      bool operator<(const Nearest& other) const {
+        return squared != other.squared ? squared < other.squared : number < other.number;
+      }
+    };
+    std::vector<Index> unreached, at;
+    std::vector<Nearest> nearest;
+    for (std::size_t s = 0; s < reached.size(); ++s) {
+      if (reached[s] > 0) continue;
+      unreached.push_back(static_cast<Index>(s));
+      const auto [squared, k] = nearest_to(surface.position[s], own);
+      at.push_back(k < 0 ? -1 : own_at[k]);
+      nearest.push_back({squared, k < 0 ? INT64_MAX : number_of(local, own_at[k])});
+    }
+    local.model.surfels.unreached += static_cast<Index>(unreached.size());
+    const std::vector<Nearest> of_ranks = ranks_.gathered(std::span(std::as_const(nearest)));
+    std::vector<Index> carriers(reached.size(), -1);
+    for (std::size_t u = 0; u < unreached.size(); ++u) {
+      bool first = at[u] >= 0;
+      for (std::size_t k = u; k < of_ranks.size(); k += unreached.size()) {
+        if (of_ranks[k] < nearest[u]) first = false;
+      }
+      if (first) carriers[unreached[u]] = at[u];
+    }
+    return carriers;
+  }
+
+  // --- the share ---------------------------------------------------------------------------------
+
+  BuiltShare share_out_of(Local& local) {
+    HaloPlan plan;
+    plan.part = ranks_.rank();
+    std::vector<char> seen(local.phyxels.size(), 0);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      if (!owns(local, i)) continue;
+      seen[i] = 1;
+      plan.owned.push_back(static_cast<Index>(i));
+    }
+    for (int r = 0; r < options_.rings; ++r) {
+      std::vector<Index> ring;
+      for (const Index i : r == 0 ? plan.owned : plan.rings.back()) {
+        visit_edges(local.model.neighbourhood, i, [&](Index j) {
+          if (!std::exchange(seen[j], 1)) ring.push_back(j);
+        });
+      }
+      std::sort(ring.begin(), ring.end());
+      plan.rings.push_back(std::move(ring));
+    }
+    ModelShare made = share_of(local.model, plan, local.owner);
+    Share& share = made.share;
+    std::vector<Index> place = own_places(local, share);
+    share.whole = 0;
+    for (const Body& body : bodies_) share.whole += body.size;
+    for (Index& number : share.number) number = number_of(local, number);
+    for (Index& surfel : share.surfel_number) surfel = surfel_number_[surfel];
+    const auto halo = std::make_shared<Halo>(ranks_, made);
+    if (options_.tile > 0) {
+      halo->begin(Records{reinterpret_cast<std::byte*>(place.data()), sizeof(Index), sizeof(Index)});
+      halo->finish();
+      share.place = std::move(place);
+    }
+    share.others = halo;
+    made.model.share = std::make_shared<Share>(std::move(share));
+    return {std::move(made.model), partitioner_, quality_, std::move(surfaces_)};
+  }
+
+  /// Where own phyxels of a share are in the whole model's tiles.
+  /// @param share its numbers are those of `local`
+  std::vector<Index> own_places(const Local& local, const Share& share) const {
+    std::vector<Index> place(share.number.size(), -1);
+    if (options_.tile == 0) return place;
+    std::vector<Index> own;  // of the share
+    const auto phyxel = [&](Index k) -> const SpreadPhyxel& {
+      return local.phyxels[share.number[k]];
+    };
+    for (std::size_t k = 0; k < place.size(); ++k) {
+      if (share.owned[k]) own.push_back(static_cast<Index>(k));
+    }
+    std::sort(own.begin(), own.end(), [&](Index a, Index b) {
+      return std::tie(phyxel(a).body, phyxel(a).along) < std::tie(phyxel(b).body, phyxel(b).along);
+    });
+    const auto tile_of = [&](Index k) {
+      return bodies_[phyxel(k).body].tile + phyxel(k).along / options_.tile;
+    };
+    const Csr& lists = local.model.neighbourhood.neighbours;
+    for (std::size_t first = 0, last = 0; first < own.size(); first = last) {
+      const Index tile = tile_of(own[first]);
+      while (last < own.size() && tile_of(own[last]) == tile) ++last;
+      order_in_tile(std::span(own).subspan(first, last - first),
+                    [&](Index k) { return lists.length(share.number[k]); });
+      for (std::size_t k = first; k < last; ++k) {
+        place[own[k]] = tile * options_.tile + static_cast<Index>(k - first);
+      }
+    }
+    return place;
+  }
+
+  const Communicator& ranks_;
+  const Scene& scene_;
+  const ShareOptions& options_;
+  std::vector<Body> bodies_;
+  std::vector<Box> boxes_;
+  std::vector<Surface> surfaces_;
+  Index groups_ = 0, group_size_ = 1;
+  Partitioner partitioner_ = Partitioner::metis;
+  PartitionQuality quality_;
+  std::vector<Index> surfel_number_;  // of the surfels that this rank moves, in the whole model
+};
+
+Piece piece_of(const Communicator& ranks) { return {ranks.rank(), ranks.size()}; }
+
+}  // namespace
+
+BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+                       const ShareOptions& options) {
+  // Copies of a body follow one another; making a piece once serves them all.
+  const BodySource* made = nullptr;
+  CloudPiece rest;
+  return Builder(ranks, scene, options).build([&](std::size_t b) {
+    const BodyRequest& request = scene.bodies[b];
+    if (!made || !(*made == request.source)) rest = rest_piece(request.source, piece_of(ranks));
+    made = &request.source;
+    CloudPiece piece = rest;
+    place(piece.cloud, request);
+    return piece;
+  });
+}
+
+BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+                       const std::vector<Cloud>& clouds, const ShareOptions& options) {
+  return Builder(ranks, scene, options).build([&](std::size_t b) {
+    return cut_piece(clouds.at(b), piece_of(ranks));
+  });
+}
+
+}  // namespace phyxel

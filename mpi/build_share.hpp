@@ -1,0 +1,38 @@
+/// Models that ranks build together, so that none ever holds the whole.
+#pragma once
+
+#include <vector>
+
+#include "mpi/communicator.hpp"
+#include "partition/partition.hpp"
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+struct ShareOptions {
+  std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
+                                      Partitioner::metis};
+  int rings = 1;  ///< See `Share`.
+  /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
+  /// tile. 0: none need to.
+  int tile = 0;
+};
+
+struct BuiltShare {
+  Model model;  ///< Its `share` is connected.
+  Partitioner partitioner = Partitioner::metis;
+  PartitionQuality quality;
+  std::vector<Surface> surfaces;  ///< Of the whole bodies, in place.
+};
+
+/// This rank's share of `build_model(scene)`, to the last bit what `share_of` would take out of the
+/// whole. Lattices are made piece by piece, other bodies are made or read by every rank, and cut;
+/// surfaces are held whole. Phyxels then go where Hilbert's curve says, are partitioned as graph of
+/// groups, and go to their owners, which ask the others for what is around. Collective.
+/// @throws AgreedError on all ranks for what `build_model` refuses
+BuiltShare build_share(const Communicator& ranks, const Scene& scene, const ShareOptions& options);
+/// The same from clouds in place, one for each body, which every rank has whole.
+BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+                       const std::vector<Cloud>& clouds, const ShareOptions& options);
+
+}  // namespace phyxel

@@ -1,0 +1,298 @@
+#include "mpi/spread.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "model/space_filling_curve.hpp"
+#include "parallel_sort.hpp"
+
+namespace phyxel {
+namespace {
+
+bool by_number(const SpreadPhyxel& a, const SpreadPhyxel& b) {
+  return std::tie(a.body, a.number) < std::tie(b.body, b.number);
+}
+
+/// Those of each rank, joined.
+template <class T>
+std::vector<T> joined(const std::vector<std::vector<T>>& parts) {
+  std::vector<T> all;
+  std::size_t size = 0;
+  for (const std::vector<T>& part : parts) size += part.size();
+  all.reserve(size);
+  for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+/// A phyxel's place in the order of all.
+struct Key {
+  Index body = 0;
+  std::uint64_t key = 0;  ///< Of the curve.
+  Index number = 0;
+  friend auto operator<=>(const Key&, const Key&) = default;
+};
+struct Keyed {
+  Key key;
+  Index here = 0;
+};
+
+/// The start of the stretch of each rank but the first: nothing before it belongs there.
+std::vector<Key> find_splitters(const Communicator& ranks, const std::vector<Keyed>& sorted,
+                                const std::vector<std::pair<Index, Index>>& starts) {
+  std::vector<Key> splitters;
+  for (const auto& [body, offset] : starts) splitters.push_back({body, 0, 0});
+  const auto try_bits = [&](const auto& with_bit) {
+    std::vector<std::int64_t> before;
+    std::vector<Key> trials;
+    for (const Key& splitter : splitters) {
+      const Key trial = trials.emplace_back(with_bit(splitter));
+      const auto at = [&](const Key& key) {
+        return std::lower_bound(sorted.begin(), sorted.end(), key,
+                                [](const Keyed& a, const Key& b) { return a.key < b; });
+      };
+      before.push_back(at(trial) - at({trial.body, 0, 0}));
+    }
+    ranks.add(before);
+    for (std::size_t s = 0; s < splitters.size(); ++s) {
+      if (before[s] <= starts[s].second) splitters[s] = trials[s];
+    }
+  };
+  for (int bit = 3 * hilbert_bits - 1; bit >= 0; --bit) {
+    try_bits([&](Key k) {
+      k.key |= std::uint64_t{1} << bit;
+      return k;
+    });
+  }
+  for (int bit = 30; bit >= 0; --bit) {
+    try_bits([&](Key k) {
+      k.number |= Index{1} << bit;
+      return k;
+    });
+  }
+  return splitters;
+}
+
+/// Cells of a grid over each body, wide enough that what is within reach is in the next one.
+class Cells {
+ public:
+  using Name = std::uint64_t;
+  Cells(const std::vector<double>& reach, const std::vector<Box>& boxes) : boxes_(boxes) {
+    for (std::size_t b = 0; b < boxes.size(); ++b) {
+      const double edge = std::max(reach[b], boxes[b].extent() / most);
+      inverse_edge_.push_back(edge > 0 ? 1 / edge : 0);
+    }
+  }
+  Name name_of(const SpreadPhyxel& p) const {
+    const auto b = static_cast<std::size_t>(p.body);
+    const Vec3d at = inverse_edge_[b] * (p.position - boxes_[b].low);
+    return name(b, static_cast<Name>(at.x) + 1, static_cast<Name>(at.y) + 1,
+                static_cast<Name>(at.z) + 1);
+  }
+  /// Calls visit(name) for a cell and those next to it.
+  template <class Visit>
+  static void visit_around(Name cell, Visit&& visit) {
+    for (Name z = 0; z < 3; ++z) {
+      for (Name y = 0; y < 3; ++y) {
+        for (Name x = 0; x < 3; ++x) visit(cell + name(0, x, y, z) - name(0, 1, 1, 1));
+      }
+    }
+  }
+
+ private:
+  static constexpr double most = 256;  ///< Cells along a side.
+  static constexpr int bits = 10;
+  static Name name(std::size_t body, Name x, Name y, Name z) {
+    return static_cast<Name>(body) << (3 * bits) | z << (2 * bits) | y << bits | x;
+  }
+  const std::vector<Box>& boxes_;
+  std::vector<double> inverse_edge_;
+};
+
+}  // namespace
+
+std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies) {
+  constexpr double far = std::numeric_limits<double>::infinity();
+  std::vector<Box> boxes(bodies, {{far, far, far}, {-far, -far, -far}});
+  const auto stretch = [](Box& box, const Vec3d& low, const Vec3d& high) {
+    box.low = {std::min(box.low.x, low.x), std::min(box.low.y, low.y), std::min(box.low.z, low.z)};
+    box.high = {std::max(box.high.x, high.x), std::max(box.high.y, high.y),
+                std::max(box.high.z, high.z)};
+  };
+  for (const SpreadPhyxel& p : own) stretch(boxes[p.body], p.position, p.position);
+  const std::vector<Box> all = ranks.gathered(std::span<const Box>(boxes));
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    stretch(boxes[k % bodies], all[k].low, all[k].high);
+  }
+  return boxes;
+}
+
+SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
+                                 const std::vector<Index>& sizes, const std::vector<Box>& boxes,
+                                 Index group) {
+  const int parts = ranks.size();
+  std::vector<HilbertFrame> frames;
+  for (const Box& box : boxes) frames.push_back(HilbertFrame::around(box.low, box.high));
+  const auto keyed = [&](const SpreadPhyxels& phyxels) {
+    const auto n = static_cast<Index>(phyxels.size());
+    std::vector<Keyed> keys(phyxels.size());
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) {
+      const SpreadPhyxel& p = phyxels[i];
+      keys[i] = {{p.body, frames[p.body].key_of(p.position), p.number}, i};
+    }
+    parallel_sort(keys, [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
+    return keys;
+  };
+  const auto groups_of = [&](Index size) { return (std::int64_t{size} + group - 1) / group; };
+  std::int64_t groups = 0;
+  for (const Index size : sizes) groups += groups_of(size);
+  // Body and place along the curve where each rank's stretch begins.
+  std::vector<std::pair<Index, Index>> starts;
+  for (int r = 0; r < parts; ++r) {
+    std::int64_t at = groups * r / parts;
+    std::size_t body = 0;
+    while (body + 1 < sizes.size() && at >= groups_of(sizes[body])) at -= groups_of(sizes[body++]);
+    starts.emplace_back(static_cast<Index>(body), static_cast<Index>(at * group));
+  }
+  {
+    const std::vector<Keyed> sorted = keyed(own);
+    const std::vector<Key> splitters =
+        find_splitters(ranks, sorted, {starts.begin() + 1, starts.end()});
+    std::vector<SpreadPhyxels> send(static_cast<std::size_t>(parts));
+    for (const Keyed& k : sorted) {
+      const auto to = std::upper_bound(splitters.begin(), splitters.end(), k.key) - splitters.begin();
+      send[static_cast<std::size_t>(to)].push_back(own[k.here]);
+    }
+    SpreadPhyxels().swap(own);
+    own = joined(ranks.exchanged(send));
+  }
+  const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
+  SpreadPhyxels ordered;
+  ordered.reserve(own.size());
+  Index body = first_body, along = first_along;
+  for (const Keyed& k : keyed(own)) {
+    SpreadPhyxel& p = ordered.emplace_back(own[k.here]);
+    if (p.body != body) body = p.body, along = 0;
+    p.along = along++;
+  }
+  return ordered;
+}
+
+SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
+                             const std::vector<int>& owner) {
+  std::vector<SpreadPhyxels> send(static_cast<std::size_t>(ranks.size()));
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    send[static_cast<std::size_t>(owner[k])].push_back(own[k]);
+  }
+  SpreadPhyxels received = joined(ranks.exchanged(send));
+  parallel_sort(received, by_number);
+  return received;
+}
+
+Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
+                      const std::vector<double>& reach, const std::vector<Box>& boxes) {
+  const Cells cells(reach, boxes);
+  const auto each = static_cast<std::size_t>(ranks.size());
+  const auto n = static_cast<Index>(own.size());
+  using Placed = std::pair<Cells::Name, Index>;
+  std::vector<Placed> here(own.size());
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < n; ++i) here[i] = {cells.name_of(own[i]), i};
+  parallel_sort(here);
+  std::vector<Cells::Name> occupied;
+  for (const auto& [name, i] : here) {
+    if (occupied.empty() || occupied.back() != name) occupied.push_back(name);
+  }
+  // Who is where.
+  std::vector<std::pair<Cells::Name, int>> others;
+  {
+    const auto from_each =
+        ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
+    for (std::size_t r = 0; r < each; ++r) {
+      if (static_cast<int>(r) == ranks.rank()) continue;
+      for (const Cells::Name name : from_each[r]) others.emplace_back(name, static_cast<int>(r));
+    }
+  }
+  parallel_sort(others);
+  std::vector<SpreadPhyxels> send(each);
+  std::vector<int> wanted_by;
+  for (std::size_t first = 0, last = 0; first < here.size(); first = last) {
+    const Cells::Name cell = here[first].first;
+    while (last < here.size() && here[last].first == cell) ++last;
+    wanted_by.clear();
+    Cells::visit_around(cell, [&](Cells::Name next) {
+      for (auto at = std::lower_bound(others.begin(), others.end(), std::pair{next, -1});
+           at != others.end() && at->first == next; ++at) {
+        wanted_by.push_back(at->second);
+      }
+    });
+    std::sort(wanted_by.begin(), wanted_by.end());
+    wanted_by.erase(std::unique(wanted_by.begin(), wanted_by.end()), wanted_by.end());
+    for (const int rank : wanted_by) {
+      for (std::size_t k = first; k < last; ++k) {
+        send[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
+      }
+    }
+  }
+  std::vector<SpreadPhyxels> received = ranks.exchanged(send);
+  received[static_cast<std::size_t>(ranks.rank())] = own;
+
+  std::vector<std::pair<SpreadPhyxel, int>> all;
+  for (std::size_t r = 0; r < each; ++r) {
+    for (const SpreadPhyxel& p : received[r]) all.emplace_back(p, static_cast<int>(r));
+    SpreadPhyxels().swap(received[r]);
+  }
+  parallel_sort(all, [](const auto& a, const auto& b) { return by_number(a.first, b.first); });
+  Surrounded result;
+  result.phyxels.reserve(all.size());
+  result.owner.reserve(all.size());
+  for (const auto& [phyxel, owner] : all) {
+    result.phyxels.push_back(phyxel);
+    result.owner.push_back(owner);
+  }
+  return result;
+}
+
+std::vector<double> medians_of(const Communicator& ranks, std::vector<std::vector<double>> values) {
+  std::vector<std::int64_t> sizes;
+  for (std::vector<double>& list : values) {
+    parallel_sort(list);
+    sizes.push_back(static_cast<std::int64_t>(list.size()));
+  }
+  ranks.add(sizes);
+  // Bits of numbers that are not negative are in the order of the numbers.
+  std::vector<std::uint64_t> medians(values.size(), 0);
+  for (int bit = 62; bit >= 0; --bit) {
+    std::vector<std::int64_t> below;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const auto trial = std::bit_cast<double>(medians[k] | std::uint64_t{1} << bit);
+      // No list holds a NaN, so all of it is below one.
+      below.push_back(std::isnan(trial)
+                          ? static_cast<std::int64_t>(values[k].size())
+                          : std::lower_bound(values[k].begin(), values[k].end(), trial) -
+                                values[k].begin());
+    }
+    ranks.add(below);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      if (sizes[k] > 0 && below[k] <= sizes[k] / 2) medians[k] |= std::uint64_t{1} << bit;
+    }
+  }
+  std::vector<double> result;
+  for (const std::uint64_t bits : medians) result.push_back(std::bit_cast<double>(bits));
+  return result;
+}
+
+std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values) {
+  std::vector<double> largest = values;
+  const std::vector<double> all = ranks.gathered(std::span<const double>(values));
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    double& value = largest[k % values.size()];
+    value = std::max(value, all[k]);
+  }
+  return largest;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,58 @@
+/// Phyxels of all bodies spread over ranks, each on one of them, while a model is built that no rank
+/// has whole. Every function is collective.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "model/box.hpp"
+#include "mpi/communicator.hpp"
+
+namespace phyxel {
+
+/// What is known of a phyxel so far, as ranks send it to each other.
+struct SpreadPhyxel {
+  Vec3d position;         ///< [m]
+  double volume = 0;      ///< [m³], where the cloud tells.
+  double spacing = 0;     ///< r̄ [m], where it is wanted.
+  double support = 0;     ///< h [m]
+  Index body = 0;
+  Index number = 0;       ///< In its body.
+  Index along = 0;        ///< Where it stands in its body along Hilbert's curve.
+  std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
+};
+using SpreadPhyxels = std::vector<SpreadPhyxel>;
+
+/// The box of each body.
+std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies);
+
+/// Brings phyxels into the order of their bodies, and within each of Hilbert's curve over its box,
+/// that of `curve_order`; each rank gets a stretch of it, of whole groups and about equally many.
+/// Sets `along`.
+/// @param sizes of the bodies. @param group phyxels that stay together, counted from the start of
+///   each body
+SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
+                                 const std::vector<Index>& sizes, const std::vector<Box>& boxes,
+                                 Index group);
+
+/// Phyxels go to their owners, and are there in the order of bodies and numbers.
+SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
+                             const std::vector<int>& owner);
+
+/// Own phyxels and those of other ranks around them.
+struct Surrounded {
+  SpreadPhyxels phyxels;   ///< In the order of bodies and numbers.
+  std::vector<int> owner;  ///< Rank of each.
+};
+/// @param reach of each body [m]: all phyxels nearer than that to an own one are there, and others
+Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
+                      const std::vector<double>& reach, const std::vector<Box>& boxes);
+
+/// The value in the middle of each list, as `median_of`; 0 for none. @param values [list], none
+///   below 0
+std::vector<double> medians_of(const Communicator& ranks, std::vector<std::vector<double>> values);
+
+/// The largest of each over the ranks.
+std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values);
+
+}  // namespace phyxel
