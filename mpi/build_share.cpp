@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -18,15 +20,11 @@
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo.hpp"
 #include "mpi/spread.hpp"
+#include "parallel_sort.hpp"
 #include "partition/share.hpp"
 
 namespace phyxel {
 namespace {
-
-/// Graphs of more groups than these are not brought together on one rank.
-constexpr Index most_groups = 200'000;
-/// Up to so many phyxels are partitioned one by one, where nothing has to stay together.
-constexpr Index most_single = 50'000;
 
 /// A little more than asked for, so that rounding leaves nothing out.
 constexpr double margin = 1 + 1e-9;
@@ -70,24 +68,12 @@ class Builder {
   BuiltShare build(const Pieces& piece) {
     SpreadPhyxels own = make_pieces(piece);
     boxes_ = boxes_of(ranks_, own, bodies_.size());
-    const Index size = count_bodies();
-    own = spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size(size));
+    count_bodies();
+    own = spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size_);
     find_spacings(own);
     find_supports(own);
+    own = sent_to_owners(ranks_, own, partition(own));
     Local local = surroundings_of(own);
-    const std::vector<int> owner = partition(local);
-    const auto stay = std::all_of(owner.begin(), owner.end(),
-                                  [&](int part) { return part == ranks_.rank(); });
-    if (ranks_.smallest(std::int64_t{stay}) == 0) {
-      SpreadPhyxels mine;
-      for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
-        if (local.owner[i] == ranks_.rank()) mine.push_back(local.phyxels[i]);
-      }
-      local = {};
-      own = sent_to_owners(ranks_, mine, owner);
-      SpreadPhyxels().swap(mine);
-      local = surroundings_of(own);
-    }
     SpreadPhyxels().swap(own);
     finish(local);
     return share_out_of(local);
@@ -120,9 +106,12 @@ class Builder {
         body.size = made.whole;
         with_volumes[b] = !cloud.volume.empty();
         if (made.first == 0 && !cloud.position.empty()) origins.push_back({b, cloud.position[0]});
-        std::vector<std::uint32_t> bits = region_bits(b, cloud);
-        for (std::size_t i = 0; i < cloud.position.size(); ++i) {
-          SpreadPhyxel& p = own.emplace_back();
+        const std::vector<std::uint32_t> bits = region_bits(b, cloud);
+        const std::size_t before = own.size(), more = cloud.position.size();
+        own.resize(before + more);
+#pragma omp parallel for schedule(static)
+        for (std::size_t i = 0; i < more; ++i) {
+          SpreadPhyxel& p = own[before + i];
           p.position = cloud.position[i];
           p.volume = cloud.volume.empty() ? 0 : cloud.volume[i];
           p.body = static_cast<Index>(b);
@@ -177,8 +166,8 @@ class Builder {
     return bits;
   }
 
-  /// Numbers, groups and tiles of bodies. @returns phyxels of all
-  Index count_bodies() {
+  /// Numbers, groups and tiles of bodies.
+  void count_bodies() {
     Offset size = 0;
     for (const Body& body : bodies_) size += body.size;
     // At any time, with lists: those around and the copy that a share is included.
@@ -197,12 +186,11 @@ class Builder {
     }
     groups_ = next.group;
     group_size_ = group;
-    return static_cast<Index>(size);
+    size_ = static_cast<Index>(size);
   }
   Index group_size(Index size) const {
-    if (options_.tile == 0) return size <= most_single ? 1 : size / most_single;
-    const Index tiles = size / options_.tile;
-    return options_.tile * (1 + tiles / most_groups);
+    const Index tile = std::max(1, options_.tile), tiles = (size + tile - 1) / tile;
+    return tile * std::max(1, (tiles + options_.most_groups - 1) / options_.most_groups);
   }
 
   // --- supports ----------------------------------------------------------------------------------
@@ -225,11 +213,7 @@ class Builder {
       const Surrounded all = surrounded(ranks_, own, reach, boxes_);
       std::vector<double> needed(n, 0);
       std::size_t at = 0;  // in own, which is in the order of bodies, but not of numbers
-      std::vector<Index> own_at(own.size());
-      std::iota(own_at.begin(), own_at.end(), 0);
-      std::sort(own_at.begin(), own_at.end(), [&](Index a, Index b) {
-        return std::tie(own[a].body, own[a].number) < std::tie(own[b].body, own[b].number);
-      });
+      const std::vector<Index> own_at = order_by_number(own);
       for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
         const auto b = static_cast<std::size_t>(all.phyxels[first].body);
         std::vector<Vec3d> position;
@@ -285,11 +269,15 @@ class Builder {
 
   // --- lists -------------------------------------------------------------------------------------
 
+  Surrounded around(const SpreadPhyxels& own, double supports) const {
+    std::vector<double> reach;
+    for (const Body& body : bodies_) reach.push_back(supports * margin * body.reach);
+    return surrounded(ranks_, own, reach, boxes_);
+  }
+
   /// Twice the largest support around: as far as a neighbour's neighbours, and a surfel's carriers.
   Local surroundings_of(const SpreadPhyxels& own) const {
-    std::vector<double> reach;
-    for (const Body& body : bodies_) reach.push_back(2 * margin * body.reach);
-    Surrounded all = surrounded(ranks_, own, reach, boxes_);
+    Surrounded all = around(own, 2);
     Local local{std::move(all.phyxels), std::move(all.owner), {}};
     Model& m = local.model;
     ranks_.together([&] {
@@ -322,20 +310,22 @@ class Builder {
     return bodies_[p.body].group + p.along / group_size_;
   }
 
-  /// What own groups are, as the first rank gets to know it.
-  struct GroupRecord {
-    Index group = 0;
-    std::int64_t weight = 0;
-    Vec3d centre;
-  };
-  struct EdgeRecord {
-    Index group = 0, other = 0;
-    std::int64_t weight = 0;
+  /// Own phyxels that stand for all, and with whom they share edges.
+  struct Samples {
+    SpreadPhyxels phyxels;         ///< Of one group after the other.
+    std::vector<Offset> offsets{0};  ///< In `group`, of each sample.
+    std::vector<Index> group;      ///< Of who is at the other end of each edge.
+    std::span<const Index> edges(std::size_t sample) const {
+      return std::span(group).subspan(
+          static_cast<std::size_t>(offsets[sample]),
+          static_cast<std::size_t>(offsets[sample + 1] - offsets[sample]));
+    }
   };
 
-  /// The part of each own phyxel, in the order in which `local` has them.
-  std::vector<int> partition(const Local& local) {
-    const Graph graph = gathered_graph(local);
+  /// The owner of each own phyxel. @param own along the curve
+  std::vector<int> partition(const SpreadPhyxels& own) {
+    const Samples samples = samples_of(own);
+    const Graph graph = gathered_graph(samples);
     const int parts = ranks_.size();
     std::optional<PartitionQuality> best;
     std::vector<int> part_of;
@@ -353,7 +343,7 @@ class Builder {
       // METIS takes random numbers from the C library: one rank's answer serves all.
       made = ranks_.broadcast(made);
       if (made.empty() && groups_ > 0) continue;
-      const PartitionQuality quality = quality_of_groups(local, made);
+      const PartitionQuality quality = quality_of_groups(samples, made);
       if (best && quality.slowest >= best->slowest) continue;
       best = quality;
       part_of = std::move(made);
@@ -363,95 +353,134 @@ class Builder {
       if (!best) throw InputError(refusal);
     });
     quality_ = *best;
-    std::vector<int> owner;
-    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
-      if (owns(local, i)) owner.push_back(part_of[group_of(local.phyxels[i])]);
-    }
+    std::vector<int> owner(own.size());
+    const auto n = static_cast<Index>(own.size());
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) owner[i] = part_of[group_of(own[i])];
     return owner;
   }
 
-  /// Calls visit(j) for all that share an edge with phyxel i.
-  template <class Visit>
-  static void visit_edges(const Neighbourhood& hood, Index i, Visit&& visit) {
-    const auto near = hood.neighbours.row(i);
-    for (const Index j : near) visit(j);
-    if (hood.symmetric) return;
-    for (const Index j : hood.inverse().row(i)) {
-      if (!std::binary_search(near.begin(), near.end(), j)) visit(j);
+  /// Of each group the first, and then some: all if there are not too many.
+  Samples samples_of(const SpreadPhyxels& own) const {
+    const Surrounded all = around(own, 1);
+    Samples samples;
+    for (const SpreadPhyxel& p : own) {
+      if (p.along % group_size_ % sample_stride() == 0) samples.phyxels.push_back(p);
     }
+    std::size_t sample = 0;
+    for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
+      const Index body = all.phyxels[first].body;
+      std::vector<Vec3d> position, point;
+      std::vector<double> support, reach;
+      for (; last < all.phyxels.size() && all.phyxels[last].body == body; ++last) {
+        position.push_back(all.phyxels[last].position);
+        support.push_back(all.phyxels[last].support);
+      }
+      const std::size_t first_sample = sample;
+      for (; sample < samples.phyxels.size() && samples.phyxels[sample].body == body; ++sample) {
+        point.push_back(samples.phyxels[sample].position);
+        reach.push_back(samples.phyxels[sample].support);
+      }
+      const Csr rows = phyxels_reaching(point, position, support, reach);
+      for (Index s = 0; s < rows.rows(); ++s) {
+        const Index self = samples.phyxels[first_sample + static_cast<std::size_t>(s)].number;
+        for (const Index j : rows.row(s)) {
+          const SpreadPhyxel& other = all.phyxels[first + static_cast<std::size_t>(j)];
+          if (other.number != self) samples.group.push_back(group_of(other));
+        }
+        samples.offsets.push_back(static_cast<Offset>(samples.group.size()));
+      }
+    }
+    return samples;
   }
-  static std::int64_t weight_of(const Neighbourhood& hood, Index i) {
-    return 1 + hood.neighbours.length(i);
-  }
+  Index sample_stride() const { return 1 + (size_ - 1) / options_.most_samples; }
 
-  PartitionQuality quality_of_groups(const Local& local, const std::vector<int>& part_of) const {
+  PartitionQuality quality_of_groups(const Samples& samples,
+                                     const std::vector<int>& part_of) const {
     PartCounts counts(ranks_.size());
-    const Neighbourhood& hood = local.model.neighbourhood;
     std::vector<std::pair<int, std::int64_t>> others;
-    const auto part = [&](std::size_t i) { return part_of[group_of(local.phyxels[i])]; };
-    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
-      if (!owns(local, i)) continue;
+    for (std::size_t s = 0; s < samples.phyxels.size(); ++s) {
       others.clear();
-      visit_edges(hood, static_cast<Index>(i), [&](Index j) {
-        others.emplace_back(part(static_cast<std::size_t>(j)), 1);
-      });
-      counts.add(part(i), weight_of(hood, static_cast<Index>(i)), others);
+      for (const Index group : samples.edges(s)) others.emplace_back(part_of[group], 1);
+      counts.add(part_of[group_of(samples.phyxels[s])],
+                 1 + static_cast<std::int64_t>(others.size()), others);
     }
+    for (std::int64_t& word : counts.words()) word *= sample_stride();
     ranks_.add(counts.words());
     return counts.quality();
   }
 
-  /// Of all groups, on the first rank.
-  Graph gathered_graph(const Local& local) const {
-    const Neighbourhood& hood = local.model.neighbourhood;
-    std::vector<Index> by_group;  // own phyxels
-    for (std::size_t i = 0; i < local.phyxels.size(); ++i) {
-      if (owns(local, i)) by_group.push_back(static_cast<Index>(i));
-    }
-    std::stable_sort(by_group.begin(), by_group.end(), [&](Index a, Index b) {
-      return group_of(local.phyxels[a]) < group_of(local.phyxels[b]);
-    });
+  /// What own groups are, as the first rank gets to know it.
+  struct GroupRecord {
+    std::int64_t weight = 0;
+    Vec3d centre;
+    std::int64_t edges = 0;
+  };
+  struct EdgeRecord {
+    Index other = 0;
+    std::int64_t weight = 0;
+  };
+
+  /// Of all groups, on the first rank. An edge may have been seen by one end only.
+  Graph gathered_graph(const Samples& samples) const {
     const auto each = static_cast<std::size_t>(ranks_.size());
     std::vector<std::vector<GroupRecord>> records(each);
     std::vector<std::vector<EdgeRecord>> edges(each);
     std::vector<Index> crossing;
-    for (std::size_t first = 0, last = 0; first < by_group.size(); first = last) {
-      const Index group = group_of(local.phyxels[by_group[first]]);
+    for (std::size_t first = 0, last = 0; first < samples.phyxels.size(); first = last) {
+      const Index group = group_of(samples.phyxels[first]);
       crossing.clear();
-      GroupRecord record{group, 0, {}};
-      for (; last < by_group.size() && group_of(local.phyxels[by_group[last]]) == group; ++last) {
-        const Index i = by_group[last];
-        record.weight += weight_of(hood, i);
-        record.centre += local.phyxels[i].position;
-        visit_edges(hood, i, [&](Index j) {
-          const Index other = group_of(local.phyxels[j]);
-          if (other != group) crossing.push_back(other);
-        });
+      GroupRecord record;
+      for (; last < samples.phyxels.size() && group_of(samples.phyxels[last]) == group; ++last) {
+        record.centre += samples.phyxels[last].position;
+        const std::span<const Index> others = samples.edges(last);
+        record.weight += 1 + static_cast<std::int64_t>(others.size());
+        std::copy_if(others.begin(), others.end(), std::back_inserter(crossing),
+                     [&](Index other) { return other != group; });
       }
       record.centre = 1.0 / static_cast<double>(last - first) * record.centre;
-      records[0].push_back(record);
       std::sort(crossing.begin(), crossing.end());
       for (std::size_t k = 0; k < crossing.size(); ++k) {
-        if (k == 0 || crossing[k] != crossing[k - 1]) edges[0].push_back({group, crossing[k], 0});
+        if (k == 0 || crossing[k] != crossing[k - 1]) {
+          edges[0].push_back({crossing[k], 0});
+          ++record.edges;
+        }
         ++edges[0].back().weight;
       }
+      records[0].push_back(record);
     }
     records = ranks_.exchanged(records);
     edges = ranks_.exchanged(edges);
-    Graph graph;
-    if (ranks_.rank() > 0) return graph;
+    if (ranks_.rank() > 0) return {};
     // Ranks have stretches of the curve, so that their groups follow each other.
+    Graph graph;
+    std::vector<std::tuple<Index, Index, std::int64_t>> both_ways;
     for (std::size_t r = 0; r < each; ++r) {
       std::size_t e = 0;
       for (const GroupRecord& record : records[r]) {
-        for (; e < edges[r].size() && edges[r][e].group == record.group; ++e) {
-          graph.neighbours.push_back(edges[r][e].other);
-          graph.edge_weight.push_back(edges[r][e].weight);
-        }
-        graph.offsets.push_back(static_cast<Offset>(graph.neighbours.size()));
+        const Index group = graph.vertices();
         graph.vertex_weight.push_back(record.weight);
         graph.centre.push_back(record.centre);
+        for (std::int64_t k = 0; k < record.edges; ++k, ++e) {
+          both_ways.emplace_back(group, edges[r][e].other, edges[r][e].weight);
+          both_ways.emplace_back(edges[r][e].other, group, edges[r][e].weight);
+        }
       }
+    }
+    parallel_sort(both_ways);
+    std::size_t at = 0;
+    for (Index group = 0; group < graph.vertices(); ++group) {
+      for (; at < both_ways.size() && std::get<0>(both_ways[at]) == group; ++at) {
+        const auto& [from, to, weight] = both_ways[at];
+        if (static_cast<Offset>(graph.neighbours.size()) > graph.offsets.back() &&
+            graph.neighbours.back() == to) {
+          graph.edge_weight.back() += weight;
+        } else {
+          graph.neighbours.push_back(to);
+          graph.edge_weight.push_back(weight);
+        }
+      }
+      graph.offsets.push_back(static_cast<Offset>(graph.neighbours.size()));
     }
     return graph;
   }
@@ -722,6 +751,14 @@ class Builder {
 
   // --- the share ---------------------------------------------------------------------------------
 
+  /// Calls visit(j) for all that i needs, or that need i; some twice.
+  template <class Visit>
+  static void visit_edges(const Neighbourhood& hood, Index i, Visit&& visit) {
+    for (const Index j : hood.neighbours.row(i)) visit(j);
+    if (hood.symmetric) return;
+    for (const Index j : hood.inverse().row(i)) visit(j);
+  }
+
   BuiltShare share_out_of(Local& local) {
     HaloPlan plan;
     plan.part = ranks_.rank();
@@ -744,8 +781,7 @@ class Builder {
     ModelShare made = share_of(local.model, plan, local.owner);
     Share& share = made.share;
     std::vector<Index> place = own_places(local, share);
-    share.whole = 0;
-    for (const Body& body : bodies_) share.whole += body.size;
+    share.whole = size_;
     for (Index& number : share.number) number = number_of(local, number);
     for (Index& surfel : share.surfel_number) surfel = surfel_number_[surfel];
     const auto halo = std::make_shared<Halo>(ranks_, made);
@@ -796,6 +832,7 @@ class Builder {
   std::vector<Body> bodies_;
   std::vector<Box> boxes_;
   std::vector<Surface> surfaces_;
+  Index size_ = 0;  // of the whole
   Index groups_ = 0, group_size_ = 1;
   Partitioner partitioner_ = Partitioner::metis;
   PartitionQuality quality_;

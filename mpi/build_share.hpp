@@ -16,6 +16,11 @@ struct ShareOptions {
   /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
   /// tile. 0: none need to.
   int tile = 0;
+  /// What is partitioned are single phyxels, if there are no more than these, or else groups along
+  /// the curve.
+  Index most_groups = 100'000;
+  /// Of more phyxels than these, only some tell whom they share edges with, for all.
+  Index most_samples = 4'000'000;
 };
 
 struct BuiltShare {

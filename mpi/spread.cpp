@@ -4,27 +4,37 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
 #include "model/space_filling_curve.hpp"
 #include "parallel_sort.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel {
 namespace {
 
-bool by_number(const SpreadPhyxel& a, const SpreadPhyxel& b) {
-  return std::tie(a.body, a.number) < std::tie(b.body, b.number);
+/// Those of each rank, joined; they are gone afterwards.
+SpreadPhyxels joined(std::vector<SpreadPhyxels> parts) {
+  SpreadPhyxels all;
+  std::size_t size = 0;
+  for (const SpreadPhyxels& part : parts) size += part.size();
+  all.reserve(size);
+  for (SpreadPhyxels& part : parts) {
+    all.insert(all.end(), part.begin(), part.end());
+    SpreadPhyxels().swap(part);
+  }
+  return all;
 }
 
-/// Those of each rank, joined.
-template <class T>
-std::vector<T> joined(const std::vector<std::vector<T>>& parts) {
-  std::vector<T> all;
-  std::size_t size = 0;
-  for (const std::vector<T>& part : parts) size += part.size();
-  all.reserve(size);
-  for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
-  return all;
+/// phyxels[order(k)] for k in [first, last).
+template <class Order>
+SpreadPhyxels ordered(const SpreadPhyxels& phyxels, std::size_t first, std::size_t last,
+                      Order&& order) {
+  SpreadPhyxels result(last - first);
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = first; k < last; ++k) {
+    result[k - first] = phyxels[static_cast<std::size_t>(order(k))];
+  }
+  return result;
 }
 
 /// A phyxel's place in the order of all.
@@ -161,24 +171,47 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     const std::vector<Keyed> sorted = keyed(own);
     const std::vector<Key> splitters =
         find_splitters(ranks, sorted, {starts.begin() + 1, starts.end()});
-    std::vector<SpreadPhyxels> send(static_cast<std::size_t>(parts));
-    for (const Keyed& k : sorted) {
-      const auto to = std::upper_bound(splitters.begin(), splitters.end(), k.key) - splitters.begin();
-      send[static_cast<std::size_t>(to)].push_back(own[k.here]);
+    std::vector<SpreadPhyxels> send;
+    std::size_t first = 0;
+    for (int r = 0; r < parts; ++r) {
+      std::size_t last = sorted.size();
+      if (r + 1 < parts) {
+        last = static_cast<std::size_t>(
+            std::lower_bound(sorted.begin(), sorted.end(), splitters[static_cast<std::size_t>(r)],
+                             [](const Keyed& a, const Key& b) { return a.key < b; }) -
+            sorted.begin());
+      }
+      send.push_back(ordered(own, first, last, [&](std::size_t k) { return sorted[k].here; }));
+      first = last;
     }
     SpreadPhyxels().swap(own);
     own = joined(ranks.exchanged(send));
   }
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
-  SpreadPhyxels ordered;
-  ordered.reserve(own.size());
+  const std::vector<Keyed> sorted = keyed(own);
+  own = ordered(own, 0, own.size(), [&](std::size_t k) { return sorted[k].here; });
   Index body = first_body, along = first_along;
-  for (const Keyed& k : keyed(own)) {
-    SpreadPhyxel& p = ordered.emplace_back(own[k.here]);
+  for (SpreadPhyxel& p : own) {
     if (p.body != body) body = p.body, along = 0;
     p.along = along++;
   }
-  return ordered;
+  return own;
+}
+
+std::vector<Index> order_by_number(const SpreadPhyxels& phyxels) {
+  const auto n = static_cast<Index>(phyxels.size());
+  std::vector<std::pair<std::uint64_t, Index>> keys(phyxels.size());
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < n; ++i) {
+    keys[i] = {static_cast<std::uint64_t>(phyxels[i].body) << 32 |
+                   static_cast<std::uint64_t>(phyxels[i].number),
+               i};
+  }
+  parallel_sort(keys);
+  std::vector<Index> order(keys.size());
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < n; ++i) order[i] = keys[i].second;
+  return order;
 }
 
 SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
@@ -187,9 +220,9 @@ SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own
   for (std::size_t k = 0; k < own.size(); ++k) {
     send[static_cast<std::size_t>(owner[k])].push_back(own[k]);
   }
-  SpreadPhyxels received = joined(ranks.exchanged(send));
-  parallel_sort(received, by_number);
-  return received;
+  const SpreadPhyxels received = joined(ranks.exchanged(send));
+  const std::vector<Index> order = order_by_number(received);
+  return ordered(received, 0, received.size(), [&](std::size_t k) { return order[k]; });
 }
 
 Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
@@ -217,42 +250,42 @@ Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
     }
   }
   parallel_sort(others);
-  std::vector<SpreadPhyxels> send(each);
-  std::vector<int> wanted_by;
-  for (std::size_t first = 0, last = 0; first < here.size(); first = last) {
-    const Cells::Name cell = here[first].first;
-    while (last < here.size() && here[last].first == cell) ++last;
-    wanted_by.clear();
-    Cells::visit_around(cell, [&](Cells::Name next) {
+  // Ranks that want what is in each cell.
+  std::vector<std::size_t> begin;  // of cells, in `here`
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    if (k == 0 || here[k].first != here[k - 1].first) begin.push_back(k);
+  }
+  begin.push_back(here.size());
+  const std::size_t filled = begin.size() - 1;
+  std::vector<std::vector<int>> wanted_by(filled);
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::size_t c = 0; c < filled; ++c) {
+    Cells::visit_around(here[begin[c]].first, [&](Cells::Name next) {
       for (auto at = std::lower_bound(others.begin(), others.end(), std::pair{next, -1});
            at != others.end() && at->first == next; ++at) {
-        wanted_by.push_back(at->second);
+        wanted_by[c].push_back(at->second);
       }
     });
-    std::sort(wanted_by.begin(), wanted_by.end());
-    wanted_by.erase(std::unique(wanted_by.begin(), wanted_by.end()), wanted_by.end());
-    for (const int rank : wanted_by) {
-      for (std::size_t k = first; k < last; ++k) {
+    sort_unique(wanted_by[c]);
+  }
+  std::vector<SpreadPhyxels> send(each);
+  for (std::size_t c = 0; c < filled; ++c) {
+    for (const int rank : wanted_by[c]) {
+      for (std::size_t k = begin[c]; k < begin[c + 1]; ++k) {
         send[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
       }
     }
   }
   std::vector<SpreadPhyxels> received = ranks.exchanged(send);
   received[static_cast<std::size_t>(ranks.rank())] = own;
-
-  std::vector<std::pair<SpreadPhyxel, int>> all;
+  std::vector<int> owner;
   for (std::size_t r = 0; r < each; ++r) {
-    for (const SpreadPhyxel& p : received[r]) all.emplace_back(p, static_cast<int>(r));
-    SpreadPhyxels().swap(received[r]);
+    owner.insert(owner.end(), received[r].size(), static_cast<int>(r));
   }
-  parallel_sort(all, [](const auto& a, const auto& b) { return by_number(a.first, b.first); });
-  Surrounded result;
-  result.phyxels.reserve(all.size());
-  result.owner.reserve(all.size());
-  for (const auto& [phyxel, owner] : all) {
-    result.phyxels.push_back(phyxel);
-    result.owner.push_back(owner);
-  }
+  const SpreadPhyxels all = joined(std::move(received));
+  const std::vector<Index> order = order_by_number(all);
+  Surrounded result{ordered(all, 0, all.size(), [&](std::size_t k) { return order[k]; }), {}};
+  for (const Index k : order) result.owner.push_back(owner[k]);
   return result;
 }
 

@@ -1,5 +1,5 @@
 /// Phyxels of all bodies spread over ranks, each on one of them, while a model is built that no rank
-/// has whole. Every function is collective.
+/// has whole. Every function that takes the ranks is collective.
 #pragma once
 
 #include <cstdint>
@@ -38,6 +38,9 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
 /// Phyxels go to their owners, and are there in the order of bodies and numbers.
 SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
                              const std::vector<int>& owner);
+
+/// Which one is first, second, ... in the order of bodies and numbers.
+std::vector<Index> order_by_number(const SpreadPhyxels& phyxels);
 
 /// Own phyxels and those of other ranks around them.
 struct Surrounded {

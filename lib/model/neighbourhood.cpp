@@ -168,7 +168,7 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
 }
 
 Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,
-                     std::span<const double> support) {
+                     std::span<const double> support, std::span<const double> reach) {
   Csr csr;
   if (position.empty()) {
     csr.offsets.assign(point.size() + 1, 0);
@@ -179,8 +179,9 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
   const int rings = static_cast<int>(std::ceil(largest / hash.cell_size()));
   return build_rows(static_cast<Index>(point.size()), [&](Index s, std::vector<Index>& row) {
     const Vec3d here = point[s];
+    const double own = reach.empty() ? 0 : reach[s];
     hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
-      const double h = support[e.index];
+      const double h = std::max(own, support[e.index]);
       if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
     });
   });

@@ -265,6 +265,7 @@ INSTANTIATE_TEST_SUITE_P(
     Bodies, BuiltShares,
     ::testing::Combine(::testing::ValuesIn(build_cases()),
                        ::testing::Values(Cut{"Metis", {{Partitioner::metis}, 1, 0}},
+                                         Cut{"Coarse", {{Partitioner::metis}, 1, 0, 60, 400}},
                                          Cut{"Curve", {{Partitioner::curve}, 2, 0}},
                                          Cut{"Tiles",
                                              {{Partitioner::bisection}, 1, cuda::tile_size}})),
