@@ -22,6 +22,7 @@
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -66,17 +67,20 @@ class Builder {
       : ranks_(ranks), scene_(scene), options_(options), bodies_(scene.bodies.size()) {}
 
   BuiltShare build(const Pieces& piece) {
-    SpreadPhyxels own = make_pieces(piece);
+    SpreadPhyxels own = in_phase("making phyxels", [&] { return make_pieces(piece); });
     boxes_ = boxes_of(ranks_, own, bodies_.size());
     count_bodies();
-    own = spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size_);
-    find_spacings(own);
+    own = in_phase("ordering along the curve", [&] {
+      return spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size_);
+    });
+    in_phase("spacings", [&] { find_spacings(own); });
     find_supports(own);
-    own = sent_to_owners(ranks_, own, partition(own));
-    Local local = surroundings_of(own);
+    const std::vector<int> owner = in_phase("partition", [&] { return partition(own); });
+    own = in_phase("sending to owners", [&] { return sent_to_owners(ranks_, own, owner); });
+    Local local = in_phase("lists", [&] { return surroundings_of(own); });
     SpreadPhyxels().swap(own);
-    finish(local);
-    return share_out_of(local);
+    in_phase("masses, moments, boundary, surfels", [&] { finish(local); });
+    return in_phase("share", [&] { return share_out_of(local); });
   }
 
  private:

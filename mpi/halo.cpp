@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cstring>
 
+#include "timeline.hpp"
+
 namespace phyxel {
 
 Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
@@ -79,6 +81,7 @@ void Halo::begin(const Bytes& outgoing, const Bytes& incoming) const {
 
 void Halo::begin(const Records& records) const {
   {
+    const Phase phase("packing");
     const Timed timed(traffic_.seconds);
     under_way_ = records;
     for (std::size_t p = 0; p < peers_.size(); ++p) {
@@ -96,7 +99,10 @@ void Halo::begin(const Records& records) const {
 
 void Halo::finish() const {
   const Timed timed(traffic_.seconds);
-  transfers_.wait();
+  {
+    const Phase phase("waiting for other ranks");
+    transfers_.wait();
+  }
   if (!under_way_.base) return;
   for (std::size_t p = 0; p < peers_.size(); ++p) {
     const std::byte* from = incoming_[p].data();

@@ -14,10 +14,12 @@
 #include "mpi/watchdog.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
+#include "profile.hpp"
 #include "progress.hpp"
 #include "setup.hpp"
 #include "stop_signal.hpp"
 #include "stopwatch.hpp"
+#include "timeline.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -27,7 +29,8 @@ struct RunOptions {
   Overrides overrides;
   CutOptions cut;
   std::string transport = "auto";
-  std::string resume;  // "", "auto" or a checkpoint file
+  std::string profile;  // a file, or ""
+  std::string resume;   // "", "auto" or a checkpoint file
   bool force = false;
   bool no_pictures = false;
   bool quiet = false;
@@ -65,10 +68,12 @@ class Run {
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
         device_(device_of_ranks()),
         begin_(checkpoint_for_all()),
-        ensemble_(scene_, device_, options_.cut),
-        backend_(make_backend_of_rank()),
-        plan_(alike(
-            [&] { return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step); })),
+        ensemble_(in_phase("model", [&] { return Ensemble(scene_, device_, options_.cut); })),
+        backend_(in_phase("backend", [&] { return make_backend_of_rank(); })),
+        plan_(alike([&] {
+          const Phase phase("time step");
+          return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
+        })),
         solver_(*backend_, ranks().agreed([&] {
           return begin_ ? resumed_state() : initial_state(model(), scene_, plan_.dt);
         })),
@@ -122,6 +127,7 @@ class Run {
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
         progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
         if (!frame && solver.steps() % agree_interval() != 0) continue;
+        const Phase agreeing("agreeing, looking, writing");
         ranks().together([&] { writer_.check(); });
         const bool stop = anyone(StopSignal::stop_requested() != 0);
         const bool due = anyone(StopSignal::checkpoint_requested() ||
@@ -135,7 +141,8 @@ class Run {
         step_seconds_ += seconds_since(stepping_since);
         if (frame) ranks().together([&] { writer_.wait_for_room(); });
         const auto look_start = Clock::now();
-        now = diagnose(model(), backend, solver.steps(), solver.dt());
+        now = in_phase("energies",
+                       [&] { return diagnose(model(), backend, solver.steps(), solver.dt()); });
         watch.check(now);
         peak_energy_ =
             std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
@@ -335,6 +342,7 @@ class Run {
 
   /// Takes what the frame needs from the backend now; it is written in the background.
   void write_frame(const std::shared_ptr<const GoodState>& good) {
+    const Phase phase("frame");
     const auto surfels = std::make_shared<SurfelState>();
     Frame frame;
     frame.state = &good->state;
@@ -355,12 +363,16 @@ class Run {
       if (wanted("von_mises")) frame.von_mises = ensemble_.phyxels(frame.von_mises);
       if (wanted("volume_ratio")) frame.volume_ratio = ensemble_.phyxels(frame.volume_ratio);
     }
-    hand_over([this, good, surfels, frame = std::move(frame)] { recorder_->write(frame); });
+    hand_over([this, good, surfels, frame = std::move(frame)] {
+      const Phase writing("writing a frame");
+      recorder_->write(frame);
+    });
   }
 
   /// The last good one, in the background, after the frames handed over before.
   void write_state() {
     hand_over([this, good = good_] {
+      const Phase writing("writing a checkpoint");
       CheckpointInfo info;
       info.program = program_version();
       info.precision = scene_.solver.precision;
@@ -523,7 +535,20 @@ class Run {
   BackgroundWriter writer_;  // last: it ends first, and its jobs use the recorder
 };
 
-void run(const RunOptions& options) { Run(options).execute(); }
+void run(const RunOptions& options) {
+  if (options.profile.empty()) {
+    Run(options).execute();
+    return;
+  }
+  start_profile(options.profile, options.force);
+  try {
+    Run(options).execute();
+  } catch (const AgreedError&) {  // on all ranks, e.g. after a signal
+    write_profile(options.profile);
+    throw;
+  }
+  write_profile(options.profile);
+}
 
 void check(const Overrides& overrides) {
   const Scene scene = scene_with(overrides);
@@ -582,6 +607,9 @@ void add_run(CLI::App& program) {
                     "Leave out the pictures the scene asks for");
   command->add_flag("--quiet", options->quiet, "No progress, no plan; only the summary");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
+  command->add_option("--profile", options->profile,
+                      "Write what each rank does when to this file, for a trace viewer "
+                      "(chrome://tracing, ui.perfetto.dev)");
   command->footer(
       "Examples:\n"
       "  phyxel run examples/dino/scene.toml --out out/dino\n"

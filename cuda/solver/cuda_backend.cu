@@ -11,6 +11,7 @@
 #include "solver/step_graph.cuh"
 #include "solver/surfels.cuh"
 #include "solver/vibration.cuh"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -94,6 +95,7 @@ class CudaBackend final : public Backend {
   }
 
   void wait() const override {
+    const Phase phase("waiting for the GPU");
     settle();
     m_.wait();
   }
@@ -258,6 +260,7 @@ class CudaBackend final : public Backend {
         50'000'000 / std::max<std::size_t>(m_.places(), 1), 1, static_cast<std::size_t>(most)));
     if ((steps_since_mark_ += steps) < ahead) return;
     steps_since_mark_ = 0;
+    const Phase phase("ahead of the GPU");
     const Event& mark = marks_[batches_++ % 2];
     PHYXEL_CUDA(cudaEventSynchronize(mark.get()));  // of the last batch but one; at once if none
     PHYXEL_CUDA(cudaEventRecord(mark.get(), m_.stream()));

@@ -21,6 +21,7 @@
 #include "solver/cpu_layout.hpp"
 #include "solver/cpu_surfels.hpp"
 #include "solver/pack.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -95,6 +96,7 @@ class CpuBackend final : public Backend {
   }
 
   void stress() override {
+    const Phase phase("stresses");
     find_stresses(runs_);
     if (!model_.share) return;
     if (model_.share->rings == 1) {
@@ -105,6 +107,7 @@ class CpuBackend final : public Backend {
   }
 
   void advance(double time, double dt) override {
+    const Phase phase("forces, motion");
     if (!load_.empty()) model_loads(time);
     for (const Run& run : runs_) {
       const bool damped = run.material.damping > 0;

@@ -158,6 +158,41 @@ TEST_F(Mpirun, DoctorListsTheRanksOnce) {
   EXPECT_EQ(alone["memory_bytes"].get<double>(), 2 * found["memory_bytes"].get<double>());
 }
 
+/// Each rank's spans lie within its own time, and steps are among them; files are another thread's.
+TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
+  write_scene("0.03");
+  const std::vector<std::string> command{"run", "scene.toml", "--quiet", "--profile", "trace.json"};
+  const Outcome outcome = run_on(2, command);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  struct Sum {
+    double seconds = 0, end = 0;
+  };
+  std::map<int, std::map<std::string, Sum>> spans;  // [rank][what]
+  const auto trace = nlohmann::json::parse(text_of(folder_ / "trace.json"));
+  for (const auto& event : trace["traceEvents"]) {
+    if (event["ph"] != "X") continue;
+    const bool file = event["name"].get<std::string>().starts_with("writing");
+    EXPECT_EQ(event["tid"], file ? 1 : 0);
+    Sum& sum = spans[event["pid"]][event["name"]];
+    EXPECT_GE(event["ts"].get<double>(), 0);
+    sum.seconds += event["dur"].get<double>();
+    sum.end = std::max(sum.end, event["ts"].get<double>() + event["dur"].get<double>());
+  }
+  ASSERT_EQ(spans.size(), 2u);
+  for (auto& [rank, of_rank] : spans) {
+    for (const char* what : {"model", "stresses", "forces, motion", "waiting for other ranks"}) {
+      EXPECT_GT(of_rank[what].seconds, 0) << what;
+    }
+    EXPECT_LE(of_rank["model"].end, of_rank["forces, motion"].end);
+    EXPECT_LE(of_rank["stresses"].seconds, of_rank["stresses"].end);
+    EXPECT_EQ(of_rank["writing a frame"].seconds > 0, rank == 0);
+  }
+  const Outcome again = run_on(2, command);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err,
+              HasSubstr("--profile trace.json: exists; allowed: another file, or --force"));
+}
+
 /// How often a text stands in another.
 int count_of(const std::string& what, const std::string& text) {
   int count = 0;
