@@ -1,6 +1,10 @@
 #include "ensemble.hpp"
 
+#include <omp.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cstdlib>
 
 #include "mpi/build_share.hpp"
 #include "partition/partition.hpp"
@@ -23,7 +27,12 @@ const Communicator& ranks() {
   static const Communicator alone;
   return the_ranks ? *the_ranks : alone;
 }
-void set_ranks(const Communicator& ranks) { the_ranks = &ranks; }
+void set_ranks(const Communicator& ranks) {
+  the_ranks = &ranks;
+  if (ranks.size() == 1 || std::getenv("OMP_NUM_THREADS")) return;
+  const auto cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
+  omp_set_num_threads(std::clamp(omp_get_num_procs(), 1, std::max(1, cores / ranks.host_size())));
+}
 
 std::vector<std::string> partitioner_choices() {
   std::vector<std::string> names = partitioner_names();

@@ -14,7 +14,8 @@ namespace phyxel::app {
 
 /// The ranks of this program.
 const Communicator& ranks();
-/// For main(): who they are. Until then there is one.
+/// For main(): who they are. Until then there is one. Ranks of one host share its cores from then
+/// on, unless someone has bound them or has said how many threads each takes.
 void set_ranks(const Communicator& ranks);
 /// @throws AgreedError if it is not the same number on all ranks. Collective.
 void require_alike(std::uint64_t value, const char* what);

@@ -221,19 +221,12 @@ class Run {
     const char* said = std::getenv("PHYXEL_WATCHDOG_SECONDS");
     return said ? std::atof(said) : 60;
   }
-  /// Of this rank. Ranks of one host share its cores, unless someone has bound them or has said how
-  /// many threads each takes.
-  int threads() const {
-    if (scene_.solver.threads > 0 || ranks().size() == 1) return scene_.solver.threads;
-    if (std::getenv("OMP_NUM_THREADS")) return 0;  // OpenMP's choice
-    const auto cores = static_cast<int>(sysconf(_SC_NPROCESSORS_ONLN));
-    return std::clamp(omp_get_num_procs(), 1, std::max(1, cores / ranks().host_size()));
-  }
 
   /// Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
   std::unique_ptr<Backend> make_backend_of_rank() const {
     const auto make = [&] {
-      return make_backend(model(), scene_.solver.precision, device_, threads(), options_.transport);
+      return make_backend(model(), scene_.solver.precision, device_, scene_.solver.threads,
+                          options_.transport);
     };
     return device_.gpu ? make() : ranks().agreed(make);
   }
@@ -328,7 +321,9 @@ class Run {
   /// twice a step, and lose more to a writer that comes between than writing beside them saves.
   bool core_is_left() const {
     if (device_.gpu) return true;
-    return backend_->threads() < omp_get_num_procs();
+    const int threads = backend_->threads();  // of each rank alike
+    return threads < omp_get_num_procs() &&
+           threads * ranks().host_size() < sysconf(_SC_NPROCESSORS_ONLN);
   }
 
   /// What writes files, to the writer of the first rank.
