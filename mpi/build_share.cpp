@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <tuple>
@@ -22,6 +23,7 @@
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
+#include "shapes/lattice_shapes.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -30,7 +32,8 @@ namespace {
 /// A little more than asked for, so that rounding leaves nothing out.
 constexpr double margin = 1 + 1e-9;
 
-using Pieces = std::function<CloudPiece(std::size_t body)>;
+/// @param digest of the whole cloud, if this rank has it
+using Pieces = std::function<CloudPiece(std::size_t body, std::uint64_t& digest)>;
 
 /// What all ranks know of a body.
 struct Body {
@@ -102,9 +105,10 @@ class Builder {
       Vec3d at;
     };
     std::vector<Origin> origins;
+    std::uint64_t digest = 0;  // of what each rank has made or read for itself
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
-        CloudPiece made = piece(b);
+        CloudPiece made = piece(b, digest);
         Cloud& cloud = made.cloud;
         Body& body = bodies_[b];
         body.size = made.whole;
@@ -125,6 +129,12 @@ class Builder {
         surfaces_[b] = std::move(cloud.surface);
       }
     });
+    const auto alike = static_cast<std::int64_t>(digest);
+    if (ranks_.smallest(alike) != ranks_.largest(alike)) {
+      throw AgreedError(ExitCode::bad_input,
+                        "the ranks have different bodies: allowed are the same files for all, on a "
+                        "file system that all see");
+    }
     ranks_.add(with_volumes);
     for (const Origin& origin : ranks_.gathered(std::span(std::as_const(origins)))) {
       bodies_[origin.body].origin = origin.at;
@@ -177,6 +187,12 @@ class Builder {
     // At any time, with lists: those around and the copy that a share is included.
     ranks_.together([&] {
       require_host_memory("the scene", static_cast<double>(size), 1700.0 / ranks_.size());
+      std::int64_t places = 0;  // in tiles, of which bodies fill whole ones
+      for (const Body& body : bodies_) places += count_of(body.size, options_.tile) * options_.tile;
+      if (places > std::numeric_limits<Index>::max()) {
+        throw InputError(fmt::format("the bodies fill {} places in tiles of {}: allowed are {}",
+                                     places, options_.tile, std::numeric_limits<Index>::max()));
+      }
     });
     const Index group = group_size(static_cast<Index>(size));
     Body next;
@@ -185,16 +201,21 @@ class Builder {
       body.group = next.group;
       body.tile = next.tile;
       next.base += body.size;
-      next.group += (body.size + group - 1) / group;
-      if (options_.tile > 0) next.tile += (body.size + options_.tile - 1) / options_.tile;
+      next.group += static_cast<Index>(count_of(body.size, group));
+      next.tile += static_cast<Index>(count_of(body.size, options_.tile));
     }
     groups_ = next.group;
     group_size_ = group;
     size_ = static_cast<Index>(size);
   }
+  /// Pieces of a length that hold `size`; none of no length.
+  static std::int64_t count_of(std::int64_t size, std::int64_t length) {
+    return length > 0 ? (size + length - 1) / length : 0;
+  }
   Index group_size(Index size) const {
-    const Index tile = std::max(1, options_.tile), tiles = (size + tile - 1) / tile;
-    return tile * std::max(1, (tiles + options_.most_groups - 1) / options_.most_groups);
+    const Index tile = std::max(1, options_.tile);
+    const std::int64_t tiles = count_of(size, tile);
+    return tile * std::max(1, static_cast<Index>(count_of(tiles, options_.most_groups)));
   }
 
   // --- supports ----------------------------------------------------------------------------------
@@ -279,9 +300,9 @@ class Builder {
     return surrounded(ranks_, own, reach, boxes_);
   }
 
-  /// Twice the largest support around: as far as a neighbour's neighbours, and a surfel's carriers.
+  /// As far as the neighbours of the last ghosts, and the carriers of surfels.
   Local surroundings_of(const SpreadPhyxels& own) const {
-    Surrounded all = around(own, 2);
+    Surrounded all = around(own, options_.rings + 1);
     Local local{std::move(all.phyxels), std::move(all.owner), {}};
     Model& m = local.model;
     ranks_.together([&] {
@@ -731,14 +752,17 @@ class Builder {
         return squared != other.squared ? squared < other.squared : number < other.number;
       }
     };
-    std::vector<Index> unreached, at;
-    std::vector<Nearest> nearest;
+    std::vector<Index> unreached;
     for (std::size_t s = 0; s < reached.size(); ++s) {
-      if (reached[s] > 0) continue;
-      unreached.push_back(static_cast<Index>(s));
-      const auto [squared, k] = nearest_to(surface.position[s], own);
-      at.push_back(k < 0 ? -1 : own_at[k]);
-      nearest.push_back({squared, k < 0 ? INT64_MAX : number_of(local, own_at[k])});
+      if (reached[s] == 0) unreached.push_back(static_cast<Index>(s));
+    }
+    std::vector<Index> at(unreached.size());
+    std::vector<Nearest> nearest(unreached.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t u = 0; u < unreached.size(); ++u) {
+      const auto [squared, k] = nearest_to(surface.position[unreached[u]], own);
+      at[u] = k < 0 ? -1 : own_at[k];
+      nearest[u] = {squared, k < 0 ? INT64_MAX : number_of(local, own_at[k])};
     }
     local.model.surfels.unreached += static_cast<Index>(unreached.size());
     const std::vector<Nearest> of_ranks = ranks_.gathered(std::span(std::as_const(nearest)));
@@ -804,16 +828,17 @@ class Builder {
   std::vector<Index> own_places(const Local& local, const Share& share) const {
     std::vector<Index> place(share.number.size(), -1);
     if (options_.tile == 0) return place;
-    std::vector<Index> own;  // of the share
     const auto phyxel = [&](Index k) -> const SpreadPhyxel& {
       return local.phyxels[share.number[k]];
     };
+    std::vector<std::tuple<Index, Index, Index>> sorted;  // body, along, which of the share
     for (std::size_t k = 0; k < place.size(); ++k) {
-      if (share.owned[k]) own.push_back(static_cast<Index>(k));
+      const auto here = static_cast<Index>(k);
+      if (share.owned[k]) sorted.emplace_back(phyxel(here).body, phyxel(here).along, here);
     }
-    std::sort(own.begin(), own.end(), [&](Index a, Index b) {
-      return std::tie(phyxel(a).body, phyxel(a).along) < std::tie(phyxel(b).body, phyxel(b).along);
-    });
+    parallel_sort(sorted);
+    std::vector<Index> own;
+    for (const auto& [body, along, k] : sorted) own.push_back(k);
     const auto tile_of = [&](Index k) {
       return bodies_[phyxel(k).body].tile + phyxel(k).along / options_.tile;
     };
@@ -843,29 +868,48 @@ class Builder {
   std::vector<Index> surfel_number_;  // of the surfels that this rank moves, in the whole model
 };
 
-Piece piece_of(const Communicator& ranks) { return {ranks.rank(), ranks.size()}; }
+/// Bodies begin on one rank after the other, so that small ones are not all the first one's.
+Piece piece_of(const Communicator& ranks, std::size_t body) {
+  const auto size = static_cast<std::size_t>(ranks.size());
+  return {static_cast<int>((static_cast<std::size_t>(ranks.rank()) + body) % size), ranks.size()};
+}
 
 }  // namespace
 
 BuiltShare build_share(const Communicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
-  // Copies of a body follow one another; making a piece once serves them all.
+  // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
-  CloudPiece rest;
-  return Builder(ranks, scene, options).build([&](std::size_t b) {
+  Cloud rest;
+  return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
     const BodyRequest& request = scene.bodies[b];
-    if (!made || !(*made == request.source)) rest = rest_piece(request.source, piece_of(ranks));
-    made = &request.source;
-    CloudPiece piece = rest;
-    place(piece.cloud, request);
-    return piece;
+    const Piece piece = piece_of(ranks, b);
+    CloudPiece cut;
+    if (const auto lattice = lattice_of(request.source, piece)) {
+      cut = make_lattice_shape(*lattice, piece);
+    } else {
+      if (!made || !(*made == request.source)) {
+        rest = rest_cloud(request.source);
+        digest = 31 * digest + cloud_digest(rest);
+      }
+      made = &request.source;
+      cut = cut_piece(rest, piece);
+    }
+    place(cut.cloud, request);
+    return cut;
   });
 }
 
 BuiltShare build_share(const Communicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
-  return Builder(ranks, scene, options).build([&](std::size_t b) {
-    return cut_piece(clouds.at(b), piece_of(ranks));
+  if (clouds.size() != scene.bodies.size()) {
+    throw AgreedError(ExitCode::bad_input,
+                      fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
+                                  clouds.size(), scene.bodies.size()));
+  }
+  return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
+    digest = 31 * digest + cloud_digest(clouds[b]);
+    return cut_piece(clouds[b], piece_of(ranks, b));
   });
 }
 

@@ -112,8 +112,8 @@ class Cells {
   }
 
  private:
-  static constexpr double most = 256;  ///< Cells along a side.
-  static constexpr int bits = 10;
+  static constexpr double most = 4096;  ///< Cells along a side.
+  static constexpr int bits = 14;
   static Name name(std::size_t body, Name x, Name y, Name z) {
     return static_cast<Name>(body) << (3 * bits) | z << (2 * bits) | y << bits | x;
   }

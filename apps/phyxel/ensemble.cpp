@@ -73,6 +73,7 @@ Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOpti
 
 void Ensemble::bring_together() {
   if (!here_.share) return;
+  const bool leads = ranks().rank() == 0;
   const auto parts = static_cast<std::size_t>(ranks().size());
   std::vector<std::vector<Index>> numbers(parts), surfel_numbers(parts);
   for (const Index i : owned_) numbers[0].push_back(here_.number(i));
@@ -80,10 +81,25 @@ void Ensemble::bring_together() {
   numbers_ = ranks().exchanged(numbers);
   surfel_numbers_ = ranks().exchanged(surfel_numbers);
 
-  auto whole = std::make_unique<Model>();
-  Surfels& surfels = whole->surfels;
-  whole->position.resize(static_cast<std::size_t>(here_.whole_size()));
-  for (const Surface& surface : surfaces_) {
+  // The others take part, and keep nothing.
+  Model model;
+  const auto phyxels_of_whole = [&](const auto& local) {
+    return brought_together(local, owned_, numbers_,
+                            leads ? static_cast<std::size_t>(here_.whole_size()) : 0);
+  };
+  model.position = phyxels_of_whole(here_.position);
+  model.mass = phyxels_of_whole(here_.mass);
+  model.volume = phyxels_of_whole(here_.volume);
+  model.neighbourhood.support = phyxels_of_whole(here_.neighbourhood.support);
+  model.neighbourhood.symmetric = here_.neighbourhood.symmetric;
+  model.gravity = here_.gravity;
+  model.degenerate = here_.degenerate;
+  model.warnings = here_.warnings;
+  Surfels& surfels = model.surfels;
+  surfels.unreached = here_.surfels.unreached;
+  Index begin = 0;
+  for (std::size_t b = 0; b < here_.parts.size() && leads; ++b) {
+    const Surface& surface = surfaces_[b];
     const auto shift = static_cast<Index>(surfels.position.size());
     surfels.position.insert(surfels.position.end(), surface.position.begin(),
                             surface.position.end());
@@ -91,26 +107,12 @@ void Ensemble::bring_together() {
     for (const Triangle& t : surface.triangle) {
       surfels.triangle.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
     }
-  }
-  surfels.unreached = here_.surfels.unreached;
-  whole_ = std::move(whole);  // `phyxels` asks for its size
-  Model model = *whole_;
-  model.position = phyxels(here_.position);
-  model.mass = phyxels(here_.mass);
-  model.volume = phyxels(here_.volume);
-  model.neighbourhood.support = phyxels(here_.neighbourhood.support);
-  model.neighbourhood.symmetric = here_.neighbourhood.symmetric;
-  model.gravity = here_.gravity;
-  model.degenerate = here_.degenerate;
-  model.warnings = here_.warnings;
-  Index begin = 0, surfel_begin = 0;
-  for (std::size_t b = 0; b < here_.parts.size(); ++b) {
     Part& part = model.parts.emplace_back(here_.parts[b]);
     part.begin = begin;
     part.end = begin += part.size;
     part.ghosts = part.far_ghosts = 0;
-    part.surfel_begin = surfel_begin;
-    part.surfel_end = surfel_begin += static_cast<Index>(surfaces_[b].position.size());
+    part.surfel_begin = shift;
+    part.surfel_end = static_cast<Index>(surfels.position.size());
   }
   const auto whole_list = [&](const std::vector<Index>& phyxels) {
     std::vector<std::vector<Index>> send(parts);
@@ -133,7 +135,7 @@ void Ensemble::bring_together() {
     model.loads.back().phyxels = whole_list(load.phyxels);
     model.loads.back().force.clear();  // wanted where phyxels are stepped
   }
-  whole_ = ranks().rank() == 0 ? std::make_unique<Model>(std::move(model)) : nullptr;
+  if (leads) whole_ = std::make_unique<Model>(std::move(model));
   surfaces_.clear();
 }
 

@@ -68,7 +68,7 @@ struct HashView {
   /// Calls visit(k, position) once for every entry k nearer to `place` than `reach`, and others.
   template <class Visit>
   __device__ void visit_near(int body, Vec3d place, double reach, Visit&& visit) const {
-    const int rings = static_cast<int>(ceil(reach / bodies[body].cell_size));
+    const int rings = rings_within(reach, bodies[body].cell_size);
     const double width = 2.0 * rings + 1;
     if (rings > 3 && width * width * width > points) {  // more cells than points
       visit_all(body, visit);

@@ -112,7 +112,6 @@ void append_rows(Csr& to, const Csr& rows, Index shift) {
   const Offset base = to.entries();
   for (std::size_t r = 1; r < rows.offsets.size(); ++r)
     to.offsets.push_back(base + rows.offsets[r]);
-  to.indices.reserve(to.indices.size() + rows.indices.size());
   for (const Index j : rows.indices) to.indices.push_back(j + shift);
 }
 

@@ -8,14 +8,15 @@
 
 #include "exact_sum.hpp"
 #include "model/box.hpp"
+#include "model/cloud_piece.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
 
 /// The rest cloud of a source, before it is scaled and moved.
 Cloud rest_cloud(const BodySource& source);
-/// The lattice that a source is, with its spacing, if it is one.
-std::optional<ShapeRequest> lattice_of(const BodySource& source);
+/// The lattice that a source is, with its spacing, if it is one. @param piece that is to be made
+std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);

@@ -53,12 +53,23 @@ struct CellGrid {
   }
 };
 
-/// The smallest cell that 21 bits a coordinate allow for a cloud that wide, or `wanted`.
+/// Rounding may move a point by that many cells: a cloud is at most a million cells wide.
+inline constexpr double cell_rounding = 5e-10;
+
+/// How many cells away points nearer than `reach` may be.
+PHYXEL_HD int rings_within(double reach, double cell_size) {
+  using std::ceil;
+  return static_cast<int>(ceil(reach * (1 + cell_rounding) / cell_size));
+}
+
+/// The smallest cell that 21 bits a coordinate allow for a cloud that wide, or `wanted`: a little
+/// more, so that what is within `wanted` is in the next cell for sure.
 PHYXEL_HD double cell_size_for(Vec3d low, Vec3d high, double wanted) {
   const Vec3d extent = high - low;
   double widest = extent.x > extent.y ? extent.x : extent.y;
   widest = extent.z > widest ? extent.z : widest;
-  const double size = wanted > widest / 1e6 ? wanted : widest / 1e6;
+  const double least = widest / 1e6, roomy = wanted * (1 + 2 * cell_rounding);
+  const double size = roomy > least ? roomy : least;
   return size > 0 ? size : 1;
 }
 

@@ -1,35 +1,45 @@
 #include "model/cloud_piece.hpp"
 
-#include <algorithm>
+#include <xxhash.h>
 
-#include "model/assembly.hpp"
-#include "shapes/lattice_shapes.hpp"
+#include <algorithm>
 
 namespace phyxel {
 
-CloudPiece cut_piece(Cloud cloud, Piece piece) {
+CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
   const auto whole = static_cast<Offset>(cloud.position.size());
   const Offset first = whole * piece.number / piece.of,
                last = whole * (piece.number + 1) / piece.of;
-  const auto cut = [&](auto& values) {
-    if (values.empty()) return;
-    values = {values.begin() + first, values.begin() + last};
+  const auto cut = [&](const auto& values) -> std::decay_t<decltype(values)> {
+    if (values.empty()) return {};
+    return {values.begin() + first, values.begin() + last};
   };
-  cut(cloud.position);
-  cut(cloud.volume);
-  for (auto& [name, members] : cloud.regions) {
-    std::vector<Index> here;
+  CloudPiece made{{cut(cloud.position), cut(cloud.volume), cloud.surface, {}},
+                  static_cast<Index>(first),
+                  static_cast<Index>(whole)};
+  for (const auto& [name, members] : cloud.regions) {
+    std::vector<Index>& here = made.cloud.regions[name];
     const auto begin = std::lower_bound(members.begin(), members.end(), first),
                end = std::lower_bound(begin, members.end(), last);
     for (auto i = begin; i != end; ++i) here.push_back(*i - static_cast<Index>(first));
-    members = here;
   }
-  return {std::move(cloud), static_cast<Index>(first), static_cast<Index>(whole)};
+  return made;
 }
 
-CloudPiece rest_piece(const BodySource& source, Piece piece) {
-  const std::optional<ShapeRequest> lattice = lattice_of(source);
-  return lattice ? make_lattice_shape(*lattice, piece) : cut_piece(rest_cloud(source), piece);
+std::uint64_t cloud_digest(const Cloud& cloud) {
+  std::uint64_t digest = 0;
+  const auto add = [&](const auto& values) {
+    digest = XXH3_64bits_withSeed(values.data(), values.size() * sizeof(values[0]), digest);
+  };
+  add(cloud.position);
+  add(cloud.volume);
+  add(cloud.surface.position);
+  add(cloud.surface.triangle);
+  for (const auto& [name, members] : cloud.regions) {
+    add(name);
+    add(members);
+  }
+  return digest;
 }
 
 }  // namespace phyxel

@@ -1,8 +1,9 @@
 /// Clouds made piece by piece, for ranks none of which is to have the whole.
 #pragma once
 
+#include <cstdint>
+
 #include "phyxel/cloud.hpp"
-#include "phyxel/scene.hpp"
 
 namespace phyxel {
 
@@ -16,10 +17,10 @@ struct CloudPiece {
   Index first = 0, whole = 0;
 };
 
-/// A piece of `rest_cloud(source)`; all of them joined are the cloud. Lattices are made piece by
-/// piece; other sources are made or read whole, and cut.
-CloudPiece rest_piece(const BodySource& source, Piece piece);
 /// A piece of a cloud that there is.
-CloudPiece cut_piece(Cloud cloud, Piece piece);
+CloudPiece cut_piece(const Cloud& cloud, Piece piece);
+
+/// A number that tells two clouds apart.
+std::uint64_t cloud_digest(const Cloud& cloud);
 
 }  // namespace phyxel

@@ -11,6 +11,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "shapes/lattice_shapes.hpp"
 
 namespace phyxel {
 namespace {
@@ -168,15 +169,15 @@ Cloud rest_cloud(const BodySource& source) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
   }
-  const std::optional<ShapeRequest> lattice = lattice_of(source);
+  const std::optional<ShapeRequest> lattice = lattice_of(source, {});
   return make_shape(lattice ? *lattice : source.shape);
 }
 
-std::optional<ShapeRequest> lattice_of(const BodySource& source) {
+std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {
   if (!source.file.empty() || !source.mesh.empty() || is_paper_shape(source.shape.name)) return {};
   ShapeRequest shape = source.shape;
   shape.seed = source.seed;
-  if (shape.spacing == 0) shape.spacing = spacing_for(shape, source.phyxels);
+  if (shape.spacing == 0) shape.spacing = spacing_for(shape, source.phyxels, piece);
   return shape;
 }
 

@@ -58,6 +58,7 @@ std::uint64_t model_digest(const Model& model) {
   for (const Part& part : model.parts) {
     const Material& m = part.material;
     add(state.get(), std::vector<char>(part.neighbourhood.begin(), part.neighbourhood.end()));
+    add(state.get(), std::vector<Index>{part.size});
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0});
   }

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "model/cell_grid.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -48,7 +49,7 @@ PHYXEL_HD void search_nearest(NearestDistances& found, int last_ring, double cel
       return;
     }
     // Rings 0 to ring - 1 hold every point nearer than (ring - 1) cells.
-    const double reached = (ring - 1) * cell_size;
+    const double reached = (ring - 1 - 2 * cell_rounding) * cell_size;
     if (ring > 0 && found.full() && found.largest() <= reached * reached) return;
     offer_ring(ring);
   }

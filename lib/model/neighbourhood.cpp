@@ -142,7 +142,7 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
   result.neighbours = build_rows(n, [&](Index i, std::vector<Index>& row) {
     const Vec3d here = position[i];
     const double h = result.support[i];
-    const int rings = static_cast<int>(std::ceil(h / hash.cell_size()));
+    const int rings = rings_within(h, hash.cell_size());
     const auto within = [&](const SpatialHash::Entry& e) {
       return e.index != i && dot(e.position - here, e.position - here) < h * h;
     };
@@ -176,7 +176,7 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
   }
   const double largest = *std::max_element(support.begin(), support.end());
   const SpatialHash hash(position, median_of(support));
-  const int rings = static_cast<int>(std::ceil(largest / hash.cell_size()));
+  const int rings = rings_within(largest, hash.cell_size());
   return build_rows(static_cast<Index>(point.size()), [&](Index s, std::vector<Index>& row) {
     const Vec3d here = point[s];
     const double own = reach.empty() ? 0 : reach[s];
@@ -188,7 +188,8 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
 }
 
 std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position) {
-  std::pair<double, Index> nearest{std::numeric_limits<double>::infinity(), -1};
+  std::pair<double, Index> nearest{std::numeric_limits<double>::infinity(),
+                                   position.empty() ? -1 : 0};
   for (std::size_t i = 0; i < position.size(); ++i) {
     const double d2 = dot(position[i] - point, position[i] - point);
     if (d2 < nearest.first) nearest = {d2, static_cast<Index>(i)};

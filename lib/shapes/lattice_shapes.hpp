@@ -39,6 +39,9 @@ CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t see
 /// would be over a million.
 Surface lattice_surface(const Lattice& lattice, double spacing);
 
+/// `spacing_for`, by whoever makes a piece. @throws InputError
+double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece);
+
 /// A shape that is a lattice, or a piece of it with all of its surface. @throws InputError as
 /// `make_shape`
 CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece = {});

@@ -76,6 +76,10 @@ const std::vector<std::string>& shape_names() {
 bool is_paper_shape(const std::string& name) { return find_paper_body(name) != nullptr; }
 
 double spacing_for(const ShapeRequest& request, Index phyxels) {
+  return spacing_for(request, phyxels, {});
+}
+
+double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
   if (const PaperBody* body = find_paper_body(request.name)) {
     throw InputError(fmt::format("shape \"{}\" is no lattice: it has {} phyxels and no spacing",
                                  body->name, body->phyxels));
@@ -85,7 +89,7 @@ double spacing_for(const ShapeRequest& request, Index phyxels) {
     throw InputError(fmt::format("shape \"{}\": {} phyxels asked for; at least 1 is needed",
                                  request.name, phyxels));
   }
-  require_memory_for_cloud(request.name, phyxels);
+  require_memory_for_cloud(request.name, phyxels, piece);
   const Lattice unit = make_lattice(request, 1);
   const double longest = std::max({unit.extent.x, unit.extent.y, unit.extent.z});
   const auto count = [&](double spacing) { return make_lattice(request, spacing).phyxels(); };
