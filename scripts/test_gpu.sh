@@ -30,6 +30,19 @@ run_tests() {
   say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
 }
 
+# Two ranks, each with its own tool: what they store in each other's memory is not seen as a race.
+# check_ranks <program> <filter>
+check_ranks() {
+  local program=$1 filter=$2 tool log
+  for tool in memcheck initcheck; do
+    log=$logs/${program}_ranks_$tool.log
+    mpirun --allow-run-as-root --oversubscribe -n 2 compute-sanitizer --tool "$tool" \
+      --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" >"$log" 2>&1 || failed=1
+    grep -qE '^\[==========\] [1-9][0-9]* tests? from .* ran' "$log" || failed=1  # or none ran
+    say "compute-sanitizer $tool, $program on 2 ranks: $(grep SUMMARY "$log" | sed 's/^=* //' | paste -sd ';')"
+  done
+}
+
 # Small cases: each tool slows kernels down a hundredfold. `device_test` faults on purpose.
 # check <program> <filter> [tools]
 check() {
@@ -50,6 +63,7 @@ run_sanitizers() {
   check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
   check setup_test '*Overlapping*'
   check physics_device_test '*'
+  check_ranks share_test 'Bodies/Shares.MayBeLookedAtAtAnyTime/*Apart*Gpu*'
 }
 
 case $part in
