@@ -38,6 +38,11 @@ Surveyor cuda_surveyor(int device) {
   return {};
 }
 
+std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device) {
+  use_cuda_device(device);
+  return nullptr;
+}
+
 bool can_survey_on_cuda(const Scene&) { return false; }
 
 std::unique_ptr<Backend> make_cuda_backend(const Model&, Precision, int device, CudaPath,

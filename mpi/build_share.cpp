@@ -18,6 +18,7 @@
 #include "model/cloud_piece.hpp"
 #include "model/host_memory.hpp"
 #include "model/neighbour_search.hpp"
+#include "model/share_surveyor.hpp"
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo.hpp"
 #include "mpi/spread.hpp"
@@ -56,12 +57,13 @@ std::vector<const Selection*> selections_of(const BodyRequest& request) {
   return all;
 }
 
-/// Own phyxels and those around, with lists: `whole` where `share_of` is concerned. Lists are whole
-/// for own phyxels, and for all that are their neighbours.
+/// Own phyxels and those around: `whole` where `share_of` is concerned. Lists, unless they are left
+/// to a device, are whole for own phyxels, and for all that are their neighbours.
 struct Local {
   SpreadPhyxels phyxels;
   std::vector<int> owner;
   Model model;
+  std::vector<Around> around;  ///< [body]
 };
 
 class Builder {
@@ -186,7 +188,8 @@ class Builder {
     for (const Body& body : bodies_) size += body.size;
     // At any time, with lists: those around and the copy that a share is included.
     ranks_.together([&] {
-      require_host_memory("the scene", static_cast<double>(size), 1700.0 / ranks_.size());
+      require_host_memory("the scene", static_cast<double>(size),
+                          (options_.surveyor ? 700.0 : 1700.0) / ranks_.size());
       std::int64_t places = 0;  // in tiles, of which bodies fill whole ones
       for (const Body& body : bodies_) places += count_of(body.size, options_.tile) * options_.tile;
       if (places > std::numeric_limits<Index>::max()) {
@@ -248,7 +251,11 @@ class Builder {
         }
         const int nearest = scene_.bodies[b].neighbourhood.nearest;
         std::vector<double> spacing(position.size()), farthest(position.size(), 0);
-        if (wants(b)) spacing = mean_spacing(position, nearest, farthest.data());
+        if (wants(b)) {
+          spacing = options_.surveyor
+                        ? options_.surveyor->mean_spacing(position, nearest, farthest.data())
+                        : mean_spacing(position, nearest, farthest.data());
+        }
         const auto enough = std::min<Index>(nearest + 1, bodies_[b].size);
         for (std::size_t i = 0; i < position.size(); ++i) {
           if (all.owner[first + i] != ranks_.rank()) continue;
@@ -316,6 +323,13 @@ class Builder {
           support.push_back(local.phyxels[at].support);
         }
         part.end = m.size();
+        m.parts.push_back(part);
+        if (options_.surveyor) {
+          m.neighbourhood.support.insert(m.neighbourhood.support.end(), support.begin(),
+                                         support.end());
+          if (scene_.bodies[b].neighbourhood.one_sided()) m.neighbourhood.symmetric = false;
+          continue;
+        }
         const std::span<const Vec3d> position = std::span(m.position).subspan(
             static_cast<std::size_t>(part.begin), support.size());
         const Neighbourhood hood =
@@ -323,7 +337,6 @@ class Builder {
         append_lists(m.neighbourhood, hood, part.begin);
         m.neighbourhood.support.insert(m.neighbourhood.support.end(), hood.support.begin(),
                                        hood.support.end());
-        m.parts.push_back(part);
       }
     });
     return local;
@@ -530,10 +543,13 @@ class Builder {
   void finish(Local& local) {
     Model& m = local.model;
     m.gravity = scene_.gravity;
+    find_moments(m);
+    ranks_.together([&] {
+      for (std::size_t b = 0; b < bodies_.size(); ++b) look_around(local, b);
+    });
     find_masses(local);
     describe_parts(local);
     add_boundary(local);
-    find_moments(m);
     gather_degenerate(local);
     add_surfels(local);
     std::size_t surfels = 0;
@@ -541,22 +557,56 @@ class Builder {
     add_warnings(m, surfels);
   }
 
+  static std::vector<double> values_of(const Local& local, const Part& part,
+                                       double SpreadPhyxel::*value) {
+    std::vector<double> values;
+    for (Index i = part.begin; i < part.end; ++i) values.push_back(local.phyxels[i].*value);
+    return values;
+  }
+
+  void look_around(Local& local, std::size_t b) const {
+    Model& m = local.model;
+    const Part& part = m.parts[b];
+    const auto begin = static_cast<std::size_t>(part.begin),
+               size = static_cast<std::size_t>(part.end) - begin;
+    const std::vector<double> spacing = bodies_[b].kernel_volumes
+                                            ? values_of(local, part, &SpreadPhyxel::spacing)
+                                            : std::vector<double>();
+    if (options_.surveyor) {
+      std::vector<char> own;
+      for (std::size_t i = 0; i < size; ++i) own.push_back(owns(local, begin + i));
+      Around& around = local.around.emplace_back(options_.surveyor->around(
+          std::span(std::as_const(m.position)).subspan(begin, size),
+          std::span(std::as_const(m.neighbourhood.support)).subspan(begin, size), spacing, own,
+          scene_.bodies[b].neighbourhood.one_sided()));
+      append(m.degenerate, around.degenerate, part.begin);
+      return;
+    }
+    Around& around = local.around.emplace_back();
+    around.needed.resize(size, 0);
+    around.length.resize(size, 0);
+    const Neighbourhood& hood = m.neighbourhood;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!owns(local, begin + i)) continue;
+      const auto at = static_cast<Index>(begin + i);
+      around.length[i] = hood.neighbours.length(at);
+      visit_edges(hood, at, [&](Index j) { around.needed[j - part.begin] = 1; });
+    }
+    if (bodies_[b].kernel_volumes) {
+      around.kernel_sum = kernel_sums(m.position, hood, spacing, part.begin);
+    }
+  }
+
+  /// Of own phyxels. Others' follow from sums that only their owners have, if they are the kernel's.
   void find_masses(Local& local) const {
     Model& m = local.model;
-    std::vector<std::vector<double>> kernel(bodies_.size());
     std::vector<ExactSum> sums(bodies_.size());
-    const auto values_of = [&](const Part& part, double SpreadPhyxel::*value) {
-      std::vector<double> values;
-      for (Index i = part.begin; i < part.end; ++i) values.push_back(local.phyxels[i].*value);
-      return values;
-    };
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       if (!bodies_[b].kernel_volumes) continue;
       const Part& part = m.parts[b];
-      kernel[b] = kernel_sums(m.position, m.neighbourhood,
-                              values_of(part, &SpreadPhyxel::spacing), part.begin);
       for (Index i = part.begin; i < part.end; ++i) {
-        if (owns(local, static_cast<std::size_t>(i))) sums[b].add(kernel[b][i - part.begin]);
+        if (!owns(local, static_cast<std::size_t>(i))) continue;
+        sums[b].add(local.around[b].kernel_sum[i - part.begin]);
       }
     }
     std::vector<ExactSum*> all;
@@ -567,9 +617,10 @@ class Builder {
       const double density = scene_.bodies[b].material.density;
       const Masses masses =
           bodies_[b].kernel_volumes
-              ? kernel_masses(values_of(part, &SpreadPhyxel::spacing), kernel[b],
-                              sums[b].value() / bodies_[b].size, density)
-              : geometric_masses(values_of(part, &SpreadPhyxel::volume), density);
+              ? kernel_masses(values_of(local, part, &SpreadPhyxel::spacing),
+                              local.around[b].kernel_sum, sums[b].value() / bodies_[b].size,
+                              density)
+              : geometric_masses(values_of(local, part, &SpreadPhyxel::volume), density);
       m.mass.insert(m.mass.end(), masses.mass.begin(), masses.mass.end());
       m.volume.insert(m.volume.end(), masses.volume.begin(), masses.volume.end());
     }
@@ -593,7 +644,7 @@ class Builder {
       for (Index i = part.begin; i < part.end; ++i) {
         if (!owns(local, static_cast<std::size_t>(i))) continue;
         sums[b].add(m.mass[i], m.volume[i], m.position[i]);
-        const Index length = m.neighbourhood.neighbours.length(i);
+        const Index length = local.around[b].length[i - part.begin];
         lists[b].pairs += length;
         lists[b].fewest = std::min(lists[b].fewest, length);
         lists[b].most = std::max(lists[b].most, length);
@@ -791,14 +842,20 @@ class Builder {
     HaloPlan plan;
     plan.part = ranks_.rank();
     std::vector<char> seen(local.phyxels.size(), 0);
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      if (!owns(local, i)) continue;
-      seen[i] = 1;
-      plan.owned.push_back(static_cast<Index>(i));
+    std::vector<Index> ring;
+    for (std::size_t b = 0; b < bodies_.size(); ++b) {
+      const Part& part = local.model.parts[b];
+      for (Index i = part.begin; i < part.end; ++i) {
+        const bool own = owns(local, static_cast<std::size_t>(i));
+        if (own) plan.owned.push_back(i);
+        if (!own && local.around[b].needed[i - part.begin]) ring.push_back(i);
+        seen[i] = own || local.around[b].needed[i - part.begin];
+      }
     }
-    for (int r = 0; r < options_.rings; ++r) {
-      std::vector<Index> ring;
-      for (const Index i : r == 0 ? plan.owned : plan.rings.back()) {
+    plan.rings.push_back(std::move(ring));
+    if (options_.rings == 2) {
+      ring.clear();
+      for (const Index i : plan.rings[0]) {
         visit_edges(local.model.neighbourhood, i, [&](Index j) {
           if (!std::exchange(seen[j], 1)) ring.push_back(j);
         });
@@ -813,11 +870,17 @@ class Builder {
     for (Index& number : share.number) number = number_of(local, number);
     for (Index& surfel : share.surfel_number) surfel = surfel_number_[surfel];
     const auto halo = std::make_shared<Halo>(ranks_, made);
-    if (options_.tile > 0) {
-      halo->begin(Records{reinterpret_cast<std::byte*>(place.data()), sizeof(Index), sizeof(Index)});
+    const auto from_owners = [&](auto& values) {
+      constexpr std::size_t bytes = sizeof(values[0]);
+      halo->begin(Records{reinterpret_cast<std::byte*>(values.data()), bytes, bytes});
       halo->finish();
+    };
+    if (options_.tile > 0) {
+      from_owners(place);
       share.place = std::move(place);
     }
+    from_owners(made.model.mass);
+    from_owners(made.model.volume);
     share.others = halo;
     made.model.share = std::make_shared<Share>(std::move(share));
     return {std::move(made.model), partitioner_, quality_, std::move(surfaces_)};
@@ -842,12 +905,15 @@ class Builder {
     const auto tile_of = [&](Index k) {
       return bodies_[phyxel(k).body].tile + phyxel(k).along / options_.tile;
     };
-    const Csr& lists = local.model.neighbourhood.neighbours;
     for (std::size_t first = 0, last = 0; first < own.size(); first = last) {
       const Index tile = tile_of(own[first]);
       while (last < own.size() && tile_of(own[last]) == tile) ++last;
       order_in_tile(std::span(own).subspan(first, last - first),
-                    [&](Index k) { return lists.length(share.number[k]); });
+                    [&](Index k) {
+                      const Index i = share.number[k];
+                      const Part& part = local.model.parts[phyxel(k).body];
+                      return local.around[phyxel(k).body].length[i - part.begin];
+                    });
       for (std::size_t k = first; k < last; ++k) {
         place[own[k]] = tile * options_.tile + static_cast<Index>(k - first);
       }

@@ -9,6 +9,8 @@
 
 namespace phyxel {
 
+class ShareSurveyor;
+
 struct ShareOptions {
   std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
                                       Partitioner::metis};
@@ -16,6 +18,8 @@ struct ShareOptions {
   /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
   /// tile. 0: none need to.
   int tile = 0;
+  /// Who searches, if no lists shall be made on the host; one ring of ghosts only. Null: the host.
+  const ShareSurveyor* surveyor = nullptr;
   /// What is partitioned are single phyxels, if there are no more than these, or else groups along
   /// the curve.
   Index most_groups = 100'000;

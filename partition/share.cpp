@@ -13,6 +13,7 @@ class Maker {
   Maker(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of)
       : whole_(whole),
         part_of_(part_of),
+        has_lists_(whole.has_lists()),
         kind_(static_cast<std::size_t>(whole.size()), absent),
         here_(kind_.size(), -1) {
     out_.share.whole = whole.size();
@@ -99,10 +100,11 @@ class Maker {
     m.position.push_back(whole_.position[i]);
     m.volume.push_back(whole_.volume[i]);
     m.mass.push_back(whole_.mass[i]);
-    m.inverse_moment.push_back(whole_.inverse_moment[i]);
-    m.moment_offset.push_back(whole_.moment_offset[i]);
     Neighbourhood& hood = m.neighbourhood;
     hood.support.push_back(whole_.neighbourhood.support[i]);
+    if (!has_lists_) return;
+    m.inverse_moment.push_back(whole_.inverse_moment[i]);
+    m.moment_offset.push_back(whole_.moment_offset[i]);
     const bool has_row = kind_[i] != far_ghost;
     add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, has_row);
     if (!hood.symmetric) {
@@ -128,6 +130,7 @@ class Maker {
 
   const Model& whole_;
   const std::vector<int>& part_of_;
+  bool has_lists_;
   std::vector<char> kind_;   // of each phyxel of the whole
   std::vector<Index> here_;  // where it is here; -1: nowhere
   ModelShare out_;
@@ -136,7 +139,7 @@ class Maker {
 }  // namespace
 
 ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of) {
-  return Maker(whole.with_lists(), plan, part_of).make();
+  return Maker(whole, plan, part_of).make();
 }
 
 }  // namespace phyxel

@@ -9,6 +9,7 @@
 #include "mpi/build_share.hpp"
 #include "partition/partition.hpp"
 #include "partition/share.hpp"
+#include "setup/survey.hpp"
 #include "setup/tiling.hpp"
 
 namespace phyxel::app {
@@ -55,10 +56,14 @@ Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOpti
     digest_ = model_digest(here_);
     return;
   }
-  // GPUs keep tiles whole.
-  BuiltShare built =
-      build_share(ranks(), scene,
-                  {candidates_of(cut.partitioner), cut.rings, device.gpu ? cuda::tile_size : 0});
+  ShareOptions options{candidates_of(cut.partitioner), cut.rings};
+  std::unique_ptr<ShareSurveyor> surveyor;
+  if (device.gpu) {
+    options.tile = cuda::tile_size;
+    if (can_survey_on_cuda(scene)) surveyor = cuda_share_surveyor(device.gpu->index);
+    options.surveyor = surveyor.get();
+  }
+  BuiltShare built = build_share(ranks(), scene, options);
   here_ = std::move(built.model);
   surfaces_ = std::move(built.surfaces);
   partitioner_ = partitioner_name(built.partitioner);
@@ -146,10 +151,23 @@ State Ensemble::whole_state(const State& local) const {
   return state;
 }
 
-State Ensemble::share_of(State whole) const {
+State Ensemble::shared_out(State whole) const {
   if (!here_.share) return whole;
-  whole.displacement = values_of(*here_.share, whole.displacement);
-  whole.velocity = values_of(*here_.share, whole.velocity);
+  const auto each = static_cast<std::size_t>(ranks().size());
+  std::vector<std::vector<Index>> wanted(each);
+  wanted[0] = here_.share->number;
+  wanted = ranks().exchanged(wanted);
+  const auto shared_out = [&](std::vector<Vec3d>& values) {
+    std::vector<std::vector<Vec3d>> send(each);
+    if (!values.empty()) {
+      for (std::size_t r = 0; r < each; ++r) {
+        for (const Index i : wanted[r]) send[r].push_back(values[i]);
+      }
+    }
+    values = std::move(ranks().exchanged(send)[0]);
+  };
+  shared_out(whole.displacement);
+  shared_out(whole.velocity);
   return whole;
 }
 

@@ -62,8 +62,8 @@ class Ensemble {
                             whole_ ? whole_->surfels.position.size() : 0);
   }
   State whole_state(const State& local) const;
-  /// This rank's share of a state of the whole, which every rank has.
-  State share_of(State whole) const;
+  /// This rank's share of a state of the whole, whose arrays the first rank has. Collective.
+  State shared_out(State whole) const;
 
  private:
   /// @param chosen which of `local` are sent; empty: all

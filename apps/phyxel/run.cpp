@@ -74,9 +74,7 @@ class Run {
           const Phase phase("time step");
           return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
         })),
-        solver_(*backend_, ranks().agreed([&] {
-          return begin_ ? resumed_state() : initial_state(model(), scene_, plan_.dt);
-        })),
+        solver_(*backend_, first_state()),
         first_step_(solver_.steps()),
         start_diagnostics_(diagnose(model(), *backend_, solver_.steps(), solver_.dt())) {
     // Last, because it replaces what an earlier run has left: all that could be refused, or find no
@@ -271,7 +269,7 @@ class Run {
     return checkpoint;
   }
 
-  /// The first rank's: the others may not see its folder.
+  /// The first rank's, the others may not see its folder; they have no arrays of it.
   std::optional<Checkpoint> checkpoint_for_all() const {
     require_alike(std::hash<std::string>{}(scene_.text), "scenes");
     std::optional<Checkpoint> found;
@@ -289,12 +287,19 @@ class Run {
     share(state.step);
     share(state.time);
     share(state.dt);
-    state.displacement = ranks().broadcast(std::move(state.displacement));
-    state.velocity = ranks().broadcast(std::move(state.velocity));
     return found;
   }
 
-  State resumed_state() const {
+  /// The checkpoint's, or that of rest.
+  State first_state() {
+    if (!begin_) {
+      return ranks().agreed([&] { return initial_state(model(), scene_, plan_.dt); });
+    }
+    ranks().together([&] { check_resumed(); });
+    return ensemble_.shared_out(std::move(begin_->state));
+  }
+
+  void check_resumed() const {
     if (begin_->info.model_digest != ensemble_.digest()) {
       throw InputError(
           fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
@@ -309,7 +314,6 @@ class Run {
                       "leave time.step, time.safety and output.frames_per_second as they were",
                       options_.resume, begin_->state.dt, plan_.dt));
     }
-    return ensemble_.share_of(begin_->state);
   }
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const {

@@ -19,14 +19,25 @@ namespace fs = std::filesystem;
 /// What two ranks on two cores are to reach from 200,000 phyxels on.
 constexpr double asked_of_two = 1.8;
 
-/// The tables `<kind>_ranks_<n>.csv` there are, by their number of ranks.
+/// The tables `<kind>_ranks_<n>*.csv` there are, by their number of ranks: rows of several calls
+/// are those of one.
 std::map<int, CsvTable> tables_in(const fs::path& results, const std::string& kind) {
   std::map<int, CsvTable> tables;
+  std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(results)) {
     const std::string name = entry.path().filename().string();
-    if (!name.starts_with(kind + "_ranks_") || !name.ends_with(".csv")) continue;
-    CsvTable table = read_csv(entry.path());
-    if (!table.rows.empty()) tables[std::stoi(table.text(0, "ranks"))] = std::move(table);
+    if (name.starts_with(kind + "_ranks_") && name.ends_with(".csv")) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    CsvTable table = read_csv(file);
+    if (table.rows.empty()) continue;
+    CsvTable& of_ranks = tables[std::stoi(table.text(0, "ranks"))];
+    if (of_ranks.rows.empty()) {
+      of_ranks = std::move(table);
+    } else {
+      of_ranks.rows.insert(of_ranks.rows.end(), table.rows.begin(), table.rows.end());
+    }
   }
   return tables;
 }

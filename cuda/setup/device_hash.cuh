@@ -88,23 +88,26 @@ struct HashView {
   }
 };
 
-/// Calls visit(j) with every index that each(offer) offers, ascending: the order in which the host
-/// sums, so that both get the same bits.
+/// Calls visit(j) with every index that each(offer) offers, by ascending number: the order in which
+/// the host sums, so that both get the same bits.
+/// @param number of each index in the whole model; null: the index itself
 template <class Each, class Visit>
-__device__ void in_ascending_order(Each&& each, Visit&& visit) {
+__device__ void in_ascending_order(const Index* number, Each&& each, Visit&& visit) {
   constexpr int most = 64;  // at once; where there are more, they are sought again
   Index found[most], after = -1;
+  const auto number_of = [&](Index j) { return number ? number[j] : j; };
   for (;;) {
     int count = 0;
     each([&](Index j) {
-      if (j <= after || (count == most && j > found[most - 1])) return;
+      const Index n = number_of(j);
+      if (n <= after || (count == most && n > number_of(found[most - 1]))) return;
       int k = count < most ? count++ : most - 1;
-      for (; k > 0 && found[k - 1] > j; --k) found[k] = found[k - 1];
+      for (; k > 0 && number_of(found[k - 1]) > n; --k) found[k] = found[k - 1];
       found[k] = j;
     });
     for (int k = 0; k < count; ++k) visit(found[k]);
     if (count < most) return;
-    after = found[most - 1];
+    after = number_of(found[most - 1]);
   }
 }
 

@@ -97,7 +97,11 @@ class Finder {
   }
 
   DeviceTiling find() {
-    place_phyxels();
+    if (model_.share) {
+      place_share();
+    } else {
+      place_phyxels();
+    }
     find_moments();
     out_.neighbours = make_lists(nullptr, most_neighbours_);
     if (!model_.neighbourhood.symmetric) {
@@ -148,16 +152,79 @@ class Finder {
     sort_tiles(begins, order, length);
     out_.phyxel = fetched(out_.phyxel_at);
     out_.place = fetched(place_of_);
+    std::vector<Index> first_place;
+    for (Index tile = 0; tile < out_.tiles(); ++tile) first_place.push_back(tile * tile_size);
+    tile_begin_ = sent(first_place, "tiles");
+  }
+
+  /// Own tiles are those of the whole, in which lists are named by places in the whole.
+  void place_share() {
+    const auto n = static_cast<std::size_t>(model_.size());
+    const Share& share = *model_.share;
+    const DeviceArray<char> owned = sent(share.owned, "places");
+    DeviceArray<Index> length(n, "list lengths");
+    DeviceArray<char> reaches(n, "list lengths");
+    const HashView hash = table_.view();
+    const double* inverse_reach =
+        model_.neighbourhood.symmetric ? nullptr : largest_support_.data();
+    for_each("reach_ghosts", model_.size(),
+             [hash, length = length.data(), reaches = reaches.data(), owned = owned.data(),
+              support = cloud_.support.data(), inverse_reach] __device__(std::int64_t at) {
+               const Index i = hash.index[at];
+               const int body = hash.body_of(i);
+               Index found = 0;
+               char ghosts = 0;
+               if (owned[i]) {
+                 const Vec3d here = hash.entries[at].position;
+                 visit_neighbours(hash, body, i, here, support, nullptr, [&](Index j, Vec3d) {
+                   ++found;
+                   if (!owned[j]) ghosts = 1;
+                 });
+                 if (inverse_reach) {
+                   visit_neighbours(hash, body, i, here, support, inverse_reach,
+                                    [&](Index j, Vec3d) {
+                                      if (!owned[j]) ghosts = 1;
+                                    });
+                 }
+               }
+               length[i] = found;
+               reaches[i] = ghosts;
+             });
+    most_neighbours_ = largest(length);
+    Tiling tiling;
+    phyxel::cuda::place_share(model_, fetched(reaches), tiling);
+    out_.phyxel = std::move(tiling.phyxel);
+    out_.place = std::move(tiling.place);
+    out_.part = std::move(tiling.part);
+    out_.own_tiles = tiling.own_tiles;
+    out_.interior_tiles = tiling.interior_tiles;
+    out_.phyxel_at = sent(out_.phyxel, "places");
+    place_of_ = sent(share.place, "places");
+    number_ = sent(share.number, "places");
+    std::vector<Index> first_place;
+    for (Index tile = 0; tile < out_.own_tiles; ++tile) {
+      Index any = -1;
+      for (int k = 0; k < tile_size && any < 0; ++k) any = out_.phyxel[tile * tile_size + k];
+      first_place.push_back(share.place[any] / tile_size * tile_size);
+    }
+    tile_begin_ = sent(first_place, "tiles");
+    // From places in the whole to places here.
+    whole_place_ = sent(share.place, "places");
+    place_here_ = sent(out_.place, "places");
+    sort_pairs(whole_place_, place_here_);
   }
 
   void find_moments() {
     const auto places = out_.phyxel.size();
     out_.inverse_moment = {places, "inverse moments"};
     out_.moment_offset = {places, "moments"};
+    PHYXEL_CUDA(cudaMemset(out_.inverse_moment.data(), 0, out_.inverse_moment.bytes()));
+    PHYXEL_CUDA(cudaMemset(out_.moment_offset.data(), 0, out_.moment_offset.bytes()));
     const HashView hash = table_.view();
-    for_each("moments", static_cast<std::int64_t>(places),
-             [hash, phyxel_at = out_.phyxel_at.data(), position = cloud_.position.data(),
-              support = cloud_.support.data(), inverse_moment = out_.inverse_moment.data(),
+    for_each("moments", static_cast<std::int64_t>(out_.own_tiles) * tile_size,
+             [hash, number = number_.data(), phyxel_at = out_.phyxel_at.data(),
+              position = cloud_.position.data(), support = cloud_.support.data(),
+              inverse_moment = out_.inverse_moment.data(),
               moment_offset = out_.moment_offset.data()] __device__(std::int64_t place) {
                const Index i = phyxel_at[place];
                Sym3d moment;
@@ -168,7 +235,7 @@ class Finder {
                    visit_neighbours(hash, hash.body_of(i), i, position[i], support, nullptr,
                                     [&](Index j, Vec3d) { offer(j); });
                  };
-                 in_ascending_order(each, [&](Index j) {
+                 in_ascending_order(number, each, [&](Index j) {
                    const Vec3d x = position[j] - position[i];
                    const double w = weight_shape(dot(x, x), inverse_h_squared);
                    moment += moment_term(x, w);
@@ -223,7 +290,10 @@ class Finder {
   DeviceHash table_;
   DeviceArray<double> largest_support_;
   Index most_neighbours_ = 0;
-  DeviceArray<Index> place_of_;
+  // Of each phyxel in the whole model's tiles; where own tiles begin there.
+  DeviceArray<Index> place_of_, tile_begin_;
+  // Of a share: numbers in the whole; places in the whole, ascending, and where those are here.
+  DeviceArray<Index> number_, whole_place_, place_here_;
   DeviceTiling out_;
 };
 
@@ -265,10 +335,11 @@ void Finder::sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Inde
 constexpr int table_size = 2 * most_halo;
 
 /// One block a tile: the places outside that its lists name, ascending.
+/// @param tile_begin first place of each tile of the batch
 /// @param found [tiles * tile_size, longest]
 /// @param halo [tiles, most_halo]
 /// @param points of each tile's halo; more than fit: the number that were seen until then
-__global__ void collect_halo(Index first_tile, const Index* found, const Index* length,
+__global__ void collect_halo(const Index* tile_begin, const Index* found, const Index* length,
                              Index longest, Index* halo, Index* points) {
   __shared__ Index table[table_size];
   __shared__ Index sorted[most_slots];
@@ -277,7 +348,7 @@ __global__ void collect_halo(Index first_tile, const Index* found, const Index* 
   for (int k = thread; k < table_size; k += tile_size) table[k] = -1;
   if (thread == 0) count = 0;
   __syncthreads();
-  const Index begin = (first_tile + static_cast<Index>(blockIdx.x)) * tile_size;
+  const Index begin = tile_begin[blockIdx.x];
   const std::size_t row = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
   for (Index e = 0; e < length[row]; ++e) {
     const Index place = found[row * longest + e];
@@ -329,7 +400,7 @@ struct Batch {
 };
 
 DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_found) {
-  const Index longest = std::max<Index>(longest_found, 1), tiles = out_.tiles();
+  const Index longest = std::max<Index>(longest_found, 1), tiles = out_.own_tiles;
   const std::string what = "neighbour lists of " + std::to_string(model_.size()) + " phyxels";
   const HashView hash = table_.view();
 
@@ -372,42 +443,42 @@ DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_fo
         });
     b.halo = {static_cast<std::size_t>(b.tiles) * most_halo, what};
     b.points = {static_cast<std::size_t>(b.tiles), what};
-    collect_halo<<<b.tiles, tile_size>>>(first, b.found.data(), b.length.data(), longest,
-                                         b.halo.data(), b.points.data());
+    collect_halo<<<b.tiles, tile_size>>>(tile_begin_.data() + first, b.found.data(),
+                                         b.length.data(), longest, b.halo.data(), b.points.data());
     check_launch({"collect_halo", static_cast<unsigned>(b.tiles), tile_size, what});
     const Index stride = largest(b.points);
     if (stride > most_halo) refuse_halo(stride);
 
     b.slots = {places * longest, what};
-    for_each(
-        "name_slots", places_64,
-        [first, longest, found = b.found.data(), length = b.length.data(), halo = b.halo.data(),
-         points = b.points.data(), slots = b.slots.data()] __device__(std::int64_t row) {
-          const Index tile = static_cast<Index>(row / tile_size);
-          const Index begin = (first + tile) * tile_size;
-          const Index* of_tile = halo + static_cast<std::size_t>(tile) * most_halo;
-          std::uint16_t* list = slots + row * longest;
-          for (Index e = 0; e < length[row]; ++e) {
-            const Index place = found[row * longest + e];
-            int slot = place - begin;
-            if (slot < 0 || slot >= tile_size) {
-              int low = 0, high = points[tile];  // the first that is not less
-              while (low < high) {
-                const int middle = (low + high) / 2;
-                if (of_tile[middle] < place) {
-                  low = middle + 1;
-                } else {
-                  high = middle;
-                }
-              }
-              slot = tile_size + far_slots + low;
-            }
-            const auto s = static_cast<std::uint16_t>(slot);
-            Index k = e;
-            for (; k > 0 && earlier_slot(s, list[k - 1]); --k) list[k] = list[k - 1];
-            list[k] = s;
-          }
-        });
+    for_each("name_slots", places_64,
+             [tile_begin = tile_begin_.data() + first, longest, found = b.found.data(),
+              length = b.length.data(), halo = b.halo.data(), points = b.points.data(),
+              slots = b.slots.data()] __device__(std::int64_t row) {
+               const Index tile = static_cast<Index>(row / tile_size);
+               const Index begin = tile_begin[tile];
+               const Index* of_tile = halo + static_cast<std::size_t>(tile) * most_halo;
+               std::uint16_t* list = slots + row * longest;
+               for (Index e = 0; e < length[row]; ++e) {
+                 const Index place = found[row * longest + e];
+                 int slot = place - begin;
+                 if (slot < 0 || slot >= tile_size) {
+                   int low = 0, high = points[tile];  // the first that is not less
+                   while (low < high) {
+                     const int middle = (low + high) / 2;
+                     if (of_tile[middle] < place) {
+                       low = middle + 1;
+                     } else {
+                       high = middle;
+                     }
+                   }
+                   slot = tile_size + far_slots + low;
+                 }
+                 const auto s = static_cast<std::uint16_t>(slot);
+                 Index k = e;
+                 for (; k > 0 && earlier_slot(s, list[k - 1]); --k) list[k] = list[k - 1];
+                 list[k] = s;
+               }
+             });
     const std::size_t teams = places / team;
     DeviceArray<std::uint16_t> spent(b.slots.size(), what);
     for (;; capacity = team * longest) {
@@ -463,10 +534,24 @@ DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_fo
           }
         });
     for_each("pack_halo", static_cast<std::int64_t>(piece.halo.size()),
-             [stride, halo = b.halo.data(), points = b.points.data(),
-              out = piece.halo.data()] __device__(std::int64_t k) {
+             [stride, halo = b.halo.data(), points = b.points.data(), out = piece.halo.data(),
+              whole = whole_place_.data(), here = place_here_.data(),
+              n = static_cast<Index>(whole_place_.size())] __device__(std::int64_t k) {
                const auto tile = k / stride, h = k % stride;
-               out[k] = h < points[tile] ? halo[tile * most_halo + h] : -1;
+               Index place = h < points[tile] ? halo[tile * most_halo + h] : -1;
+               if (whole && place >= 0) {
+                 Index low = 0, high = n - 1;
+                 while (low < high) {
+                   const Index middle = low + (high - low) / 2;
+                   if (whole[middle] < place) {
+                     low = middle + 1;
+                   } else {
+                     high = middle;
+                   }
+                 }
+                 place = here[low];
+               }
+               out[k] = place;
              });
     chunks += piece_chunks;
     lists.halo_stride = std::max(lists.halo_stride, stride);

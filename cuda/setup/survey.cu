@@ -17,11 +17,13 @@ constexpr int most_nearest = 256;
 
 /// `mean_spacing` of the CPU, entry by entry of the hash so that neighbours in space are
 /// neighbours in a warp.
+/// @param farthest of the nearest, of each; null: not wanted
 template <int capacity>
-void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spacing) {
+void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spacing,
+                  double* farthest) {
   const HashView hash = table.view();
   for_each("mean_spacing", hash.points,
-           [hash, nearest, spacing = spacing.data()] __device__(std::int64_t at) {
+           [hash, nearest, farthest, spacing = spacing.data()] __device__(std::int64_t at) {
              const auto self = static_cast<std::uint32_t>(at);
              const Vec3d here = hash.entries[self].position;
              const HashView::Body& body = hash.bodies[0];
@@ -45,10 +47,12 @@ void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spa
              search_nearest(found, body.grid.farthest_ring(here, body.high), body.cell_size,
                             offer_ring, [&] { hash.visit_all(0, offer); });
              spacing[hash.index[self]] = found.mean_distance();
+             if (farthest) farthest[hash.index[self]] = sqrt(found.largest());
            });
 }
 
-DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int nearest) {
+DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int nearest,
+                                    double* farthest = nullptr) {
   const auto n = static_cast<Index>(position.size());
   DeviceArray<double> spacing(position.size(), "mean spacings");
   PHYXEL_CUDA(cudaMemset(spacing.data(), 0, spacing.bytes()));
@@ -60,9 +64,9 @@ DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int near
     const double occupancy = hash.mean_occupancy();
     if (occupancy <= 8 || attempt == 4) {
       if (nearest <= 16) {
-        find_spacing<16>(hash, nearest, spacing);
+        find_spacing<16>(hash, nearest, spacing, farthest);
       } else {
-        find_spacing<most_nearest>(hash, nearest, spacing);
+        find_spacing<most_nearest>(hash, nearest, spacing, farthest);
       }
       return spacing;
     }
@@ -118,6 +122,80 @@ struct AddLengths {
   }
 };
 
+/// What is asked of the neighbourhoods of one body's points.
+struct Question {
+  const Vec3d* position;
+  const double* support;
+  const double* spacing;  ///< Null: no kernel sums are wanted.
+  const char* own;        ///< Whether a point is asked about; null: all are.
+  double inverse_reach;   ///< The largest support, where lists are one-sided; else 0.
+};
+
+/// @param kernel_sum of each point, if wanted
+/// @param needed set for points that own ones have in their lists, or that have own ones in theirs;
+///   null: not wanted
+void look_around(const DeviceHash& table, const Question& q, Finding* findings, double* kernel_sum,
+                 char* needed) {
+  const HashView hash = table.view();
+  for_each("survey", hash.points,
+           [hash, q, findings, kernel_sum, needed] __device__(std::int64_t at) {
+             const auto self = static_cast<std::uint32_t>(at);
+             const Index i = hash.index[self];
+             if (q.own && !q.own[i]) {
+               findings[i] = {0, 3, 0};
+               return;
+             }
+             const Vec3d here = hash.entries[self].position;
+             const double h = q.support[i], inverse_h_squared = 1 / (h * h);
+             const auto cube = [&](Index j) { return q.spacing[j] * q.spacing[j] * q.spacing[j]; };
+             Sym3d moment;
+             Finding f{};
+             hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
+               const Vec3d x = p - here;
+               const double d2 = dot(x, x);
+               if (k == self || !(d2 < h * h)) return;
+               ++f.length;
+               moment += moment_term(x, weight_shape(d2, inverse_h_squared));
+               if (d2 <= 1e-20 * h * h) f.coincident = 1;
+               if (needed) needed[hash.index[k]] = 1;
+             });
+             if (needed && q.inverse_reach > 0) {
+               hash.visit_near(0, here, q.inverse_reach, [&](std::uint32_t k, Vec3d p) {
+                 const Index j = hash.index[k];
+                 const Vec3d x = p - here;
+                 if (k != self && dot(x, x) < q.support[j] * q.support[j]) needed[j] = 1;
+               });
+             }
+             f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
+             findings[i] = f;
+             if (!kernel_sum) return;
+             double sum = h > 0 ? cube(i) * weight(0, h) : 0;
+             const auto each = [&](auto&& offer) {
+               hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
+                 if (k != self && dot(p - here, p - here) < h * h) offer(hash.index[k]);
+               });
+             };
+             in_ascending_order(nullptr, each, [&](Index j) {
+               const Vec3d x = q.position[j] - here;
+               sum += cube(j) * weight(sqrt(dot(x, x)), h);
+             });
+             kernel_sum[i] = sum;
+           });
+}
+
+Degenerate degenerate_of(const std::vector<Finding>& findings) {
+  Degenerate d;
+  for (std::size_t k = 0; k < findings.size(); ++k) {
+    const Finding& f = findings[k];
+    const auto i = static_cast<Index>(k);
+    if (f.coincident) d.coincident.push_back(i);
+    if (f.rank == 0) d.isolated.push_back(i);
+    if (f.rank == 1) d.collinear.push_back(i);
+    if (f.rank == 2) d.coplanar.push_back(i);
+  }
+  return d;
+}
+
 Survey survey_on_device(std::span<const Vec3d> host_position, const NeighbourhoodRule& rule,
                         bool kernel_volumes) {
   Survey survey;
@@ -132,44 +210,9 @@ Survey survey_on_device(std::span<const Vec3d> host_position, const Neighbourhoo
   const DeviceArray<double> support = supports(spacing, n, rule, &middle);
   if (kernel_volumes) kernel_sum = {n, "kernel sums" + of};
   DeviceArray<Finding> findings(n, "survey" + of);
-  {
-    const DeviceHash table(position, {{0, static_cast<Index>(n), middle}});
-    const HashView hash = table.view();
-    for_each(
-        "survey", static_cast<std::int64_t>(n),
-        [hash, findings = findings.data(), support = support.data(), spacing = spacing.data(),
-         kernel_sum = kernel_sum.data(), position = position.data()] __device__(std::int64_t at) {
-          const auto self = static_cast<std::uint32_t>(at);
-          const Index i = hash.index[self];
-          const Vec3d here = hash.entries[self].position;
-          const double h = support[i], inverse_h_squared = 1 / (h * h);
-          const auto cube = [&](Index j) { return spacing[j] * spacing[j] * spacing[j]; };
-          Sym3d moment;
-          Finding f{};
-          hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
-            const Vec3d x = p - here;
-            const double d2 = dot(x, x);
-            if (k == self || !(d2 < h * h)) return;
-            ++f.length;
-            moment += moment_term(x, weight_shape(d2, inverse_h_squared));
-            if (d2 <= 1e-20 * h * h) f.coincident = 1;
-          });
-          f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
-          findings[i] = f;
-          if (!kernel_sum) return;
-          double sum = h > 0 ? cube(i) * weight(0, h) : 0;
-          const auto each = [&](auto&& offer) {
-            hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
-              if (k != self && dot(p - here, p - here) < h * h) offer(hash.index[k]);
-            });
-          };
-          in_ascending_order(each, [&](Index j) {
-            const Vec3d x = position[j] - here;
-            sum += cube(j) * weight(sqrt(dot(x, x)), h);
-          });
-          kernel_sum[i] = sum;
-        });
-  }
+  look_around(DeviceHash(position, {{0, static_cast<Index>(n), middle}}),
+              {position.data(), support.data(), spacing.data(), nullptr, 0}, findings.data(),
+              kernel_sum.data(), nullptr);
   const thrust::transform_iterator lengths(findings.data(), AsLengths{});
   const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),
                              Lengths{0, static_cast<Index>(n), 0, 0}, AddLengths{});
@@ -179,20 +222,81 @@ Survey survey_on_device(std::span<const Vec3d> host_position, const Neighbourhoo
     survey.spacing = fetched(spacing);
     survey.kernel_sum = fetched(kernel_sum);
   }
-  if (all.degenerate > 0) {
-    const std::vector<Finding> each = fetched(findings);
-    for (Index i = 0; i < static_cast<Index>(n); ++i) {
-      Degenerate& d = survey.degenerate;
-      if (each[i].coincident) d.coincident.push_back(i);
-      if (each[i].rank == 0) d.isolated.push_back(i);
-      if (each[i].rank == 1) d.collinear.push_back(i);
-      if (each[i].rank == 2) d.coplanar.push_back(i);
-    }
-  }
+  if (all.degenerate > 0) survey.degenerate = degenerate_of(fetched(findings));
   return survey;
 }
 
+class CudaShareSurveyor final : public ShareSurveyor {
+ public:
+  explicit CudaShareSurveyor(int device) : device_(device) {}
+
+  std::vector<double> mean_spacing(std::span<const Vec3d> host_position, int nearest,
+                                   double* farthest) const override {
+    use_cuda_device(device_);
+    const std::size_t n = host_position.size();
+    if (n < 2) return std::vector<double>(n, 0);
+    DeviceArray<Vec3d> position(n, "rest positions");
+    position.upload(host_position.data());
+    DeviceArray<double> farthest_here;
+    if (farthest) farthest_here = {n, "mean spacings"};
+    const std::vector<double> spacing =
+        fetched(mean_spacing_of(position, nearest, farthest_here.data()));
+    if (farthest) std::ranges::copy(fetched(farthest_here), farthest);
+    return spacing;
+  }
+
+  Around around(std::span<const Vec3d> host_position, std::span<const double> host_support,
+                std::span<const double> host_spacing, std::span<const char> host_own,
+                bool one_sided) const override {
+    use_cuda_device(device_);
+    Around around;
+    const std::size_t n = host_position.size();
+    if (n == 0) return around;
+    const std::string what = "what is around " + std::to_string(n) + " phyxels";
+    const auto sent_span = [&](auto values) {
+      DeviceArray<std::remove_const_t<typename decltype(values)::element_type>> array(values.size(),
+                                                                                      what);
+      if (!values.empty()) array.upload(values.data());
+      return array;
+    };
+    const DeviceArray<Vec3d> position = sent_span(host_position);
+    const DeviceArray<double> support = sent_span(host_support), spacing = sent_span(host_spacing);
+    const DeviceArray<char> own = sent_span(host_own);
+    DeviceArray<double> kernel_sum;
+    if (!host_spacing.empty()) {
+      kernel_sum = {n, what};
+      PHYXEL_CUDA(cudaMemset(kernel_sum.data(), 0, kernel_sum.bytes()));
+    }
+    DeviceArray<Finding> findings(n, what);
+    DeviceArray<char> needed(n, what);
+    PHYXEL_CUDA(cudaMemset(needed.data(), 0, needed.bytes()));
+    double sum = 0, largest = 0;
+    for (const double h : host_support) {
+      sum += h;
+      largest = std::max(largest, h);
+    }
+    look_around(
+        DeviceHash(position, {{0, static_cast<Index>(n), sum / static_cast<double>(n)}}),
+        {position.data(), support.data(), spacing.data(), own.data(), one_sided ? largest : 0},
+        findings.data(), kernel_sum.data(), needed.data());
+    around.needed = fetched(needed);
+    const std::vector<Finding> found = fetched(findings);
+    for (const Finding& f : found) around.length.push_back(f.length);
+    around.degenerate = degenerate_of(found);
+    if (!host_spacing.empty()) around.kernel_sum = fetched(kernel_sum);
+    return around;
+  }
+
+ private:
+  int device_;
+};
+
 }  // namespace
+
+std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device) {
+  use_cuda_device(device);
+  return std::make_unique<CudaShareSurveyor>(device);
+}
 
 Surveyor cuda_surveyor(int device) {
   return [device](std::span<const Vec3d> position, const NeighbourhoodRule& rule,

@@ -1,6 +1,9 @@
 /// Supports, list lengths and degenerate phyxels, found on a GPU.
 #pragma once
 
+#include <memory>
+
+#include "model/share_surveyor.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
@@ -9,7 +12,10 @@ namespace phyxel {
 /// the CPU to the last bit, kernel sums to rounding. The function throws DeviceError.
 Surveyor cuda_surveyor(int device = 0);
 
-/// Whether that surveyor knows the rules of all bodies: not `max_neighbours`, and `nearest` up to
+/// For `build_share`, on ranks whose GPUs find their lists themselves. @throws DeviceError
+std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device);
+
+/// Whether those surveyors know the rules of all bodies: not `max_neighbours`, and `nearest` up to
 /// 256.
 bool can_survey_on_cuda(const Scene& scene);
 

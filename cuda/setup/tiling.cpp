@@ -43,18 +43,22 @@ void place_phyxels(const Model& model, Tiling& tiling) {
   find_places(tiling);
 }
 
-/// Whether a phyxel needs a ghost in either pass.
-bool reaches_ghosts(const Model& model, Index phyxel) {
+/// Whether each phyxel needs a ghost in either pass.
+std::vector<char> who_reaches_ghosts(const Model& model) {
+  std::vector<char> reaches(static_cast<std::size_t>(model.size()), 0);
   const auto is_ghost = [&](Index j) { return !model.owns(j); };
-  const auto near = model.neighbourhood.neighbours.row(phyxel),
-             inverse = model.neighbourhood.inverse().row(phyxel);
-  return std::any_of(near.begin(), near.end(), is_ghost) ||
-         std::any_of(inverse.begin(), inverse.end(), is_ghost);
+  for (Index i = 0; i < model.size(); ++i) {
+    const auto near = model.neighbourhood.neighbours.row(i),
+               inverse = model.neighbourhood.inverse().row(i);
+    reaches[i] = std::any_of(near.begin(), near.end(), is_ghost) ||
+                 std::any_of(inverse.begin(), inverse.end(), is_ghost);
+  }
+  return reaches;
 }
 
-/// The tiles of the whole, as far as they are here, those that reach ghosts last; then ghosts, body
-/// by body.
-void place_share(const Model& model, Tiling& tiling) {
+}  // namespace
+
+void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Tiling& tiling) {
   const std::vector<Index>& whole = model.share->place;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
   const auto sorted = [&](Index begin, Index end) {
@@ -79,7 +83,7 @@ void place_share(const Model& model, Tiling& tiling) {
     for (const Index i : sorted(model.parts[p].begin, model.parts[p].owned_end())) {
       if (std::exchange(tile, whole[i] / tile_size) != whole[i] / tile_size) own.push_back({p, {}});
       own.back().phyxels.push_back(i);
-      if (reaches_ghosts(model, i)) own.back().reaches_ghosts = true;
+      if (reaches_ghosts[i]) own.back().reaches_ghosts = true;
     }
   }
   for (const bool boundary : {false, true}) {
@@ -103,6 +107,8 @@ void place_share(const Model& model, Tiling& tiling) {
   }
   find_places(tiling);
 }
+
+namespace {
 
 /// What tells the order of halos: of each place, that in the whole model.
 std::vector<Index> orders_of(const Model& model, const Tiling& tiling) {
@@ -246,7 +252,11 @@ void refuse_halo(int points) {
 
 Tiling make_tiling(const Model& model) {
   Tiling tiling;
-  model.share ? place_share(model, tiling) : place_phyxels(model, tiling);
+  if (model.share) {
+    place_share(model, who_reaches_ghosts(model), tiling);
+  } else {
+    place_phyxels(model, tiling);
+  }
   const std::vector<Index> order = orders_of(model, tiling);
   tiling.neighbours = make_lists(model.neighbourhood.neighbours, tiling, order);
   if (!model.neighbourhood.symmetric) {

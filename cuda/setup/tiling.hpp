@@ -88,4 +88,9 @@ struct Tiling {
 /// @throws InputError if a tile reaches more points than 16-bit slots can name.
 Tiling make_tiling(const Model& model);
 
+/// Places of a share: the tiles of the whole, as far as they are here, those that reach ghosts
+/// last; then ghosts, body by body. Sets all of a tiling but its lists.
+/// @param reaches_ghosts whether each phyxel needs a ghost in either pass, shape [n]
+void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Tiling& tiling);
+
 }  // namespace phyxel::cuda

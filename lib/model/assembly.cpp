@@ -124,6 +124,16 @@ void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift) {
   if (!all.symmetric) append_rows(all.inverse_lists, hood.inverse(), shift);
 }
 
+void append(Degenerate& to, const Degenerate& found, Index shift) {
+  const auto append_shifted = [&](std::vector<Index>& all, const std::vector<Index>& some) {
+    for (const Index i : some) all.push_back(i + shift);
+  };
+  append_shifted(to.isolated, found.isolated);
+  append_shifted(to.collinear, found.collinear);
+  append_shifted(to.coplanar, found.coplanar);
+  append_shifted(to.coincident, found.coincident);
+}
+
 void find_moments(Model& model) {
   if (!model.has_lists()) return;
   const Index n = model.size();

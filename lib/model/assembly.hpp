@@ -47,6 +47,9 @@ void append_rows(Csr& to, const Csr& rows, Index shift);
 /// A body's lists. Inverse ones are stored for all bodies as soon as one needs them.
 void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift);
 
+/// @param shift what the indices found are counted from
+void append(Degenerate& to, const Degenerate& found, Index shift);
+
 /// Moments A_i, their pseudo-inverses and the offsets b_i; notes what is degenerate. Nothing where
 /// the lists are left to a device.
 void find_moments(Model& model);

@@ -21,11 +21,6 @@ void append(std::vector<T>& to, const std::vector<T>& values) {
   to.insert(to.end(), values.begin(), values.end());
 }
 
-std::vector<Index> shifted(std::vector<Index> indices, Index shift) {
-  for (Index& i : indices) i += shift;
-  return indices;
-}
-
 /// What a survey tells, found here along with the lists.
 Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool kernel_volumes,
                          Neighbourhood& hood) {
@@ -44,13 +39,6 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
     survey.lists.most = std::max(survey.lists.most, hood.neighbours.length(i));
   }
   return survey;
-}
-
-void append(Degenerate& to, const Degenerate& found, Index shift) {
-  append(to.isolated, shifted(found.isolated, shift));
-  append(to.collinear, shifted(found.collinear, shift));
-  append(to.coplanar, shifted(found.coplanar, shift));
-  append(to.coincident, shifted(found.coincident, shift));
 }
 
 /// @param surveyor null: lists and moments are made here.

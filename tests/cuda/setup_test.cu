@@ -2,7 +2,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 
+#include "model/assembly.hpp"
+#include "model/neighbour_search.hpp"
+#include "partition/partition.hpp"
+#include "partition/share.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
 #include "setup/device_tiling.hpp"
@@ -136,6 +141,77 @@ TEST_P(Setup, MomentsEqualTheCpusToTheLastBit) {
                  wanted[] = {b[k].xx, b[k].xy, b[k].xz, b[k].yy, b[k].yz,
                              b[k].zz, d[k].x,  d[k].y,  d[k].z};
     for (int e = 0; e < 9; ++e) ASSERT_EQ(found_here[e], wanted[e]) << k;
+  }
+}
+
+/// One of three shares, with the lists of the whole, and without.
+ModelShare a_share(const Model& whole) {
+  const Graph graph = phyxel_graph(whole);
+  const Groups tiles = curve_groups(whole, cuda::tile_size);
+  const std::vector<int> part_of =
+      ungrouped(make_partition(grouped_graph(graph, tiles), 3, Partitioner::bisection), tiles);
+  ModelShare made = share_of(whole, make_halo_plans(graph, part_of, 3, 1)[1], part_of);
+  made.share.place = values_of(made.share, cuda::make_tiling(whole).place);
+  made.model.share = std::make_shared<Share>(made.share);
+  return made;
+}
+
+TEST_P(Setup, TilesOfSharesEqualTheCpusToTheLastEntry) {
+  const ModelShare share = a_share(host_);
+  Model without = share.model;
+  without.neighbourhood.neighbours = without.neighbourhood.inverse_lists = {};
+  without.inverse_moment.clear();
+  without.moment_offset.clear();
+  const cuda::DeviceTiling found = cuda::make_device_tiling(without),
+                           expected = cuda::make_device_tiling(share.model);
+  EXPECT_EQ(found.phyxel, expected.phyxel);
+  EXPECT_EQ(found.place, expected.place);
+  EXPECT_EQ(found.part, expected.part);
+  EXPECT_EQ(found.own_tiles, expected.own_tiles);
+  EXPECT_EQ(found.interior_tiles, expected.interior_tiles);
+  expect_same(found.neighbours, expected.neighbours);
+  ASSERT_EQ(found.inverse.has_value(), expected.inverse.has_value());
+  if (found.inverse) expect_same(*found.inverse, *expected.inverse);
+  const auto a = cuda::fetched(found.inverse_moment), b = cuda::fetched(expected.inverse_moment);
+  const auto c = cuda::fetched(found.moment_offset), d = cuda::fetched(expected.moment_offset);
+  for (Index place = 0; place < found.own_tiles * cuda::tile_size; ++place) {
+    ASSERT_EQ(std::memcmp(&a[place], &b[place], sizeof a[place]), 0) << place;
+    ASSERT_TRUE(c[place] == d[place]) << place;
+  }
+}
+
+TEST_P(Setup, WhatIsAroundEqualsTheCpus) {
+  const auto surveyor = cuda_share_surveyor(0);
+  for (const Part& part : host_.parts) {
+    const auto begin = static_cast<std::size_t>(part.begin),
+               size = static_cast<std::size_t>(part.end - part.begin);
+    const auto position = std::span(host_.position).subspan(begin, size);
+    const std::vector<double> support(host_.neighbourhood.support.begin() + part.begin,
+                                      host_.neighbourhood.support.begin() + part.end);
+    std::vector<double> farthest(size), expected_farthest(size);
+    const std::vector<double> spacing = surveyor->mean_spacing(position, 10, farthest.data());
+    EXPECT_EQ(spacing, mean_spacing(position, 10, expected_farthest.data()));
+    EXPECT_EQ(farthest, expected_farthest);
+
+    std::vector<char> own(size);
+    for (std::size_t i = 0; i < size; ++i) own[i] = i % 5 < 2;
+    const bool one_sided = !host_.neighbourhood.symmetric;
+    NeighbourhoodRule rule;
+    if (one_sided) rule.support = NeighbourhoodRule::Support::adaptive;
+    const Neighbourhood hood = neighbours_within(position, support, rule);
+    const std::vector<double> sums = kernel_sums(position, hood, spacing);
+    std::vector<char> needed(size, 0);
+    const Around around = surveyor->around(position, support, spacing, own, one_sided);
+    ASSERT_EQ(around.length.size(), size);
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!own[i]) continue;
+      const auto at = static_cast<Index>(i);
+      EXPECT_EQ(around.length[i], hood.neighbours.length(at));
+      EXPECT_EQ(around.kernel_sum[i], sums[i]);
+      for (const Index j : hood.neighbours.row(at)) needed[j] = 1;
+      for (const Index j : hood.inverse().row(at)) needed[j] = 1;
+    }
+    EXPECT_EQ(around.needed, needed);
   }
 }
 
