@@ -7,7 +7,6 @@
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -48,14 +47,6 @@ struct Body {
   std::size_t used_regions = 0;
   double reach = 0;  ///< The largest support [m].
 };
-
-std::vector<const Selection*> selections_of(const BodyRequest& request) {
-  std::vector<const Selection*> all;
-  for (const FixRequest& fix : request.fixed) all.push_back(&fix.select);
-  for (const MotionRequest& motion : request.motions) all.push_back(&motion.select);
-  for (const LoadRequest& load : request.loads) all.push_back(&load.select);
-  return all;
-}
 
 /// Own phyxels and those around: `whole` where `share_of` is concerned. Lists, unless they are left
 /// to a device, are whole for own phyxels, and for all that are their neighbours.
@@ -230,18 +221,22 @@ class Builder {
       return !scene_.bodies[b].neighbourhood.radius || bodies_[b].kernel_volumes;
     };
     std::vector<double> reach(n, 0);
+    bool any = false;
     for (std::size_t b = 0; b < n; ++b) {
       if (!wants(b) || bodies_[b].size < 2) continue;
+      any = true;
       // Of evenly spread phyxels that would be half as far again as is needed.
       reach[b] = roomy_cell_size(boxes_[b].low, boxes_[b].high,
                                  static_cast<std::size_t>(bodies_[b].size)) *
                  1.6 * std::cbrt(scene_.bodies[b].neighbourhood.nearest / 10.0);
     }
+    if (!any) return;
+    // `own` is in the order of bodies, but not of numbers.
+    const std::vector<Index> own_at = order_by_number(own);
     for (;;) {
       const Surrounded all = surrounded(ranks_, own, reach, boxes_);
       std::vector<double> needed(n, 0);
-      std::size_t at = 0;  // in own, which is in the order of bodies, but not of numbers
-      const std::vector<Index> own_at = order_by_number(own);
+      std::size_t at = 0;
       for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
         const auto b = static_cast<std::size_t>(all.phyxels[first].body);
         std::vector<Vec3d> position;
@@ -572,9 +567,9 @@ class Builder {
     const std::vector<double> spacing = bodies_[b].kernel_volumes
                                             ? values_of(local, part, &SpreadPhyxel::spacing)
                                             : std::vector<double>();
+    std::vector<char> own;
+    for (std::size_t i = 0; i < size; ++i) own.push_back(owns(local, begin + i));
     if (options_.surveyor) {
-      std::vector<char> own;
-      for (std::size_t i = 0; i < size; ++i) own.push_back(owns(local, begin + i));
       Around& around = local.around.emplace_back(options_.surveyor->around(
           std::span(std::as_const(m.position)).subspan(begin, size),
           std::span(std::as_const(m.neighbourhood.support)).subspan(begin, size), spacing, own,
@@ -582,16 +577,8 @@ class Builder {
       append(m.degenerate, around.degenerate, part.begin);
       return;
     }
-    Around& around = local.around.emplace_back();
-    around.needed.resize(size, 0);
-    around.length.resize(size, 0);
     const Neighbourhood& hood = m.neighbourhood;
-    for (std::size_t i = 0; i < size; ++i) {
-      if (!owns(local, begin + i)) continue;
-      const auto at = static_cast<Index>(begin + i);
-      around.length[i] = hood.neighbours.length(at);
-      visit_edges(hood, at, [&](Index j) { around.needed[j - part.begin] = 1; });
-    }
+    Around& around = local.around.emplace_back(around_by_lists(hood, part.begin, own));
     if (bodies_[b].kernel_volumes) {
       around.kernel_sum = kernel_sums(m.position, hood, spacing, part.begin);
     }

@@ -49,6 +49,13 @@ struct Keyed {
   Index here = 0;
 };
 
+/// Which is the first that is not before a key.
+std::ptrdiff_t first_from(const std::vector<Keyed>& sorted, const Key& key) {
+  return std::lower_bound(sorted.begin(), sorted.end(), key,
+                          [](const Keyed& a, const Key& b) { return a.key < b; }) -
+         sorted.begin();
+}
+
 /// The start of the stretch of each rank but the first: nothing before it belongs there.
 std::vector<Key> find_splitters(const Communicator& ranks, const std::vector<Keyed>& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
@@ -59,11 +66,7 @@ std::vector<Key> find_splitters(const Communicator& ranks, const std::vector<Key
     std::vector<Key> trials;
     for (const Key& splitter : splitters) {
       const Key trial = trials.emplace_back(with_bit(splitter));
-      const auto at = [&](const Key& key) {
-        return std::lower_bound(sorted.begin(), sorted.end(), key,
-                                [](const Keyed& a, const Key& b) { return a.key < b; });
-      };
-      before.push_back(at(trial) - at({trial.body, 0, 0}));
+      before.push_back(first_from(sorted, trial) - first_from(sorted, {trial.body, 0, 0}));
     }
     ranks.add(before);
     for (std::size_t s = 0; s < splitters.size(); ++s) {
@@ -176,10 +179,7 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     for (int r = 0; r < parts; ++r) {
       std::size_t last = sorted.size();
       if (r + 1 < parts) {
-        last = static_cast<std::size_t>(
-            std::lower_bound(sorted.begin(), sorted.end(), splitters[static_cast<std::size_t>(r)],
-                             [](const Keyed& a, const Key& b) { return a.key < b; }) -
-            sorted.begin());
+        last = static_cast<std::size_t>(first_from(sorted, splitters[static_cast<std::size_t>(r)]));
       }
       send.push_back(ordered(own, first, last, [&](std::size_t k) { return sorted[k].here; }));
       first = last;

@@ -65,13 +65,6 @@ struct Measured {
   std::string transport;
 };
 
-/// What exchanges have cost the rank that had most.
-Traffic most_traffic(const Backend& backend) {
-  const auto here = backend.exchanges();
-  if (!here) return {};
-  return {ranks().largest(here->traffic.bytes_sent), ranks().largest(here->traffic.seconds)};
-}
-
 Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precision,
                  const ChosenDevice& device, const Options& options) {
   const Model& model = ensemble.here();

@@ -35,6 +35,12 @@ void set_ranks(const Communicator& ranks) {
   omp_set_num_threads(std::clamp(omp_get_num_procs(), 1, std::max(1, cores / ranks.host_size())));
 }
 
+Traffic most_traffic(const Backend& backend) {
+  const auto here = backend.exchanges();
+  if (!here) return {};
+  return {ranks().largest(here->traffic.bytes_sent), ranks().largest(here->traffic.seconds)};
+}
+
 std::vector<std::string> partitioner_choices() {
   std::vector<std::string> names = partitioner_names();
   names.push_back("auto");
@@ -88,14 +94,10 @@ void Ensemble::bring_together() {
 
   // The others take part, and keep nothing.
   Model model;
-  const auto phyxels_of_whole = [&](const auto& local) {
-    return brought_together(local, owned_, numbers_,
-                            leads ? static_cast<std::size_t>(here_.whole_size()) : 0);
-  };
-  model.position = phyxels_of_whole(here_.position);
-  model.mass = phyxels_of_whole(here_.mass);
-  model.volume = phyxels_of_whole(here_.volume);
-  model.neighbourhood.support = phyxels_of_whole(here_.neighbourhood.support);
+  model.position = phyxels(here_.position);
+  model.mass = phyxels(here_.mass);
+  model.volume = phyxels(here_.volume);
+  model.neighbourhood.support = phyxels(here_.neighbourhood.support);
   model.neighbourhood.symmetric = here_.neighbourhood.symmetric;
   model.gravity = here_.gravity;
   model.degenerate = here_.degenerate;

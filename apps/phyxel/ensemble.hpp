@@ -20,6 +20,9 @@ void set_ranks(const Communicator& ranks);
 /// @throws AgreedError if it is not the same number on all ranks. Collective.
 void require_alike(std::uint64_t value, const char* what);
 
+/// What exchanges have cost the rank that had most. Collective.
+Traffic most_traffic(const Backend& backend);
+
 /// Names of partitioners, and "auto".
 std::vector<std::string> partitioner_choices();
 
@@ -54,12 +57,11 @@ class Ensemble {
   /// Values of all phyxels, or of all surfels, on the first rank, likewise; nothing on the others.
   template <class T>
   std::vector<T> phyxels(const std::vector<T>& local) const {
-    return brought_together(local, owned_, numbers_, whole_ ? whole_->position.size() : 0);
+    return brought_together(local, owned_, numbers_);
   }
   template <class T>
   std::vector<T> surfels(const std::vector<T>& local) const {
-    return brought_together(local, {}, surfel_numbers_,
-                            whole_ ? whole_->surfels.position.size() : 0);
+    return brought_together(local, {}, surfel_numbers_);
   }
   State whole_state(const State& local) const;
   /// This rank's share of a state of the whole, whose arrays the first rank has. Collective.
@@ -69,13 +71,14 @@ class Ensemble {
   /// @param chosen which of `local` are sent; empty: all
   template <class T>
   std::vector<T> brought_together(const std::vector<T>& local, const std::vector<Index>& chosen,
-                                  const std::vector<std::vector<Index>>& numbers,
-                                  std::size_t size) const {
+                                  const std::vector<std::vector<Index>>& numbers) const {
     if (!here_.share) return local;
     std::vector<std::vector<T>> send(static_cast<std::size_t>(ranks().size()));
     for (const Index i : chosen) send[0].push_back(local[i]);
     if (chosen.empty()) send[0] = local;
     const std::vector<std::vector<T>> received = ranks().exchanged(send);
+    std::size_t size = 0;
+    for (const std::vector<Index>& of_rank : numbers) size += of_rank.size();
     std::vector<T> all(size);
     for (std::size_t r = 0; r < numbers.size(); ++r) {
       for (std::size_t k = 0; k < numbers[r].size(); ++k) all[numbers[r][k]] = received[r][k];

@@ -185,11 +185,7 @@ class Run {
     for (const ArrayBytes& array : backend_->memory())
       bytes += static_cast<std::int64_t>(array.bytes);
     bytes = ranks().sum(bytes);
-    Traffic traffic;  // of the rank that had most
-    if (const auto exchanges = backend_->exchanges()) {
-      traffic = {ranks().largest(exchanges->traffic.bytes_sent),
-                 ranks().largest(exchanges->traffic.seconds)};
-    }
+    const Traffic traffic = most_traffic(*backend_);
     if (leads()) say_summary(now, bytes, traffic);
   }
 

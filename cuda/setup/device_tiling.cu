@@ -218,8 +218,8 @@ class Finder {
     const auto places = out_.phyxel.size();
     out_.inverse_moment = {places, "inverse moments"};
     out_.moment_offset = {places, "moments"};
-    PHYXEL_CUDA(cudaMemset(out_.inverse_moment.data(), 0, out_.inverse_moment.bytes()));
-    PHYXEL_CUDA(cudaMemset(out_.moment_offset.data(), 0, out_.moment_offset.bytes()));
+    out_.inverse_moment.clear();
+    out_.moment_offset.clear();
     const HashView hash = table_.view();
     for_each("moments", static_cast<std::int64_t>(out_.own_tiles) * tile_size,
              [hash, number = number_.data(), phyxel_at = out_.phyxel_at.data(),

@@ -55,7 +55,7 @@ DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int near
                                     double* farthest = nullptr) {
   const auto n = static_cast<Index>(position.size());
   DeviceArray<double> spacing(position.size(), "mean spacings");
-  PHYXEL_CUDA(cudaMemset(spacing.data(), 0, spacing.bytes()));
+  spacing.clear();
   if (n < 2) return spacing;
   const Box box = box_around(position, 0, n);
   double cell = roomy_cell_size(box.low, box.high, position.size());
@@ -265,11 +265,11 @@ class CudaShareSurveyor final : public ShareSurveyor {
     DeviceArray<double> kernel_sum;
     if (!host_spacing.empty()) {
       kernel_sum = {n, what};
-      PHYXEL_CUDA(cudaMemset(kernel_sum.data(), 0, kernel_sum.bytes()));
+      kernel_sum.clear();
     }
     DeviceArray<Finding> findings(n, what);
     DeviceArray<char> needed(n, what);
-    PHYXEL_CUDA(cudaMemset(needed.data(), 0, needed.bytes()));
+    needed.clear();
     double sum = 0, largest = 0;
     for (const double h : host_support) {
       sum += h;

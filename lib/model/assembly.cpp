@@ -187,27 +187,31 @@ void BodySums::tell(Part& part) const {
   if (part.mass > 0) part.centre = moment.value() / part.mass;
 }
 
+std::vector<const Selection*> selections_of(const BodyRequest& request) {
+  std::vector<const Selection*> all;
+  for (const FixRequest& fix : request.fixed) all.push_back(&fix.select);
+  for (const MotionRequest& motion : request.motions) all.push_back(&motion.select);
+  for (const LoadRequest& load : request.loads) all.push_back(&load.select);
+  return all;
+}
+
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
   BoundaryChoice choice;
   std::vector<char> moved(cloud.position.size(), 0);
   const SomePhyxels here{cloud, number, size};
-  const auto claim = [&](const Selection& selection) {
+  choice.first_load = request.fixed.size() + request.motions.size();
+  for (const Selection* selection : selections_of(request)) {
+    const bool moves = choice.chosen.size() < choice.first_load;
     const std::vector<Index>& chosen =
-        choice.chosen.emplace_back(select(selection, here, request.name));
+        choice.chosen.emplace_back(select(*selection, here, request.name));
     for (const Index i : chosen) {
-      if (moved[i]++) {
+      if (moves && moved[i]++) {
         throw InputError(fmt::format(
             "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry",
-            selection.where, here.number_of(i), request.name));
+            selection->where, here.number_of(i), request.name));
       }
     }
-  };
-  for (const FixRequest& fix : request.fixed) claim(fix.select);
-  for (const MotionRequest& motion : request.motions) claim(motion.select);
-  choice.first_load = choice.chosen.size();
-  for (const LoadRequest& load : request.loads) {
-    choice.chosen.push_back(select(load.select, here, request.name));
   }
   return choice;
 }
@@ -231,10 +235,7 @@ std::vector<ExactSum> BoundaryChoice::loaded_masses(const Model& model, Index sh
 
 void BoundaryChoice::refuse_empty(const BodyRequest& request,
                                   const std::vector<std::int64_t>& counts, const Box& box) const {
-  std::vector<const Selection*> selections;
-  for (const FixRequest& fix : request.fixed) selections.push_back(&fix.select);
-  for (const MotionRequest& motion : request.motions) selections.push_back(&motion.select);
-  for (const LoadRequest& load : request.loads) selections.push_back(&load.select);
+  const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < selections.size(); ++entry) {
     if (counts[entry] == 0) refuse_selection(*selections[entry], request.name, box);
   }

@@ -72,8 +72,11 @@ struct BodySums {
   void tell(Part& part) const;
 };
 
-/// Which phyxels of a cloud the boundary of its body concerns: entries are what is fixed, then
-/// motions, then loads, as the scene has them.
+/// What a body's boundary selects, entry by entry: what is fixed, then motions, then loads, as the
+/// scene has them.
+std::vector<const Selection*> selections_of(const BodyRequest& request);
+
+/// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
   std::size_t first_load = 0;

@@ -17,6 +17,10 @@ struct Around {
   Degenerate degenerate;           ///< Own ones.
 };
 
+/// What lists tell: who is needed, and the lengths.
+/// @param begin the first point of the body in the neighbourhood. @param own of the body's points
+Around around_by_lists(const Neighbourhood& hood, Index begin, std::span<const char> own);
+
 class ShareSurveyor {
  public:
   virtual ~ShareSurveyor() = default;

@@ -145,16 +145,7 @@ class HostSurveyor final : public ShareSurveyor {
     m.position = {position.begin(), position.end()};
     m.neighbourhood = neighbours_within(position, {support.begin(), support.end()}, rule);
     find_moments(m);
-    Around around;
-    around.needed.resize(own.size(), 0);
-    around.length.resize(own.size(), 0);
-    for (std::size_t i = 0; i < own.size(); ++i) {
-      if (!own[i]) continue;
-      const auto at = static_cast<Index>(i);
-      around.length[i] = m.neighbourhood.neighbours.length(at);
-      for (const Index j : m.neighbourhood.neighbours.row(at)) around.needed[j] = 1;
-      for (const Index j : m.neighbourhood.inverse().row(at)) around.needed[j] = 1;
-    }
+    Around around = around_by_lists(m.neighbourhood, 0, own);
     if (!spacing.empty()) {
       around.kernel_sum = kernel_sums(position, m.neighbourhood, {spacing.begin(), spacing.end()});
     }

@@ -75,6 +75,14 @@ inline Model built_in_bodies(
   return build_model(scene);
 }
 
+/// As where lists and moments are left to a device.
+inline Model without_lists(Model model) {
+  model.neighbourhood.neighbours = model.neighbourhood.inverse_lists = {};
+  model.inverse_moment.clear();
+  model.moment_offset.clear();
+  return model;
+}
+
 inline State state_of(const std::vector<Vec3d>& displacement, double dt = 1e-3) {
   State state;
   state.displacement = displacement;
