@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <set>
 #include <span>
 
@@ -30,7 +32,8 @@ struct Options {
   std::string csv;
   bool force = false;
   std::string device = "cpu", transport = "auto";
-  bool weak = false;  ///< Sizes are of one rank.
+  bool weak = false;         ///< Sizes are of one rank.
+  bool without_one = false;  ///< One rank alone is not measured.
 };
 
 /// A jittered cube of about so many phyxels, under gravity.
@@ -59,45 +62,155 @@ std::size_t gpus_of_ranks(const ChosenDevice& device) {
   return gpus.size();
 }
 
+/// A body that steps in turns with others.
+class Stepped {
+ public:
+  Stepped(const Model& model, const Scene& scene, Precision precision, const ChosenDevice& device,
+          const Options& options)
+      : backend_(make_backend(model, precision, device, 1, options.transport)),
+        solver_(*backend_, initial_state(model, scene, step_of(scene))) {}
+
+  /// @returns seconds
+  double take(std::int64_t steps) {
+    const auto start = Clock::now();
+    for (std::int64_t s = 0; s < steps; ++s) solver_.step();
+    backend_->wait();
+    return seconds_since(start);
+  }
+  const Backend& backend() const { return *backend_; }
+
+ private:
+  /// A tenth of the sound step: any speed, no risk.
+  static double step_of(const Scene& scene) {
+    const BodyRequest& body = scene.bodies[0];
+    return 0.1 * body.source.shape.spacing / pressure_wave_speed(body.material);
+  }
+
+  std::unique_ptr<Backend> backend_;
+  Solver solver_;
+};
+
 struct Measured {
   Median steps_per_s;
+  std::optional<Median> alone_per_s;          // steps of one rank's body, by the first rank
   double bytes_per_step = 0, exchanging = 0;  // of the rank that has most; share of the time
   std::string transport;
 };
 
-Measured measure(const Ensemble& ensemble, const Scene& scene, Precision precision,
-                 const ChosenDevice& device, const Options& options) {
-  const Model& model = ensemble.here();
-  const auto backend = make_backend(model, precision, device, 1, options.transport);
-  // A tenth of the sound step: any speed, no risk.
-  const BodyRequest& body = scene.bodies[0];
-  const double dt = 0.1 * body.source.shape.spacing / pressure_wave_speed(body.material);
-  Solver solver(*backend, initial_state(model, scene, dt));
-  // Ranks agree on numbers of steps, so that all take as many.
-  const auto timed = [&](std::int64_t steps) {
-    ranks().barrier();
-    const auto start = Clock::now();
-    for (std::int64_t s = 0; s < steps; ++s) solver.step();
-    backend->wait();
-    return ranks().largest(seconds_since(start));
-  };
-  timed(device.gpu ? 64 : 2);  // two graphs of steps, and the step before them
-  const double one = device.gpu ? timed(64) / 64 : timed(5) / 5;
-  const auto steps = std::max<std::int64_t>(2, std::llround(options.seconds / one));
-  const Traffic before = most_traffic(*backend);
-  std::vector<double> rates;
-  double total = 0;
-  for (int repeat = 0; repeat < options.repeats; ++repeat) {
-    const double seconds = timed(steps);
-    total += seconds;
-    rates.push_back(static_cast<double>(steps) / seconds);
+/// What takes steps, and how many make a repeat.
+class Repeats {
+ public:
+  /// @param take takes so many steps and gives the seconds; all ranks get the same
+  Repeats(std::function<double(std::int64_t)> take, const ChosenDevice& device,
+          const Options& options)
+      : take_(std::move(take)) {
+    take_(device.gpu ? 64 : 2);  // two graphs of steps, and the step before them
+    const double one = device.gpu ? take_(64) / 64 : take_(5) / 5;
+    steps_ = std::max<std::int64_t>(2, std::llround(options.seconds / one));
   }
-  const Traffic after = most_traffic(*backend);
-  return {median_of(rates),
-          static_cast<double>(after.bytes_sent - before.bytes_sent) /
-              static_cast<double>(steps * options.repeats),
-          (after.seconds - before.seconds) / total,
-          backend->exchanges() ? backend->exchanges()->transport : "none"};
+  void repeat() {
+    const double seconds = take_(steps_);
+    seconds_ += seconds;
+    rates_.push_back(static_cast<double>(steps_) / seconds);
+  }
+  Median per_second() const { return median_of(rates_); }
+  double seconds() const { return seconds_; }
+  double steps() const { return static_cast<double>(steps_) * static_cast<double>(rates_.size()); }
+
+ private:
+  std::function<double(std::int64_t)> take_;
+  std::int64_t steps_ = 0;
+  double seconds_ = 0;
+  std::vector<double> rates_;
+};
+
+/// All ranks and, in turn with them, the first one alone: the machine may be slower a minute later.
+/// @param one what the first rank steps alone; null on the others, and if nobody does
+Measured measure(const Ensemble& ensemble, const Scene& scene, const Model* one,
+                 const Scene& scene_of_one, Precision precision, const ChosenDevice& device,
+                 const Options& options) {
+  Stepped shared(ensemble.here(), scene, precision, device, options);
+  std::optional<Stepped> alone;
+  ranks().together([&] {
+    if (one) alone.emplace(*one, scene_of_one, precision, device, options);
+  });
+  Repeats together(
+      [&](std::int64_t steps) {
+        ranks().barrier();
+        return ranks().largest(shared.take(steps));
+      },
+      device, options);
+  std::optional<Repeats> by_one;
+  if (one) by_one.emplace([&](std::int64_t steps) { return alone->take(steps); }, device, options);
+  const Traffic before = most_traffic(shared.backend());
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    together.repeat();
+    if (by_one) by_one->repeat();
+  }
+  const Traffic after = most_traffic(shared.backend());
+  Measured m{together.per_second(), std::nullopt,
+             static_cast<double>(after.bytes_sent - before.bytes_sent) / together.steps(),
+             (after.seconds - before.seconds) / together.seconds(),
+             shared.backend().exchanges() ? shared.backend().exchanges()->transport : "none"};
+  if (by_one) m.alone_per_s = by_one->per_second();
+  ranks().barrier();  // before memory that others store into goes
+  return m;
+}
+
+const std::vector<std::string> columns{"ranks",
+                                       "threads_each",
+                                       "partitioner",
+                                       "cut_by",
+                                       "rings",
+                                       "precision",
+                                       "phyxels",
+                                       "neighbours",
+                                       "fewest",
+                                       "most",
+                                       "most_ghosts",
+                                       "set_up_s",
+                                       "steps_per_s",
+                                       "phyxel_steps_per_s",
+                                       "spread",
+                                       "phyxels_alone",
+                                       "phyxel_steps_per_s_alone",
+                                       "spread_alone",
+                                       "bytes_per_step",
+                                       "exchanging",
+                                       "transport"};
+
+std::vector<std::string> row_of(const Ensemble& ensemble, const std::string& partitioner, int rings,
+                                const std::string& precision, double set_up, Index phyxels_alone,
+                                const Measured& m) {
+  const bool alone = ranks().size() == 1;
+  const Model& model = ensemble.here();
+  const double n = model.whole_size();
+  const Ensemble::Shares& shares = ensemble.shares();
+  std::vector<std::string> row{std::to_string(ranks().size()),
+                               "1",
+                               alone ? "none" : partitioner,
+                               alone ? "none" : ensemble.partitioner(),
+                               alone ? "0" : std::to_string(rings),
+                               precision,
+                               std::to_string(model.whole_size()),
+                               fmt::format("{:.1f}", static_cast<double>(model.pairs()) / n),
+                               std::to_string(shares.fewest),
+                               std::to_string(shares.most),
+                               std::to_string(shares.most_ghosts),
+                               fmt::format("{:.3g}", set_up),
+                               fmt::format("{:.5g}", m.steps_per_s.value),
+                               fmt::format("{:.5g}", m.steps_per_s.value * n),
+                               fmt::format("{:.3f}", m.steps_per_s.spread)};
+  if (m.alone_per_s) {
+    row.insert(row.end(), {std::to_string(phyxels_alone),
+                           fmt::format("{:.5g}", m.alone_per_s->value * phyxels_alone),
+                           fmt::format("{:.3f}", m.alone_per_s->spread)});
+  } else {
+    row.insert(row.end(), {"", "", ""});
+  }
+  row.insert(row.end(), {fmt::format("{:.0f}", m.bytes_per_step),
+                         fmt::format("{:.4f}", m.exchanging), m.transport});
+  return row;
 }
 
 void bench_scaling(const Options& options) {
@@ -109,11 +222,7 @@ void bench_scaling(const Options& options) {
   Facts facts = machine_facts(cores);
   for (const auto& fact : device_facts(device)) facts.push_back(fact);
   if (device.gpu) facts.emplace_back("gpus", std::to_string(gpus_of_ranks(device)));
-  CsvTable table{facts,
-                 {"ranks", "threads_each", "partitioner", "rings", "precision", "phyxels",
-                  "neighbours", "fewest", "most", "most_ghosts", "steps_per_s",
-                  "phyxel_steps_per_s", "spread", "bytes_per_step", "exchanging", "transport"},
-                 {}};
+  CsvTable table{facts, columns, {}};
   ranks().together([&] {
     if (!leads) return;
     if (!options.csv.empty() && std::filesystem::exists(options.csv) && !options.force) {
@@ -122,28 +231,26 @@ void bench_scaling(const Options& options) {
     fmt::print("{}", csv_text(table));
   });
   for (const Index size : options.sizes) {
-    const Scene scene = cube_scene(options.weak ? size * ranks().size() : size);
+    const Scene scene = cube_scene(options.weak ? size * ranks().size() : size),
+                scene_of_one = cube_scene(size);
+    std::optional<Model> one;
+    ranks().together([&] {
+      if (leads && !alone && !options.without_one) one = make_model(scene_of_one, device);
+    });
     for (const std::string& partitioner : options.partitioners) {
       for (const int rings : options.rings) {
         if (device.gpu && rings != 1) continue;
+        ranks().barrier();
+        const auto start = Clock::now();
         const Ensemble ensemble(scene, device, {partitioner, rings});
-        const Ensemble::Shares& shares = ensemble.shares();
+        const double set_up = ranks().largest(seconds_since(start));
         for (const std::string& precision : options.precisions) {
-          const Measured m = measure(ensemble, scene, precision_option(precision), device, options);
+          const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,
+                                     precision_option(precision), device, options);
           ranks().together([&] {
             if (!leads) return;
-            const Model& model = ensemble.here();
-            const double n = model.whole_size();
             table.rows.push_back(
-                {std::to_string(ranks().size()), "1", alone ? "none" : partitioner,
-                 alone ? "0" : std::to_string(rings), precision, std::to_string(model.whole_size()),
-                 fmt::format("{:.1f}", static_cast<double>(model.pairs()) / n),
-                 std::to_string(shares.fewest), std::to_string(shares.most),
-                 std::to_string(shares.most_ghosts), fmt::format("{:.5g}", m.steps_per_s.value),
-                 fmt::format("{:.5g}", m.steps_per_s.value * n),
-                 fmt::format("{:.3f}", m.steps_per_s.spread),
-                 fmt::format("{:.0f}", m.bytes_per_step), fmt::format("{:.4f}", m.exchanging),
-                 m.transport});
+                row_of(ensemble, partitioner, rings, precision, set_up, one ? one->size() : 0, m));
             fmt::print("{}\n", fmt::join(table.rows.back(), ","));
             std::fflush(stdout);
             if (!options.csv.empty()) write_csv(options.csv, table);
@@ -166,6 +273,8 @@ void add_bench_scaling(CLI::App& bench) {
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
   command->add_flag("--weak", options->weak, "Sizes are those of a rank, not of the body");
+  command->add_flag("--without-one", options->without_one,
+                    "Do not measure the first rank alone in turn with all, as speed-ups need it");
   command->add_option("--partitioner", options->partitioners, "metis, curve, bisection, auto")
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_choices()));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
@@ -42,58 +41,69 @@ std::map<int, CsvTable> tables_in(const fs::path& results, const std::string& ki
   return tables;
 }
 
-/// The row of one rank that a row of many is measured against: the same body, or one `ranks` times
-/// smaller, to the percent that cubes leave.
-std::optional<std::size_t> alone(const CsvTable& one, const CsvTable& many, std::size_t row,
-                                 int ranks) {
-  const double phyxels = many.number(row, "phyxels");
-  for (std::size_t r = 0; r < one.rows.size(); ++r) {
-    if (one.text(r, "precision") == many.text(row, "precision") &&
-        std::abs(ranks * one.number(r, "phyxels") / phyxels - 1) < 0.015) {
-      return r;
-    }
-  }
-  return std::nullopt;
-}
-
 const std::vector<std::string> head{
-    "phyxels",  "precision",  "cut by", "ghost rings", "transport",      "10⁶ phyxel-steps/s",
-    "speed-up", "efficiency", "spread", "most ghosts", "kB sent a step", "exchanging"};
+    "phyxels",    "precision", "cut by",     "ghost rings", "transport",   "10⁶ phyxel-steps/s",
+    "one alone",  "speed-up",  "efficiency", "spread",      "most ghosts", "kB sent a step",
+    "exchanging", "set-up [s]"};
 
-std::vector<std::string> cells(const CsvTable& many, std::size_t r, double speed_up, int ranks) {
-  return {many.text(r, "phyxels"),
-          many.text(r, "precision"),
-          many.text(r, "partitioner"),
-          many.text(r, "rings"),
-          many.text(r, "transport"),
-          fmt::format("{:.2f}", many.number(r, "phyxel_steps_per_s") * 1e-6),
+std::vector<std::string> cells(const CsvTable& table, std::size_t r, double speed_up, int ranks) {
+  const std::string asked = table.text(r, "partitioner"), cut_by = table.text(r, "cut_by");
+  return {table.text(r, "phyxels"),
+          table.text(r, "precision"),
+          asked == cut_by ? cut_by : fmt::format("{} ({})", cut_by, asked),
+          table.text(r, "rings"),
+          table.text(r, "transport"),
+          fmt::format("{:.2f}", table.number(r, "phyxel_steps_per_s") * 1e-6),
+          fmt::format("{:.2f}", table.number(r, "phyxel_steps_per_s_alone") * 1e-6),
           fmt::format("{:.2f}", speed_up),
           fmt::format("{:.0f}%", 100 * speed_up / ranks),
-          fmt::format("{:.0f}%", 100 * many.number(r, "spread")),
-          many.text(r, "most_ghosts"),
-          fmt::format("{:.1f}", many.number(r, "bytes_per_step") * 1e-3),
-          fmt::format("{:.1f}%", 100 * many.number(r, "exchanging"))};
+          fmt::format("{:.0f}%, {:.0f}%", 100 * table.number(r, "spread"),
+                      100 * table.number(r, "spread_alone")),
+          table.text(r, "most_ghosts"),
+          fmt::format("{:.1f}", table.number(r, "bytes_per_step") * 1e-3),
+          fmt::format("{:.1f}%", 100 * table.number(r, "exchanging")),
+          table.text(r, "set_up_s")};
 }
 
-std::string section(const CsvTable& one, const CsvTable& many, int ranks, bool gpus) {
+const std::vector<std::string> head_without_one{
+    "phyxels",    "precision", "cut by",         "transport",   "10⁶ phyxel-steps/s",
+    "steps/s",    "spread",    "most of a rank", "most ghosts", "kB sent a step",
+    "exchanging", "set-up [s]"};
+
+std::vector<std::string> cells_without_one(const CsvTable& table, std::size_t r) {
+  return {table.text(r, "phyxels"),
+          table.text(r, "precision"),
+          table.text(r, "cut_by"),
+          table.text(r, "transport"),
+          fmt::format("{:.2f}", table.number(r, "phyxel_steps_per_s") * 1e-6),
+          table.text(r, "steps_per_s"),
+          fmt::format("{:.0f}%", 100 * table.number(r, "spread")),
+          table.text(r, "most"),
+          table.text(r, "most_ghosts"),
+          fmt::format("{:.1f}", table.number(r, "bytes_per_step") * 1e-3),
+          fmt::format("{:.1f}%", 100 * table.number(r, "exchanging")),
+          table.text(r, "set_up_s")};
+}
+
+std::string section(const CsvTable& table, int ranks, bool gpus) {
   std::string text = fmt::format(
-      "### {} {}\n\nMeasured by {} on {}{}; {}; {}. One rank: {}.\n\n", ranks,
-      gpus ? "ranks, a GPU each" : "CPU ranks", many.fact("program"), many.fact("hardware"),
-      gpus ? fmt::format(", {} × {}", many.fact("gpus"), many.fact("gpu")) : "",
-      many.fact("compiler"), many.fact("date"), one.fact("date"));
-  std::vector<std::vector<std::string>> strong, weak;
+      "### {} {}\n\nMeasured by {} on {}{}; {}; {}.\n\n", ranks,
+      gpus ? "ranks, a GPU each" : "CPU ranks", table.fact("program"), table.fact("hardware"),
+      gpus ? fmt::format(", {} × {}", table.fact("gpus"), table.fact("gpu")) : "",
+      table.fact("compiler"), table.fact("date"));
+  std::vector<std::vector<std::string>> strong, weak, large;
   double best = 0;
-  for (std::size_t r = 0; r < many.rows.size(); ++r) {
-    const double speed = many.number(r, "phyxel_steps_per_s");
-    if (const auto same = alone(one, many, r, 1)) {
-      const double gain = speed / one.number(*same, "phyxel_steps_per_s");
-      strong.push_back(cells(many, r, gain, ranks));
-      if (many.number(r, "phyxels") > 150'000 && many.text(r, "rings") == "1") {
-        best = std::max(best, gain);
-      }
+  for (std::size_t r = 0; r < table.rows.size(); ++r) {
+    if (table.text(r, "phyxels_alone").empty()) {
+      large.push_back(cells_without_one(table, r));
+      continue;
     }
-    if (const auto part = alone(one, many, r, ranks)) {
-      weak.push_back(cells(many, r, speed / one.number(*part, "phyxel_steps_per_s"), ranks));
+    const double gain =
+        table.number(r, "phyxel_steps_per_s") / table.number(r, "phyxel_steps_per_s_alone");
+    const bool same = table.number(r, "phyxels_alone") == table.number(r, "phyxels");
+    (same ? strong : weak).push_back(cells(table, r, gain, ranks));
+    if (same && table.number(r, "phyxels") > 150'000 && table.text(r, "rings") == "1") {
+      best = std::max(best, gain);
     }
   }
   if (!gpus && ranks == 2 && best > 0) {
@@ -104,15 +114,16 @@ std::string section(const CsvTable& one, const CsvTable& many, int ranks, bool g
   }
   if (!strong.empty()) text += "The same body on more ranks:\n\n" + table_text(head, strong);
   if (!weak.empty()) text += "A body that grows with the ranks:\n\n" + table_text(head, weak);
+  if (!large.empty()) {
+    text += "Bodies that one rank was not measured with:\n\n" + table_text(head_without_one, large);
+  }
   return text;
 }
 
 std::string sections(const fs::path& results, const std::string& kind) {
-  const std::map<int, CsvTable> tables = tables_in(results, kind);
-  if (!tables.contains(1)) return "";
   std::string text;
-  for (const auto& [ranks, table] : tables) {
-    if (ranks > 1) text += section(tables.at(1), table, ranks, kind == "gpu");
+  for (const auto& [ranks, table] : tables_in(results, kind)) {
+    if (ranks > 1) text += section(table, ranks, kind == "gpu");
   }
   return text;
 }
@@ -129,8 +140,10 @@ void write_scaling_page(const fs::path& results, const fs::path& page) {
       "same positions to the last bit (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), "
       "so the error of a scaled run is that of one rank. One ring of ghosts: displacements and "
       "stresses are exchanged; two: displacements of both, and the inner ring's stresses are found "
-      "twice. *Speed-up*: over one rank, in phyxel-steps per second, with the same binary on the "
-      "same kind of machine; *efficiency*: that by rank. *Exchanging* is the largest share of a "
+      "twice. *One alone*: 10⁶ phyxel-steps/s of the first rank by itself, with the whole body or "
+      "with one rank's part of it, measured in turn with all ranks; *speed-up*: over that; "
+      "*efficiency*: that by rank; *spread*: (largest - smallest) / median of the repeats, of all "
+      "and of one. *Exchanging* is the largest share of a "
       "rank's time for packing, waiting and unpacking, in which uneven work shows, too.\n\n";
   text += "## GPUs\n\n";
   text += gpus.empty() ? "Not measured yet.\n\n"

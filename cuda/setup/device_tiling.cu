@@ -37,7 +37,7 @@ DeviceTiling send_tiling(const Model& model) {
   out.place = std::move(tiling.place);
   out.part = std::move(tiling.part);
   out.own_tiles = tiling.own_tiles;
-  out.interior_tiles = tiling.interior_tiles;
+  out.boundary_tiles = tiling.boundary_tiles;
   return out;
 }
 
@@ -144,7 +144,7 @@ class Finder {
       }
     }
     tile_begin.push_back(n);
-    out_.own_tiles = out_.interior_tiles = out_.tiles();
+    out_.own_tiles = out_.tiles();
     const DeviceArray<Index> begins = sent(tile_begin, "tiles");
     const auto places = out_.part.size() * tile_size;
     out_.phyxel_at = {places, "places"};
@@ -197,7 +197,7 @@ class Finder {
     out_.place = std::move(tiling.place);
     out_.part = std::move(tiling.part);
     out_.own_tiles = tiling.own_tiles;
-    out_.interior_tiles = tiling.interior_tiles;
+    out_.boundary_tiles = tiling.boundary_tiles;
     out_.phyxel_at = sent(out_.phyxel, "places");
     place_of_ = sent(share.place, "places");
     number_ = sent(share.number, "places");
@@ -594,7 +594,7 @@ Tiling fetched_tiling(const DeviceTiling& on_device) {
                 on_device.place,
                 on_device.part,
                 on_device.own_tiles,
-                on_device.interior_tiles,
+                on_device.boundary_tiles,
                 lists(on_device.neighbours),
                 {}};
   if (on_device.inverse) tiling.inverse = lists(*on_device.inverse);

@@ -21,7 +21,7 @@ struct DeviceTileLists {
 
 struct DeviceTiling {
   std::vector<Index> phyxel, place, part;  ///< As in `Tiling`, on the host.
-  Index own_tiles = 0, interior_tiles = 0;
+  Index own_tiles = 0, boundary_tiles = 0;
   DeviceArray<Index> phyxel_at;  ///< The same as `phyxel`, on the device.
   DeviceTileLists neighbours;
   std::optional<DeviceTileLists> inverse;  ///< Where the neighbours do not serve both passes.

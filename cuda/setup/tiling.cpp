@@ -39,7 +39,7 @@ void place_phyxels(const Model& model, Tiling& tiling) {
       tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
     }
   }
-  tiling.own_tiles = tiling.interior_tiles = tiling.tiles();
+  tiling.own_tiles = tiling.tiles();
   find_places(tiling);
 }
 
@@ -86,7 +86,7 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
       if (reaches_ghosts[i]) own.back().reaches_ghosts = true;
     }
   }
-  for (const bool boundary : {false, true}) {
+  for (const bool boundary : {true, false}) {
     for (const OwnTile& of : own) {
       if (of.reaches_ghosts != boundary) continue;
       add_tile(of.part);
@@ -95,7 +95,7 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
                       static_cast<std::size_t>(whole[i] % tile_size)] = i;
       }
     }
-    if (!boundary) tiling.interior_tiles = tiling.tiles();
+    if (boundary) tiling.boundary_tiles = tiling.tiles();
   }
   tiling.own_tiles = tiling.tiles();
   for (std::size_t p = 0; p < model.parts.size(); ++p) {

@@ -73,8 +73,8 @@ struct Tiling {
   std::vector<Index> place;   ///< Where a phyxel is, shape [n].
   std::vector<Index> part;    ///< Body of a tile, shape [tiles].
   /// The first tiles have lists; the rest are a share's ghosts. Of those with lists, the first ones
-  /// name no ghost.
-  Index own_tiles = 0, interior_tiles = 0;
+  /// name ghosts, or are ghosts elsewhere.
+  Index own_tiles = 0, boundary_tiles = 0;
   TileLists neighbours;  ///< For the first pass.
   TileLists inverse;     ///< For the second pass; empty if the neighbours serve both.
 
@@ -88,8 +88,8 @@ struct Tiling {
 /// @throws InputError if a tile reaches more points than 16-bit slots can name.
 Tiling make_tiling(const Model& model);
 
-/// Places of a share: the tiles of the whole, as far as they are here, those that reach ghosts
-/// last; then ghosts, body by body. Sets all of a tiling but its lists.
+/// Places of a share: the tiles of the whole, as far as they are here, those first that reach
+/// ghosts or are ghosts elsewhere; then ghosts, body by body. Sets all of a tiling but its lists.
 /// @param reaches_ghosts whether each phyxel needs a ghost in either pass, shape [n]
 void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Tiling& tiling);
 

@@ -85,10 +85,14 @@ class CudaBackend final : public Backend {
     }
     m_.use_device();
     boundary_.sum_loads(time);
-    passes_.advance(dt);
-    boundary_.follow_paths(time, dt);
-    if (fresh_) boundary_.put_held_at_rest();
-    passes_.send_displacements();
+    if (fresh_ || boundary_.changes()) {
+      passes_.advance(dt);
+      boundary_.follow_paths(time, dt);
+      if (fresh_) boundary_.put_held_at_rest();
+      passes_.send_displacements();
+    } else {
+      passes_.advance_and_send(dt);
+    }
     if (halo_) halo_->count_steps(1);
     fresh_ = false;
     bound_queue(1);
@@ -229,8 +233,7 @@ class CudaBackend final : public Backend {
     const auto launch = [&](int count) {
       for (int s = 0; s < count; ++s) {
         passes_.stress();
-        passes_.advance(m_.dt());
-        passes_.send_displacements();
+        passes_.advance_and_send(m_.dt());
         if (surfels) surfels_->launch(passes_);
       }
     };
@@ -289,7 +292,8 @@ class CudaBackend final : public Backend {
 
 std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
                                            CudaPath path, Transport transport) {
-  if (model.share && (model.share->place.empty() || model.share->rings != 1)) {
+  if (model.share && (model.share->place.size() != static_cast<std::size_t>(model.size()) ||
+                      model.share->rings != 1)) {
     throw InputError("a GPU steps shares that are cut between tiles and have one ring of ghosts");
   }
   switch (precision) {

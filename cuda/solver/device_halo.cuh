@@ -1,11 +1,10 @@
 /// What GPUs send each other: values of phyxels, from the ranks that own them to those that have
 /// them as ghosts.
 ///
-/// Two ways. *Direct*: a kernel stores the records where the other ranks' kernels read them, in
-/// memory that CUDA IPC has opened, then raises a flag there; the other side's queue waits for the
-/// flag. The host takes no part. *Host*: a kernel packs, the host copies, MPI carries. Either way
-/// `begin` and `finish` only queue what the device does, so that what is launched in between
-/// overlaps.
+/// Two ways. *Direct*: kernels store the records where the other ranks' kernels read them and raise
+/// a flag there, for which those wait (peers.cuh); the passes of a step do so themselves. The host
+/// takes no part. *Host*: a kernel packs, the host copies, MPI carries. Either way `begin` and
+/// `finish` only queue what the device does, so that what is launched in between overlaps.
 ///
 /// Nothing says that an array may be written again, because the order of a step says it: who sends
 /// stresses has received displacements, which their owner sends after it has read the stresses of
@@ -22,84 +21,9 @@
 
 #include "solver/cuda_backend.hpp"
 #include "solver/device_model.cuh"
+#include "solver/peers.cuh"
 
 namespace phyxel::cuda {
-
-/// What a step sends, in this order.
-enum class Sent : int { stresses, displacements };
-inline constexpr int kinds_sent = 2;
-
-/// One record's way: from a place here to a place of a peer.
-struct Crossing {
-  Index here, there;
-  int peer;
-};
-
-__device__ inline void raise(unsigned* flag, unsigned value) {
-  asm volatile("st.release.sys.global.u32 [%0], %1;" ::"l"(flag), "r"(value) : "memory");
-}
-__device__ inline unsigned look_at(const unsigned* flag) {
-  unsigned value;
-  asm volatile("ld.acquire.sys.global.u32 %0, [%1];" : "=r"(value) : "l"(flag) : "memory");
-  return value;
-}
-
-/// Flags and counters of one kind of exchange.
-struct Signals {
-  unsigned* const* there;  ///< The flag of this rank in each peer's memory.
-  unsigned* here;          ///< Those of the peers, in this rank's.
-  int peers;
-  unsigned *sent, *received, *blocks_done;  ///< Exchanges so far; blocks of the one under way.
-  unsigned long long* waited;               ///< [ns]
-};
-
-/// Stores the records of `crossings` with the peers; the last block then tells them.
-template <class Records>
-__global__ void store_at_peers(const __grid_constant__ Records records, const Records* peers,
-                               const Crossing* crossings, int count,
-                               const __grid_constant__ Signals signals) {
-  const int stride = static_cast<int>(gridDim.x * blockDim.x);
-  for (int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x); k < count; k += stride) {
-    const Crossing c = crossings[k];
-    peers[c.peer].set(static_cast<std::size_t>(c.there),
-                      records.get(static_cast<std::size_t>(c.here)));
-  }
-  __syncthreads();
-  __shared__ bool last;
-  if (threadIdx.x == 0) {
-    __threadfence_system();  // for all of this block, which the barrier has brought together
-    last = atomicAdd(signals.blocks_done, 1U) == gridDim.x - 1;
-  }
-  __syncthreads();
-  if (!last) return;
-  const unsigned exchanges = *signals.sent + 1;
-  __threadfence_system();
-  __syncthreads();
-  if (threadIdx.x == 0) {
-    *signals.blocks_done = 0;
-    *signals.sent = exchanges;
-  }
-  for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
-       p += static_cast<int>(blockDim.x)) {
-    raise(signals.there[p], exchanges);
-  }
-}
-
-/// One block: waits until every peer has told of the next exchange.
-__global__ inline void wait_for_peers(const __grid_constant__ Signals signals) {
-  const unsigned next = *signals.received + 1;
-  unsigned long long start = 0, end = 0;
-  asm volatile("mov.u64 %0, %globaltimer;" : "=l"(start));
-  for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
-       p += static_cast<int>(blockDim.x)) {
-    while (static_cast<int>(look_at(signals.here + p) - next) < 0) __nanosleep(50);
-  }
-  __syncthreads();
-  if (threadIdx.x > 0) return;
-  asm volatile("mov.u64 %0, %globaltimer;" : "=l"(end));
-  *signals.received = next;
-  *signals.waited += end - start;
-}
 
 template <class Records>
 __global__ void pack(const __grid_constant__ Records records, const Index* place, int count,
@@ -278,6 +202,15 @@ class DirectExchange {
     wait_for_peers<<<1, warp_size, 0, m_.stream()>>>(signals_[static_cast<int>(what)]);
     m_.launched("wait_for_peers", 1, warp_size);
   }
+  /// For passes that exchange by themselves. Only if `tiles_meet`.
+  Meeting<Stresses<Real>> meeting_of_pass_1(bool waits) const {
+    return meeting(Sent::displacements, Sent::stresses, m_.fields().stresses, stresses_, waits);
+  }
+  Meeting<Points<Real>> meeting_of_pass_2(bool waits) const {
+    return meeting(Sent::stresses, Sent::displacements, m_.fields().points, points_, waits);
+  }
+  /// Whether there is a block to tell the peers.
+  bool tiles_meet() const { return m_.boundary_tiles() > 0; }
   /// Other ranks' memory is no longer used here, and may be freed once all have done this.
   void close() { opened_.clear(); }
   double waited_seconds() const {
@@ -288,10 +221,22 @@ class DirectExchange {
   }
   std::size_t bytes() const {
     return flags_.bytes() + counters_.bytes() + crossings_.bytes() + points_.bytes() +
-           stresses_.bytes();
+           stresses_.bytes() + first_.bytes();
   }
 
  private:
+  template <class Records>
+  Meeting<Records> meeting(Sent awaited, Sent told, const Records& own,
+                           const DeviceArray<Records>& peers, bool waits) const {
+    return {signals_[static_cast<int>(awaited)],
+            signals_[static_cast<int>(told)],
+            m_.boundary_tiles(),
+            first_.data(),
+            crossings_.data(),
+            own,
+            peers.data(),
+            waits};
+  }
   /// What a peer needs to store here; then the places of what it sends.
   struct Invitation {
     cudaIpcMemHandle_t points, stresses, flags;
@@ -362,7 +307,7 @@ class DirectExchange {
     }
     points_ = sent(points, "peers");
     stresses_ = sent(stresses, "peers");
-    crossings_ = sent(crossings, "what other ranks get");
+    send_crossings(std::move(crossings));
     for (int kind = 0; kind < kinds_sent; ++kind) {
       their_flags_[kind] = sent(their_flags[kind], "peers");
       unsigned* const counter = counters_.data() + 3 * kind;
@@ -374,6 +319,19 @@ class DirectExchange {
                         counter + 2,
                         waited_.data() + kind};
     }
+  }
+  /// By place, so that each tile knows its own.
+  void send_crossings(std::vector<Crossing> crossings) {
+    std::stable_sort(crossings.begin(), crossings.end(),
+                     [](const Crossing& a, const Crossing& b) { return a.here < b.here; });
+    std::vector<Index> first;
+    std::size_t k = 0;
+    for (Index tile = 0; tile <= m_.boundary_tiles(); ++tile) {
+      while (k < crossings.size() && crossings[k].here < tile * tile_size) ++k;
+      first.push_back(static_cast<Index>(k));
+    }
+    first_ = sent(first, "what other ranks get");
+    crossings_ = sent(crossings, "what other ranks get");
   }
   template <class Records>
   void store(const Records& own, const Records* peers, Sent what) const {
@@ -390,6 +348,7 @@ class DirectExchange {
   DeviceArray<unsigned> flags_, counters_;
   DeviceArray<unsigned long long> waited_;
   DeviceArray<Crossing> crossings_;
+  DeviceArray<Index> first_;  // of each boundary tile
   DeviceArray<Points<Real>> points_;
   DeviceArray<Stresses<Real>> stresses_;
   DeviceArray<unsigned*> their_flags_[kinds_sent];
@@ -439,6 +398,16 @@ class DeviceHalo {
     } else {
       host_.finish(m_.fields().points);
     }
+  }
+  /// What a pass has to do that takes in one kind of value and sends the other by itself, as all
+  /// do or none; null if the exchange stands outside.
+  const DirectExchange<Real, StateReal>* in_passes() const {
+    return direct_ && direct_->tiles_meet() ? direct_.get() : nullptr;
+  }
+  /// Such a pass is about to be launched. @returns whether it waits
+  bool pass_meets(Sent awaited, Sent told) const {
+    under_way_[static_cast<int>(told)] = true;
+    return std::exchange(under_way_[static_cast<int>(awaited)], false);
   }
   bool is_under_way(Sent what) const { return under_way_[static_cast<int>(what)]; }
   /// Other values, at once, through the host.

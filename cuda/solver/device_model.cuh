@@ -86,8 +86,8 @@ class DeviceModel {
   /// Of a share, with ghosts', which come after all that is stepped here.
   std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
   Index tiles() const { return tiling_.own_tiles; }  ///< That are stepped here.
-  /// Of those, the first ones, which reach no ghost.
-  Index interior_tiles() const { return tiling_.interior_tiles; }
+  /// Of those, the first ones, which reach ghosts or are ghosts elsewhere.
+  Index boundary_tiles() const { return tiling_.boundary_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.

@@ -13,6 +13,7 @@
 #include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "solver/peers.cuh"
 #include "solver/records.cuh"
 
 namespace phyxel::cuda {
@@ -198,10 +199,12 @@ struct Gradients {
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-template <class Real, class StateReal, bool green, bool volume, bool only_gradient>
+template <class Real, class StateReal, bool green, bool volume, bool only_gradient,
+          class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
-           const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients) {
+           const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
+           const __grid_constant__ Others others) {
   extern __shared__ __align__(16) char image[];
   Index tile = first_tile + static_cast<Index>(blockIdx.x);
   if constexpr (only_gradient) {
@@ -209,6 +212,7 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
   }
   const unsigned place = place_of(tile);
   const TileLists::Row row = lists.rows[place / warp_size];
+  others.before(tile);
   fetch_tile(f.points, lists, tile, image);
   prefetch_rows(f.moment_constants + warp_place_of(tile), f.places, 7);
   const uint4 first = first_entries(lists, row);
@@ -238,19 +242,23 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     const Mat3<Real> q =
         pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
     f.stresses.set(place, {own.x, q});
+    others.after(tile);
   }
 }
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
 /// `force`, shape [3, places], and nothing else is written.
-template <class Real, class StateReal, bool own_supports, bool damped, bool loaded, bool only_force>
+template <class Real, class StateReal, bool own_supports, bool damped, bool loaded, bool only_force,
+          class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
-           const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force) {
+           const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force,
+           const __grid_constant__ Others others) {
   extern __shared__ __align__(16) char image[];
   const Index tile = first_tile + static_cast<Index>(blockIdx.x);
   const unsigned place = place_of(tile);
   const TileLists::Row row = lists.rows[place / warp_size];
+  others.before(tile);
   fetch_tile(f.stresses, lists, tile, image);
   // A support of each point, after the records.
   Real* supports = reinterpret_cast<Real*>(image + Stresses<Real>::bytes * lists.slots);
@@ -288,20 +296,22 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
   }
 
   const Real inverse_mass = f.force_constants[3 * f.places + place];
-  if (inverse_mass <= Real(0)) return;
-  if constexpr (loaded) sum += column3(f.load, f.places, place);
-  const Vec3<StateReal> velocity = next_velocity<Real, StateReal, damped>(
-      column3(f.velocity, f.places, place), sum, inverse_mass, f.gravity, dt, body);
-  set_column3(f.velocity, f.places, place, velocity);
-  auto point = f.points.get(place);
-  if constexpr (std::is_same_v<Real, StateReal>) {
-    point.u = fused(dt, velocity, point.u);
-  } else {
-    const Vec3<StateReal> u = fused(dt, velocity, column3(f.displacement, f.places, place));
-    set_column3(f.displacement, f.places, place, u);
-    point.u = to<Real>(u);
+  if (inverse_mass > Real(0)) {
+    if constexpr (loaded) sum += column3(f.load, f.places, place);
+    const Vec3<StateReal> velocity = next_velocity<Real, StateReal, damped>(
+        column3(f.velocity, f.places, place), sum, inverse_mass, f.gravity, dt, body);
+    set_column3(f.velocity, f.places, place, velocity);
+    auto point = f.points.get(place);
+    if constexpr (std::is_same_v<Real, StateReal>) {
+      point.u = fused(dt, velocity, point.u);
+    } else {
+      const Vec3<StateReal> u = fused(dt, velocity, column3(f.displacement, f.places, place));
+      set_column3(f.displacement, f.places, place, u);
+      point.u = to<Real>(u);
+    }
+    f.points.set(place, point);
   }
-  f.points.set(place, point);
+  others.after(tile);
 }
 
 }  // namespace phyxel::cuda

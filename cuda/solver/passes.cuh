@@ -9,40 +9,47 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Passes {
   using AllFields = Fields<Real, StateReal>;
-  using Pass1 = void (*)(AllFields, DeviceLists, Index, Gradients<Real>);
-  using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*);
+  template <class Others>
+  using Pass1 = void (*)(AllFields, DeviceLists, Index, Gradients<Real>, Others);
+  template <class Others>
+  using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*, Others);
+  using Meeting1 = Meeting<Stresses<Real>>;
+  using Meeting2 = Meeting<Points<Real>>;
 
  public:
   /// @param halo of a share, or null
   Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo)
-      : m_(model), halo_(halo) {
-    const auto add = [](auto& runs, auto kernel, Index tile) {
-      if (!runs.empty() && runs.back().kernel == kernel) {
-        ++runs.back().tiles;
-      } else {
-        runs.push_back({kernel, tile, 1});
-      }
-    };
-    for (Index tile = 0; tile < m_.tiles(); ++tile) {
-      const Material& material = m_.model().parts[m_.tiling().part[tile]].material;
-      Runs& runs = tile < m_.interior_tiles() ? interior_ : boundary_;
-      add(runs.stress, pass_1_of(material), tile);
-      add(runs.advance, m_.own_supports() ? pass_2_of<true>(material) : pass_2_of<false>(material),
-          tile);
-    }
-  }
+      : m_(model),
+        halo_(halo),
+        direct_(halo ? halo->in_passes() : nullptr),
+        interior_(m_.boundary_tiles(), m_.tiles(), *this),
+        boundary_(0, m_.boundary_tiles(), *this),
+        meeting_(0, direct_ ? m_.tiles() : 0, *this) {}
 
   /// What ghosts are not needed for is launched before they are waited for.
   void stress() const {
-    launch_stress(interior_);
+    if (direct_) {
+      const bool waits = halo_->pass_meets(Sent::displacements, Sent::stresses);
+      return meeting_.stress(direct_->meeting_of_pass_1(waits));
+    }
+    interior_.stress({});
     receive(Sent::displacements);
-    launch_stress(boundary_);
+    boundary_.stress({});
     send(Sent::stresses);
   }
+  /// Displacements may still change before other ranks get theirs (`send_displacements`).
   void advance(double dt) const {
-    launch_advance(interior_, dt);
+    interior_.advance(dt, {});
     receive(Sent::stresses);
-    launch_advance(boundary_, dt);
+    boundary_.advance(dt, {});
+  }
+  void advance_and_send(double dt) const {
+    if (direct_) {
+      const bool waits = halo_->pass_meets(Sent::stresses, Sent::displacements);
+      return meeting_.advance(dt, direct_->meeting_of_pass_2(waits));
+    }
+    advance(dt);
+    send_displacements();
   }
   /// After displacements have changed: other ranks get theirs.
   void send_displacements() const { send(Sent::displacements); }
@@ -60,16 +67,17 @@ class Passes {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
-    launch_pass_1(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, {});
+    launch_pass_1<Alone>(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, {},
+                         {});
     send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
   void gather(Real* forces) const {
     receive(Sent::stresses);
-    launch_pass_2({m_.own_supports() ? pass_2<Real, StateReal, true, false, false, true>
-                                     : pass_2<Real, StateReal, false, false, false, true>,
-                   0, m_.tiles()},
-                  StateReal(0), forces);
+    launch_pass_2<Alone>({m_.own_supports() ? pass_2<Real, StateReal, true, false, false, true>
+                                            : pass_2<Real, StateReal, false, false, false, true>,
+                          0, m_.tiles()},
+                         StateReal(0), forces, {});
   }
   /// Of ghosts: zero.
   DeviceArray<Real> forces() const {
@@ -86,7 +94,8 @@ class Passes {
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    launch_pass_1(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, tiles}, gradients);
+    launch_pass_1<Alone>(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, tiles},
+                         gradients, {});
   }
 
  private:
@@ -96,9 +105,41 @@ class Passes {
     Kernel kernel;
     Index first_tile, tiles;
   };
+  /// The launches of a step that serve tiles side by side.
+  template <class Others1, class Others2>
   struct Runs {
-    std::vector<Run<Pass1>> stress;
-    std::vector<Run<Pass2>> advance;
+    Runs(Index begin, Index end, const Passes& passes) : of(passes) {
+      for (Index tile = begin; tile < end; ++tile) {
+        const Material& material = of.m_.model().parts[of.m_.tiling().part[tile]].material;
+        add(pass_1, pass_1_of<Others1>(material), tile);
+        add(pass_2,
+            of.m_.own_supports() ? of.template pass_2_of<true, Others2>(material)
+                                 : of.template pass_2_of<false, Others2>(material),
+            tile);
+      }
+    }
+    template <class Kernel>
+    static void add(std::vector<Run<Kernel>>& runs, Kernel kernel, Index tile) {
+      if (!runs.empty() && runs.back().kernel == kernel) {
+        ++runs.back().tiles;
+      } else {
+        runs.push_back({kernel, tile, 1});
+      }
+    }
+    void stress(const Others1& others) const {
+      for (const auto& run : pass_1) {
+        of.template launch_pass_1<Others1>(of.m_.fields(), run, {}, others);
+      }
+    }
+    void advance(double dt, const Others2& others) const {
+      for (const auto& run : pass_2) {
+        of.template launch_pass_2<Others2>(run, static_cast<StateReal>(dt), nullptr, others);
+      }
+    }
+
+    const Passes& of;
+    std::vector<Run<Pass1<Others1>>> pass_1;
+    std::vector<Run<Pass2<Others2>>> pass_2;
   };
 
   void send(Sent what) const {
@@ -107,14 +148,6 @@ class Passes {
   void receive(Sent what) const {
     if (halo_) halo_->finish(what);
   }
-  void launch_stress(const Runs& runs) const {
-    for (const Run<Pass1>& run : runs.stress) launch_pass_1(m_.fields(), run, {});
-  }
-  void launch_advance(const Runs& runs, double dt) const {
-    for (const Run<Pass2>& run : runs.advance) {
-      launch_pass_2(run, static_cast<StateReal>(dt), nullptr);
-    }
-  }
   DeviceArray<Real> without_ghosts(std::size_t rows, const char* what) const {
     DeviceArray<Real> array(rows * m_.places(), what + m_.subject());
     if (m_.share()) array.clear(m_.stream());
@@ -122,41 +155,47 @@ class Passes {
   }
 
   /// Terms chosen at run time become kernels: the one place.
-  static Pass1 pass_1_of(const Material& m) {
+  template <class Others>
+  static Pass1<Others> pass_1_of(const Material& m) {
     const bool volume = m.volume_stiffness > 0;
     if (m.strain == Strain::green) {
-      return volume ? pass_1<Real, StateReal, true, true, false>
-                    : pass_1<Real, StateReal, true, false, false>;
+      return volume ? cuda::pass_1<Real, StateReal, true, true, false, Others>
+                    : cuda::pass_1<Real, StateReal, true, false, false, Others>;
     }
-    return volume ? pass_1<Real, StateReal, false, true, false>
-                  : pass_1<Real, StateReal, false, false, false>;
+    return volume ? cuda::pass_1<Real, StateReal, false, true, false, Others>
+                  : cuda::pass_1<Real, StateReal, false, false, false, Others>;
   }
-  template <bool own_supports>
-  Pass2 pass_2_of(const Material& m) const {
+  template <bool own_supports, class Others>
+  Pass2<Others> pass_2_of(const Material& m) const {
     const bool loaded = !m_.model().loads.empty();
     if (m.damping > 0) {
-      return loaded ? pass_2<Real, StateReal, own_supports, true, true, false>
-                    : pass_2<Real, StateReal, own_supports, true, false, false>;
+      return loaded ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
+                    : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;
     }
-    return loaded ? pass_2<Real, StateReal, own_supports, false, true, false>
-                  : pass_2<Real, StateReal, own_supports, false, false, false>;
+    return loaded ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
+                  : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
   }
 
-  void launch_pass_1(const AllFields& fields, const Run<Pass1>& run,
-                     Gradients<Real> gradients) const {
+  template <class Others>
+  void launch_pass_1(const AllFields& fields, const Run<Pass1<Others>>& run,
+                     Gradients<Real> gradients, const Others& others) const {
     m_.launch_blocks("pass_1", run.kernel, static_cast<unsigned>(run.tiles),
                      Points<Real>::bytes * m_.lists().slots, false, fields, m_.lists(),
-                     run.first_tile, gradients);
+                     run.first_tile, gradients, others);
   }
-  void launch_pass_2(const Run<Pass2>& run, StateReal dt, Real* force) const {
+  template <class Others>
+  void launch_pass_2(const Run<Pass2<Others>>& run, StateReal dt, Real* force,
+                     const Others& others) const {
     m_.launch_blocks("pass_2", run.kernel, static_cast<unsigned>(run.tiles),
                      m_.pass_2_bytes(m_.second_lists().slots), false, m_.fields(),
-                     m_.second_lists(), run.first_tile, dt, force);
+                     m_.second_lists(), run.first_tile, dt, force, others);
   }
 
   const DeviceModel<Real, StateReal>& m_;
   const DeviceHalo<Real, StateReal>* halo_;
-  Runs interior_, boundary_;
+  const DirectExchange<Real, StateReal>* direct_;
+  Runs<Alone, Alone> interior_, boundary_;
+  Runs<Meeting1, Meeting2> meeting_;  // all tiles, where passes exchange by themselves
 };
 
 }  // namespace phyxel::cuda

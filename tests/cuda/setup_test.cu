@@ -124,7 +124,7 @@ void expect_same(const cuda::DeviceTiling& found, const cuda::DeviceTiling& expe
   EXPECT_EQ(found.place, expected.place);
   EXPECT_EQ(found.part, expected.part);
   EXPECT_EQ(found.own_tiles, expected.own_tiles);
-  EXPECT_EQ(found.interior_tiles, expected.interior_tiles);
+  EXPECT_EQ(found.boundary_tiles, expected.boundary_tiles);
   expect_same(found.neighbours, expected.neighbours);
   ASSERT_EQ(found.inverse.has_value(), expected.inverse.has_value());
   if (found.inverse) expect_same(*found.inverse, *expected.inverse);

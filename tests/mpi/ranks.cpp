@@ -21,6 +21,14 @@ class OnlyFailures : public ::testing::EmptyTestEventListener {
   }
 };
 
+/// The other ranks would wait for ever for one that has left a test by an exception, to which
+/// GoogleTest gives no file.
+class EndsAllAtExceptions : public ::testing::EmptyTestEventListener {
+  void OnTestPartResult(const ::testing::TestPartResult& result) override {
+    if (result.failed() && !result.file_name()) world().abort(ExitCode{1});
+  }
+};
+
 }  // namespace
 
 const Communicator& world() { return *the_world; }
@@ -31,11 +39,12 @@ int main(int argc, char** argv) {
   using namespace phyxel::test;
   ::testing::InitGoogleTest(&argc, argv);
   the_world.emplace(argc, argv);
+  auto& listeners = ::testing::UnitTest::GetInstance()->listeners();
   if (world().rank() > 0) {
-    auto& listeners = ::testing::UnitTest::GetInstance()->listeners();
     delete listeners.Release(listeners.default_result_printer());
     listeners.Append(new OnlyFailures);
   }
+  if (world().size() > 1) listeners.Append(new EndsAllAtExceptions);
   const int failed = RUN_ALL_TESTS();
   const auto all_failed = world().largest(static_cast<std::int64_t>(failed));
   the_world.reset();
