@@ -70,13 +70,13 @@ __device__ void store(const Records& records, const Records* peers, const Crossi
 /// @returns to its threads whether it is that one
 __device__ inline bool tell_if_last(const Signals& signals, unsigned blocks) {
   __syncthreads();
-  __shared__ bool last;
+  bool last = false;
   if (threadIdx.x == 0) {
     __threadfence_system();  // for all of this block, which the barrier has brought together
     last = atomicAdd(signals.blocks_done, 1U) == blocks - 1;
   }
-  __syncthreads();
-  if (!last) return false;
+  // Through no static shared memory: a block may need all there is.
+  if (__syncthreads_or(last) == 0) return false;
   const unsigned exchanges = *signals.sent + 1;
   __threadfence_system();
   __syncthreads();

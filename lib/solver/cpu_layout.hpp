@@ -8,11 +8,13 @@
 #include <new>
 #include <vector>
 
+#include "huge_pages.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
 
-/// std::vector storage aligned for SIMD and for whole cache lines.
+/// std::vector storage aligned for SIMD and for whole cache lines; in huge pages, where it is
+/// large.
 template <class T>
 struct AlignedAllocator {
   using value_type = T;
@@ -20,8 +22,17 @@ struct AlignedAllocator {
   AlignedAllocator() = default;
   template <class U>
   explicit AlignedAllocator(const AlignedAllocator<U>&) {}
-  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), alignment)); }
-  void deallocate(T* p, std::size_t) { ::operator delete(p, alignment); }
+  T* allocate(std::size_t n) {
+    const std::size_t bytes = n * sizeof(T);
+    if (bytes < least_huge) return static_cast<T*>(::operator new(bytes, alignment));
+    void* memory = allocate_huge(bytes);
+    if (!memory) throw std::bad_alloc();
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* p, std::size_t n) {
+    if (n * sizeof(T) < least_huge) return ::operator delete(p, alignment);
+    std::free(p);
+  }
   template <class U>
   bool operator==(const AlignedAllocator<U>&) const {
     return true;
