@@ -118,6 +118,11 @@ struct ExactVector {
     y.add(v.y);
     z.add(v.z);
   }
+  void add(const ExactVector& other) {
+    x.add(other.x);
+    y.add(other.y);
+    z.add(other.z);
+  }
   Vec3d value() const { return {x.value(), y.value(), z.value()}; }
 };
 

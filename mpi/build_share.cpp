@@ -23,6 +23,7 @@
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
+#include "tabulated.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "timeline.hpp"
 
@@ -231,35 +232,31 @@ class Builder {
                  1.6 * std::cbrt(scene_.bodies[b].neighbourhood.nearest / 10.0);
     }
     if (!any) return;
-    // `own` is in the order of bodies, but not of numbers.
-    const std::vector<Index> own_at = order_by_number(own);
     for (;;) {
       const Surrounded all = surrounded(ranks_, own, reach, boxes_);
       std::vector<double> needed(n, 0);
-      std::size_t at = 0;
-      for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
+      for (const auto& [first, last] : stretches_of_bodies(all.phyxels)) {
         const auto b = static_cast<std::size_t>(all.phyxels[first].body);
-        std::vector<Vec3d> position;
-        for (; last < all.phyxels.size() && all.phyxels[last].body == all.phyxels[first].body;
-             ++last) {
-          position.push_back(all.phyxels[last].position);
-        }
+        if (!wants(b)) continue;
+        const std::size_t size = last - first, begin = first;
+        const auto position =
+            tabulated(size, [&](std::size_t k) { return all.phyxels[begin + k].position; });
         const int nearest = scene_.bodies[b].neighbourhood.nearest;
-        std::vector<double> spacing(position.size()), farthest(position.size(), 0);
-        if (wants(b)) {
-          spacing = options_.surveyor
-                        ? options_.surveyor->mean_spacing(position, nearest, farthest.data())
-                        : mean_spacing(position, nearest, farthest.data());
-        }
+        std::vector<double> farthest(size, 0);
+        const std::vector<double> spacing =
+            options_.surveyor ? options_.surveyor->mean_spacing(position, nearest, farthest.data())
+                              : mean_spacing(position, nearest, farthest.data());
         const auto enough = std::min<Index>(nearest + 1, bodies_[b].size);
-        for (std::size_t i = 0; i < position.size(); ++i) {
-          if (all.owner[first + i] != ranks_.rank()) continue;
-          own[own_at[at++]].spacing = spacing[i];
-          if (!wants(b)) continue;
-          needed[b] = std::max(needed[b], static_cast<Index>(position.size()) < enough
-                                              ? 2 * reach[b] + 1e-300
-                                              : farthest[i] * margin);
+        const bool too_few = static_cast<Index>(size) < enough;
+        double most = 0;
+#pragma omp parallel for schedule(static) reduction(max : most)
+        for (std::size_t k = 0; k < size; ++k) {
+          const Index here = all.here[begin + k];
+          if (here < 0) continue;
+          own[here].spacing = spacing[k];
+          most = std::max(most, too_few ? 2 * reach[b] + 1e-300 : farthest[k] * margin);
         }
+        needed[b] = most;
       }
       needed = largest_of(ranks_, needed);
       bool done = true;
@@ -277,18 +274,25 @@ class Builder {
     const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
       return scene_.bodies[b].neighbourhood;
     };
-    for (const SpreadPhyxel& p : own) {
-      const auto b = static_cast<std::size_t>(p.body);
-      if (!rule(b).radius && rule(b).support == NeighbourhoodRule::Support::uniform) {
-        spacings[b].push_back(p.spacing);
-      }
+    const auto stretches = stretches_of_bodies(own);
+    for (const auto& [first, last] : stretches) {
+      const auto b = static_cast<std::size_t>(own[first].body);
+      if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
+      spacings[b] =
+          tabulated(last - first, [&own, begin = first](std::size_t k) { return own[begin + k].spacing; });
     }
     const std::vector<double> medians = medians_of(ranks_, std::move(spacings));
     std::vector<double> reach(bodies_.size(), 0);
-    for (SpreadPhyxel& p : own) {
-      const auto b = static_cast<std::size_t>(p.body);
-      p.support = support_radii({&p.spacing, 1}, rule(b), medians[b])[0];
-      reach[b] = std::max(reach[b], p.support);
+    for (const auto& [first, last] : stretches) {
+      const auto b = static_cast<std::size_t>(own[first].body);
+      double most = 0;
+#pragma omp parallel for schedule(static) reduction(max : most)
+      for (std::size_t k = first; k < last; ++k) {
+        SpreadPhyxel& p = own[k];
+        p.support = support_radii({&p.spacing, 1}, rule(b), medians[b])[0];
+        most = std::max(most, p.support);
+      }
+      reach[b] = most;
     }
     reach = largest_of(ranks_, reach);
     for (std::size_t b = 0; b < bodies_.size(); ++b) bodies_[b].reach = reach[b];
@@ -302,36 +306,46 @@ class Builder {
     return surrounded(ranks_, own, reach, boxes_);
   }
 
+  template <class T>
+  static std::span<const T> of_part(const std::vector<T>& values, const Part& part) {
+    return std::span(values).subspan(static_cast<std::size_t>(part.begin),
+                                     static_cast<std::size_t>(part.end - part.begin));
+  }
+
   /// As far as the neighbours of the last ghosts, and the carriers of surfels.
   Local surroundings_of(const SpreadPhyxels& own) const {
     Surrounded all = around(own, options_.rings + 1);
     Local local{std::move(all.phyxels), std::move(all.owner), {}};
     Model& m = local.model;
     ranks_.together([&] {
-      std::size_t at = 0;
+      m.position = tabulated(local.phyxels.size(),
+                             [&](std::size_t k) { return local.phyxels[k].position; });
+      m.neighbourhood.support = tabulated(
+          local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].support; });
+      m.parts.resize(bodies_.size());
+      for (const auto& [first, last] : stretches_of_bodies(local.phyxels)) {
+        Part& part = m.parts[static_cast<std::size_t>(local.phyxels[first].body)];
+        part.begin = static_cast<Index>(first);
+        part.end = static_cast<Index>(last);
+      }
+      Index before = 0;
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
-        Part part;
-        part.begin = m.size();
-        std::vector<double> support;
-        for (; at < local.phyxels.size() && local.phyxels[at].body == static_cast<Index>(b); ++at) {
-          m.position.push_back(local.phyxels[at].position);
-          support.push_back(local.phyxels[at].support);
-        }
-        part.end = m.size();
-        m.parts.push_back(part);
+        Part& part = m.parts[b];
+        if (part.begin == part.end) part.begin = part.end = before;  // nobody is here
+        before = part.end;
+        const NeighbourhoodRule& rule = scene_.bodies[b].neighbourhood;
         if (options_.surveyor) {
-          m.neighbourhood.support.insert(m.neighbourhood.support.end(), support.begin(),
-                                         support.end());
-          if (scene_.bodies[b].neighbourhood.one_sided()) m.neighbourhood.symmetric = false;
+          if (rule.one_sided()) m.neighbourhood.symmetric = false;
           continue;
         }
-        const std::span<const Vec3d> position = std::span(m.position).subspan(
-            static_cast<std::size_t>(part.begin), support.size());
-        const Neighbourhood hood =
-            neighbours_within(position, std::move(support), scene_.bodies[b].neighbourhood);
+        const Neighbourhood hood = neighbours_within(
+            of_part(m.position, part),
+            {m.neighbourhood.support.begin() + part.begin,
+             m.neighbourhood.support.begin() + part.end},
+            rule);
         append_lists(m.neighbourhood, hood, part.begin);
-        m.neighbourhood.support.insert(m.neighbourhood.support.end(), hood.support.begin(),
-                                       hood.support.end());
+        std::copy(hood.support.begin(), hood.support.end(),
+                  m.neighbourhood.support.begin() + part.begin);
       }
     });
     return local;
@@ -401,14 +415,16 @@ class Builder {
       if (p.along % group_size_ % sample_stride() == 0) samples.phyxels.push_back(p);
     }
     std::size_t sample = 0;
-    for (std::size_t first = 0, last = 0; first < all.phyxels.size(); first = last) {
+    for (const auto& [first, last] : stretches_of_bodies(all.phyxels)) {
       const Index body = all.phyxels[first].body;
-      std::vector<Vec3d> position, point;
-      std::vector<double> support, reach;
-      for (; last < all.phyxels.size() && all.phyxels[last].body == body; ++last) {
-        position.push_back(all.phyxels[last].position);
-        support.push_back(all.phyxels[last].support);
-      }
+      const auto position = tabulated(last - first, [&all, begin = first](std::size_t k) {
+        return all.phyxels[begin + k].position;
+      });
+      const auto support = tabulated(last - first, [&all, begin = first](std::size_t k) {
+        return all.phyxels[begin + k].support;
+      });
+      std::vector<Vec3d> point;
+      std::vector<double> reach;
       const std::size_t first_sample = sample;
       for (; sample < samples.phyxels.size() && samples.phyxels[sample].body == body; ++sample) {
         point.push_back(samples.phyxels[sample].position);
@@ -554,25 +570,24 @@ class Builder {
 
   static std::vector<double> values_of(const Local& local, const Part& part,
                                        double SpreadPhyxel::*value) {
-    std::vector<double> values;
-    for (Index i = part.begin; i < part.end; ++i) values.push_back(local.phyxels[i].*value);
-    return values;
+    return tabulated(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) {
+      return local.phyxels[static_cast<std::size_t>(part.begin) + k].*value;
+    });
   }
 
   void look_around(Local& local, std::size_t b) const {
     Model& m = local.model;
     const Part& part = m.parts[b];
-    const auto begin = static_cast<std::size_t>(part.begin),
-               size = static_cast<std::size_t>(part.end) - begin;
     const std::vector<double> spacing = bodies_[b].kernel_volumes
                                             ? values_of(local, part, &SpreadPhyxel::spacing)
                                             : std::vector<double>();
-    std::vector<char> own;
-    for (std::size_t i = 0; i < size; ++i) own.push_back(owns(local, begin + i));
+    const auto own = tabulated(
+        static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) -> char {
+          return owns(local, static_cast<std::size_t>(part.begin) + k);
+        });
     if (options_.surveyor) {
       Around& around = local.around.emplace_back(options_.surveyor->around(
-          std::span(std::as_const(m.position)).subspan(begin, size),
-          std::span(std::as_const(m.neighbourhood.support)).subspan(begin, size), spacing, own,
+          of_part(m.position, part), of_part(m.neighbourhood.support, part), spacing, own,
           scene_.bodies[b].neighbourhood.one_sided()));
       append(m.degenerate, around.degenerate, part.begin);
       return;
@@ -591,10 +606,10 @@ class Builder {
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       if (!bodies_[b].kernel_volumes) continue;
       const Part& part = m.parts[b];
-      for (Index i = part.begin; i < part.end; ++i) {
-        if (!owns(local, static_cast<std::size_t>(i))) continue;
-        sums[b].add(local.around[b].kernel_sum[i - part.begin]);
-      }
+      sums[b] = added_up<ExactSum>(part.begin, part.end, [&](ExactSum& sum, Index i) {
+        if (!owns(local, static_cast<std::size_t>(i))) return;
+        sum.add(local.around[b].kernel_sum[i - part.begin]);
+      });
     }
     std::vector<ExactSum*> all;
     for (ExactSum& sum : sums) all.push_back(&sum);
@@ -627,15 +642,23 @@ class Builder {
       part.kernel_volumes = bodies_[b].kernel_volumes;
       part.size = bodies_[b].size;
       part.origin = bodies_[b].origin;
-      lists[b].fewest = bodies_[b].size;
+      sums[b] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
+        if (owns(local, static_cast<std::size_t>(i))) {
+          sum.add(m.mass[i], m.volume[i], m.position[i]);
+        }
+      });
+      Offset pairs = 0;
+      Index fewest = bodies_[b].size, most = 0;
+#pragma omp parallel for schedule(static) reduction(+ : pairs) reduction(min : fewest) \
+    reduction(max : most)
       for (Index i = part.begin; i < part.end; ++i) {
         if (!owns(local, static_cast<std::size_t>(i))) continue;
-        sums[b].add(m.mass[i], m.volume[i], m.position[i]);
         const Index length = local.around[b].length[i - part.begin];
-        lists[b].pairs += length;
-        lists[b].fewest = std::min(lists[b].fewest, length);
-        lists[b].most = std::max(lists[b].most, length);
+        pairs += length;
+        fewest = std::min(fewest, length);
+        most = std::max(most, length);
       }
+      lists[b] = {pairs, fewest, most};
       BodySums& s = sums[b];
       all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z});
     }
@@ -660,16 +683,17 @@ class Builder {
     std::vector<ExactSum> masses;
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        if (selections_of(scene_.bodies[b]).empty()) continue;
         const Part& part = m.parts[b];
+        const std::span<const SpreadPhyxel> here = of_part(local.phyxels, part);
         Cloud cloud;
-        std::vector<Index> number;
+        cloud.position = tabulated(here.size(), [&](std::size_t k) { return here[k].position; });
+        auto number = tabulated(here.size(), [&](std::size_t k) { return here[k].number; });
         for (const std::string& name : bodies_[b].regions) cloud.regions[name];
-        for (Index i = part.begin; i < part.end; ++i) {
-          const SpreadPhyxel& p = local.phyxels[i];
-          cloud.position.push_back(p.position);
-          number.push_back(p.number);
-          for (std::size_t r = 0; r < bodies_[b].used_regions; ++r) {
-            if (p.regions >> r & 1) cloud.regions[bodies_[b].regions[r]].push_back(i - part.begin);
+        for (std::size_t r = 0; r < bodies_[b].used_regions; ++r) {
+          std::vector<Index>& region = cloud.regions[bodies_[b].regions[r]];
+          for (std::size_t k = 0; k < here.size(); ++k) {
+            if (here[k].regions >> r & 1) region.push_back(static_cast<Index>(k));
           }
         }
         BoundaryChoice& choice = choices[b];
@@ -854,7 +878,8 @@ class Builder {
     Share& share = made.share;
     std::vector<Index> place = own_places(local, share);
     share.whole = size_;
-    for (Index& number : share.number) number = number_of(local, number);
+    share.number = tabulated(share.number.size(),
+                             [&](std::size_t k) { return number_of(local, share.number[k]); });
     for (Index& surfel : share.surfel_number) surfel = surfel_number_[surfel];
     const auto halo = std::make_shared<Halo>(ranks_, made);
     const auto from_owners = [&](auto& values) {
@@ -881,28 +906,33 @@ class Builder {
     const auto phyxel = [&](Index k) -> const SpreadPhyxel& {
       return local.phyxels[share.number[k]];
     };
-    std::vector<std::tuple<Index, Index, Index>> sorted;  // body, along, which of the share
+    std::vector<Index> owned;
     for (std::size_t k = 0; k < place.size(); ++k) {
-      const auto here = static_cast<Index>(k);
-      if (share.owned[k]) sorted.emplace_back(phyxel(here).body, phyxel(here).along, here);
+      if (share.owned[k]) owned.push_back(static_cast<Index>(k));
     }
+    // body, along, which of the share
+    auto sorted = tabulated(owned.size(), [&](std::size_t k) {
+      const SpreadPhyxel& p = phyxel(owned[k]);
+      return std::tuple(p.body, p.along, owned[k]);
+    });
     parallel_sort(sorted);
-    std::vector<Index> own;
-    for (const auto& [body, along, k] : sorted) own.push_back(k);
-    const auto tile_of = [&](Index k) {
-      return bodies_[phyxel(k).body].tile + phyxel(k).along / options_.tile;
+    auto own = tabulated(sorted.size(), [&](std::size_t k) { return std::get<2>(sorted[k]); });
+    const auto tile_of = [&](std::size_t k) {
+      return bodies_[std::get<0>(sorted[k])].tile + std::get<1>(sorted[k]) / options_.tile;
     };
-    for (std::size_t first = 0, last = 0; first < own.size(); first = last) {
-      const Index tile = tile_of(own[first]);
-      while (last < own.size() && tile_of(own[last]) == tile) ++last;
-      order_in_tile(std::span(own).subspan(first, last - first),
-                    [&](Index k) {
-                      const Index i = share.number[k];
-                      const Part& part = local.model.parts[phyxel(k).body];
-                      return local.around[phyxel(k).body].length[i - part.begin];
-                    });
-      for (std::size_t k = first; k < last; ++k) {
-        place[own[k]] = tile * options_.tile + static_cast<Index>(k - first);
+    std::vector<std::size_t> begin;  // of each tile
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      if (k == 0 || tile_of(k) != tile_of(k - 1)) begin.push_back(k);
+    }
+    begin.push_back(own.size());
+#pragma omp parallel for schedule(dynamic, 64)
+    for (std::size_t t = 0; t < begin.size() - 1; ++t) {
+      order_in_tile(std::span(own).subspan(begin[t], begin[t + 1] - begin[t]), [&](Index k) {
+        const Index i = share.number[k], b = phyxel(k).body;
+        return local.around[b].length[i - local.model.parts[b].begin];
+      });
+      for (std::size_t k = begin[t]; k < begin[t + 1]; ++k) {
+        place[own[k]] = tile_of(begin[t]) * options_.tile + static_cast<Index>(k - begin[t]);
       }
     }
     return place;

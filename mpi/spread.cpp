@@ -1,13 +1,17 @@
 #include "mpi/spread.hpp"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "model/space_filling_curve.hpp"
 #include "parallel_sort.hpp"
 #include "sort_unique.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -124,6 +128,77 @@ class Cells {
   std::vector<double> inverse_edge_;
 };
 
+/// The order of all phyxels: by body, then by number.
+std::uint64_t numbered(const SpreadPhyxel& p) {
+  return static_cast<std::uint64_t>(p.body) << 32 | static_cast<std::uint64_t>(p.number);
+}
+
+struct Others {
+  SpreadPhyxels phyxels;
+  std::vector<int> owner;
+};
+/// Phyxels of other ranks in the cells that have own ones, or next to them.
+Others of_others(const Communicator& ranks, const SpreadPhyxels& own, const Cells& cells) {
+  const auto each = static_cast<std::size_t>(ranks.size());
+  using Placed = std::pair<Cells::Name, Index>;
+  auto here = tabulated(own.size(), [&](std::size_t i) {
+    return Placed{cells.name_of(own[i]), static_cast<Index>(i)};
+  });
+  parallel_sort(here);
+  std::vector<Cells::Name> occupied;
+  std::vector<std::size_t> begin;  // of their cells, in `here`
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    if (k > 0 && here[k].first == here[k - 1].first) continue;
+    occupied.push_back(here[k].first);
+    begin.push_back(k);
+  }
+  begin.push_back(here.size());
+  // Who is where.
+  std::vector<std::pair<Cells::Name, int>> elsewhere;
+  {
+    const auto from_each =
+        ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
+    for (std::size_t r = 0; r < each; ++r) {
+      if (static_cast<int>(r) == ranks.rank()) continue;
+      for (const Cells::Name name : from_each[r]) elsewhere.emplace_back(name, static_cast<int>(r));
+    }
+  }
+  parallel_sort(elsewhere);
+  std::vector<SpreadPhyxels> send(each);
+#pragma omp parallel
+  {
+    std::vector<SpreadPhyxels> mine(each);
+    std::vector<int> wanted_by;
+#pragma omp for schedule(dynamic, 256) nowait
+    for (std::size_t c = 0; c < occupied.size(); ++c) {
+      wanted_by.clear();
+      Cells::visit_around(occupied[c], [&](Cells::Name next) {
+        for (auto at = std::lower_bound(elsewhere.begin(), elsewhere.end(), std::pair{next, -1});
+             at != elsewhere.end() && at->first == next; ++at) {
+          wanted_by.push_back(at->second);
+        }
+      });
+      sort_unique(wanted_by);
+      for (const int rank : wanted_by) {
+        for (std::size_t k = begin[c]; k < begin[c + 1]; ++k) {
+          mine[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
+        }
+      }
+    }
+#pragma omp critical
+    for (std::size_t r = 0; r < each; ++r) {
+      send[r].insert(send[r].end(), mine[r].begin(), mine[r].end());
+    }
+  }
+  std::vector<SpreadPhyxels> received = ranks.exchanged(send);
+  Others others;
+  for (std::size_t r = 0; r < each; ++r) {
+    others.owner.insert(others.owner.end(), received[r].size(), static_cast<int>(r));
+  }
+  others.phyxels = joined(std::move(received));
+  return others;
+}
+
 }  // namespace
 
 std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies) {
@@ -190,35 +265,69 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
   const std::vector<Keyed> sorted = keyed(own);
   own = ordered(own, 0, own.size(), [&](std::size_t k) { return sorted[k].here; });
-  Index body = first_body, along = first_along;
-  for (SpreadPhyxel& p : own) {
-    if (p.body != body) body = p.body, along = 0;
-    p.along = along++;
+  const auto stretches = stretches_of_bodies(own);
+  for (const auto& [first, last] : stretches) {
+    // A rank's first body may have begun on another one.
+    const Index begun = first == 0 && own[0].body == first_body ? first_along : 0;
+#pragma omp parallel for schedule(static)
+    for (std::size_t k = first; k < last; ++k) {
+      own[k].along = begun + static_cast<Index>(k - first);
+    }
   }
   return own;
 }
 
-std::vector<Index> order_by_number(const SpreadPhyxels& phyxels) {
-  const auto n = static_cast<Index>(phyxels.size());
-  std::vector<std::pair<std::uint64_t, Index>> keys(phyxels.size());
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) {
-    keys[i] = {static_cast<std::uint64_t>(phyxels[i].body) << 32 |
-                   static_cast<std::uint64_t>(phyxels[i].number),
-               i};
+std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(
+    const SpreadPhyxels& phyxels) {
+  std::vector<std::pair<std::size_t, std::size_t>> stretches;
+  for (auto first = phyxels.begin(), last = first; first != phyxels.end(); first = last) {
+    last = std::partition_point(
+        first, phyxels.end(), [&](const SpreadPhyxel& p) { return p.body == first->body; });
+    stretches.emplace_back(first - phyxels.begin(), last - phyxels.begin());
   }
+  return stretches;
+}
+
+std::vector<Index> order_by_number(const SpreadPhyxels& phyxels) {
+  std::int64_t descents = 0;
+  const auto n = static_cast<Index>(phyxels.size());
+#pragma omp parallel for schedule(static) reduction(+ : descents)
+  for (Index i = 1; i < n; ++i) descents += numbered(phyxels[i]) < numbered(phyxels[i - 1]);
+  if (descents == 0) {
+    return tabulated(phyxels.size(), [](std::size_t i) { return static_cast<Index>(i); });
+  }
+  auto keys = tabulated(phyxels.size(), [&](std::size_t i) {
+    return std::pair(numbered(phyxels[i]), static_cast<Index>(i));
+  });
   parallel_sort(keys);
-  std::vector<Index> order(keys.size());
-#pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) order[i] = keys[i].second;
-  return order;
+  return tabulated(keys.size(), [&](std::size_t k) { return keys[k].second; });
 }
 
 SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
                              const std::vector<int>& owner) {
-  std::vector<SpreadPhyxels> send(static_cast<std::size_t>(ranks.size()));
-  for (std::size_t k = 0; k < own.size(); ++k) {
-    send[static_cast<std::size_t>(owner[k])].push_back(own[k]);
+  const auto parts = static_cast<std::size_t>(ranks.size());
+  // Threads take stretches; where each begins among what a rank gets.
+  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
+  const auto begin_of = [&](std::size_t stretch) { return own.size() * stretch / threads; };
+  std::vector<std::vector<std::size_t>> at(threads, std::vector<std::size_t>(parts, 0));
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t t = 0; t < threads; ++t) {
+    for (std::size_t k = begin_of(t); k < begin_of(t + 1); ++k) {
+      ++at[t][static_cast<std::size_t>(owner[k])];
+    }
+  }
+  std::vector<SpreadPhyxels> send(parts);
+  for (std::size_t r = 0; r < parts; ++r) {
+    std::size_t size = 0;
+    for (std::size_t t = 0; t < threads; ++t) size += std::exchange(at[t][r], size);
+    send[r].resize(size);
+  }
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t t = 0; t < threads; ++t) {
+    for (std::size_t k = begin_of(t); k < begin_of(t + 1); ++k) {
+      const auto r = static_cast<std::size_t>(owner[k]);
+      send[r][at[t][r]++] = own[k];
+    }
   }
   const SpreadPhyxels received = joined(ranks.exchanged(send));
   const std::vector<Index> order = order_by_number(received);
@@ -227,66 +336,36 @@ SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own
 
 Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
                       const std::vector<double>& reach, const std::vector<Box>& boxes) {
-  const Cells cells(reach, boxes);
-  const auto each = static_cast<std::size_t>(ranks.size());
-  const auto n = static_cast<Index>(own.size());
-  using Placed = std::pair<Cells::Name, Index>;
-  std::vector<Placed> here(own.size());
+  const Others others = of_others(ranks, own, Cells(reach, boxes));
+  // Both in the order of numbers, then each knows how many of the other come before it.
+  const std::vector<Index> own_order = order_by_number(own),
+                           order = order_by_number(others.phyxels);
+  const auto before = [](const SpreadPhyxels& phyxels, const std::vector<Index>& sorted,
+                         const SpreadPhyxel& p) {
+    return static_cast<std::size_t>(
+        std::partition_point(sorted.begin(), sorted.end(),
+                             [&](Index k) { return numbered(phyxels[k]) < numbered(p); }) -
+        sorted.begin());
+  };
+  Surrounded all;
+  all.phyxels.resize(own.size() + others.phyxels.size());
+  all.owner.resize(all.phyxels.size(), ranks.rank());
+  all.here.resize(all.phyxels.size(), -1);
 #pragma omp parallel for schedule(static)
-  for (Index i = 0; i < n; ++i) here[i] = {cells.name_of(own[i]), i};
-  parallel_sort(here);
-  std::vector<Cells::Name> occupied;
-  for (const auto& [name, i] : here) {
-    if (occupied.empty() || occupied.back() != name) occupied.push_back(name);
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const SpreadPhyxel& p = own[own_order[k]];
+    const std::size_t at = k + before(others.phyxels, order, p);
+    all.phyxels[at] = p;
+    all.here[at] = own_order[k];
   }
-  // Who is where.
-  std::vector<std::pair<Cells::Name, int>> others;
-  {
-    const auto from_each =
-        ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
-    for (std::size_t r = 0; r < each; ++r) {
-      if (static_cast<int>(r) == ranks.rank()) continue;
-      for (const Cells::Name name : from_each[r]) others.emplace_back(name, static_cast<int>(r));
-    }
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const SpreadPhyxel& p = others.phyxels[order[k]];
+    const std::size_t at = k + before(own, own_order, p);
+    all.phyxels[at] = p;
+    all.owner[at] = others.owner[order[k]];
   }
-  parallel_sort(others);
-  // Ranks that want what is in each cell.
-  std::vector<std::size_t> begin;  // of cells, in `here`
-  for (std::size_t k = 0; k < here.size(); ++k) {
-    if (k == 0 || here[k].first != here[k - 1].first) begin.push_back(k);
-  }
-  begin.push_back(here.size());
-  const std::size_t filled = begin.size() - 1;
-  std::vector<std::vector<int>> wanted_by(filled);
-#pragma omp parallel for schedule(dynamic, 256)
-  for (std::size_t c = 0; c < filled; ++c) {
-    Cells::visit_around(here[begin[c]].first, [&](Cells::Name next) {
-      for (auto at = std::lower_bound(others.begin(), others.end(), std::pair{next, -1});
-           at != others.end() && at->first == next; ++at) {
-        wanted_by[c].push_back(at->second);
-      }
-    });
-    sort_unique(wanted_by[c]);
-  }
-  std::vector<SpreadPhyxels> send(each);
-  for (std::size_t c = 0; c < filled; ++c) {
-    for (const int rank : wanted_by[c]) {
-      for (std::size_t k = begin[c]; k < begin[c + 1]; ++k) {
-        send[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
-      }
-    }
-  }
-  std::vector<SpreadPhyxels> received = ranks.exchanged(send);
-  received[static_cast<std::size_t>(ranks.rank())] = own;
-  std::vector<int> owner;
-  for (std::size_t r = 0; r < each; ++r) {
-    owner.insert(owner.end(), received[r].size(), static_cast<int>(r));
-  }
-  const SpreadPhyxels all = joined(std::move(received));
-  const std::vector<Index> order = order_by_number(all);
-  Surrounded result{ordered(all, 0, all.size(), [&](std::size_t k) { return order[k]; }), {}};
-  for (const Index k : order) result.owner.push_back(owner[k]);
-  return result;
+  return all;
 }
 
 std::vector<double> medians_of(const Communicator& ranks, std::vector<std::vector<double>> values) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "model/box.hpp"
@@ -39,6 +40,9 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
 SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
                              const std::vector<int>& owner);
 
+/// First and last of each body that is there, which follow each other.
+std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const SpreadPhyxels& phyxels);
+
 /// Which one is first, second, ... in the order of bodies and numbers.
 std::vector<Index> order_by_number(const SpreadPhyxels& phyxels);
 
@@ -46,6 +50,7 @@ std::vector<Index> order_by_number(const SpreadPhyxels& phyxels);
 struct Surrounded {
   SpreadPhyxels phyxels;   ///< In the order of bodies and numbers.
   std::vector<int> owner;  ///< Rank of each.
+  std::vector<Index> here;  ///< Which own one each is; -1: another rank's.
 };
 /// @param reach of each body [m]: all phyxels nearer than that to an own one are there, and others
 Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,

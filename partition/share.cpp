@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "tabulated.hpp"
+
 namespace phyxel {
 namespace {
 
@@ -39,7 +41,7 @@ class Maker {
     m.warnings = whole_.warnings;
     m.neighbourhood.symmetric = whole_.neighbourhood.symmetric;
     for (const Part& part : whole_.parts) add_part(part);
-    for (const Index i : out_.share.number) add_phyxel(i);
+    add_phyxels();
     add_surfels();
     for (const Motion& motion : whole_.motions) {
       m.motions.push_back(motion);
@@ -94,21 +96,28 @@ class Maker {
     out_.model.parts.push_back(own);
   }
 
-  void add_phyxel(Index i) {
+  /// Of each phyxel that is here, what the whole has of it.
+  template <class T>
+  std::vector<T> own_of(const std::vector<T>& whole) const {
+    const std::vector<Index>& number = out_.share.number;
+    return tabulated(number.size(), [&](std::size_t k) { return whole[number[k]]; });
+  }
+  void add_phyxels() {
     Model& m = out_.model;
-    out_.owner.push_back(part_of_[i]);
-    m.position.push_back(whole_.position[i]);
-    m.volume.push_back(whole_.volume[i]);
-    m.mass.push_back(whole_.mass[i]);
     Neighbourhood& hood = m.neighbourhood;
-    hood.support.push_back(whole_.neighbourhood.support[i]);
+    out_.owner = own_of(part_of_);
+    m.position = own_of(whole_.position);
+    m.volume = own_of(whole_.volume);
+    m.mass = own_of(whole_.mass);
+    hood.support = own_of(whole_.neighbourhood.support);
     if (!has_lists_) return;
-    m.inverse_moment.push_back(whole_.inverse_moment[i]);
-    m.moment_offset.push_back(whole_.moment_offset[i]);
-    const bool has_row = kind_[i] != far_ghost;
-    add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, has_row);
-    if (!hood.symmetric) {
-      add_row(hood.inverse_lists, whole_.neighbourhood.inverse_lists, i, kind_[i] == owned);
+    m.inverse_moment = own_of(whole_.inverse_moment);
+    m.moment_offset = own_of(whole_.moment_offset);
+    for (const Index i : out_.share.number) {
+      add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, kind_[i] != far_ghost);
+      if (!hood.symmetric) {
+        add_row(hood.inverse_lists, whole_.neighbourhood.inverse_lists, i, kind_[i] == owned);
+      }
     }
   }
   void add_row(Csr& to, const Csr& from, Index row, bool filled) const {

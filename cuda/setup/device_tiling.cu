@@ -450,6 +450,7 @@ DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_fo
     if (stride > most_halo) refuse_halo(stride);
 
     b.slots = {places * longest, what};
+    b.slots.clear();  // lists end before their room does, and all of it is copied
     for_each("name_slots", places_64,
              [tile_begin = tile_begin_.data() + first, longest, found = b.found.data(),
               length = b.length.data(), halo = b.halo.data(), points = b.points.data(),

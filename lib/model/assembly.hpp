@@ -69,6 +69,11 @@ struct BodySums {
     volume.add(v);
     moment.add(m * x);
   }
+  void add(const BodySums& other) {
+    mass.add(other.mass);
+    volume.add(other.volume);
+    moment.add(other.moment);
+  }
   void tell(Part& part) const;
 };
 

@@ -1,0 +1,92 @@
+/// What is done on many threads is what one thread would have done.
+#include <gmock/gmock.h>
+#include <omp.h>
+
+#include <numeric>
+#include <random>
+
+#include "exact_sum.hpp"
+#include "model/spatial_hash.hpp"
+#include "parallel_sort.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+class Threads : public ::testing::TestWithParam<int> {
+ protected:
+  void SetUp() override { omp_set_num_threads(GetParam()); }
+  void TearDown() override { omp_set_num_threads(before_); }
+  const int before_ = omp_get_max_threads();
+};
+
+/// More than two pieces' worth, so that there is something to bring together.
+constexpr int many = 400'000;
+
+TEST_P(Threads, SortAsOne) {
+  std::mt19937_64 engine(1);
+  // All different, few values many times, one or two.
+  for (const std::int64_t kinds : {std::int64_t{1} << 62, std::int64_t{7}, std::int64_t{1}}) {
+    std::vector<std::int64_t> values(many);
+    for (std::int64_t& v : values)
+      v = std::uniform_int_distribution<std::int64_t>(0, kinds)(engine);
+    std::vector<std::int64_t> expected = values;
+    std::sort(expected.begin(), expected.end());
+    parallel_sort(values);
+    EXPECT_TRUE(values == expected) << kinds;
+    parallel_sort(values);
+    EXPECT_TRUE(values == expected) << kinds;
+    parallel_sort(values, std::greater<>());
+    std::reverse(expected.begin(), expected.end());
+    EXPECT_TRUE(values == expected) << kinds;
+  }
+  for (const int few : {0, 1, 2, 70'000}) {
+    std::vector<int> values(static_cast<std::size_t>(few));
+    std::iota(values.rbegin(), values.rend(), 0);
+    parallel_sort(values);
+    EXPECT_TRUE(std::is_sorted(values.begin(), values.end())) << few;
+  }
+}
+
+TEST_P(Threads, HashPointsAsOne) {
+  std::mt19937_64 engine(2);
+  std::vector<Vec3d> points(5000);
+  std::uniform_real_distribution<double> anywhere(0, 1);
+  for (Vec3d& p : points) p = {anywhere(engine), anywhere(engine), anywhere(engine)};
+  const auto visited = [&] {
+    const SpatialHash hash(points, 0.1);
+    std::vector<Index> order;
+    hash.visit_all([&](const SpatialHash::Entry& e) {
+      EXPECT_EQ(e.position, points[e.index]);
+      order.push_back(e.index);
+    });
+    for (int k = 0; k < 50; ++k) {
+      hash.visit_near(points[k], 1, [&](const SpatialHash::Entry& e) { order.push_back(e.index); });
+    }
+    order.push_back(static_cast<Index>(1000 * hash.mean_occupancy()));
+    return order;
+  };
+  const std::vector<Index> here = visited();
+  omp_set_num_threads(1);
+  EXPECT_EQ(here, visited());
+  std::vector<Index> all(here.begin(), here.begin() + 5000);
+  std::sort(all.begin(), all.end());
+  for (Index i = 0; i < 5000; ++i) EXPECT_EQ(all[i], i);
+}
+
+TEST_P(Threads, FillAndAddAsOne) {
+  const auto squares = tabulated(1000, [](std::size_t k) { return k * k; });
+  ASSERT_EQ(squares.size(), 1000U);
+  for (std::size_t k = 0; k < 1000; ++k) EXPECT_EQ(squares[k], k * k);
+  EXPECT_TRUE(tabulated(0, [](std::size_t k) { return k; }).empty());
+  ExactSum one;
+  const auto term = [](int k) { return std::ldexp(1.0 / (k + 1), k % 200 - 100); };
+  for (int k = 3; k < 1000; ++k) one.add(term(k));
+  const auto all = added_up<ExactSum>(3, 1000, [&](ExactSum& sum, int k) { sum.add(term(k)); });
+  EXPECT_EQ(all.value(), one.value());
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Threads, ::testing::Values(1, 2, 3, 5));
+
+}  // namespace
+}  // namespace phyxel
