@@ -17,6 +17,8 @@ class Halo final : public Others {
   void add(std::span<std::int64_t> values) const override { ranks_.add(values); }
   double largest(double value) const override { return ranks_.largest(value); }
   double smallest(double value) const override { return ranks_.smallest(value); }
+  int rank() const override { return ranks_.rank(); }
+  int count() const override { return ranks_.size(); }
   const std::vector<Peer>& peers() const override { return peers_; }
   std::vector<std::vector<std::byte>> told(
       const std::vector<std::vector<std::byte>>& words) const override;

@@ -12,6 +12,7 @@
 #include "ensemble.hpp"
 #include "files/hdf5_file.hpp"
 #include "model/host_memory.hpp"
+#include "solver/nccl.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -74,8 +75,10 @@ std::string transport_of_ranks(const ChosenDevice& device) {
   const bool all_direct = ranks().smallest(std::int64_t{direct}) == 1;
   if (ranks().size() == 1) return "none: one rank";
   if (!device.gpu) return "MPI";
-  return all_direct ? "direct: stores into other GPUs' memory (CUDA IPC)"
-                    : "host: host memory and MPI";
+  if (all_direct) return "direct: stores into other GPUs' memory (CUDA IPC)";
+  const bool nccl = ranks().smallest(std::int64_t{cuda::has_nccl()}) == 1;
+  return nccl ? "nccl, where every rank has a GPU of its own; else host: host memory and MPI"
+              : "host: host memory and MPI";
 }
 
 Findings facts() {
@@ -98,6 +101,7 @@ Findings facts() {
           {"cuda", cuda_version()},
           {"gpus", gpu_facts(devices)},
           {"no_gpu_because", why},
+          {"nccl", cuda::nccl_version()},
           {"mpi", mpi_description()},
           {"ranks", places},
           {"hdf5", hdf5_version() + ", serial: the first rank writes"},
@@ -126,6 +130,7 @@ std::string table(const Findings& f) {
     if (gpu["usable"] != "yes") about += "; not usable: " + gpu["usable"].get<std::string>();
     line(fmt::format("cuda:{}", gpu["index"].get<int>()).c_str(), about);
   }
+  line("NCCL", text("nccl"));
   line("MPI", text("mpi"));
   line("HDF5", text("hdf5"));
   line("ranks", fmt::format("{}", f["ranks"].size()));

@@ -593,7 +593,7 @@ void add_run(CLI::App& program) {
       ->check(CLI::Range(1, 2));
   command
       ->add_option("--transport", options->transport,
-                   "How ranks' GPUs exchange: direct (stores into each other's memory), host "
+                   "How ranks' GPUs exchange: direct (stores into each other's memory), nccl, host "
                    "(MPI), or auto")
       ->check(CLI::IsMember(transport_names()));
   command->add_flag("--force", options->force,

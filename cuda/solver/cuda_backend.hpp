@@ -15,8 +15,9 @@ enum class CudaPath {
 
 /// How the GPUs of a share's ranks exchange ghosts' values; results are the same to the last bit.
 enum class Transport {
-  automatic,  ///< Direct where all ranks can, or else through the hosts.
+  automatic,  ///< The first of the following that all ranks can.
   direct,     ///< Stores into the memory of other ranks' GPUs, on one host: CUDA IPC.
+  nccl,       ///< NVIDIA's NCCL, where every rank has a GPU of its own.
   host,       ///< Through host memory, by MPI.
 };
 

@@ -3,8 +3,9 @@
 ///
 /// Two ways. *Direct*: kernels store the records where the other ranks' kernels read them and raise
 /// a flag there, for which those wait (peers.cuh); the passes of a step do so themselves. The host
-/// takes no part. *Host*: a kernel packs, the host copies, MPI carries. Either way `begin` and
-/// `finish` only queue what the device does, so that what is launched in between overlaps.
+/// takes no part. *Packed*: a kernel packs, and NCCL or the host and MPI carry, for which either
+/// way `begin` and `finish` only queue what the device does, so that what is launched in between
+/// overlaps.
 ///
 /// Nothing says that an array may be written again, because the order of a step says it: who sends
 /// stresses has received displacements, which their owner sends after it has read the stresses of
@@ -21,6 +22,7 @@
 
 #include "solver/cuda_backend.hpp"
 #include "solver/device_model.cuh"
+#include "solver/nccl.hpp"
 #include "solver/peers.cuh"
 
 namespace phyxel::cuda {
@@ -91,45 +93,126 @@ class PeerLists {
   DeviceArray<Index> on_device;
 };
 
-/// Exchanges through host memory.
-template <class Model>
-class HostExchange {
+/// Brings packed records to other ranks and theirs here, in a queue of its own.
+class Courier {
  public:
-  HostExchange(const Model& model, const PeerLists& send, const PeerLists& receive)
-      : m_(model), send_(send), receive_(receive) {}
+  virtual ~Courier() = default;
+  virtual void reserve(std::size_t outgoing, std::size_t incoming) = 0;
+  /// @param bytes_each of a record
+  virtual void begin(std::byte* packed, std::byte* arrived, std::size_t bytes_each) = 0;
+  /// What is queued from now on finds `arrived` filled.
+  virtual void finish(std::byte* arrived, std::size_t bytes_each) = 0;
+  virtual std::string describe() const = 0;
+  cudaStream_t queue() const { return queue_.get(); }
 
+ private:
+  Stream queue_;
+};
+
+/// Through host memory, by MPI.
+class HostCourier final : public Courier {
+ public:
+  HostCourier(const Others& others, const PeerLists& send, const PeerLists& receive)
+      : others_(others), send_(send), receive_(receive) {}
+
+  void reserve(std::size_t outgoing, std::size_t incoming) override {
+    outgoing_.reserve(outgoing);
+    incoming_.reserve(incoming);
+  }
+  void begin(std::byte* packed, std::byte*, std::size_t bytes_each) override {
+    copy(outgoing_.data(), packed, send_.places.size() * bytes_each, cudaMemcpyDeviceToHost);
+  }
+  void finish(std::byte* arrived, std::size_t bytes_each) override {
+    PHYXEL_CUDA(cudaStreamSynchronize(queue()));
+    others_.begin(send_.in(outgoing_.data(), bytes_each),
+                  receive_.in(incoming_.data(), bytes_each));
+    others_.finish();
+    copy(arrived, incoming_.data(), receive_.places.size() * bytes_each, cudaMemcpyHostToDevice);
+  }
+  std::string describe() const override { return "host memory and MPI"; }
+
+ private:
+  void copy(std::byte* to, const std::byte* from, std::size_t bytes, cudaMemcpyKind kind) const {
+    if (bytes > 0) PHYXEL_CUDA(cudaMemcpyAsync(to, from, bytes, kind, queue()));
+  }
+
+  const Others& others_;
+  const PeerLists &send_, &receive_;
+  PinnedBytes outgoing_, incoming_;
+};
+
+/// By NCCL; the host only queues.
+class NcclCourier final : public Courier {
+ public:
+  /// Collective. @throws DeviceError
+  NcclCourier(const Others& others, const NcclRanks::Name& name, const PeerLists& send,
+              const PeerLists& receive)
+      : others_(others),
+        ranks_(name, others.rank(), others.count()),
+        send_(send),
+        receive_(receive) {}
+
+  void reserve(std::size_t, std::size_t) override {}
+  void begin(std::byte* packed, std::byte* arrived, std::size_t bytes_each) override {
+    ranks_.exchange(messages(send_.in(packed, bytes_each)),
+                    messages(receive_.in(arrived, bytes_each)), queue());
+  }
+  void finish(std::byte*, std::size_t) override {}
+  std::string describe() const override { return "NCCL " + nccl_version(); }
+
+ private:
+  std::vector<NcclRanks::Message> messages(const Others::Bytes& of_peers) const {
+    std::vector<NcclRanks::Message> messages;
+    for (std::size_t p = 0; p < of_peers.size(); ++p) {
+      messages.push_back({others_.peers()[p].rank, of_peers[p]});
+    }
+    return messages;
+  }
+
+  const Others& others_;
+  NcclRanks ranks_;
+  const PeerLists &send_, &receive_;
+};
+
+/// Exchanges of records that are packed here and unpacked there.
+template <class Model>
+class PackedExchange {
+ public:
+  PackedExchange(const Model& model, const PeerLists& send, const PeerLists& receive)
+      : m_(model),
+        send_(send),
+        receive_(receive),
+        courier_(std::make_unique<HostCourier>(*model.share()->others, send, receive)) {}
+
+  /// From now on, between exchanges.
+  void send_by(std::unique_ptr<Courier> courier) {
+    courier_ = std::move(courier);
+    bytes_each_ = 0;
+  }
   template <class Records>
   void begin(const Records& records) {
     using Value = typename Records::Value;
     reserve(sizeof(Value));
     m_.launch_each("pack", pack<Records>, send_.count(), records, send_.on_device.data(),
                    send_.count(), reinterpret_cast<Value*>(packed_.data()));
-    // Copies have a queue of their own; it begins when all before has been packed.
+    // What carries has a queue of its own; it begins when all before has been packed.
     PHYXEL_CUDA(cudaEventRecord(packed_now_.get(), m_.stream()));
-    PHYXEL_CUDA(cudaStreamWaitEvent(copies_.get(), packed_now_.get()));
-    copy(outgoing_.data(), packed_.data(), send_.count() * sizeof(Value), cudaMemcpyDeviceToHost);
+    PHYXEL_CUDA(cudaStreamWaitEvent(courier_->queue(), packed_now_.get()));
+    courier_->begin(packed_.data(), arrived_.data(), sizeof(Value));
   }
   template <class Records>
   void finish(const Records& records) {
     using Value = typename Records::Value;
-    PHYXEL_CUDA(cudaStreamSynchronize(copies_.get()));
-    const Others& others = *m_.share()->others;
-    others.begin(send_.in(outgoing_.data(), sizeof(Value)),
-                 receive_.in(incoming_.data(), sizeof(Value)));
-    others.finish();
-    PHYXEL_CUDA(cudaMemcpyAsync(arrived_.data(), incoming_.data(), receive_.count() * sizeof(Value),
-                                cudaMemcpyHostToDevice, copies_.get()));
-    PHYXEL_CUDA(cudaEventRecord(arrived_now_.get(), copies_.get()));
+    courier_->finish(arrived_.data(), sizeof(Value));
+    PHYXEL_CUDA(cudaEventRecord(arrived_now_.get(), courier_->queue()));
     PHYXEL_CUDA(cudaStreamWaitEvent(m_.stream(), arrived_now_.get()));
     m_.launch_each("unpack", unpack<Records>, receive_.count(), records, receive_.on_device.data(),
                    receive_.count(), reinterpret_cast<const Value*>(arrived_.data()));
   }
+  std::string describe() const { return courier_->describe(); }
   std::size_t bytes() const { return packed_.bytes() + arrived_.bytes(); }
 
  private:
-  void copy(std::byte* to, const std::byte* from, std::size_t bytes, cudaMemcpyKind kind) const {
-    if (bytes > 0) PHYXEL_CUDA(cudaMemcpyAsync(to, from, bytes, kind, copies_.get()));
-  }
   /// Only between exchanges: nothing is under way.
   void reserve(std::size_t bytes_each) {
     if (bytes_each <= bytes_each_) return;
@@ -137,16 +220,14 @@ class HostExchange {
     bytes_each_ = bytes_each;
     packed_ = {send_.places.size() * bytes_each, "what other ranks get"};
     arrived_ = {receive_.places.size() * bytes_each, "what other ranks send"};
-    outgoing_.reserve(packed_.size());
-    incoming_.reserve(arrived_.size());
+    courier_->reserve(packed_.size(), arrived_.size());
   }
 
   const Model& m_;
   const PeerLists &send_, &receive_;
+  std::unique_ptr<Courier> courier_;
   std::size_t bytes_each_ = 0;
   DeviceArray<std::byte> packed_, arrived_;
-  PinnedBytes outgoing_, incoming_;
-  Stream copies_;
   Event packed_now_, arrived_now_;
 };
 
@@ -367,8 +448,13 @@ class DeviceHalo {
       : m_(model),
         send_(others().peers(), &Peer::send, model.tiling().place),
         receive_(others().peers(), &Peer::receive, model.tiling().place),
-        host_(model, send_, receive_) {
-    if (wanted != Transport::host) open_direct(wanted == Transport::direct);
+        packed_(model, send_, receive_) {
+    if (wanted == Transport::automatic || wanted == Transport::direct) {
+      open_direct(wanted == Transport::direct);
+    }
+    if (wanted == Transport::nccl || (wanted == Transport::automatic && !direct_)) {
+      open_nccl(wanted == Transport::nccl);
+    }
   }
   DeviceHalo(const DeviceHalo&) = delete;
   DeviceHalo& operator=(const DeviceHalo&) = delete;
@@ -383,9 +469,9 @@ class DeviceHalo {
     if (direct_) {
       direct_->begin(what);
     } else if (what == Sent::stresses) {
-      host_.begin(m_.fields().stresses);
+      packed_.begin(m_.fields().stresses);
     } else {
-      host_.begin(m_.fields().points);
+      packed_.begin(m_.fields().points);
     }
   }
   /// What is launched from now on sees ghosts' values. Nothing happens if nothing is under way.
@@ -394,9 +480,9 @@ class DeviceHalo {
     if (direct_) {
       direct_->finish(what);
     } else if (what == Sent::stresses) {
-      host_.finish(m_.fields().stresses);
+      packed_.finish(m_.fields().stresses);
     } else {
-      host_.finish(m_.fields().points);
+      packed_.finish(m_.fields().points);
     }
   }
   /// What a pass has to do that takes in one kind of value and sends the other by itself, as all
@@ -410,11 +496,11 @@ class DeviceHalo {
     return std::exchange(under_way_[static_cast<int>(awaited)], false);
   }
   bool is_under_way(Sent what) const { return under_way_[static_cast<int>(what)]; }
-  /// Other values, at once, through the host.
+  /// Other values, at once.
   template <class Records>
   void exchange(const Records& records) const {
-    host_.begin(records);
-    host_.finish(records);
+    packed_.begin(records);
+    packed_.finish(records);
   }
 
   bool is_direct() const { return direct_ != nullptr; }
@@ -424,13 +510,13 @@ class DeviceHalo {
                    (Stresses<Real>::bytes + Points<Real>::bytes);
   }
   std::string describe() const {
-    return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : "host memory and MPI";
+    return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : packed_.describe();
   }
   Traffic traffic() const {
     return {bytes_sent_, direct_ ? direct_->waited_seconds() : others().traffic().seconds};
   }
   std::size_t bytes() const {
-    return send_.on_device.bytes() + receive_.on_device.bytes() + host_.bytes() +
+    return send_.on_device.bytes() + receive_.on_device.bytes() + packed_.bytes() +
            (direct_ ? direct_->bytes() : 0);
   }
 
@@ -462,12 +548,41 @@ class DeviceHalo {
     direct_.reset();
     if (!insist) return;
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";
-    throw DeviceError("--transport direct: " + trouble + "; allowed here: host, auto");
+    throw DeviceError("--transport direct: " + trouble + "; allowed here: nccl, host, auto");
+  }
+  /// One rank names the ranks, for all.
+  void open_nccl(bool insist) {
+    std::string trouble;
+    NcclRanks::Name name{};
+    const auto agree = [&](bool fine) { return others().smallest(fine) > 0; };
+    const auto attempt = [&](auto&& work) {
+      try {
+        work();
+      } catch (const DeviceError& error) {
+        trouble = error.what();
+      }
+      return agree(trouble.empty());
+    };
+    const bool named = attempt([&] {
+      if (!has_nccl()) throw DeviceError(nccl_version());
+      if (others().rank() == 0) name = NcclRanks::make_name();
+    });
+    if (named) {
+      others().add(name);
+      std::unique_ptr<Courier> courier;
+      if (attempt(
+              [&] { courier = std::make_unique<NcclCourier>(others(), name, send_, receive_); })) {
+        return packed_.send_by(std::move(courier));
+      }
+    }
+    if (!insist) return;
+    if (trouble.empty()) trouble = "another rank cannot use NCCL";
+    throw DeviceError("--transport nccl: " + trouble + "; allowed here: direct, host, auto");
   }
 
   const Model& m_;
   PeerLists send_, receive_;
-  mutable HostExchange<Model> host_;
+  mutable PackedExchange<Model> packed_;
   std::unique_ptr<DirectExchange<Real, StateReal>> direct_;
   mutable bool under_way_[kinds_sent]{};
   mutable std::int64_t bytes_sent_ = 0;

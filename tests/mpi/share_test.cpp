@@ -13,6 +13,7 @@
 #include "ranks.hpp"
 #include "setup/tiling.hpp"
 #include "solver/cuda_backend.hpp"
+#include "solver/nccl.hpp"
 
 namespace phyxel {
 namespace {
@@ -63,14 +64,18 @@ const Model& whole_of(const ShareCase& c) {
 }
 
 /// What steps a share, and how values travel.
-enum class Way { one_ring, two_rings, gpu_direct, gpu_host };
+enum class Way { one_ring, two_rings, gpu_direct, gpu_nccl, gpu_host };
 
 class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
  protected:
-  bool on_gpus() const { return way_ == Way::gpu_direct || way_ == Way::gpu_host; }
+  bool on_gpus() const { return way_ >= Way::gpu_direct; }
   void SetUp() override {
     if (on_gpus() && world().smallest(std::int64_t{!cuda_devices().empty()}) == 0) {
       GTEST_SKIP() << "no CUDA device";
+    }
+    const bool own_gpu = static_cast<int>(cuda_devices().size()) >= world().host_size();
+    if (way_ == Way::gpu_nccl && world().smallest(std::int64_t{own_gpu && cuda::has_nccl()}) == 0) {
+      GTEST_SKIP() << "NCCL needs a GPU for each rank, and itself: " << cuda::nccl_version();
     }
     const int rings = way_ == Way::two_rings ? 2 : 1, parts = world().size();
     const Graph graph = phyxel_graph(whole_);
@@ -93,7 +98,17 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
     if (!on_gpus()) return make_cpu_backend(model, precision, 1);
     const auto devices = static_cast<int>(cuda_devices().size());
     return make_cuda_backend(model, precision, world().host_rank() % devices, CudaPath::automatic,
-                             way_ == Way::gpu_direct ? Transport::direct : Transport::host);
+                             transport());
+  }
+  Transport transport() const {
+    switch (way_) {
+      case Way::gpu_direct:
+        return Transport::direct;
+      case Way::gpu_nccl:
+        return Transport::nccl;
+      default:
+        return Transport::host;
+    }
   }
   State start(const Model& model) const {
     State state;
@@ -219,14 +234,15 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
 }
 
 std::string name_of(const ::testing::TestParamInfo<std::tuple<ShareCase, Way>>& test) {
-  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuHost"};
+  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuNccl", "GpuHost"};
   const auto& [body, way] = test.param;
   return std::string(body.name) + ways[static_cast<int>(way)];
 }
 INSTANTIATE_TEST_SUITE_P(Bodies, Shares,
                          ::testing::Combine(::testing::ValuesIn(share_cases()),
                                             ::testing::Values(Way::one_ring, Way::two_rings,
-                                                              Way::gpu_direct, Way::gpu_host)),
+                                                              Way::gpu_direct, Way::gpu_nccl,
+                                                              Way::gpu_host)),
                          name_of);
 
 }  // namespace

@@ -48,6 +48,8 @@ class Others {
   virtual double largest(double value) const = 0;
   virtual double smallest(double value) const = 0;
 
+  virtual int rank() const = 0;
+  virtual int count() const = 0;  ///< Of all ranks.
   virtual const std::vector<Peer>& peers() const = 0;
   /// What each peer is told, by peer, and so what they tell.
   virtual std::vector<std::vector<std::byte>> told(
