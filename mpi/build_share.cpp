@@ -626,6 +626,7 @@ class Builder {
       part.neighbourhood = in_words(request.neighbourhood);
       part.kernel_volumes = bodies_[b].kernel_volumes;
       part.size = bodies_[b].size;
+      part.surfels = static_cast<Index>(surfaces_[b].position.size());
       part.origin = bodies_[b].origin;
       lists[b].fewest = bodies_[b].size;
       for (Index i = part.begin; i < part.end; ++i) {

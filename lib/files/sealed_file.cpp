@@ -71,13 +71,19 @@ std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
 
 }  // namespace
 
-void write_sealed(const fs::path& file, const std::string& kind, std::span<const std::byte> content,
+void write_sealed(const fs::path& file, const std::string& kind, const Content& content,
                   Durable durable) {
+  NewFile out(file, seal_size + content.size);
   Digest digest;
-  digest.add(content.data(), content.size());
-  const auto seal = seal_of(kind, content.size(), digest.hex());
-  const std::span<const std::byte> pieces[] = {std::as_bytes(std::span(seal)), content};
-  write_whole_file(file, pieces, durable);
+  std::uint64_t at = seal_size;
+  content.produce([&](std::span<const std::byte> bytes) {
+    digest.add(bytes.data(), bytes.size());
+    out.write(at, bytes);
+    at += bytes.size();
+  });
+  const auto seal = seal_of(kind, content.size, digest.hex());
+  out.write(0, std::as_bytes(std::span(seal)));
+  out.finish(durable);
 }
 
 void seal_in_place(const fs::path& file, const std::string& kind) {
