@@ -17,12 +17,12 @@ StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& num
   return places;
 }
 
-StretchExchange::Places::Range StretchExchange::Places::within(Index begin, Index end) const {
+StretchExchange::Places::Range StretchExchange::Places::within(Stretch stretch) const {
   const auto before = [&](Index limit) {
     return static_cast<std::size_t>(std::lower_bound(number.begin(), number.end(), limit) -
                                     number.begin());
   };
-  return {before(begin), before(end)};
+  return {before(stretch.begin), before(stretch.end)};
 }
 
 StretchExchange::StretchExchange(const Communicator& ranks, const Model& share)
@@ -31,33 +31,42 @@ StretchExchange::StretchExchange(const Communicator& ranks, const Model& share)
       own_(places_of(share.share->number, [&](Index i) { return share.owns(i); })),
       surfels_(places_of(share.share->surfel_number, [](Index) { return true; })) {}
 
-std::vector<double> StretchExchange::gathered(Quantity quantity, std::span<const double> here,
-                                              Index begin, Index end) const {
+std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const double> here,
+                                             std::span<const Stretch> wanted) const {
   const Places& places = is_of_surfels(quantity) ? surfels_ : own_;
   const std::size_t width = width_of(quantity);
-  const Places::Range range = places.within(begin, end);
-  std::vector<std::vector<Index>> numbers(static_cast<std::size_t>(ranks_.size()));
-  std::vector<std::vector<double>> values(numbers.size());
-  for (std::size_t k = range.begin; k < range.end; ++k) {
-    const auto value = here.subspan(width * static_cast<std::size_t>(places.here[k]), width);
-    numbers[0].push_back(places.number[k]);
-    values[0].insert(values[0].end(), value.begin(), value.end());
+  std::vector<std::vector<Index>> numbers(wanted.size());
+  std::vector<std::vector<double>> values(wanted.size());
+  for (std::size_t r = 0; r < wanted.size(); ++r) {
+    const Places::Range range = places.within(wanted[r]);
+    for (std::size_t k = range.begin; k < range.end; ++k) {
+      const auto value = here.subspan(width * static_cast<std::size_t>(places.here[k]), width);
+      numbers[r].push_back(places.number[k]);
+      values[r].insert(values[r].end(), value.begin(), value.end());
+    }
   }
   numbers = ranks_.exchanged(numbers);
   values = ranks_.exchanged(values);
-  if (ranks_.rank() != 0) return {};
-  std::vector<double> all(width * static_cast<std::size_t>(end - begin));
+  const Stretch own = wanted[static_cast<std::size_t>(ranks_.rank())];
+  std::vector<double> all(width * static_cast<std::size_t>(own.end - own.begin));
   for (std::size_t r = 0; r < numbers.size(); ++r) {
     for (std::size_t k = 0; k < numbers[r].size(); ++k) {
-      const auto row = static_cast<std::size_t>(numbers[r][k] - begin);
+      const auto row = static_cast<std::size_t>(numbers[r][k] - own.begin);
       std::copy_n(values[r].data() + width * k, width, all.data() + width * row);
     }
   }
   return all;
 }
 
-State StretchExchange::scattered(
-    Index length, const std::function<State(Index begin, Index end)>& read) const {
+std::vector<double> StretchExchange::gathered(Quantity quantity, std::span<const double> here,
+                                              Stretch wanted) const {
+  std::vector<Stretch> of_ranks(static_cast<std::size_t>(ranks_.size()));
+  of_ranks[0] = wanted;
+  return brought(quantity, here, of_ranks);
+}
+
+State StretchExchange::scattered(Index length,
+                                 const std::function<State(Index begin, Index end)>& read) const {
   const Places places = places_of(share_.share->number, [](Index) { return true; });
   const Index all = share_.whole_size();
   State state;
@@ -71,7 +80,7 @@ State StretchExchange::scattered(
     });
     some.displacement = ranks_.broadcast(std::move(some.displacement));
     some.velocity = ranks_.broadcast(std::move(some.velocity));
-    const Places::Range range = places.within(begin, end);
+    const Places::Range range = places.within({begin, end});
     for (std::size_t k = range.begin; k < range.end; ++k) {
       const auto row = static_cast<std::size_t>(places.number[k] - begin);
       state.displacement[places.here[k]] = some.displacement[row];

@@ -18,11 +18,18 @@ class StretchExchange {
   /// @param share must outlive this
   StretchExchange(const Communicator& ranks, const Model& share);
 
-  /// Those of the whole model's phyxels, or surfels, `begin` to `end` on the first rank; nothing on
-  /// the others. Collective.
+  /// Some of the whole model's phyxels, or surfels.
+  struct Stretch {
+    Index begin = 0, end = 0;
+  };
+  /// The values of the stretch that this rank is to have. Collective.
   /// @param here of all phyxels or surfels of this rank
-  std::vector<double> gathered(Quantity quantity, std::span<const double> here, Index begin,
-                               Index end) const;
+  /// @param wanted what each rank is to have
+  std::vector<double> brought(Quantity quantity, std::span<const double> here,
+                              std::span<const Stretch> wanted) const;
+  /// The same, on the first rank alone.
+  std::vector<double> gathered(Quantity quantity, std::span<const double> here,
+                               Stretch wanted) const;
 
   /// This rank's share of a state, at most `length` phyxels of which are in any other memory.
   /// Collective.
@@ -37,7 +44,7 @@ class StretchExchange {
     struct Range {
       std::size_t begin, end;
     };
-    Range within(Index begin, Index end) const;
+    Range within(Stretch stretch) const;
   };
   template <class Wanted>
   static Places places_of(const std::vector<Index>& numbers, Wanted&& wanted);

@@ -12,6 +12,7 @@
 #include "ensemble.hpp"
 #include "files/hdf5_file.hpp"
 #include "model/host_memory.hpp"
+#include "mpi/parallel_file.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -100,7 +101,8 @@ Findings facts() {
           {"no_gpu_because", why},
           {"mpi", mpi_description()},
           {"ranks", places},
-          {"hdf5", hdf5_version() + ", serial: the first rank writes"},
+          {"hdf5", hdf5_version() + (can_write_together() ? ", parallel: all ranks write"
+                                                          : ", serial: the first rank writes")},
           {"device", chosen},
           {"transport", transport}};
 }

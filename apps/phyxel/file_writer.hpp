@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "background_writer.hpp"
@@ -27,9 +28,10 @@ struct Moment {
 /// Has files written on the first rank, on a thread of its own, one after the other, while all go
 /// on. On several ranks that thread asks for a stretch at a time, and ranks bring it when they
 /// `serve`: they keep their own values of a moment until its file is there, and the first rank a
-/// stretch more. MPI is used by the thread that steps alone, and HDF5 by the writer's alone.
-/// At most two files are open, the one being written and one that waits. Every function is
-/// collective, and throws on all ranks what a job threw.
+/// stretch more. With parallel HDF5, long arrays are written by all of them at once. MPI is used by
+/// the thread that steps alone, and HDF5 by the writer's alone. At most two files are open, the one
+/// being written and one that waits. Every function is collective, and throws on all ranks what a
+/// job threw.
 class FileWriter {
  public:
   /// Called on the first rank's thread, with values that its thread alone may ask for.
@@ -57,16 +59,25 @@ class FileWriter {
   struct Call {
     std::int64_t done = 0;  // files, since the start
     bool failed = false;
-    bool asks = false;  // for a stretch of the file that is open
+    enum class Ask { nothing, stretch, array } ask = Ask::nothing;  // of the file that is open
     Quantity quantity{};
-    Index begin = 0, end = 0;
+    StretchExchange::Stretch stretch;
+  };
+  /// What is to be written together.
+  struct Array {
+    std::string file;
+    FileArray array;
   };
 
   static bool alone() { return ranks().size() == 1; }
   static bool leads() { return ranks().rank() == 0; }
   void serve(bool wait);
   Call next_call(bool wait);
-  std::vector<double> asked(Quantity quantity, Index begin, Index end);
+  std::vector<double> asked(Quantity quantity, StretchExchange::Stretch stretch);
+  void have_written(Array array);
+  std::vector<double> answered(std::unique_lock<std::mutex>& lock);
+  std::span<const double> own_values(Quantity quantity) const;
+  void write_array() const;
   void ended(bool well);
 
   const Ensemble& ensemble_;
@@ -78,6 +89,7 @@ class FileWriter {
   std::mutex mutex_;
   std::condition_variable changed_;
   Call call_;
+  Array array_;  // if it asks for one
   std::optional<std::vector<double>> answer_;
   bool leaving_ = false;
 

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -74,7 +75,7 @@ void sync_folder(const fs::path& file) {
 
 NewFile::NewFile(const fs::path& file, std::uint64_t size)
     : file_(file), temporary_(file.string() + ".tmp"), size_(size) {
-  fd_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  fd_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (fd_ < 0) phyxel::fail(file_, "cannot be written", errno);
   if (size == 0) return;
   int error = 0;
@@ -100,6 +101,19 @@ void NewFile::fail(int error) {
 
 void NewFile::write(std::uint64_t at, std::span<const std::byte> bytes) {
   if (const int error = write_all(fd_, bytes, static_cast<off_t>(at))) fail(error);
+}
+
+void NewFile::read(std::uint64_t at, std::uint64_t count,
+                   const std::function<void(std::span<const std::byte>)>& take) {
+  std::vector<std::byte> some(std::min<std::uint64_t>(count, std::uint64_t{16} << 20));
+  for (const std::uint64_t end = at + count; at < end;) {
+    const ssize_t got = ::pread(fd_, some.data(), std::min<std::uint64_t>(some.size(), end - at),
+                                static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) fail(got < 0 ? errno : EIO);
+    take({some.data(), static_cast<std::size_t>(got)});
+    at += static_cast<std::uint64_t>(got);
+  }
 }
 
 void NewFile::finish(Durable durable) {

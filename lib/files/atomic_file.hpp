@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace phyxel {
 
@@ -26,6 +27,10 @@ class NewFile {
 
   /// @throws OutputError.
   void write(std::uint64_t at, std::span<const std::byte> bytes);
+  /// Some of what is there by now, piece by piece. @throws OutputError.
+  void read(std::uint64_t at, std::uint64_t count,
+            const std::function<void(std::span<const std::byte>)>& take);
+  const std::filesystem::path& temporary() const { return temporary_; }
   /// Renames it. @throws OutputError.
   void finish(Durable durable);
 
@@ -37,11 +42,18 @@ class NewFile {
   int fd_ = -1;
 };
 
-/// Bytes of known number, handed over from the first to the last, piece by piece.
+/// Bytes of known number, handed over from the first to the last.
 struct Content {
   using Sink = std::function<void(std::span<const std::byte>)>;
+  struct Piece {
+    std::uint64_t bytes = 0;
+    std::function<void(const Sink&)> produce;  ///< Null: comes by `write_together`.
+    bool is_layout = false;                    ///< What tells where all else is.
+  };
   std::uint64_t size = 0;
-  std::function<void(const Sink&)> produce;
+  std::vector<Piece> pieces;
+  /// Puts pieces into a file whose layout is there, which it may change; null: there are none.
+  std::function<void(const std::filesystem::path& file)> write_together;
 };
 
 /// Writes a file, whole or not at all. @throws OutputError, as `NewFile`.

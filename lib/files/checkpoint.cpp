@@ -87,8 +87,8 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   out.attribute("/state", "time", state.time);
   out.attribute("/state", "dt", state.dt);
   const bool as_float = info.precision == Precision::single;
-  write_later(out, "/state/displacement", as_float, Quantity::displacement, phyxels, values);
-  write_later(out, "/state/velocity", as_float, Quantity::velocity, phyxels, values);
+  write_later(out, {"/state/displacement", as_float, phyxels, {Quantity::displacement}}, values);
+  write_later(out, {"/state/velocity", as_float, phyxels, {Quantity::velocity}}, values);
 
   const fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);

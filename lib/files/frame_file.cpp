@@ -62,29 +62,35 @@ void write_counts(Hdf5Writer& out, std::int64_t points, std::int64_t cells,
   count("/VTKHDF/NumberOfConnectivityIds", connectivity);
 }
 
-/// Rows of an array from those of a quantity, in the type they are stored as.
+/// Rows of an array, in the type they are stored as.
 template <class T>
-Hdf5Writer::Fill<T> rows_of(Quantity quantity, Stretches& values) {
-  return [quantity, &values](std::size_t first, std::span<T> rows) {
+Hdf5Writer::Fill<T> rows_of(const FileArray& array, Stretches& values) {
+  return [terms = array.terms, &values](std::size_t first, std::span<T> rows) {
     const auto begin = static_cast<Index>(first);
-    const auto count = static_cast<Index>(rows.size() / width_of(quantity));
-    const std::span<const double> found = values.values(quantity, begin, begin + count);
-    std::transform(found.begin(), found.end(), rows.begin(),
+    const Index end = begin + static_cast<Index>(rows.size() / width_of(terms[0]));
+    const std::span<const double> found = values.values(terms[0], begin, end);
+    std::vector<double> sum(found.begin(), found.end());
+    for (std::size_t t = 1; t < terms.size(); ++t) {
+      const std::span<const double> more = values.values(terms[t], begin, end);
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+    }
+    std::transform(sum.begin(), sum.end(), rows.begin(),
                    [](double value) { return static_cast<T>(value); });
   };
 }
 
-/// Deformed positions of phyxels.
 template <class T>
-Hdf5Writer::Fill<T> points_of(Stretches& values) {
-  return [&values](std::size_t first, std::span<T> rows) {
-    const auto begin = static_cast<Index>(first);
-    const Index end = begin + static_cast<Index>(rows.size() / 3);
-    const std::span<const double> at_rest = values.values(Quantity::position, begin, end);
-    std::vector<double> point(at_rest.begin(), at_rest.end());
-    const std::span<const double> moved = values.values(Quantity::displacement, begin, end);
-    for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = static_cast<T>(point[k] + moved[k]);
-  };
+void write_rows(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+  const std::size_t width = width_of(array.terms[0]), columns = width > 1 ? width : 0;
+  const auto rows = static_cast<std::size_t>(array.count);
+  if (values.writes_together(array.count)) {
+    out.together<T>(array.path, rows, columns, [array, &values](const std::filesystem::path& file) {
+      values.write_together(file, array);
+    });
+  } else {
+    out.later<T>(array.path, rows, columns, static_cast<std::size_t>(values.length()),
+                 rows_of<T>(array, values));
+  }
 }
 
 /// 0, 1, 2, ... times `step`.
@@ -109,16 +115,9 @@ Hdf5Writer::Fill<Index> bodies(std::vector<std::int64_t> ends) {
 
 }  // namespace
 
-void write_later(Hdf5Writer& out, const std::string& path, bool as_float, Quantity quantity,
-                 Index count, Stretches& values) {
-  const std::size_t width = width_of(quantity), columns = width > 1 ? width : 0;
-  const auto rows = static_cast<std::size_t>(count);
-  const auto stretch = static_cast<std::size_t>(values.length());
-  if (as_float) {
-    out.later<float>(path, rows, columns, stretch, rows_of<float>(quantity, values));
-  } else {
-    out.later<double>(path, rows, columns, stretch, rows_of<double>(quantity, values));
-  }
+void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+  if (array.as_float) return write_rows<float>(out, array, values);
+  write_rows<double>(out, array, values);
 }
 
 std::span<const DiagnosticColumn> diagnostic_columns() {
@@ -159,17 +158,14 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
 
   Hdf5Writer out;
   write_counts(out, n, static_cast<std::int64_t>(cells), n);
-  if (as_float) {
-    out.later<float>("/VTKHDF/Points", rows, 3, stretch, points_of<float>(values));
-  } else {
-    out.later<double>("/VTKHDF/Points", rows, 3, stretch, points_of<double>(values));
-  }
+  write_later(out, {"/VTKHDF/Points", as_float, n, {Quantity::position, Quantity::displacement}},
+              values);
   out.array<std::uint8_t>("/VTKHDF/Types", std::vector<std::uint8_t>(cells, vtk_poly_vertex));
   out.later<std::int64_t>("/VTKHDF/Connectivity", rows, 0, stretch, counting(1));
   out.array<std::int64_t>("/VTKHDF/Offsets", offsets);
   out.group("/VTKHDF/PointData");
   const auto field = [&](const char* name, bool in_float, Quantity quantity) {
-    write_later(out, std::string("/VTKHDF/PointData/") + name, in_float, quantity, n, values);
+    write_later(out, {std::string("/VTKHDF/PointData/") + name, in_float, n, {quantity}}, values);
   };
   if (wants(scene, "displacement")) field("displacement", as_float, Quantity::displacement);
   if (wants(scene, "velocity")) field("velocity", as_float, Quantity::velocity);
@@ -195,8 +191,10 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
 
   Hdf5Writer out;
   write_counts(out, points, static_cast<std::int64_t>(cells), static_cast<std::int64_t>(3 * cells));
-  write_later(out, "/VTKHDF/Points", scene.solver.precision == Precision::single,
-              Quantity::surfel_position, static_cast<Index>(points), values);
+  const auto vectors = [&](const char* path, bool as_float, Quantity quantity) {
+    write_later(out, {path, as_float, static_cast<Index>(points), {quantity}}, values);
+  };
+  vectors("/VTKHDF/Points", scene.solver.precision == Precision::single, Quantity::surfel_position);
   out.later<std::uint8_t>("/VTKHDF/Types", cells, 0, stretch,
                           [](std::size_t, std::span<std::uint8_t> types) {
                             std::fill(types.begin(), types.end(), vtk_triangle);
@@ -209,8 +207,7 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
                           });
   out.later<std::int64_t>("/VTKHDF/Offsets", cells + 1, 0, stretch, counting(3));
   out.group("/VTKHDF/PointData");
-  write_later(out, "/VTKHDF/PointData/Normals", true, Quantity::surfel_normal,
-              static_cast<Index>(points), values);
+  vectors("/VTKHDF/PointData/Normals", true, Quantity::surfel_normal);
   if (model.parts.size() > 1) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }

@@ -32,8 +32,7 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
                          const Diagnostics& diagnostics, Stretches& values);
 
 class Hdf5Writer;
-/// A quantity of `count` phyxels or surfels, which comes when the file is written.
-void write_later(Hdf5Writer& out, const std::string& path, bool as_float, Quantity quantity,
-                 Index count, Stretches& values);
+/// An array that comes when the file is written.
+void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values);
 
 }  // namespace phyxel

@@ -97,6 +97,19 @@ void set_versions(hid_t access) {
   H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
 }
 
+/// Hands over a stretch of the layout.
+std::function<void(const Content::Sink&)> from_memory(std::shared_ptr<const SparseBytes> memory,
+                                                      std::uint64_t begin, std::uint64_t end) {
+  return [=, memory = std::move(memory)](const Content::Sink& sink) {
+    std::vector<std::byte> some;
+    for (std::uint64_t at = begin; at < end; at += some.size()) {
+      some.resize(std::min<std::uint64_t>(end - at, std::uint64_t{1} << 20));
+      memory->read(at, some);
+      sink(some);
+    }
+  };
+}
+
 }  // namespace
 
 // --- Writing ------------------------------------------------------------------------------------
@@ -137,15 +150,20 @@ void Hdf5Writer::array(const std::string& path, std::span<const T> values, std::
 }
 
 template <class T>
-void Hdf5Writer::later(const std::string& path, std::size_t rows, std::size_t columns,
-                       std::size_t stretch, Fill<T> fill) {
-  const std::size_t width = std::max<std::size_t>(columns, 1);
+std::uint64_t Hdf5Writer::place(const std::string& path, std::size_t rows, std::size_t columns) {
   reserve<T>(path, rows, columns);
-  if (rows == 0) return;
-  this->rows<T>(path, 0, std::vector<T>(width), columns);  // gives it its place
+  this->rows<T>(path, 0, std::vector<T>(std::max<std::size_t>(columns, 1)), columns);
   const Handle array(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
   const haddr_t at = H5Dget_offset(array);
   demand(at != HADDR_UNDEF, name_, path);
+  return at;
+}
+
+template <class T>
+void Hdf5Writer::later(const std::string& path, std::size_t rows, std::size_t columns,
+                       std::size_t stretch, Fill<T> fill) {
+  if (rows == 0) return reserve<T>(path, rows, columns);
+  const std::size_t width = std::max<std::size_t>(columns, 1);
   const auto produce = [=, fill = std::move(fill)](const Content::Sink& sink) {
     std::vector<T> values;
     for (std::size_t first = 0; first < rows; first += stretch) {
@@ -154,7 +172,15 @@ void Hdf5Writer::later(const std::string& path, std::size_t rows, std::size_t co
       sink(std::as_bytes(std::span(values)));
     }
   };
-  later_.push_back({at, rows * width * sizeof(T), produce});
+  later_.push_back({place<T>(path, rows, columns), {rows * width * sizeof(T), produce}});
+}
+
+template <class T>
+void Hdf5Writer::together(const std::string& path, std::size_t rows, std::size_t columns,
+                          std::function<void(const std::filesystem::path& file)> write) {
+  const std::size_t bytes = rows * std::max<std::size_t>(columns, 1) * sizeof(T);
+  later_.push_back({place<T>(path, rows, columns), {bytes, nullptr}});
+  together_.push_back(std::move(write));
 }
 
 void Hdf5Writer::vectors(const std::string& path, std::span<const Vec3d> values, bool as_float) {
@@ -227,24 +253,24 @@ Content Hdf5Writer::content() {
   close();
   std::sort(later_.begin(), later_.end(),
             [](const Later& a, const Later& b) { return a.at < b.at; });
-  const auto produce = [memory = memory_, later = std::move(later_)](const Content::Sink& sink) {
-    std::uint64_t done = 0;
-    const auto from_memory = [&](std::uint64_t end) {
-      std::vector<std::byte> some;
-      for (; done < end; done += some.size()) {
-        some.resize(std::min<std::uint64_t>(end - done, std::uint64_t{1} << 20));
-        memory->read(done, some);
-        sink(some);
-      }
-    };
-    for (const Later& array : later) {
-      from_memory(array.at);
-      array.produce(sink);
-      done += array.bytes;
-    }
-    from_memory(memory->size());
+  Content content{memory_->size(), {}, nullptr};
+  std::uint64_t done = 0;
+  const auto add_layout = [&](std::uint64_t end) {
+    content.pieces.push_back({end - done, from_memory(memory_, done, end), true});
+    done = end;
   };
-  return {memory_->size(), produce};
+  for (Later& array : later_) {
+    add_layout(array.at);
+    done += array.piece.bytes;
+    content.pieces.push_back(std::move(array.piece));
+  }
+  add_layout(content.size);
+  if (!together_.empty()) {
+    content.write_together = [all = std::move(together_)](const std::filesystem::path& file) {
+      for (const auto& write : all) write(file);
+    };
+  }
+  return content;
 }
 
 void Hdf5Writer::close() {
@@ -444,6 +470,8 @@ double Hdf5Reader::number_attribute(const std::string& path, const std::string& 
 
 #define PHYXEL_HDF5_TYPE(T)                                                                     \
   template void Hdf5Writer::array<T>(const std::string&, std::span<const T>, std::size_t);      \
+  template void Hdf5Writer::together<T>(const std::string&, std::size_t, std::size_t,           \
+                                        std::function<void(const std::filesystem::path&)>);     \
   template void Hdf5Writer::later<T>(const std::string&, std::size_t, std::size_t, std::size_t, \
                                      Fill<T>);                                                  \
   template void Hdf5Writer::reserve<T>(const std::string&, std::size_t, std::size_t);           \

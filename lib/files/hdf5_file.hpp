@@ -42,6 +42,10 @@ class Hdf5Writer {
   template <class T>
   void later(const std::string& path, std::size_t rows, std::size_t columns, std::size_t stretch,
              Fill<T> fill);
+  /// The same, written by `write(file)` when all that is not `later` is in the file.
+  template <class T>
+  void together(const std::string& path, std::size_t rows, std::size_t columns,
+                std::function<void(const std::filesystem::path& file)> write);
   /// Shape [n, 3], stored as float or double.
   void vectors(const std::string& path, std::span<const Vec3d> values, bool as_float);
   /// A text of any length; nothing is stored for an empty one.
@@ -69,14 +73,18 @@ class Hdf5Writer {
  private:
   /// An array of which nothing is in memory.
   struct Later {
-    std::uint64_t at = 0, bytes = 0;
-    std::function<void(const Content::Sink&)> produce;
+    std::uint64_t at = 0;
+    Content::Piece piece;
   };
+  /// Makes an array that has its place. @returns where that is
+  template <class T>
+  std::uint64_t place(const std::string& path, std::size_t rows, std::size_t columns);
 
   std::int64_t file_ = -1;
   std::string name_;  // for messages
   std::shared_ptr<SparseBytes> memory_;
   std::vector<Later> later_;
+  std::vector<std::function<void(const std::filesystem::path&)>> together_;
 };
 
 /// Reads an HDF5 file whose seal has been checked. Every extent is compared with the file's size

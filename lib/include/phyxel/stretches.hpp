@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <span>
+#include <string>
+#include <vector>
 
-#include "phyxel/types.hpp"
+#include "phyxel/cloud.hpp"
 
 namespace phyxel {
 
@@ -37,6 +40,14 @@ constexpr bool is_of_surfels(Quantity quantity) {
   return quantity == Quantity::surfel_position || quantity == Quantity::surfel_normal;
 }
 
+/// An array of an HDF5 file: the sum of some quantities of so many phyxels, or surfels.
+struct FileArray {
+  std::string path;
+  bool as_float = false;
+  Index count = 0;
+  std::vector<Quantity> terms;
+};
+
 /// Where a file's values come from: on one rank the arrays themselves; on several, wherever they
 /// are, so that no rank holds those of the whole model.
 class Stretches {
@@ -57,6 +68,11 @@ class Stretches {
   virtual std::span<const double> values(Quantity quantity, Index begin, Index end) = 0;
   /// All of the whole model.
   virtual std::span<const Triangle> triangles() const = 0;
+
+  /// Whether an array of so many is written by all who have its values, instead of being asked for.
+  virtual bool writes_together(Index) const { return false; }
+  /// Has them write it into a file that is laid out. What else is in the file must be written anew.
+  virtual void write_together(const std::filesystem::path&, const FileArray&) {}
 
  private:
   Index length_;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -86,6 +87,43 @@ TEST_F(Recording, FramesAreTheSameBytesWhateverTheLengthOfStretches) {
       EXPECT_TRUE(text_of(folder_ / "out" / "surface_000000.hdf") == surface) << length;
     }
   }
+}
+
+/// Stands for ranks that write all arrays by themselves: through HDF5, which changes the layout.
+class WrittenBeside : public FrameStretches {
+ public:
+  using FrameStretches::FrameStretches;
+  bool writes_together(Index) const override { return true; }
+  void write_together(const fs::path& file, const FileArray& array) override {
+    std::vector<double> sum;
+    for (const Quantity term : array.terms) {
+      const auto more = FrameStretches::values(term, 0, array.count);
+      sum.resize(more.size());
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+    }
+    const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t rows = H5Dopen2(opened, array.path.c_str(), H5P_DEFAULT);
+    EXPECT_GE(H5Dwrite(rows, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, sum.data()), 0);
+    H5Dclose(rows);
+    EXPECT_GE(H5Fclose(opened), 0);
+    ++written;
+  }
+  int written = 0;
+};
+
+TEST_F(Recording, FramesThatOthersWriteAreTheSameBytes) {
+  const test::TwoBodiesFrame moment(model_, 3);
+  const Frame frame = moment.frame();
+  Recorder(model_, scene_, true).write(frame);
+  const std::string phyxels = text_of(folder_ / "out" / "phyxels_000000.hdf");
+  const std::string surface = text_of(folder_ / "out" / "surface_000000.hdf");
+  WrittenBeside values(model_, frame, 2);
+  Recorder(model_, scene_, true).write(frame.diagnostics, values);
+  EXPECT_EQ(values.written, 9);  // points, six fields; points, normals
+  EXPECT_TRUE(text_of(folder_ / "out" / "phyxels_000000.hdf") == phyxels);
+  EXPECT_TRUE(text_of(folder_ / "out" / "surface_000000.hdf") == surface);
+  const FrameData read = read_frame(folder_ / "out" / "phyxels_000000.hdf");
+  EXPECT_EQ(read.point[4].x, model_.position[4].x + 1.5);
 }
 
 /// Files of this process may not grow beyond so many bytes: a disk that is full.
