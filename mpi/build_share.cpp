@@ -641,6 +641,7 @@ class Builder {
       part.neighbourhood = in_words(request.neighbourhood);
       part.kernel_volumes = bodies_[b].kernel_volumes;
       part.size = bodies_[b].size;
+      part.surfels = static_cast<Index>(surfaces_[b].position.size());
       part.origin = bodies_[b].origin;
       sums[b] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
         if (owns(local, static_cast<std::size_t>(i))) {

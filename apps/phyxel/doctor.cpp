@@ -12,6 +12,7 @@
 #include "ensemble.hpp"
 #include "files/hdf5_file.hpp"
 #include "model/host_memory.hpp"
+#include "mpi/parallel_file.hpp"
 #include "solver/nccl.hpp"
 #include "version.hpp"
 
@@ -104,7 +105,8 @@ Findings facts() {
           {"nccl", cuda::nccl_version()},
           {"mpi", mpi_description()},
           {"ranks", places},
-          {"hdf5", hdf5_version() + ", serial: the first rank writes"},
+          {"hdf5", hdf5_version() + (can_write_together() ? ", parallel: all ranks write"
+                                                          : ", serial: the first rank writes")},
           {"device", chosen},
           {"transport", transport}};
 }

@@ -22,6 +22,19 @@ std::vector<Partitioner> candidates_of(const std::string& name) {
   return {Partitioner::bisection, Partitioner::curve, Partitioner::metis};
 }
 
+/// Of all bodies, as the whole model numbers their surfels.
+std::vector<Triangle> triangles_of(const std::vector<Surface>& surfaces) {
+  std::vector<Triangle> triangles;
+  Index shift = 0;
+  for (const Surface& surface : surfaces) {
+    for (const Triangle& t : surface.triangle) {
+      triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+    }
+    shift += static_cast<Index>(surface.position.size());
+  }
+  return triangles;
+}
+
 }  // namespace
 
 const Communicator& ranks() {
@@ -60,6 +73,7 @@ Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOpti
     here_ = make_model(scene, device);
     shares_ = {here_.size(), here_.size(), 0};
     digest_ = model_digest(here_);
+    boundary_ = boundary_size(here_);
     return;
   }
   ShareOptions options{candidates_of(cut.partitioner), cut.rings};
@@ -71,106 +85,26 @@ Ensemble::Ensemble(const Scene& scene, const ChosenDevice& device, const CutOpti
   }
   BuiltShare built = build_share(ranks(), scene, options);
   here_ = std::move(built.model);
-  surfaces_ = std::move(built.surfaces);
+  exchange_ = std::make_unique<const StretchExchange>(ranks(), here_);
+  if (ranks().rank() == 0) triangles_ = triangles_of(built.surfaces);
   partitioner_ = partitioner_name(built.partitioner);
   digest_ = model_digest(here_);
-  for (Index i = 0; i < here_.size(); ++i) {
-    if (here_.owns(i)) owned_.push_back(i);
-  }
-  const auto own = static_cast<std::int64_t>(owned_.size());
+  const BoundarySize boundary = boundary_size(here_);
+  boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
+  std::int64_t own = 0;
+  for (const Part& part : here_.parts) own += part.owned_end() - part.begin;
   const std::int64_t ghosts = here_.size() - own;
   shares_ = {ranks().smallest(own), ranks().largest(own), ranks().largest(ghosts)};
 }
 
-void Ensemble::bring_together() {
-  if (!here_.share) return;
-  const bool leads = ranks().rank() == 0;
-  const auto parts = static_cast<std::size_t>(ranks().size());
-  std::vector<std::vector<Index>> numbers(parts), surfel_numbers(parts);
-  for (const Index i : owned_) numbers[0].push_back(here_.number(i));
-  surfel_numbers[0] = here_.share->surfel_number;
-  numbers_ = ranks().exchanged(numbers);
-  surfel_numbers_ = ranks().exchanged(surfel_numbers);
-
-  // The others take part, and keep nothing.
-  Model model;
-  model.position = phyxels(here_.position);
-  model.mass = phyxels(here_.mass);
-  model.volume = phyxels(here_.volume);
-  model.neighbourhood.support = phyxels(here_.neighbourhood.support);
-  model.neighbourhood.symmetric = here_.neighbourhood.symmetric;
-  model.gravity = here_.gravity;
-  model.degenerate = here_.degenerate;
-  model.warnings = here_.warnings;
-  Surfels& surfels = model.surfels;
-  surfels.unreached = here_.surfels.unreached;
-  Index begin = 0;
-  for (std::size_t b = 0; b < here_.parts.size() && leads; ++b) {
-    const Surface& surface = surfaces_[b];
-    const auto shift = static_cast<Index>(surfels.position.size());
-    surfels.position.insert(surfels.position.end(), surface.position.begin(),
-                            surface.position.end());
-    surfels.normal.insert(surfels.normal.end(), surface.normal.begin(), surface.normal.end());
-    for (const Triangle& t : surface.triangle) {
-      surfels.triangle.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-    }
-    Part& part = model.parts.emplace_back(here_.parts[b]);
-    part.begin = begin;
-    part.end = begin += part.size;
-    part.ghosts = part.far_ghosts = 0;
-    part.surfel_begin = shift;
-    part.surfel_end = static_cast<Index>(surfels.position.size());
-  }
-  const auto whole_list = [&](const std::vector<Index>& phyxels) {
-    std::vector<std::vector<Index>> send(parts);
-    for (const Index i : phyxels) {
-      if (here_.owns(i)) send[0].push_back(here_.number(i));
-    }
-    std::vector<Index> all;
-    for (const std::vector<Index>& from : ranks().exchanged(send)) {
-      all.insert(all.end(), from.begin(), from.end());
-    }
-    std::sort(all.begin(), all.end());
-    return all;
-  };
-  for (const Motion& motion : here_.motions) {
-    model.motions.push_back(motion);
-    model.motions.back().phyxels = whole_list(motion.phyxels);
-  }
-  for (const Load& load : here_.loads) {
-    model.loads.push_back(load);
-    model.loads.back().phyxels = whole_list(load.phyxels);
-    model.loads.back().force.clear();  // wanted where phyxels are stepped
-  }
-  if (leads) whole_ = std::make_unique<Model>(std::move(model));
-  surfaces_.clear();
+std::span<const Triangle> Ensemble::triangles() const {
+  return here_.share ? triangles_ : here_.surfels.triangle;
 }
 
-State Ensemble::whole_state(const State& local) const {
-  State state = local;
-  state.displacement = phyxels(local.displacement);
-  state.velocity = phyxels(local.velocity);
-  return state;
-}
-
-State Ensemble::shared_out(State whole) const {
-  if (!here_.share) return whole;
-  const auto each = static_cast<std::size_t>(ranks().size());
-  std::vector<std::vector<Index>> wanted(each);
-  wanted[0] = here_.share->number;
-  wanted = ranks().exchanged(wanted);
-  const auto shared_out = [&](std::vector<Vec3d>& values) {
-    std::vector<std::vector<Vec3d>> send(each);
-    if (!values.empty()) {
-      for (std::size_t r = 0; r < each; ++r) {
-        for (const Index i : wanted[r]) send[r].push_back(values[i]);
-      }
-    }
-    values = std::move(ranks().exchanged(send)[0]);
-  };
-  shared_out(whole.displacement);
-  shared_out(whole.velocity);
-  return whole;
+State Ensemble::state_of(const CheckpointReader* checkpoint, Index length) const {
+  if (!here_.share) return checkpoint->state(0, here_.size());
+  return exchange_->scattered(
+      length, [&](Index begin, Index end) { return checkpoint->state(begin, end); });
 }
 
 }  // namespace phyxel::app

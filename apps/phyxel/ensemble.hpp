@@ -1,4 +1,4 @@
-/// A model on the ranks of the program, and what they bring together on the first.
+/// A model on the ranks of the program.
 #pragma once
 
 #include <memory>
@@ -7,8 +7,11 @@
 
 #include "device_option.hpp"
 #include "mpi/communicator.hpp"
+#include "mpi/stretch_exchange.hpp"
+#include "phyxel/checkpoint.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
+#include "setup.hpp"
 
 namespace phyxel::app {
 
@@ -38,6 +41,8 @@ class Ensemble {
  public:
   /// Builds it on the device that will step it, if there is one rank. Collective.
   Ensemble(const Scene& scene, const ChosenDevice& device, const CutOptions& cut);
+  Ensemble(const Ensemble&) = delete;
+  Ensemble& operator=(const Ensemble&) = delete;
 
   /// What this rank steps.
   const Model& here() const { return here_; }
@@ -49,49 +54,22 @@ class Ensemble {
   const Shares& shares() const { return shares_; }
   const std::string& partitioner() const { return partitioner_; }
 
-  /// Gives the first rank what frames and summaries are written from: the whole model without lists
-  /// and moments. Collective.
-  void bring_together();
-  /// The whole; on the first rank, once it has been brought together.
-  const Model& whole() const { return here_.share ? *whole_ : here_; }
-  /// Values of all phyxels, or of all surfels, on the first rank, likewise; nothing on the others.
-  template <class T>
-  std::vector<T> phyxels(const std::vector<T>& local) const {
-    return brought_together(local, owned_, numbers_);
-  }
-  template <class T>
-  std::vector<T> surfels(const std::vector<T>& local) const {
-    return brought_together(local, {}, surfel_numbers_);
-  }
-  State whole_state(const State& local) const;
-  /// This rank's share of a state of the whole, whose arrays the first rank has. Collective.
-  State shared_out(State whole) const;
+  const BoundarySize& boundary() const { return boundary_; }  ///< Of the whole.
+  /// Of the whole, on the first rank.
+  std::span<const Triangle> triangles() const;
+  /// Between the ranks, if there are several.
+  const StretchExchange& exchange() const { return *exchange_; }
+
+  /// This rank's share of the state of a checkpoint, which comes in stretches. Collective.
+  /// @param checkpoint on the first rank
+  State state_of(const CheckpointReader* checkpoint, Index length) const;
 
  private:
-  /// @param chosen which of `local` are sent; empty: all
-  template <class T>
-  std::vector<T> brought_together(const std::vector<T>& local, const std::vector<Index>& chosen,
-                                  const std::vector<std::vector<Index>>& numbers) const {
-    if (!here_.share) return local;
-    std::vector<std::vector<T>> send(static_cast<std::size_t>(ranks().size()));
-    for (const Index i : chosen) send[0].push_back(local[i]);
-    if (chosen.empty()) send[0] = local;
-    const std::vector<std::vector<T>> received = ranks().exchanged(send);
-    std::size_t size = 0;
-    for (const std::vector<Index>& of_rank : numbers) size += of_rank.size();
-    std::vector<T> all(size);
-    for (std::size_t r = 0; r < numbers.size(); ++r) {
-      for (std::size_t k = 0; k < numbers[r].size(); ++k) all[numbers[r][k]] = received[r][k];
-    }
-    return all;
-  }
-
   Model here_;
-  std::vector<Surface> surfaces_;  // of a share's whole bodies, until they are brought together
-  std::unique_ptr<const Model> whole_;
+  std::unique_ptr<const StretchExchange> exchange_;
+  std::vector<Triangle> triangles_;  // of a share's whole
   std::uint64_t digest_ = 0;
-  std::vector<Index> owned_;                                  // here
-  std::vector<std::vector<Index>> numbers_, surfel_numbers_;  // [rank], on the first rank
+  BoundarySize boundary_;
   Shares shares_;
   std::string partitioner_;
 };

@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "background_writer.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
 #include "ensemble.hpp"
+#include "file_writer.hpp"
 #include "mpi/watchdog.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
@@ -56,11 +56,11 @@ auto alike(Work&& work) {
   }
 }
 
-/// One run from its plan to its summary, on one rank or on several: all step, and what is said and
-/// written is brought together on the first. Files are written on a thread of their own, while
-/// stepping goes on if a core is left for that. HDF5 is not made for threads: after the constructor
-/// that thread alone uses it, until all is written. At most two frames are held, the one being
-/// written and one that waits, and the last good state, which often is that of the latter.
+/// One run from its plan to its summary, on one rank or on several: all step, and the first one
+/// speaks and writes. Files are written on a thread of their own, while stepping goes on if a core
+/// is left for that. HDF5 is not made for threads: after the constructor that thread alone uses it,
+/// until all is written. A rank holds its values of at most two frames, the one being written and
+/// one that waits, and its last good state, which often is that of the latter.
 class Run {
  public:
   explicit Run(const RunOptions& options)
@@ -79,13 +79,11 @@ class Run {
         start_diagnostics_(diagnose(model(), *backend_, solver_.steps(), solver_.dt())) {
     // Last, because it replaces what an earlier run has left: all that could be refused, or find no
     // memory, has been tried by now.
-    ensemble_.bring_together();
     ranks().together([&] {
       if (!leads()) return;
-      recorder_.emplace(ensemble_.whole(), scene_, options.force,
+      recorder_.emplace(model(), scene_, options.force,
                         begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
     });
-    has_surfels_ = ranks().sum(static_cast<std::int64_t>(model().surfels.position.size())) > 0;
     if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
     if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
     setup_seconds_ = seconds_since(start_);
@@ -124,9 +122,9 @@ class Run {
         const bool last = solver.steps() == plan_.steps;
         const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
         progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+        writer_.serve();
         if (!frame && solver.steps() % agree_interval() != 0) continue;
         const Phase agreeing("agreeing, looking, writing");
-        ranks().together([&] { writer_.check(); });
         const bool stop = anyone(StopSignal::stop_requested() != 0);
         const bool due = anyone(StopSignal::checkpoint_requested() ||
                                 (scene_.output.checkpoint_every > 0 &&
@@ -137,7 +135,7 @@ class Run {
 
         backend.wait();
         step_seconds_ += seconds_since(stepping_since);
-        if (frame) ranks().together([&] { writer_.wait_for_room(); });
+        if (frame) writer_.wait_for_room();
         const auto look_start = Clock::now();
         now = in_phase("energies",
                        [&] { return diagnose(model(), backend, solver.steps(), solver.dt()); });
@@ -154,7 +152,7 @@ class Run {
           last_checkpoint = Clock::now();
         }
         if (stop && !last) {
-          ranks().together([&] { writer_.finish(); });
+          writer_.finish();
           progress.finish();
           const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
           throw AgreedError(ExitCode::stopped,
@@ -173,7 +171,7 @@ class Run {
       if (ranks().size() > 1) throw;
       throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
     }
-    ranks().together([&] { writer_.finish(); });
+    writer_.finish();
     progress.finish();
     loop_seconds_ = seconds_since(loop_start_);
     ranks().together([&] {
@@ -230,7 +228,7 @@ class Run {
     progress.finish();
     try {
       write_state();
-      ranks().together([&] { writer_.finish(); });
+      writer_.finish();
     } catch (const Error& writing) {
       return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
     }
@@ -244,7 +242,7 @@ class Run {
   }
 
   /// Before the model is built, so that a wrong --resume or output folder costs no time.
-  std::optional<Checkpoint> find_checkpoint() const {
+  std::optional<CheckpointReader> find_checkpoint() const {
     check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
     if (options_.resume.empty()) return std::nullopt;
     std::filesystem::path file = options_.resume;
@@ -255,22 +253,27 @@ class Run {
       if (!latest) return std::nullopt;
       file = *latest;
     }
-    Checkpoint checkpoint = read_checkpoint(file);
-    if (checkpoint.info.precision != scene_.solver.precision) {
-      throw InputError(fmt::format(
-          "{}: written by a run in {}, this one is in {}: allowed --precision {}", file.string(),
-          precision_name(checkpoint.info.precision), precision_name(scene_.solver.precision),
-          precision_name(checkpoint.info.precision)));
+    CheckpointReader checkpoint(file);
+    const Precision precision = checkpoint.info().precision;
+    if (precision != scene_.solver.precision) {
+      throw InputError(
+          fmt::format("{}: written by a run in {}, this one is in {}: allowed --precision {}",
+                      file.string(), precision_name(precision),
+                      precision_name(scene_.solver.precision), precision_name(precision)));
     }
     return checkpoint;
   }
 
-  /// The first rank's, the others may not see its folder; they have no arrays of it.
-  std::optional<Checkpoint> checkpoint_for_all() const {
+  /// What it says, without arrays; the first rank's, the others may not see its folder.
+  std::optional<Checkpoint> checkpoint_for_all() {
     require_alike(std::hash<std::string>{}(scene_.text), "scenes");
     std::optional<Checkpoint> found;
     ranks().together([&] {
-      if (leads()) found = find_checkpoint();
+      if (!leads()) return;
+      checkpoint_reader_ = find_checkpoint();
+      if (checkpoint_reader_) {
+        found = {checkpoint_reader_->state(0, 0), checkpoint_reader_->info()};
+      }
     });
     if (ranks().size() == 1) return found;
     if (ranks().broadcast(std::vector<char>{found.has_value()}).front() == 0) return std::nullopt;
@@ -292,11 +295,25 @@ class Run {
       return ranks().agreed([&] { return initial_state(model(), scene_, plan_.dt); });
     }
     ranks().together([&] { check_resumed(); });
-    return ensemble_.shared_out(std::move(begin_->state));
+    const CheckpointReader* const reader = checkpoint_reader_ ? &*checkpoint_reader_ : nullptr;
+    State state = ensemble_.state_of(reader, stretch_length());
+    checkpoint_reader_.reset();
+    state.step = begin_->state.step;
+    state.time = begin_->state.time;
+    state.dt = begin_->state.dt;
+    return state;
+  }
+
+  /// Phyxels of which values are brought to the first rank at a time: fewer, in tests.
+  static Index stretch_length() {
+    const char* said = std::getenv("PHYXEL_STRETCH");
+    return said ? std::max(1, std::atoi(said)) : Stretches::usual_length;
   }
 
   void check_resumed() const {
-    if (begin_->info.model_digest != ensemble_.digest()) {
+    const bool as_many =
+        !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().whole_size();
+    if (begin_->info.model_digest != ensemble_.digest() || !as_many) {
       throw InputError(
           fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
                       "neighbourhoods, loads and "
@@ -313,8 +330,7 @@ class Run {
   }
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const {
-    return std::make_shared<const GoodState>(
-        GoodState{ensemble_.whole_state(solver_.state()), now});
+    return std::make_shared<const GoodState>(GoodState{solver_.state(), now});
   }
 
   /// Whether one is left for the writer. Threads that step on all of them wait for one another
@@ -326,47 +342,51 @@ class Run {
            threads * ranks().host_size() < sysconf(_SC_NPROCESSORS_ONLN);
   }
 
-  /// What writes files, to the writer of the first rank.
-  void hand_over(std::function<void()> job) {
-    ranks().together([&] {
-      if (!leads()) return;
-      writer_.submit(std::move(job));
-      if (!core_is_left()) writer_.finish();
-    });
+  void hand_over(std::shared_ptr<const Moment> moment, FileWriter::Job job) {
+    writer_.submit(std::move(moment), std::move(job));
+    // The first rank's, which writes.
+    if (ranks().broadcast(std::vector<char>{core_is_left()}).front() == 0) writer_.finish();
+  }
+
+  static std::shared_ptr<Moment> moment_of(const std::shared_ptr<const GoodState>& good) {
+    const auto moment = std::make_shared<Moment>();
+    moment->state = std::shared_ptr<const State>(good, &good->state);
+    moment->frame.state = &good->state;
+    moment->frame.diagnostics = good->diagnostics;
+    return moment;
   }
 
   /// Takes what the frame needs from the backend now; it is written in the background.
   void write_frame(const std::shared_ptr<const GoodState>& good) {
     const Phase phase("frame");
-    const auto surfels = std::make_shared<SurfelState>();
-    Frame frame;
-    frame.state = &good->state;
-    frame.diagnostics = good->diagnostics;
-    if (scene_.output.surface && has_surfels_) {
-      backend_->advect_surfels(*surfels);
-      surfels->position = ensemble_.surfels(surfels->position);
-      surfels->normal = ensemble_.surfels(surfels->normal);
-      frame.surfels = surfels.get();
+    const auto moment = moment_of(good);
+    Frame& frame = moment->frame;
+    if (scene_.output.surface && model().whole_surfels() > 0) {
+      backend_->advect_surfels(moment->surfels);
+      frame.surfels = &moment->surfels;
+      moment->optional.push_back(Quantity::surfel_position);
     }
-    const auto wanted = [&](const char* field) {
+    const auto wanted = [&](const char* field, Quantity quantity) {
       const auto& fields = scene_.output.fields;
-      return std::find(fields.begin(), fields.end(), field) != fields.end();
+      if (std::find(fields.begin(), fields.end(), field) == fields.end()) return false;
+      moment->optional.push_back(quantity);
+      return true;
     };
-    if (wanted("von_mises") || wanted("volume_ratio")) {
-      stress_fields(model(), *backend_, wanted("von_mises") ? &frame.von_mises : nullptr,
-                    wanted("volume_ratio") ? &frame.volume_ratio : nullptr);
-      if (wanted("von_mises")) frame.von_mises = ensemble_.phyxels(frame.von_mises);
-      if (wanted("volume_ratio")) frame.volume_ratio = ensemble_.phyxels(frame.volume_ratio);
+    const bool von_mises = wanted("von_mises", Quantity::von_mises);
+    const bool volume_ratio = wanted("volume_ratio", Quantity::volume_ratio);
+    if (von_mises || volume_ratio) {
+      stress_fields(model(), *backend_, von_mises ? &frame.von_mises : nullptr,
+                    volume_ratio ? &frame.volume_ratio : nullptr);
     }
-    hand_over([this, good, surfels, frame = std::move(frame)] {
+    hand_over(moment, [this, diagnostics = good->diagnostics](Stretches& values) {
       const Phase writing("writing a frame");
-      recorder_->write(frame);
+      recorder_->write(diagnostics, values);
     });
   }
 
   /// The last good one, in the background, after the frames handed over before.
   void write_state() {
-    hand_over([this, good = good_] {
+    hand_over(moment_of(good_), [this, good = good_](Stretches& values) {
       const Phase writing("writing a checkpoint");
       CheckpointInfo info;
       info.program = program_version();
@@ -376,7 +396,8 @@ class Run {
       info.total_energy = good->diagnostics.total_energy();
       info.initial_energy = initial_energy_;
       info.frames_written = recorder_->frames_written();
-      checkpoint_ = write_checkpoint(recorder_->directory(), good->state, info);
+      checkpoint_ =
+          write_checkpoint(recorder_->directory(), good->state, info, model().whole_size(), values);
     });
   }
 
@@ -384,7 +405,7 @@ class Run {
     if (options_.json || options_.quiet || !leads()) return;
     fmt::print("{}: {}\n", program_version(),
                scene_.title.empty() ? scene_.file.string() : scene_.title);
-    fmt::print("{}", describe_model(scene_, ensemble_.whole()));
+    fmt::print("{}", describe_model(scene_, model(), ensemble_.boundary()));
     fmt::print("  device      {}\n", backend_->name());
     if (ranks().size() > 1) {
       const Ensemble::Shares& shares = ensemble_.shares();
@@ -425,7 +446,7 @@ class Run {
         (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
     const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
     const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
-    const Model& whole = ensemble_.whole();
+    const Index phyxels = model().whole_size();
     if (options_.json) {
       nlohmann::ordered_json j = {
           {"program", program_version()},
@@ -433,9 +454,9 @@ class Run {
           {"title", scene_.title},
           {"device", backend_->name()},
           {"ranks", ranks().size()},
-          {"phyxels", whole.size()},
-          {"surfels", whole.surfels.position.size()},
-          {"neighbours_per_phyxel", static_cast<double>(whole.pairs()) / std::max(1, whole.size())},
+          {"phyxels", phyxels},
+          {"surfels", model().whole_surfels()},
+          {"neighbours_per_phyxel", static_cast<double>(model().pairs()) / std::max(1, phyxels)},
           {"time_s", now.time},
           {"steps", solver_.steps()},
           {"time_step_s", plan_.dt},
@@ -445,7 +466,7 @@ class Run {
           {"loop_seconds", loop_seconds_},
           {"step_seconds", step_seconds_},
           {"steps_per_second", steps / step_seconds_},
-          {"phyxel_steps_per_second", steps * whole.size() / step_seconds_},
+          {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
           {"bytes", bytes},
           {"transport", transport_},
           {"gpus", gpus_},
@@ -453,11 +474,11 @@ class Run {
           {"exchange_seconds", traffic.seconds},
           {"energy_j", now.total_energy()},
           {"energy_drift", energy_drift},
-          {"conservative", is_conservative(whole)},
+          {"conservative", is_conservative(model())},
           {"internal_force_balance", force_balance},
           {"internal_torque_balance", torque_balance},
           {"inverted_phyxels", now.inverted},
-          {"warnings", whole.warnings},
+          {"warnings", model().warnings},
           {"frames", recorder_->frames_written()},
           {"directory", recorder_->directory().string()},
           {"checkpoint", checkpoint_.string()}};
@@ -468,8 +489,8 @@ class Run {
         "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
         "with "
         "output; {:.0f} bytes per phyxel\n",
-        steps / step_seconds_, steps * whole.size() / step_seconds_, step_seconds_, loop_seconds_,
-        static_cast<double>(bytes) / std::max(1, whole.size()));
+        steps / step_seconds_, steps * phyxels / step_seconds_, step_seconds_, loop_seconds_,
+        static_cast<double>(bytes) / std::max(1, phyxels));
     if (ranks().size() > 1) {
       fmt::print(
           "  exchange    at most {:.3g} kB a step and rank; {:.1f}% of the seconds above for "
@@ -478,7 +499,7 @@ class Run {
           1e-3 * static_cast<double>(traffic.bytes_sent) / steps,
           100 * traffic.seconds / loop_seconds_);
     }
-    if (is_conservative(whole)) {
+    if (is_conservative(model())) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
                  energy_drift, peak_energy_);
     } else {
@@ -510,15 +531,15 @@ class Run {
   Clock::time_point start_ = Clock::now();
   Scene scene_;
   ChosenDevice device_;
-  std::optional<Checkpoint> begin_;
+  std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until its state is read
+  std::optional<Checkpoint> begin_;                    // without arrays
   Ensemble ensemble_;
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
   Solver solver_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_;
-  std::optional<Recorder> recorder_;  // on the first rank
-  bool has_surfels_ = false;
+  std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // between ranks
   std::vector<int> gpus_;                  // of the ranks
   std::shared_ptr<const GoodState> good_;  // the last one
@@ -527,7 +548,8 @@ class Run {
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;
   std::vector<std::filesystem::path> pictures_;
-  BackgroundWriter writer_;  // last: it ends first, and its jobs use the recorder
+  // Last: it ends first, and its jobs use the recorder.
+  FileWriter writer_{ensemble_, stretch_length()};
 };
 
 void run(const RunOptions& options) {
@@ -551,7 +573,7 @@ void check(const Overrides& overrides) {
   const Model model = make_model(scene, device);
   const auto backend = make_backend(model, scene.solver.precision, device, scene.solver.threads);
   const StepPlan plan = plan_steps(scene, model, *backend, overrides.unsafe_step);
-  fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model));
+  fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model, boundary_size(model)));
   fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
   fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps,
              scene.time.end, plan.steps_per_frame);

@@ -107,7 +107,17 @@ StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bo
   return plan;
 }
 
-std::string describe_model(const Scene& scene, const Model& model) {
+BoundarySize boundary_size(const Model& model) {
+  const auto own = [&](const std::vector<Index>& phyxels) {
+    return std::count_if(phyxels.begin(), phyxels.end(), [&](Index i) { return model.owns(i); });
+  };
+  BoundarySize size;
+  for (const Motion& motion : model.motions) size.moved += own(motion.phyxels);
+  for (const Load& load : model.loads) size.loaded += own(load.phyxels);
+  return size;
+}
+
+std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary) {
   std::string text;
   const std::size_t shown = std::min<std::size_t>(model.parts.size(), 12);
   for (std::size_t p = 0; p < shown; ++p) {
@@ -115,7 +125,7 @@ std::string describe_model(const Scene& scene, const Model& model) {
     const Material& m = part.material;
     text += fmt::format(
         "  body        {}: {} phyxels, {} surfels, {:.4g} kg, {:.4g} m^3 ({} volumes)\n", part.name,
-        part.size, part.surfel_end - part.surfel_begin, part.mass, part.volume,
+        part.size, part.surfels, part.mass, part.volume,
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
     text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
@@ -124,12 +134,9 @@ std::string describe_model(const Scene& scene, const Model& model) {
   if (shown < model.parts.size()) {
     text += fmt::format("              and {} more bodies\n", model.parts.size() - shown);
   }
-  Index moved = 0, loaded = 0;
-  for (const Motion& motion : model.motions) moved += static_cast<Index>(motion.phyxels.size());
-  for (const Load& load : model.loads) loaded += static_cast<Index>(load.phyxels.size());
   text += fmt::format(
       "  boundary    {} phyxels fixed or moved, {} loaded; gravity [{:g}, {:g}, {:g}] m/s^2\n",
-      moved, loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
+      boundary.moved, boundary.loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
   for (const std::string& warning : model.warnings)
     text += fmt::format("  warning     {}\n", warning);
   return text;

@@ -39,8 +39,17 @@ struct StepPlan {
 /// @throws InputError for a step above the largest stable one unless `unsafe_step`.
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step);
 
+/// Phyxels that follow a path, and that loads pull.
+struct BoundarySize {
+  std::int64_t moved = 0, loaded = 0;
+};
+/// Of those that are no ghosts.
+BoundarySize boundary_size(const Model& model);
+
 /// Bodies, materials, terms, neighbours and warnings, one per line.
-std::string describe_model(const Scene& scene, const Model& model);
+/// @param model may be a rank's share
+/// @param boundary of the whole
+std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary);
 
 /// The value of `--precision`. @throws InputError
 Precision precision_option(const std::string& name);

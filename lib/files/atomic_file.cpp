@@ -5,9 +5,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <utility>
 
 #include "phyxel/error.hpp"
 
@@ -71,30 +73,61 @@ void sync_folder(const fs::path& file) {
 
 }  // namespace
 
-void write_whole_file(const fs::path& file, std::span<const std::span<const std::byte>> pieces,
-                      Durable durable) {
-  const fs::path temporary = file.string() + ".tmp";
-  Descriptor descriptor(temporary, O_WRONLY | O_CREAT | O_TRUNC);
-  if (descriptor.get() < 0) fail(file, "cannot be written", errno);
+NewFile::NewFile(const fs::path& file, std::uint64_t size)
+    : file_(file), temporary_(file.string() + ".tmp"), size_(size) {
+  fd_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd_ < 0) phyxel::fail(file_, "cannot be written", errno);
+  if (size == 0) return;
   int error = 0;
-  off_t at = 0;
-  for (const auto piece : pieces) {
-    if (error == 0) error = write_all(descriptor.get(), piece, at);
-    at += static_cast<off_t>(piece.size());
+  do {
+    error = ::posix_fallocate(fd_, 0, static_cast<off_t>(size));
+  } while (error == EINTR);
+  // Some file systems know no such thing: there, writing tells.
+  if (error != 0 && error != EOPNOTSUPP && error != EINVAL) fail(error);
+}
+
+NewFile::~NewFile() {
+  if (fd_ < 0) return;
+  ::close(fd_);
+  ::unlink(temporary_.c_str());
+}
+
+void NewFile::fail(int error) {
+  if (fd_ >= 0) ::close(fd_);
+  fd_ = -1;
+  ::unlink(temporary_.c_str());
+  phyxel::fail(file_, fmt::format("{} bytes could not be written", size_).c_str(), error);
+}
+
+void NewFile::write(std::uint64_t at, std::span<const std::byte> bytes) {
+  if (const int error = write_all(fd_, bytes, static_cast<off_t>(at))) fail(error);
+}
+
+void NewFile::read(std::uint64_t at, std::uint64_t count,
+                   const std::function<void(std::span<const std::byte>)>& take) {
+  std::vector<std::byte> some(std::min<std::uint64_t>(count, std::uint64_t{16} << 20));
+  for (const std::uint64_t end = at + count; at < end;) {
+    const ssize_t got = ::pread(fd_, some.data(), std::min<std::uint64_t>(some.size(), end - at),
+                                static_cast<off_t>(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) fail(got < 0 ? errno : EIO);
+    take({some.data(), static_cast<std::size_t>(got)});
+    at += static_cast<std::uint64_t>(got);
   }
-  if (error == 0 && durable == Durable::yes && ::fsync(descriptor.get()) != 0) error = errno;
-  if (descriptor.close() != 0 && error == 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    fail(file, fmt::format("{} bytes could not be written", at).c_str(), error);
-  }
-  move_into_place(temporary, file, Durable::no);
-  if (durable == Durable::yes) sync_folder(file);
+}
+
+void NewFile::finish(Durable durable) {
+  if (durable == Durable::yes && ::fsync(fd_) != 0) fail(errno);
+  // Closing can report what writing did not (NFS, quotas).
+  if (::close(std::exchange(fd_, -1)) != 0) fail(errno);
+  move_into_place(temporary_, file_, Durable::no);
+  if (durable == Durable::yes) sync_folder(file_);
 }
 
 void write_whole_file(const fs::path& file, std::string_view text, Durable durable) {
-  const std::span<const std::byte> pieces[] = {bytes_of(text)};
-  write_whole_file(file, pieces, durable);
+  NewFile out(file, text.size());
+  out.write(0, bytes_of(text));
+  out.finish(durable);
 }
 
 void move_into_place(const fs::path& temporary, const fs::path& file, Durable durable) {

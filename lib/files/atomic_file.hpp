@@ -2,20 +2,61 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace phyxel {
 
 /// Whether data must survive a power cut before the call returns.
 enum class Durable { no, yes };
 
-/// Writes the pieces, one after the other, to `file`.tmp and renames it: `file` is the old content
-/// or the new, never a part. @throws OutputError; the old file, if any, stays and no .tmp is left.
-void write_whole_file(const std::filesystem::path& file,
-                      std::span<const std::span<const std::byte>> pieces, Durable durable);
+/// A file on its way: written to `file`.tmp and renamed, so that `file` is the old content or the
+/// new, never a part. If it is not finished, the old file, if any, stays and no .tmp is left.
+class NewFile {
+ public:
+  /// Takes `size` bytes of the disk. @throws OutputError, also if they are not there.
+  NewFile(const std::filesystem::path& file, std::uint64_t size);
+  ~NewFile();
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  /// @throws OutputError.
+  void write(std::uint64_t at, std::span<const std::byte> bytes);
+  /// Some of what is there by now, piece by piece. @throws OutputError.
+  void read(std::uint64_t at, std::uint64_t count,
+            const std::function<void(std::span<const std::byte>)>& take);
+  const std::filesystem::path& temporary() const { return temporary_; }
+  /// Renames it. @throws OutputError.
+  void finish(Durable durable);
+
+ private:
+  [[noreturn]] void fail(int error);
+
+  std::filesystem::path file_, temporary_;
+  std::uint64_t size_;
+  int fd_ = -1;
+};
+
+/// Bytes of known number, handed over from the first to the last.
+struct Content {
+  using Sink = std::function<void(std::span<const std::byte>)>;
+  struct Piece {
+    std::uint64_t bytes = 0;
+    std::function<void(const Sink&)> produce;  ///< Null: comes by `write_together`.
+    bool is_layout = false;                    ///< What tells where all else is.
+  };
+  std::uint64_t size = 0;
+  std::vector<Piece> pieces;
+  /// Puts pieces into a file whose layout is there, which it may change; null: there are none.
+  std::function<void(const std::filesystem::path& file)> write_together;
+};
+
+/// Writes a file, whole or not at all. @throws OutputError, as `NewFile`.
 void write_whole_file(const std::filesystem::path& file, std::string_view text, Durable durable);
 
 /// Renames a finished `.tmp` file into place, synced first if durable. @throws OutputError.

@@ -80,7 +80,7 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
     out.array<Index>("/surface/triangle", std::span(corners, 3 * surface.triangle.size()), 3);
   }
   for (const auto& [name, phyxels] : cloud.regions) out.array<Index>("/regions/" + name, phyxels);
-  write_sealed(file, kind, out.image(), Durable::yes);
+  write_sealed(file, kind, out.content(), Durable::yes);
 }
 
 Cloud read_body(const std::filesystem::path& file) {

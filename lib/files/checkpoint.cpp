@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
+#include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
@@ -46,9 +48,12 @@ std::vector<std::pair<std::int64_t, fs::path>> checkpoints_in(const fs::path& di
   return found;
 }
 
-void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3d>& values) {
+void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3d>& values,
+                  Index first) {
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!is_finite(values[i])) in.refuse(fmt::format("{} is not finite in row {}", path, i));
+    if (!is_finite(values[i]))
+      in.refuse(
+          fmt::format("{} is not finite in row {}", path, i + static_cast<std::size_t>(first)));
   }
 }
 
@@ -56,6 +61,16 @@ void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3
 
 fs::path write_checkpoint(const fs::path& directory, const State& state,
                           const CheckpointInfo& info) {
+  const Model none;
+  Frame frame;
+  frame.state = &state;
+  FrameStretches values(none, frame);
+  return write_checkpoint(directory, state, info, static_cast<Index>(state.displacement.size()),
+                          values);
+}
+
+fs::path write_checkpoint(const fs::path& directory, const State& state, const CheckpointInfo& info,
+                          Index phyxels, Stretches& values) {
   Hdf5Writer out;
   out.group("/phyxel");
   out.attribute("/phyxel", "version", version);
@@ -72,11 +87,11 @@ fs::path write_checkpoint(const fs::path& directory, const State& state,
   out.attribute("/state", "time", state.time);
   out.attribute("/state", "dt", state.dt);
   const bool as_float = info.precision == Precision::single;
-  out.vectors("/state/displacement", state.displacement, as_float);
-  out.vectors("/state/velocity", state.velocity, as_float);
+  write_later(out, {"/state/displacement", as_float, phyxels, {Quantity::displacement}}, values);
+  write_later(out, {"/state/velocity", as_float, phyxels, {Quantity::velocity}}, values);
 
   const fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
-  write_sealed(file, kind, out.image(), Durable::yes);
+  write_sealed(file, kind, out.content(), Durable::yes);
   // Only now may others go: those beyond the last two, and those of a future that this run left
   // behind when it went back to an earlier checkpoint.
   std::size_t seen = 0;
@@ -87,50 +102,69 @@ fs::path write_checkpoint(const fs::path& directory, const State& state,
   return file;
 }
 
-Checkpoint read_checkpoint(const fs::path& file) {
+CheckpointReader::CheckpointReader(const fs::path& file) {
   check_seal(file, kind);
-  const Hdf5Reader in(file);
-  Checkpoint checkpoint;
-  CheckpointInfo& info = checkpoint.info;
-  info.version = static_cast<int>(in.integer_attribute("/phyxel", "version"));
-  if (info.version != version) {
+  file_ = std::make_unique<const Hdf5Reader>(file);
+  const Hdf5Reader& in = *file_;
+  info_.version = static_cast<int>(in.integer_attribute("/phyxel", "version"));
+  if (info_.version != version) {
     in.refuse(
-        fmt::format("format version {}; this program reads version {}", info.version, version));
+        fmt::format("format version {}; this program reads version {}", info_.version, version));
   }
-  info.program = in.text_attribute("/phyxel", "program");
+  info_.program = in.text_attribute("/phyxel", "program");
   const std::string precision = in.text_attribute("/phyxel", "precision");
   const auto known = precision_named(precision);
   if (!known) in.refuse(fmt::format("unknown precision \"{}\"", precision));
-  info.precision = *known;
+  info_.precision = *known;
   const std::string digest = in.text_attribute("/phyxel", "model_digest");
   const auto [end, error] =
-      std::from_chars(digest.data(), digest.data() + digest.size(), info.model_digest, 16);
+      std::from_chars(digest.data(), digest.data() + digest.size(), info_.model_digest, 16);
   if (error != std::errc() || end != digest.data() + digest.size())
     in.refuse("model_digest is not a number");
-  info.total_energy = in.number_attribute("/phyxel", "total_energy");
-  info.initial_energy = in.number_attribute("/phyxel", "initial_energy");
-  info.frames_written = in.integer_attribute("/phyxel", "frames_written");
-  info.scene_text = in.text("/phyxel/scene");
+  info_.total_energy = in.number_attribute("/phyxel", "total_energy");
+  info_.initial_energy = in.number_attribute("/phyxel", "initial_energy");
+  info_.frames_written = in.integer_attribute("/phyxel", "frames_written");
+  info_.scene_text = in.text("/phyxel/scene");
 
-  State& state = checkpoint.state;
-  state.step = in.integer_attribute("/state", "step");
-  state.time = in.number_attribute("/state", "time");
-  state.dt = in.number_attribute("/state", "dt");
-  state.displacement = in.vectors("/state/displacement");
-  state.velocity = in.vectors("/state/velocity");
-  if (state.step < 0 || info.frames_written < 0)
+  state_.step = in.integer_attribute("/state", "step");
+  state_.time = in.number_attribute("/state", "time");
+  state_.dt = in.number_attribute("/state", "dt");
+  if (state_.step < 0 || info_.frames_written < 0)
     in.refuse("counts a negative number of steps or frames");
-  if (!(state.dt > 0) || !std::isfinite(state.dt) || !std::isfinite(state.time)) {
+  if (!(state_.dt > 0) || !std::isfinite(state_.dt) || !std::isfinite(state_.time)) {
     in.refuse(
-        fmt::format("dt = {} s at t = {} s; allowed: dt > 0, both finite", state.dt, state.time));
+        fmt::format("dt = {} s at t = {} s; allowed: dt > 0, both finite", state_.dt, state_.time));
   }
-  if (state.velocity.size() != state.displacement.size()) {
-    in.refuse(fmt::format("/state/velocity has {} rows, /state/displacement {}",
-                          state.velocity.size(), state.displacement.size()));
+  const std::size_t rows = in.shape("/state/displacement").rows;
+  if (const std::size_t other = in.shape("/state/velocity").rows; other != rows) {
+    in.refuse(fmt::format("/state/velocity has {} rows, /state/displacement {}", other, rows));
   }
-  check_finite(in, "/state/displacement", state.displacement);
-  check_finite(in, "/state/velocity", state.velocity);
-  return checkpoint;
+  if (rows > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
+    in.refuse(fmt::format("/state/displacement has {} rows; allowed at most {}", rows,
+                          std::numeric_limits<Index>::max()));
+  }
+  phyxels_ = static_cast<Index>(rows);
+}
+CheckpointReader::~CheckpointReader() = default;
+CheckpointReader::CheckpointReader(CheckpointReader&&) noexcept = default;
+CheckpointReader& CheckpointReader::operator=(CheckpointReader&&) noexcept = default;
+
+State CheckpointReader::state(Index begin, Index end) const {
+  State state = state_;
+  const auto read = [&](const char* path) {
+    std::vector<Vec3d> values =
+        file_->vectors(path, static_cast<std::size_t>(begin), static_cast<std::size_t>(end));
+    check_finite(*file_, path, values, begin);
+    return values;
+  };
+  state.displacement = read("/state/displacement");
+  state.velocity = read("/state/velocity");
+  return state;
+}
+
+Checkpoint read_checkpoint(const fs::path& file) {
+  const CheckpointReader reader(file);
+  return {reader.state(0, reader.phyxels()), reader.info()};
 }
 
 std::optional<fs::path> latest_checkpoint(const fs::path& directory, std::string* warning) {

@@ -15,53 +15,110 @@ namespace {
 constexpr std::uint8_t vtk_poly_vertex = 2, vtk_triangle = 5;
 constexpr std::int64_t version = 1;
 
-/// Bodies are told apart by an array of their own only where there are several.
 bool wants(const Scene& scene, const char* field) {
   return std::find(scene.output.fields.begin(), scene.output.fields.end(), field) !=
          scene.output.fields.end();
 }
 
 /// The run's own metadata, beside the VTKHDF group.
-void write_metadata(Hdf5Writer& out, const Scene& scene, const Frame& frame) {
+void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diagnostics) {
   out.group("/phyxel");
   out.attribute("/phyxel", "version", version);
   out.attribute("/phyxel", "program", program_version());
   out.attribute("/phyxel", "title", scene.title);
-  out.attribute("/phyxel", "step", frame.diagnostics.step);
+  out.attribute("/phyxel", "step", diagnostics.step);
   out.attribute("/phyxel", "units", std::string("SI: m, m/s, Pa, kg, s, J"));
   for (const DiagnosticColumn& column : diagnostic_columns()) {
-    out.attribute("/phyxel", column.name, column.value(frame.diagnostics));
+    out.attribute("/phyxel", column.name, column.value(diagnostics));
   }
   out.text("/phyxel/scene", scene.text);
 }
 
-void write_grid(Hdf5Writer& out, std::span<const Vec3d> points, bool as_float,
-                std::span<const std::int64_t> connectivity, std::span<const std::int64_t> offsets,
-                std::uint8_t cell_type) {
+/// Where each body's phyxels, or surfels, end in the whole model.
+struct Ends {
+  std::vector<std::int64_t> phyxels, surfels;
+};
+Ends ends_of(const Model& model) {
+  Ends ends;
+  std::int64_t phyxels = 0, surfels = 0;
+  for (const Part& part : model.parts) {
+    ends.phyxels.push_back(phyxels = model.share ? phyxels + part.size : part.end);
+    ends.surfels.push_back(surfels = model.share ? surfels + part.surfels : part.surfel_end);
+  }
+  return ends;
+}
+
+void write_counts(Hdf5Writer& out, std::int64_t points, std::int64_t cells,
+                  std::int64_t connectivity) {
   out.group("/VTKHDF");
   const std::int64_t vtkhdf[] = {1, 0};
   out.attribute("/VTKHDF", "Version", std::span<const std::int64_t>(vtkhdf));
   out.attribute("/VTKHDF", "Type", std::string("UnstructuredGrid"));
-  const auto count = [&](const char* name, std::size_t value) {
-    const auto number = static_cast<std::int64_t>(value);
-    out.array<std::int64_t>(name, std::span(&number, 1));
+  const auto count = [&](const char* name, std::int64_t value) {
+    out.array<std::int64_t>(name, std::span<const std::int64_t>(&value, 1));
   };
-  const std::size_t cells = offsets.size() - 1;
-  count("/VTKHDF/NumberOfPoints", points.size());
+  count("/VTKHDF/NumberOfPoints", points);
   count("/VTKHDF/NumberOfCells", cells);
-  count("/VTKHDF/NumberOfConnectivityIds", connectivity.size());
-  out.vectors("/VTKHDF/Points", points, as_float);
-  out.array<std::uint8_t>("/VTKHDF/Types", std::vector<std::uint8_t>(cells, cell_type));
-  out.array<std::int64_t>("/VTKHDF/Connectivity", connectivity);
-  out.array<std::int64_t>("/VTKHDF/Offsets", offsets);
-  out.group("/VTKHDF/PointData");
+  count("/VTKHDF/NumberOfConnectivityIds", connectivity);
 }
 
-void write_scalars(Hdf5Writer& out, const char* path, std::span<const double> values) {
-  out.array<float>(path, std::vector<float>(values.begin(), values.end()));
+/// Rows of an array, in the type they are stored as.
+template <class T>
+Hdf5Writer::Fill<T> rows_of(const FileArray& array, Stretches& values) {
+  return [terms = array.terms, &values](std::size_t first, std::span<T> rows) {
+    const auto begin = static_cast<Index>(first);
+    const Index end = begin + static_cast<Index>(rows.size() / width_of(terms[0]));
+    const std::span<const double> found = values.values(terms[0], begin, end);
+    std::vector<double> sum(found.begin(), found.end());
+    for (std::size_t t = 1; t < terms.size(); ++t) {
+      const std::span<const double> more = values.values(terms[t], begin, end);
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+    }
+    std::transform(sum.begin(), sum.end(), rows.begin(),
+                   [](double value) { return static_cast<T>(value); });
+  };
+}
+
+template <class T>
+void write_rows(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+  const std::size_t width = width_of(array.terms[0]), columns = width > 1 ? width : 0;
+  const auto rows = static_cast<std::size_t>(array.count);
+  if (values.writes_together(array.count)) {
+    out.together<T>(array.path, rows, columns, [array, &values](const std::filesystem::path& file) {
+      values.write_together(file, array);
+    });
+  } else {
+    out.later<T>(array.path, rows, columns, static_cast<std::size_t>(values.length()),
+                 rows_of<T>(array, values));
+  }
+}
+
+/// 0, 1, 2, ... times `step`.
+Hdf5Writer::Fill<std::int64_t> counting(std::int64_t step) {
+  return [step](std::size_t first, std::span<std::int64_t> rows) {
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      rows[k] = step * static_cast<std::int64_t>(first + k);
+    }
+  };
+}
+
+/// Which body each phyxel, or surfel, is of.
+Hdf5Writer::Fill<Index> bodies(std::vector<std::int64_t> ends) {
+  return [ends = std::move(ends)](std::size_t first, std::span<Index> rows) {
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      const auto number = static_cast<std::int64_t>(first + k);
+      rows[k] =
+          static_cast<Index>(std::upper_bound(ends.begin(), ends.end(), number) - ends.begin());
+    }
+  };
 }
 
 }  // namespace
+
+void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+  if (array.as_float) return write_rows<float>(out, array, values);
+  write_rows<double>(out, array, values);
+}
 
 std::span<const DiagnosticColumn> diagnostic_columns() {
   using D = const Diagnostics&;
@@ -89,65 +146,73 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
 }
 
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                        const Frame& frame) {
+                        const Diagnostics& diagnostics, Stretches& values) {
   const bool as_float = scene.solver.precision == Precision::single;
-  const State& state = *frame.state;
-  const auto n = static_cast<std::size_t>(model.size());
-  std::vector<Vec3d> points(n);
-  std::vector<std::int64_t> connectivity(n), offsets{0};
-  for (std::size_t i = 0; i < n; ++i) {
-    points[i] = model.position[i] + state.displacement[i];
-    connectivity[i] = static_cast<std::int64_t>(i);
-  }
-  for (const Part& part : model.parts) offsets.push_back(part.end);
+  const Index n = model.whole_size();
+  const auto rows = static_cast<std::size_t>(n),
+             stretch = static_cast<std::size_t>(values.length());
+  const Ends ends = ends_of(model);
+  std::vector<std::int64_t> offsets{0};
+  offsets.insert(offsets.end(), ends.phyxels.begin(), ends.phyxels.end());
+  const std::size_t cells = ends.phyxels.size();
 
   Hdf5Writer out;
-  write_grid(out, points, as_float, connectivity, offsets, vtk_poly_vertex);
-  const std::string data = "/VTKHDF/PointData/";
-  if (wants(scene, "displacement"))
-    out.vectors(data + "displacement", state.displacement, as_float);
-  if (wants(scene, "velocity")) out.vectors(data + "velocity", state.velocity, as_float);
-  if (!frame.von_mises.empty()) write_scalars(out, "/VTKHDF/PointData/von_mises", frame.von_mises);
-  if (!frame.volume_ratio.empty())
-    write_scalars(out, "/VTKHDF/PointData/volume_ratio", frame.volume_ratio);
-  if (wants(scene, "mass")) write_scalars(out, "/VTKHDF/PointData/mass", model.mass);
-  if (wants(scene, "volume")) write_scalars(out, "/VTKHDF/PointData/volume", model.volume);
-  if (model.parts.size() > 1 || wants(scene, "body")) {
-    std::vector<Index> body(n);
-    for (std::size_t p = 0; p < model.parts.size(); ++p) {
-      std::fill(body.begin() + model.parts[p].begin, body.begin() + model.parts[p].end,
-                static_cast<Index>(p));
-    }
-    out.array<Index>(data + "body", body);
+  write_counts(out, n, static_cast<std::int64_t>(cells), n);
+  write_later(out, {"/VTKHDF/Points", as_float, n, {Quantity::position, Quantity::displacement}},
+              values);
+  out.array<std::uint8_t>("/VTKHDF/Types", std::vector<std::uint8_t>(cells, vtk_poly_vertex));
+  out.later<std::int64_t>("/VTKHDF/Connectivity", rows, 0, stretch, counting(1));
+  out.array<std::int64_t>("/VTKHDF/Offsets", offsets);
+  out.group("/VTKHDF/PointData");
+  const auto field = [&](const char* name, bool in_float, Quantity quantity) {
+    write_later(out, {std::string("/VTKHDF/PointData/") + name, in_float, n, {quantity}}, values);
+  };
+  if (wants(scene, "displacement")) field("displacement", as_float, Quantity::displacement);
+  if (wants(scene, "velocity")) field("velocity", as_float, Quantity::velocity);
+  if (values.has(Quantity::von_mises)) field("von_mises", true, Quantity::von_mises);
+  if (values.has(Quantity::volume_ratio)) field("volume_ratio", true, Quantity::volume_ratio);
+  if (wants(scene, "mass")) field("mass", true, Quantity::mass);
+  if (wants(scene, "volume")) field("volume", true, Quantity::volume);
+  if (cells > 1 || wants(scene, "body")) {
+    out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.phyxels));
   }
-  write_metadata(out, scene, frame);
-  write_sealed(file, phyxel_frame_kind, out.image(), Durable::no);
+  write_metadata(out, scene, diagnostics);
+  write_sealed(file, phyxel_frame_kind, out.content(), Durable::no);
 }
 
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                         const Frame& frame) {
-  const bool as_float = scene.solver.precision == Precision::single;
-  const auto& triangles = model.surfels.triangle;
-  std::vector<std::int64_t> connectivity, offsets{0};
-  connectivity.reserve(3 * triangles.size());
-  offsets.reserve(triangles.size() + 1);
-  for (const Triangle& triangle : triangles) {
-    connectivity.insert(connectivity.end(), triangle.begin(), triangle.end());
-    offsets.push_back(static_cast<std::int64_t>(connectivity.size()));
-  }
+                         const Diagnostics& diagnostics, Stretches& values) {
+  const Ends ends = ends_of(model);
+  const std::int64_t points = ends.surfels.empty() ? 0 : ends.surfels.back();
+  const auto rows = static_cast<std::size_t>(points);
+  const auto stretch = static_cast<std::size_t>(values.length());
+  const std::span<const Triangle> triangles = values.triangles();
+  const std::size_t cells = triangles.size();
+
   Hdf5Writer out;
-  write_grid(out, frame.surfels->position, as_float, connectivity, offsets, vtk_triangle);
-  out.vectors("/VTKHDF/PointData/Normals", frame.surfels->normal, true);
+  write_counts(out, points, static_cast<std::int64_t>(cells), static_cast<std::int64_t>(3 * cells));
+  const auto vectors = [&](const char* path, bool as_float, Quantity quantity) {
+    write_later(out, {path, as_float, static_cast<Index>(points), {quantity}}, values);
+  };
+  vectors("/VTKHDF/Points", scene.solver.precision == Precision::single, Quantity::surfel_position);
+  out.later<std::uint8_t>("/VTKHDF/Types", cells, 0, stretch,
+                          [](std::size_t, std::span<std::uint8_t> types) {
+                            std::fill(types.begin(), types.end(), vtk_triangle);
+                          });
+  out.later<std::int64_t>("/VTKHDF/Connectivity", 3 * cells, 0, stretch,
+                          [triangles](std::size_t first, std::span<std::int64_t> corners) {
+                            for (std::size_t k = 0; k < corners.size(); ++k) {
+                              corners[k] = triangles[(first + k) / 3][(first + k) % 3];
+                            }
+                          });
+  out.later<std::int64_t>("/VTKHDF/Offsets", cells + 1, 0, stretch, counting(3));
+  out.group("/VTKHDF/PointData");
+  vectors("/VTKHDF/PointData/Normals", true, Quantity::surfel_normal);
   if (model.parts.size() > 1) {
-    std::vector<Index> body(frame.surfels->position.size());
-    for (std::size_t p = 0; p < model.parts.size(); ++p) {
-      std::fill(body.begin() + model.parts[p].surfel_begin,
-                body.begin() + model.parts[p].surfel_end, static_cast<Index>(p));
-    }
-    out.array<Index>("/VTKHDF/PointData/body", body);
+    out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }
-  write_metadata(out, scene, frame);
-  write_sealed(file, surface_frame_kind, out.image(), Durable::no);
+  write_metadata(out, scene, diagnostics);
+  write_sealed(file, surface_frame_kind, out.content(), Durable::no);
 }
 
 FrameData read_frame(const std::filesystem::path& file) {

@@ -23,12 +23,16 @@ struct DiagnosticColumn {
 std::span<const DiagnosticColumn> diagnostic_columns();
 
 /// VTKHDF UnstructuredGrid 1.0, what every ParaView since 5.10 opens: one poly-vertex cell a body.
-/// Positions in the precision of the run's state.
+/// Positions in the precision of the run's state. `model` may be a rank's share.
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                        const Frame& frame);
+                        const Diagnostics& diagnostics, Stretches& values);
 
 /// The same for the deformed surface: triangles, with normals.
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                         const Frame& frame);
+                         const Diagnostics& diagnostics, Stretches& values);
+
+class Hdf5Writer;
+/// An array that comes when the file is written.
+void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values);
 
 }  // namespace phyxel

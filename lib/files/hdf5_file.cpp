@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "files/hdf5_memory.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
 
@@ -91,26 +92,39 @@ void put_attribute(hid_t file, const std::string& path, const std::string& attri
   demand(handle.good() && H5Awrite(handle, type, value) >= 0, name, path + "@" + attribute);
 }
 
-hid_t access_list(bool in_memory) {
-  const hid_t list = H5Pcreate(H5P_FILE_ACCESS);
-  H5Pset_libver_bounds(list, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);  // what every ParaView reads
-  if (in_memory) H5Pset_fapl_core(list, std::size_t{16} << 20, false);
-  return list;
+/// What every ParaView reads.
+void set_versions(hid_t access) {
+  H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+}
+
+/// Hands over a stretch of the layout.
+std::function<void(const Content::Sink&)> from_memory(std::shared_ptr<const SparseBytes> memory,
+                                                      std::uint64_t begin, std::uint64_t end) {
+  return [=, memory = std::move(memory)](const Content::Sink& sink) {
+    std::vector<std::byte> some;
+    for (std::uint64_t at = begin; at < end; at += some.size()) {
+      some.resize(std::min<std::uint64_t>(end - at, std::uint64_t{1} << 20));
+      memory->read(at, some);
+      sink(some);
+    }
+  };
 }
 
 }  // namespace
 
 // --- Writing ------------------------------------------------------------------------------------
-Hdf5Writer::Hdf5Writer() : name_("HDF5 file in memory") {
+Hdf5Writer::Hdf5Writer() : name_("HDF5 file in memory"), memory_(std::make_shared<SparseBytes>()) {
   quiet();
-  const Handle access(access_list(true), H5Pclose);
+  const Handle access(memory_access_list(*memory_), H5Pclose);
+  set_versions(access);
   file_ = H5Fcreate("phyxel", H5F_ACC_TRUNC, H5P_DEFAULT, access);
   demand(file_ >= 0, name_, "the file");
 }
 
 Hdf5Writer::Hdf5Writer(const std::filesystem::path& file) : name_(file.string()) {
   quiet();
-  const Handle access(access_list(false), H5Pclose);
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  set_versions(access);
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
   H5Pset_userblock(creation, seal_size);
   file_ = H5Fcreate(file.c_str(), H5F_ACC_TRUNC, creation, access);
@@ -133,6 +147,40 @@ template <class T>
 void Hdf5Writer::array(const std::string& path, std::span<const T> values, std::size_t columns) {
   reserve<T>(path, columns > 0 ? values.size() / columns : values.size(), columns);
   if (!values.empty()) rows<T>(path, 0, values, columns);
+}
+
+template <class T>
+std::uint64_t Hdf5Writer::place(const std::string& path, std::size_t rows, std::size_t columns) {
+  reserve<T>(path, rows, columns);
+  this->rows<T>(path, 0, std::vector<T>(std::max<std::size_t>(columns, 1)), columns);
+  const Handle array(H5Dopen2(file_, path.c_str(), H5P_DEFAULT), H5Dclose);
+  const haddr_t at = H5Dget_offset(array);
+  demand(at != HADDR_UNDEF, name_, path);
+  return at;
+}
+
+template <class T>
+void Hdf5Writer::later(const std::string& path, std::size_t rows, std::size_t columns,
+                       std::size_t stretch, Fill<T> fill) {
+  if (rows == 0) return reserve<T>(path, rows, columns);
+  const std::size_t width = std::max<std::size_t>(columns, 1);
+  const auto produce = [=, fill = std::move(fill)](const Content::Sink& sink) {
+    std::vector<T> values;
+    for (std::size_t first = 0; first < rows; first += stretch) {
+      values.resize(width * std::min(stretch, rows - first));
+      fill(first, values);
+      sink(std::as_bytes(std::span(values)));
+    }
+  };
+  later_.push_back({place<T>(path, rows, columns), {rows * width * sizeof(T), produce}});
+}
+
+template <class T>
+void Hdf5Writer::together(const std::string& path, std::size_t rows, std::size_t columns,
+                          std::function<void(const std::filesystem::path& file)> write) {
+  const std::size_t bytes = rows * std::max<std::size_t>(columns, 1) * sizeof(T);
+  later_.push_back({place<T>(path, rows, columns), {bytes, nullptr}});
+  together_.push_back(std::move(write));
 }
 
 void Hdf5Writer::vectors(const std::string& path, std::span<const Vec3d> values, bool as_float) {
@@ -201,15 +249,28 @@ void Hdf5Writer::attribute(const std::string& path, const std::string& name,
   put_attribute(file_, path, name, H5T_NATIVE_DOUBLE, space, values.data(), name_);
 }
 
-std::vector<std::byte> Hdf5Writer::image() {
-  demand(H5Fflush(file_, H5F_SCOPE_GLOBAL) >= 0, name_, "the file");
-  const ssize_t size = H5Fget_file_image(file_, nullptr, 0);
-  demand(size > 0, name_, "the file");
-  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
-  demand(H5Fget_file_image(file_, bytes.data(), bytes.size()) == size, name_, "the file");
-  H5Fclose(file_);
-  file_ = -1;
-  return bytes;
+Content Hdf5Writer::content() {
+  close();
+  std::sort(later_.begin(), later_.end(),
+            [](const Later& a, const Later& b) { return a.at < b.at; });
+  Content content{memory_->size(), {}, nullptr};
+  std::uint64_t done = 0;
+  const auto add_layout = [&](std::uint64_t end) {
+    content.pieces.push_back({end - done, from_memory(memory_, done, end), true});
+    done = end;
+  };
+  for (Later& array : later_) {
+    add_layout(array.at);
+    done += array.piece.bytes;
+    content.pieces.push_back(std::move(array.piece));
+  }
+  add_layout(content.size);
+  if (!together_.empty()) {
+    content.write_together = [all = std::move(together_)](const std::filesystem::path& file) {
+      for (const auto& write : all) write(file);
+    };
+  }
+  return content;
 }
 
 void Hdf5Writer::close() {
@@ -300,6 +361,12 @@ bool Hdf5Reader::is_integer(const std::string& path) const {
 
 template <class T>
 std::vector<T> Hdf5Reader::array(const std::string& path, std::size_t columns) const {
+  return rows<T>(path, columns, 0, shape(path).rows);
+}
+
+template <class T>
+std::vector<T> Hdf5Reader::rows(const std::string& path, std::size_t columns, std::size_t begin,
+                                std::size_t end) const {
   const Shape found = shape(path);
   if (found.columns != columns) {
     refuse(fmt::format("{} has shape [{}, {}]; expected {}", path, found.rows, found.columns,
@@ -308,17 +375,29 @@ std::vector<T> Hdf5Reader::array(const std::string& path, std::size_t columns) c
   if (is_integer(path) != std::is_integral_v<T>) {
     refuse(fmt::format("{} does not hold {}", path, std::is_integral_v<T> ? "integers" : "reals"));
   }
+  if (begin > end || end > found.rows) {
+    refuse(fmt::format("{} has {} rows; wanted are {} to {}", path, found.rows, begin, end));
+  }
   const Handle array(open_array(path), H5Dclose);
-  std::vector<T> values(found.rows * std::max<std::size_t>(columns, 1));
-  if (!values.empty() &&
-      H5Dread(array, type_of<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
+  std::vector<T> values((end - begin) * std::max<std::size_t>(columns, 1));
+  if (values.empty()) return values;
+  const Handle whole(H5Dget_space(array), H5Sclose);
+  const Handle part = space_of(end - begin, columns);
+  const hsize_t start[2] = {begin, 0}, count[2] = {end - begin, columns};
+  if (H5Sselect_hyperslab(whole, H5S_SELECT_SET, start, nullptr, count, nullptr) < 0 ||
+      H5Dread(array, type_of<T>(), part, whole, H5P_DEFAULT, values.data()) < 0) {
     refuse(path + " cannot be read");
   }
   return values;
 }
 
 std::vector<Vec3d> Hdf5Reader::vectors(const std::string& path) const {
-  const std::vector<double> flat = array<double>(path, 3);
+  return vectors(path, 0, shape(path).rows);
+}
+
+std::vector<Vec3d> Hdf5Reader::vectors(const std::string& path, std::size_t begin,
+                                       std::size_t end) const {
+  const std::vector<double> flat = rows<double>(path, 3, begin, end);
   std::vector<Vec3d> values(flat.size() / 3);
   for (std::size_t i = 0; i < values.size(); ++i)
     values[i] = {flat[3 * i], flat[3 * i + 1], flat[3 * i + 2]};
@@ -389,12 +468,18 @@ double Hdf5Reader::number_attribute(const std::string& path, const std::string& 
   return value;
 }
 
-#define PHYXEL_HDF5_TYPE(T)                                                                \
-  template void Hdf5Writer::array<T>(const std::string&, std::span<const T>, std::size_t); \
-  template void Hdf5Writer::reserve<T>(const std::string&, std::size_t, std::size_t);      \
-  template void Hdf5Writer::rows<T>(const std::string&, std::size_t, std::span<const T>,   \
-                                    std::size_t);                                          \
-  template std::vector<T> Hdf5Reader::array<T>(const std::string&, std::size_t) const;
+#define PHYXEL_HDF5_TYPE(T)                                                                     \
+  template void Hdf5Writer::array<T>(const std::string&, std::span<const T>, std::size_t);      \
+  template void Hdf5Writer::together<T>(const std::string&, std::size_t, std::size_t,           \
+                                        std::function<void(const std::filesystem::path&)>);     \
+  template void Hdf5Writer::later<T>(const std::string&, std::size_t, std::size_t, std::size_t, \
+                                     Fill<T>);                                                  \
+  template void Hdf5Writer::reserve<T>(const std::string&, std::size_t, std::size_t);           \
+  template void Hdf5Writer::rows<T>(const std::string&, std::size_t, std::span<const T>,        \
+                                    std::size_t);                                               \
+  template std::vector<T> Hdf5Reader::array<T>(const std::string&, std::size_t) const;          \
+  template std::vector<T> Hdf5Reader::rows<T>(const std::string&, std::size_t, std::size_t,     \
+                                              std::size_t) const;
 PHYXEL_HDF5_TYPE(float)
 PHYXEL_HDF5_TYPE(double)
 PHYXEL_HDF5_TYPE(std::int32_t)

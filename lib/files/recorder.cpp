@@ -98,13 +98,54 @@ void check_output_folder(const fs::path& directory, bool may_exist) {
   make_writable_folder(directory);
 }
 
+std::span<const double> values_of(const Model& model, const Frame& frame, Quantity quantity) {
+  const auto flat = [](const std::vector<Vec3d>& vectors) -> std::span<const double> {
+    if (vectors.empty()) return {};
+    return {&vectors.front().x, 3 * vectors.size()};
+  };
+  switch (quantity) {
+    case Quantity::position:
+      return flat(model.position);
+    case Quantity::mass:
+      return model.mass;
+    case Quantity::volume:
+      return model.volume;
+    case Quantity::displacement:
+      return flat(frame.state->displacement);
+    case Quantity::velocity:
+      return flat(frame.state->velocity);
+    case Quantity::von_mises:
+      return frame.von_mises;
+    case Quantity::volume_ratio:
+      return frame.volume_ratio;
+    case Quantity::surfel_position:
+      if (frame.surfels) return flat(frame.surfels->position);
+      break;
+    case Quantity::surfel_normal:
+      if (frame.surfels) return flat(frame.surfels->normal);
+      break;
+  }
+  return {};
+}
+
+bool FrameStretches::has(Quantity quantity) const {
+  return !values_of(model_, frame_, quantity).empty();
+}
+
+std::span<const double> FrameStretches::values(Quantity quantity, Index begin, Index end) {
+  const std::size_t width = width_of(quantity);
+  return values_of(model_, frame_, quantity)
+      .subspan(width * static_cast<std::size_t>(begin),
+               width * static_cast<std::size_t>(end - begin));
+}
+
 Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
                    std::optional<std::int64_t> resume_after)
     : model_(model),
       scene_(scene),
       directory_(scene.output.directory),
       writes_phyxels_(scene.output.phyxels),
-      writes_surface_(scene.output.surface && !model.surfels.position.empty()) {
+      writes_surface_(scene.output.surface && model.whole_surfels() > 0) {
   check_output_folder(directory_, overwrite || resume_after);
   check_space(resume_after.value_or(0));
   if (resume_after) {
@@ -118,12 +159,12 @@ void Recorder::check_space(std::int64_t frames_before) const {
   const double scalar = scene_.solver.precision == Precision::single ? 4 : 8;
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
   double frame = 20e3;  // seal, HDF5's own structure, metadata
-  const double phyxels = count(model_.position.size());
+  const double phyxels = model_.whole_size();
   if (writes_phyxels_)
     frame += phyxels * (3 * scalar * (1 + count(scene_.output.fields.size())) + 8);
   if (writes_surface_) {
-    frame += count(model_.surfels.position.size()) * 3 * (scalar + 4) +
-             count(model_.surfels.triangle.size()) * 33;
+    // A closed surface has twice as many triangles as corners.
+    frame += model_.whole_surfels() * (3 * (scalar + 4) + 2 * 33);
   }
   const double frames = scene_.output.frames_per_second > 0
                             ? std::floor(scene_.time.end * scene_.output.frames_per_second) + 1
@@ -192,18 +233,23 @@ void Recorder::continue_after(std::int64_t frames) {
 }
 
 void Recorder::write(const Frame& frame) {
-  const double time = frame.diagnostics.time;
+  FrameStretches values(model_, frame);
+  write(frame.diagnostics, values);
+}
+
+void Recorder::write(const Diagnostics& diagnostics, Stretches& values) {
+  const double time = diagnostics.time;
   if (writes_phyxels_) {
     const fs::path file = frame_file(directory_, "phyxels", frames_);
-    write_phyxel_frame(file, model_, scene_, frame);
+    write_phyxel_frame(file, model_, scene_, diagnostics, values);
     phyxels_.append({file, time});
   }
-  if (writes_surface_ && frame.surfels) {
+  if (writes_surface_ && values.has(Quantity::surfel_position)) {
     const fs::path file = frame_file(directory_, "surface", frames_);
-    write_surface_frame(file, model_, scene_, frame);
+    write_surface_frame(file, model_, scene_, diagnostics, values);
     surface_.append({file, time});
   }
-  const std::string line = log_line(frame.diagnostics);
+  const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
   ++frames_;

@@ -71,13 +71,50 @@ std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
 
 }  // namespace
 
-void write_sealed(const fs::path& file, const std::string& kind, std::span<const std::byte> content,
+namespace {
+
+/// The layout first, by which those who write the rest find their way.
+void write_together(NewFile& out, const Content& content) {
+  std::uint64_t at = seal_size;
+  for (const Content::Piece& piece : content.pieces) {
+    std::uint64_t end = at;
+    if (piece.is_layout) {
+      piece.produce([&](std::span<const std::byte> bytes) {
+        out.write(end, bytes);
+        end += bytes.size();
+      });
+    }
+    at += piece.bytes;
+  }
+  content.write_together(out.temporary());
+}
+
+}  // namespace
+
+void write_sealed(const fs::path& file, const std::string& kind, const Content& content,
                   Durable durable) {
+  NewFile out(file, seal_size + content.size);
+  if (content.write_together) write_together(out, content);
   Digest digest;
-  digest.add(content.data(), content.size());
-  const auto seal = seal_of(kind, content.size(), digest.hex());
-  const std::span<const std::byte> pieces[] = {std::as_bytes(std::span(seal)), content};
-  write_whole_file(file, pieces, durable);
+  std::uint64_t at = seal_size;
+  const auto digested = [&](std::span<const std::byte> bytes) {
+    digest.add(bytes.data(), bytes.size());
+    at += bytes.size();
+  };
+  const auto written = [&](std::span<const std::byte> bytes) {
+    out.write(at, bytes);
+    digested(bytes);
+  };
+  for (const Content::Piece& piece : content.pieces) {
+    if (piece.produce) {
+      piece.produce(written);
+    } else {
+      out.read(at, piece.bytes, digested);
+    }
+  }
+  const auto seal = seal_of(kind, content.size, digest.hex());
+  out.write(0, std::as_bytes(std::span(seal)));
+  out.finish(durable);
 }
 
 void seal_in_place(const fs::path& file, const std::string& kind) {

@@ -12,7 +12,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <span>
 #include <string>
 
 #include "files/atomic_file.hpp"
@@ -22,9 +21,10 @@ namespace phyxel {
 /// Bytes of the seal: the smallest user block of HDF5.
 inline constexpr std::size_t seal_size = 512;
 
-/// Writes seal and content, whole or not at all. @throws OutputError.
+/// Writes seal and content, whole or not at all; the disk must have room for both before the
+/// content is asked for. @throws OutputError, and what `content` throws.
 void write_sealed(const std::filesystem::path& file, const std::string& kind,
-                  std::span<const std::byte> content, Durable durable);
+                  const Content& content, Durable durable);
 
 /// Seals a file that was written with `seal_size` bytes left free in front. @throws OutputError.
 void seal_in_place(const std::filesystem::path& file, const std::string& kind);

@@ -100,7 +100,8 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
                          .neighbourhood = in_words(request.neighbourhood),
                          .lists = survey.lists,
                          .kernel_volumes = kernel_volumes,
-                         .size = model.size() - shift});
+                         .size = model.size() - shift,
+                         .surfels = static_cast<Index>(cloud.surface.position.size())});
   Part& part = model.parts.back();
   if (part.begin < part.end) part.origin = model.position[part.begin];
   BodySums sums;
@@ -220,6 +221,13 @@ const Model& Model::with_lists() const {
         "backend on that device, or a model built without a surveyor");
   }
   return *this;
+}
+
+Index Model::whole_surfels() const {
+  if (!share) return static_cast<Index>(surfels.position.size());
+  Index sum = 0;
+  for (const Part& part : parts) sum += part.surfels;
+  return sum;
 }
 
 Offset Model::pairs() const {

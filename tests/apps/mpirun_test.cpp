@@ -108,16 +108,18 @@ TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
   ASSERT_EQ(alone.code, 0) << alone.err;
   const struct {
     int ranks;
-    const char *partitioner, *rings, *precision;
-  } cases[] = {{1, "metis", "1", "float"},
-               {2, "metis", "1", "float"},
-               {2, "curve", "2", "float"},
-               {3, "bisection", "1", "float"},
-               {3, "metis", "2", "float"}};
+    const char *partitioner, *rings, *stretch;
+  } cases[] = {{1, "metis", "1", "7"},
+               {2, "metis", "1", "97"},
+               {2, "curve", "2", "1000000"},
+               {3, "bisection", "1", "1000000"},
+               {3, "metis", "2", "97"}};
   for (const auto& c : cases) {
     const std::string out = std::string(c.partitioner) + std::to_string(c.ranks) + c.rings;
-    const Outcome outcome = run_on(c.ranks, {"run", "scene.toml", "--out", out, "--partitioner",
-                                             c.partitioner, "--ghost-rings", c.rings});
+    use_ranks(c.ranks);
+    environment_.emplace_back("PHYXEL_STRETCH", c.stretch);
+    const Outcome outcome = run({"run", "scene.toml", "--out", out, "--partitioner", c.partitioner,
+                                 "--ghost-rings", c.rings});
     ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
     if (c.ranks > 1) {
       EXPECT_THAT(outcome.out, HasSubstr(std::to_string(c.ranks) + " ranks, cut by"));
@@ -264,6 +266,31 @@ TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {
   EXPECT_TRUE(a.displacement == b.displacement);
   EXPECT_TRUE(a.velocity == b.velocity);
   EXPECT_EQ(text_of(folder_ / "alone" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
+}
+
+/// Written on three ranks, read on two, on one, and on three again, in short stretches.
+TEST_F(Mpirun, CheckpointsGoOnOnOtherRanksToTheByte) {
+  write_scene();
+  for (const char* precision : {"float", "double"}) {
+    const std::string alone = std::string("alone_") + precision;
+    const auto run_to = [&](int ranks, const std::string& out, const char* end, bool resumes) {
+      use_ranks(ranks);
+      environment_.emplace_back("PHYXEL_STRETCH", "101");
+      std::vector<std::string> arguments{"run",   "scene.toml", "--precision", precision,
+                                         "--out", out,          "--until",     end};
+      if (resumes) arguments.insert(arguments.end(), {"--resume", "auto"});
+      const Outcome outcome = run(arguments);
+      ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+    };
+    run_to(0, alone, "0.05", false);
+    run_to(0, alone, "0.1", true);
+    for (const int ranks : {0, 2, 3}) {
+      const std::string out = precision + std::to_string(ranks);
+      run_to(3, out, "0.05", false);
+      run_to(ranks, out, "0.1", true);
+      expect_same_files(alone, out);
+    }
+  }
 }
 
 TEST_F(Mpirun, DivergedRunIsToldOnceAndItsLastGoodStateKept) {

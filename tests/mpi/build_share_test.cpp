@@ -296,10 +296,13 @@ TEST_P(BuiltShares, KnowOfTheWhole) {
     EXPECT_EQ(part.lists.most, whole.lists.most);
     EXPECT_EQ(part.kernel_volumes, whole.kernel_volumes);
     EXPECT_EQ(part.size, whole.size);
+    EXPECT_EQ(part.surfels, whole.surfels);
     EXPECT_EQ(part.mass, whole.mass);
     EXPECT_EQ(part.volume, whole.volume);
     EXPECT_TRUE(part.centre == whole.centre && part.origin == whole.origin);
   }
+  EXPECT_EQ(here_.whole_size(), whole_.size());
+  EXPECT_EQ(here_.whole_surfels(), whole_.whole_surfels());
   EXPECT_EQ(model_digest(here_), model_digest(whole_));
   EXPECT_EQ(here_.degenerate.describe(), whole_.degenerate.describe());
   EXPECT_EQ(here_.warnings, whole_.warnings);

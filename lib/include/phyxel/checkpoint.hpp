@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
+#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
@@ -28,14 +30,42 @@ struct CheckpointInfo {
 /// @throws OutputError; earlier checkpoints stay intact.
 std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
                                        const CheckpointInfo& info);
+/// The same for a state of so many phyxels whose arrays are not all here, or not at once.
+/// @param state its arrays are not looked at
+std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
+                                       const CheckpointInfo& info, Index phyxels,
+                                       Stretches& values);
 
 struct Checkpoint {
   State state;
   CheckpointInfo info;
 };
 
-/// Reads one checkpoint. The digest is compared before HDF5 parses a single byte.
-/// @throws InputError for a missing, truncated, altered or foreign file.
+class Hdf5Reader;
+
+/// A checkpoint whose arrays are read a stretch at a time.
+class CheckpointReader {
+ public:
+  /// Compares the digest before HDF5 parses a single byte, and reads all but the arrays.
+  /// @throws InputError for a missing, truncated, altered or foreign file.
+  explicit CheckpointReader(const std::filesystem::path& file);
+  ~CheckpointReader();
+  CheckpointReader(CheckpointReader&&) noexcept;
+  CheckpointReader& operator=(CheckpointReader&&) noexcept;
+
+  const CheckpointInfo& info() const { return info_; }
+  Index phyxels() const { return phyxels_; }
+  /// The state of phyxels `begin` to `end`. @throws InputError if a value is not finite.
+  State state(Index begin, Index end) const;
+
+ private:
+  std::unique_ptr<const Hdf5Reader> file_;
+  CheckpointInfo info_;
+  State state_;  // without arrays
+  Index phyxels_ = 0;
+};
+
+/// Reads one checkpoint, whole. @throws InputError as `CheckpointReader`.
 Checkpoint read_checkpoint(const std::filesystem::path& file);
 
 /// The newest readable checkpoint in `directory`; a damaged one is skipped, and `warning` says so.

@@ -33,6 +33,7 @@ struct Part {
   ListLengths lists;            ///< Of the whole body.
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
   Index size = 0;               ///< Phyxels of the whole body.
+  Index surfels = 0;            ///< Surfels of the whole body.
   Vec3d origin;                 ///< Its first phyxel at rest [m]: solvers count positions from it.
   double mass = 0, volume = 0;  ///< Of the whole body [kg, m³].
   Vec3d centre;                 ///< Of its mass, at rest [m].
@@ -105,6 +106,7 @@ struct Model {
   Index size() const { return static_cast<Index>(position.size()); }
   /// Phyxels of the whole model.
   Index whole_size() const { return share ? share->whole : size(); }
+  Index whole_surfels() const;
   /// Which phyxel of the whole model phyxel i is.
   Index number(Index i) const { return share ? share->number[i] : i; }
   /// Whether phyxel i is no ghost.

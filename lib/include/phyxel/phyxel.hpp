@@ -15,4 +15,5 @@
 #include "phyxel/shapes.hpp"
 #include "phyxel/solver.hpp"
 #include "phyxel/state.hpp"
+#include "phyxel/stretches.hpp"
 #include "phyxel/types.hpp"

@@ -10,6 +10,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
+#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
@@ -20,6 +21,25 @@ struct Frame {
   Diagnostics diagnostics;
   std::vector<double> von_mises;     ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
   std::vector<double> volume_ratio;  ///< det F, shape [n] or empty.
+};
+
+/// All that this rank has of a quantity: of phyxels and surfels of its model, in the order they
+/// have there. Empty: nothing.
+std::span<const double> values_of(const Model& model, const Frame& frame, Quantity quantity);
+
+/// A frame of a model that is whole here.
+class FrameStretches : public Stretches {
+ public:
+  /// Both must outlive this.
+  FrameStretches(const Model& model, const Frame& frame, Index length = usual_length)
+      : Stretches(length), model_(model), frame_(frame) {}
+  bool has(Quantity quantity) const override;
+  std::span<const double> values(Quantity quantity, Index begin, Index end) override;
+  std::span<const Triangle> triangles() const override { return model_.surfels.triangle; }
+
+ private:
+  const Model& model_;
+  const Frame& frame_;
 };
 
 /// One frame of a series: its file and its time [s].
@@ -53,10 +73,12 @@ class SeriesFile {
 ///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
-/// Each frame is written to a temporary name and renamed. Metadata sit in the group `/phyxel`.
+/// Each frame is written to a temporary name, for which the disk must have room beforehand, and
+/// renamed. Metadata sit in the group `/phyxel`.
 class Recorder {
  public:
   /// Checks the folder and the free space, then removes what the run replaces.
+  /// @param model a rank's share of it will do, if all frames come in stretches
   /// @param resume_after frames of an earlier part of this run, which are kept; later ones are
   ///   removed. Unset: a new run.
   /// @throws InputError if the folder holds an earlier trajectory and `overwrite` is false, if it
@@ -66,6 +88,8 @@ class Recorder {
 
   /// @throws OutputError; frames already written stay intact.
   void write(const Frame& frame);
+  /// A frame whose values are not all here, or not at once. @throws likewise
+  void write(const Diagnostics& diagnostics, Stretches& values);
 
   /// Including those of the earlier part of a resumed run.
   std::int64_t frames_written() const { return frames_; }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <functional>
 #include <random>
 
@@ -122,6 +123,26 @@ std::vector<std::string> names_in(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
   std::sort(names.begin(), names.end());
   return names;
+}
+
+TEST_F(Files, ACheckpointIsReadInStretches) {
+  const State state = small_state(false);
+  const CheckpointReader reader(
+      write_checkpoint(folder_, state, {.precision = Precision::double_}));
+  EXPECT_EQ(reader.phyxels(), 5);
+  EXPECT_EQ(reader.info().precision, Precision::double_);
+  EXPECT_TRUE(reader.state(0, 0).displacement.empty());
+  EXPECT_EQ(reader.state(0, 0).time, state.time);
+  State read;
+  for (const auto& [begin, end] : {std::pair{0, 2}, {2, 4}, {4, 5}}) {
+    const State some = reader.state(begin, end);
+    read.displacement.insert(read.displacement.end(), some.displacement.begin(),
+                             some.displacement.end());
+    read.velocity.insert(read.velocity.end(), some.velocity.begin(), some.velocity.end());
+  }
+  EXPECT_TRUE(read.displacement == state.displacement);
+  EXPECT_TRUE(read.velocity == state.velocity);
+  EXPECT_THROW(reader.state(4, 6), InputError);
 }
 
 TEST_F(Files, TheLastTwoCheckpointsAreKept) {
@@ -341,7 +362,7 @@ TEST_F(Files, WrongContentIsNamedByArrayAndRow) {
   for (const auto& c : cases) {
     Hdf5Writer out;
     c.write(out);
-    write_sealed(folder_ / "body.h5", "body", out.image(), Durable::no);
+    write_sealed(folder_ / "body.h5", "body", out.content(), Durable::no);
     const std::string message = refusal([&] { read_body(folder_ / "body.h5"); });
     EXPECT_THAT(message, HasSubstr(c.message));
     EXPECT_THAT(message, HasSubstr("body.h5"));
@@ -362,6 +383,42 @@ TEST_F(Files, AFileOnDiskSealedAfterwardsIsReadLikeAnother) {
   const Hdf5Reader in(folder_ / "disk.h5");
   EXPECT_THAT(in.array<double>("/a/b", 2), ::testing::ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
   EXPECT_EQ(in.text("/note"), "hello");
+}
+
+/// Of a billion phyxels: only what is asked for is ever in memory.
+TEST_F(Files, ArraysThatComeLaterTakeNoMemory) {
+  constexpr std::size_t rows = 1'000'000'000;
+  Hdf5Writer out;
+  out.group("/state");
+  out.later<double>("/state/u", rows, 3, 1000, [](std::size_t first, std::span<double> values) {
+    ASSERT_EQ(values.size(), 3000u);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      values[k] = static_cast<double>(3 * first + k);
+    }
+  });
+  out.later<std::uint8_t>("/state/kind", rows, 0, 1000,
+                          [](std::size_t, std::span<std::uint8_t>) {});
+  out.text("/note", "hello");
+  const Content content = out.content();
+  EXPECT_GT(content.size, 25 * rows);
+  EXPECT_LT(content.size, 25 * rows + 10000);
+  // The first few pieces, whose numbers count on.
+  struct Enough {};
+  std::size_t pieces = 0, longest = 0;
+  double next = 0;
+  const auto look = [&](std::span<const std::byte> bytes) {
+    longest = std::max(longest, bytes.size());
+    if (bytes.size() == 3000 * sizeof(double)) {
+      double first = 0;
+      std::memcpy(&first, bytes.data(), sizeof first);
+      EXPECT_EQ(first, next);
+      next += 3000;
+    }
+    if (++pieces == 20) throw Enough();
+  };
+  EXPECT_THROW(for (const Content::Piece& piece : content.pieces) piece.produce(look), Enough);
+  EXPECT_EQ(longest, 3000 * sizeof(double));
+  EXPECT_GT(next, 0);
 }
 
 TEST_F(Files, ALogIsExtendedInOneWriteAndNeverShortenedByAnother) {

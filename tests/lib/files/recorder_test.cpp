@@ -3,10 +3,14 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
+#include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include <cstdlib>
 
+#include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
 #include "support/folder.hpp"
 #include "support/two_bodies.hpp"
@@ -51,6 +55,121 @@ TEST_F(Recording, FramesComeBack) {
     EXPECT_EQ(surface.point[1].x, 1.5);
     EXPECT_TRUE(surface.normal == model_.surfels.normal);
     EXPECT_EQ(surface.body, (std::vector<Index>{1, 1, 1, 1}));
+  }
+}
+
+/// Counts what is asked for.
+class Counted : public FrameStretches {
+ public:
+  using FrameStretches::FrameStretches;
+  std::span<const double> values(Quantity quantity, Index begin, Index end) override {
+    ++asked;
+    longest = std::max(longest, end - begin);
+    return FrameStretches::values(quantity, begin, end);
+  }
+  int asked = 0;
+  Index longest = 0;
+};
+
+TEST_F(Recording, FramesAreTheSameBytesWhateverTheLengthOfStretches) {
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    scene_.solver.precision = precision;
+    const test::TwoBodiesFrame moment(model_, 3);
+    const Frame frame = moment.frame();
+    Recorder(model_, scene_, true).write(frame);
+    const std::string phyxels = text_of(folder_ / "out" / "phyxels_000000.hdf");
+    const std::string surface = text_of(folder_ / "out" / "surface_000000.hdf");
+    for (const Index length : {1, 2, 3, 5}) {
+      Counted values(model_, frame, length);
+      Recorder(model_, scene_, true).write(frame.diagnostics, values);
+      EXPECT_EQ(values.longest, length);
+      EXPECT_TRUE(text_of(folder_ / "out" / "phyxels_000000.hdf") == phyxels) << length;
+      EXPECT_TRUE(text_of(folder_ / "out" / "surface_000000.hdf") == surface) << length;
+    }
+  }
+}
+
+/// Stands for ranks that write all arrays by themselves: through HDF5, which changes the layout.
+class WrittenBeside : public FrameStretches {
+ public:
+  using FrameStretches::FrameStretches;
+  bool writes_together(Index) const override { return true; }
+  void write_together(const fs::path& file, const FileArray& array) override {
+    std::vector<double> sum;
+    for (const Quantity term : array.terms) {
+      const auto more = FrameStretches::values(term, 0, array.count);
+      sum.resize(more.size());
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+    }
+    const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t rows = H5Dopen2(opened, array.path.c_str(), H5P_DEFAULT);
+    EXPECT_GE(H5Dwrite(rows, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, sum.data()), 0);
+    H5Dclose(rows);
+    EXPECT_GE(H5Fclose(opened), 0);
+    ++written;
+  }
+  int written = 0;
+};
+
+TEST_F(Recording, FramesThatOthersWriteAreTheSameBytes) {
+  const test::TwoBodiesFrame moment(model_, 3);
+  const Frame frame = moment.frame();
+  Recorder(model_, scene_, true).write(frame);
+  const std::string phyxels = text_of(folder_ / "out" / "phyxels_000000.hdf");
+  const std::string surface = text_of(folder_ / "out" / "surface_000000.hdf");
+  WrittenBeside values(model_, frame, 2);
+  Recorder(model_, scene_, true).write(frame.diagnostics, values);
+  EXPECT_EQ(values.written, 9);  // points, six fields; points, normals
+  EXPECT_TRUE(text_of(folder_ / "out" / "phyxels_000000.hdf") == phyxels);
+  EXPECT_TRUE(text_of(folder_ / "out" / "surface_000000.hdf") == surface);
+  const FrameData read = read_frame(folder_ / "out" / "phyxels_000000.hdf");
+  EXPECT_EQ(read.point[4].x, model_.position[4].x + 1.5);
+}
+
+/// Files of this process may not grow beyond so many bytes: a disk that is full.
+class SmallDisk {
+ public:
+  explicit SmallDisk(rlim_t bytes) : handler_(signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~SmallDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_F(Recording, AFullDiskIsFoundBeforeAnyValueIsAskedFor) {
+  const test::TwoBodiesFrame moment(model_, 0);
+  const Frame frame = moment.frame();
+  Counted values(model_, frame, 2);
+  Recorder recorder(model_, scene_, false);
+  recorder.write(frame);
+  const std::string before = text_of(folder_ / "out" / "phyxels_000000.hdf");
+  const auto expect_failure = [&](auto&& write, const char* file) {
+    const SmallDisk disk(4000);
+    try {
+      write();
+      ADD_FAILURE() << file << " fits?";
+    } catch (const OutputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(file));
+      EXPECT_THAT(error.what(), HasSubstr("bytes could not be written"));
+    }
+  };
+  expect_failure([&] { recorder.write(frame.diagnostics, values); }, "phyxels_000001.hdf");
+  expect_failure([&] { write_checkpoint(folder_ / "out", moment.state, {}, 5, values); },
+                 "checkpoint_000000000.h5");
+  EXPECT_EQ(values.asked, 0);
+  EXPECT_EQ(recorder.frames_written(), 1);
+  EXPECT_EQ(text_of(folder_ / "out" / "phyxels_000000.hdf"), before);
+  EXPECT_EQ(read_series(folder_ / "out" / "phyxels.hdf.series").size(), 1u);
+  for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
+    EXPECT_NE(entry.path().extension(), ".tmp");
   }
 }
 

@@ -1,0 +1,192 @@
+#include "file_writer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "mpi/parallel_file.hpp"
+#include "phyxel/error.hpp"
+#include "timeline.hpp"
+
+namespace phyxel::app {
+
+/// The values of all ranks, as the writer's thread sees them.
+class FileWriter::Asking : public Stretches {
+ public:
+  Asking(FileWriter& writer, const Moment& moment)
+      : Stretches(writer.length_), writer_(writer), moment_(moment) {}
+
+  bool has(Quantity quantity) const override {
+    const auto& optional = moment_.optional;
+    return std::find(optional.begin(), optional.end(), quantity) != optional.end();
+  }
+  std::span<const double> values(Quantity quantity, Index begin, Index end) override {
+    return values_ = writer_.asked(quantity, {begin, end});
+  }
+  std::span<const Triangle> triangles() const override { return writer_.ensemble_.triangles(); }
+  /// Where they are more than the first rank can be brought at once.
+  bool writes_together(Index count) const override {
+    return can_write_together() && count > length();
+  }
+  void write_together(const std::filesystem::path& file, const FileArray& array) override {
+    writer_.have_written({std::filesystem::absolute(file).string(), array});
+  }
+
+ private:
+  FileWriter& writer_;
+  const Moment& moment_;
+  std::vector<double> values_;
+};
+
+FileWriter::FileWriter(const Ensemble& ensemble, Index length)
+    : ensemble_(ensemble), length_(length) {}
+
+FileWriter::~FileWriter() {
+  {
+    const std::lock_guard lock(mutex_);
+    leaving_ = true;
+  }
+  changed_.notify_all();
+}
+
+void FileWriter::submit(std::shared_ptr<const Moment> moment, Job job) {
+  if (alone()) {
+    writer_.submit([this, moment = std::move(moment), job = std::move(job)] {
+      FrameStretches values(ensemble_.here(), moment->frame, length_);
+      job(values);
+    });
+    return;
+  }
+  wait_for_room();
+  ranks().together([&] {
+    if (!leads()) return;
+    writer_.submit([this, moment, job = std::move(job)] {
+      try {
+        Asking values(*this, *moment);
+        job(values);
+      } catch (...) {
+        ended(false);
+        throw;
+      }
+      ended(true);
+    });
+  });
+  open_.push_back(std::move(moment));
+}
+
+void FileWriter::serve() {
+  if (alone()) return writer_.check();
+  if (!open_.empty()) serve(false);
+}
+
+void FileWriter::wait_for_room() {
+  if (alone()) return writer_.wait_for_room();
+  while (open_.size() > 1) serve(true);
+}
+
+void FileWriter::finish() {
+  if (alone()) return writer_.finish();
+  while (!open_.empty()) serve(true);
+}
+
+void FileWriter::serve(bool wait) {
+  const Call call = ranks().broadcast(std::vector{next_call(wait)}).front();
+  for (; done_ < call.done; ++done_) open_.pop_front();
+  if (call.failed) {
+    ranks().together([&] {
+      if (leads()) writer_.finish();
+    });
+  }
+  if (call.ask == Call::Ask::nothing) return;
+  std::vector<double> values;
+  if (call.ask == Call::Ask::stretch) {
+    const Phase phase("bringing values together");
+    values = ensemble_.exchange().gathered(call.quantity, own_values(call.quantity), call.stretch);
+  } else {
+    const Phase phase("writing together");
+    write_array();
+  }
+  if (!leads()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    call_.ask = Call::Ask::nothing;
+    answer_ = std::move(values);
+  }
+  changed_.notify_all();
+}
+
+std::span<const double> FileWriter::own_values(Quantity quantity) const {
+  return values_of(ensemble_.here(), open_.front()->frame, quantity);
+}
+
+void FileWriter::write_array() const {
+  const auto told = [](const auto& values) {
+    return ranks().broadcast(std::vector(values.begin(), values.end()));
+  };
+  const auto text = [](const std::vector<char>& letters) {
+    return std::string(letters.begin(), letters.end());
+  };
+  struct Numbers {
+    bool as_float;
+    Index count;
+  };
+  const FileArray& asked = array_.array;  // on the first rank
+  const std::string file = text(told(array_.file));
+  const Numbers numbers =
+      ranks().broadcast(std::vector{Numbers{asked.as_float, asked.count}}).front();
+  const FileArray array{text(told(asked.path)), numbers.as_float, numbers.count, told(asked.terms)};
+  phyxel::write_together(
+      ranks(), file, array, length_, [&](std::span<const StretchExchange::Stretch> of_ranks) {
+        std::vector<double> sum;
+        for (const Quantity term : array.terms) {
+          const auto more = ensemble_.exchange().brought(term, own_values(term), of_ranks);
+          if (sum.empty()) {  // not added to zero, which would lose the sign of another
+            sum = more;
+            continue;
+          }
+          for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+        }
+        return sum;
+      });
+}
+
+FileWriter::Call FileWriter::next_call(bool wait) {
+  if (!leads()) return {};
+  std::unique_lock lock(mutex_);
+  if (wait) {
+    changed_.wait(lock, [&] {
+      return call_.ask != Call::Ask::nothing || call_.failed || call_.done > done_;
+    });
+  }
+  return call_;
+}
+
+std::vector<double> FileWriter::asked(Quantity quantity, StretchExchange::Stretch stretch) {
+  std::unique_lock lock(mutex_);
+  call_ = {call_.done, false, Call::Ask::stretch, quantity, stretch};
+  return answered(lock);
+}
+
+void FileWriter::have_written(Array array) {
+  std::unique_lock lock(mutex_);
+  array_ = std::move(array);
+  call_.ask = Call::Ask::array;
+  answered(lock);
+}
+
+std::vector<double> FileWriter::answered(std::unique_lock<std::mutex>& lock) {
+  changed_.notify_all();
+  changed_.wait(lock, [&] { return answer_ || leaving_; });
+  if (!answer_) throw OutputError("the run has ended before its files were written");
+  return *std::exchange(answer_, std::nullopt);
+}
+
+void FileWriter::ended(bool well) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (well) ++call_.done;
+    if (!well) call_.failed = true;
+  }
+  changed_.notify_all();
+}
+
+}  // namespace phyxel::app

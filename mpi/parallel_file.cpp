@@ -1,0 +1,108 @@
+#include "mpi/parallel_file.hpp"
+
+#include <fmt/format.h>
+#include <hdf5.h>
+#include <mpi.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "mpi/pulse.hpp"
+
+namespace phyxel {
+namespace {
+
+/// One that all ranks have open. It is not closed by itself: after an error that would hang.
+class SharedFile {
+ public:
+  SharedFile(const Communicator& ranks, const std::string& file, const std::string& path)
+      : ranks_(ranks), name_(file), path_(path) {
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    H5Pset_fapl_mpio(access, MPI_COMM_WORLD, MPI_INFO_NULL);
+    H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
+    H5Pset_all_coll_metadata_ops(access, true);
+    H5Pset_coll_metadata_write(access, true);
+    file_ = H5Fopen(file.c_str(), H5F_ACC_RDWR, access);
+    demand(file_ >= 0);
+    array_ = H5Dopen2(file_, path.c_str(), H5P_DEFAULT);
+    demand(array_ >= 0);
+    H5Pclose(access);
+    transfer_ = H5Pcreate(H5P_DATASET_XFER);
+    H5Pset_dxpl_mpio(transfer_, H5FD_MPIO_COLLECTIVE);
+  }
+
+  template <class T>
+  void write(hid_t type, std::size_t width, StretchExchange::Stretch rows,
+             const std::vector<double>& values) {
+    const std::vector<T> stored(values.begin(), values.end());
+    const int dimensions = width > 1 ? 2 : 1;
+    const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
+    const hsize_t count[2] = {static_cast<hsize_t>(rows.end - rows.begin), width};
+    const hid_t all = H5Dget_space(array_), some = H5Screate_simple(dimensions, count, nullptr);
+    if (rows.begin < rows.end) {
+      H5Sselect_hyperslab(all, H5S_SELECT_SET, start, nullptr, count, nullptr);
+    } else {
+      H5Sselect_none(all);
+      H5Sselect_none(some);
+    }
+    demand(H5Dwrite(array_, type, some, all, transfer_, stored.data()) >= 0);
+    H5Sclose(some);
+    H5Sclose(all);
+  }
+
+  void close() {
+    H5Pclose(transfer_);
+    H5Dclose(array_);
+    demand(H5Fclose(file_) >= 0);
+  }
+
+ private:
+  void demand(bool good) const {
+    if (ranks_.smallest(std::int64_t{good}) == 1) return;
+    if (ranks_.rank() == 0) {
+      throw OutputError(
+          fmt::format("{}: {} could not be written by all ranks together", name_, path_));
+    }
+    ranks_.barrier();  // until the first rank ends all
+  }
+
+  const Communicator& ranks_;
+  std::string name_, path_;
+  hid_t file_ = -1, array_ = -1, transfer_ = -1;
+};
+
+}  // namespace
+
+bool can_write_together() { return true; }
+
+void write_together(const Communicator& ranks, const std::string& file, const FileArray& array,
+                    Index length, const RowsOf& rows) {
+  // Or else HDF5 would hang: a rank that cannot open it leaves the others waiting.
+  ranks.together([&] {
+    if (::access(file.c_str(), R_OK | W_OK) == 0) return;
+    throw OutputError(fmt::format(
+        "{}: cannot be opened by all ranks: allowed are folders on a file system that all see",
+        file));
+  });
+  SharedFile out(ranks, file, array.path);
+  const std::size_t width = width_of(array.terms[0]);
+  std::vector<StretchExchange::Stretch> of_ranks(static_cast<std::size_t>(ranks.size()));
+  for (std::int64_t at = 0; at < array.count;) {
+    for (StretchExchange::Stretch& stretch : of_ranks) {
+      stretch.begin = static_cast<Index>(at);
+      stretch.end = static_cast<Index>(at = std::min<std::int64_t>(array.count, at + length));
+    }
+    const std::vector<double> values = rows(of_ranks);
+    const StretchExchange::Stretch own = of_ranks[static_cast<std::size_t>(ranks.rank())];
+    const Waiting waiting;
+    if (array.as_float) {
+      out.write<float>(H5T_NATIVE_FLOAT, width, own, values);
+    } else {
+      out.write<double>(H5T_NATIVE_DOUBLE, width, own, values);
+    }
+  }
+  out.close();
+}
+
+}  // namespace phyxel

@@ -1,0 +1,94 @@
+#include "mpi/stretch_exchange.hpp"
+
+#include <algorithm>
+
+namespace phyxel {
+
+template <class Wanted>
+StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& numbers,
+                                                   Wanted&& wanted) {
+  Places places;
+  for (Index i = 0; i < static_cast<Index>(numbers.size()); ++i) {
+    if (wanted(i)) places.here.push_back(i);
+  }
+  std::sort(places.here.begin(), places.here.end(),
+            [&](Index a, Index b) { return numbers[a] < numbers[b]; });
+  for (const Index i : places.here) places.number.push_back(numbers[i]);
+  return places;
+}
+
+StretchExchange::Places::Range StretchExchange::Places::within(Stretch stretch) const {
+  const auto before = [&](Index limit) {
+    return static_cast<std::size_t>(std::lower_bound(number.begin(), number.end(), limit) -
+                                    number.begin());
+  };
+  return {before(stretch.begin), before(stretch.end)};
+}
+
+StretchExchange::StretchExchange(const Communicator& ranks, const Model& share)
+    : ranks_(ranks),
+      share_(share),
+      own_(places_of(share.share->number, [&](Index i) { return share.owns(i); })),
+      surfels_(places_of(share.share->surfel_number, [](Index) { return true; })) {}
+
+std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const double> here,
+                                             std::span<const Stretch> wanted) const {
+  const Places& places = is_of_surfels(quantity) ? surfels_ : own_;
+  const std::size_t width = width_of(quantity);
+  std::vector<std::vector<Index>> numbers(wanted.size());
+  std::vector<std::vector<double>> values(wanted.size());
+  for (std::size_t r = 0; r < wanted.size(); ++r) {
+    const Places::Range range = places.within(wanted[r]);
+    for (std::size_t k = range.begin; k < range.end; ++k) {
+      const auto value = here.subspan(width * static_cast<std::size_t>(places.here[k]), width);
+      numbers[r].push_back(places.number[k]);
+      values[r].insert(values[r].end(), value.begin(), value.end());
+    }
+  }
+  numbers = ranks_.exchanged(numbers);
+  values = ranks_.exchanged(values);
+  const Stretch own = wanted[static_cast<std::size_t>(ranks_.rank())];
+  std::vector<double> all(width * static_cast<std::size_t>(own.end - own.begin));
+  for (std::size_t r = 0; r < numbers.size(); ++r) {
+    for (std::size_t k = 0; k < numbers[r].size(); ++k) {
+      const auto row = static_cast<std::size_t>(numbers[r][k] - own.begin);
+      std::copy_n(values[r].data() + width * k, width, all.data() + width * row);
+    }
+  }
+  return all;
+}
+
+std::vector<double> StretchExchange::gathered(Quantity quantity, std::span<const double> here,
+                                              Stretch wanted) const {
+  std::vector<Stretch> of_ranks(static_cast<std::size_t>(ranks_.size()));
+  of_ranks[0] = wanted;
+  return brought(quantity, here, of_ranks);
+}
+
+State StretchExchange::scattered(Index length,
+                                 const std::function<State(Index begin, Index end)>& read) const {
+  const Places places = places_of(share_.share->number, [](Index) { return true; });
+  const Index all = share_.whole_size();
+  State state;
+  state.displacement.resize(places.here.size());
+  state.velocity.resize(places.here.size());
+  for (Index begin = 0; begin < all;) {
+    const Index end = all - begin > length ? begin + length : all;
+    State some;
+    ranks_.together([&] {
+      if (ranks_.rank() == 0) some = read(begin, end);
+    });
+    some.displacement = ranks_.broadcast(std::move(some.displacement));
+    some.velocity = ranks_.broadcast(std::move(some.velocity));
+    const Places::Range range = places.within({begin, end});
+    for (std::size_t k = range.begin; k < range.end; ++k) {
+      const auto row = static_cast<std::size_t>(places.number[k] - begin);
+      state.displacement[places.here[k]] = some.displacement[row];
+      state.velocity[places.here[k]] = some.velocity[row];
+    }
+    begin = end;
+  }
+  return state;
+}
+
+}  // namespace phyxel

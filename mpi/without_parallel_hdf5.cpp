@@ -1,0 +1,13 @@
+/// Serial HDF5: the first rank writes.
+#include "mpi/parallel_file.hpp"
+
+namespace phyxel {
+
+bool can_write_together() { return false; }
+
+void write_together(const Communicator&, const std::string& file, const FileArray&, Index,
+                    const RowsOf&) {
+  throw OutputError(file + ": this program was built without parallel HDF5");
+}
+
+}  // namespace phyxel
