@@ -9,6 +9,7 @@
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
+#include "scaling_model.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -122,9 +123,13 @@ std::string section(const CsvTable& table, int ranks, bool gpus) {
 
 std::string sections(const fs::path& results, const std::string& kind) {
   std::string text;
+  std::vector<CsvTable> tables;
   for (const auto& [ranks, table] : tables_in(results, kind)) {
     if (ranks > 1) text += section(table, ranks, kind == "gpu");
+    tables.push_back(table);
   }
+  const fs::path sizes = results / (kind + "_sizes.csv");
+  if (fs::exists(sizes)) text += scaling_model(tables, read_csv(sizes));
   return text;
 }
 
