@@ -285,9 +285,10 @@ class Builder {
     std::vector<double> reach(bodies_.size(), 0);
     for (const auto& [first, last] : stretches) {
       const auto b = static_cast<std::size_t>(own[first].body);
+      const std::size_t begin = first, end = last;  // for clang, whose OpenMP takes no bindings
       double most = 0;
 #pragma omp parallel for schedule(static) reduction(max : most)
-      for (std::size_t k = first; k < last; ++k) {
+      for (std::size_t k = begin; k < end; ++k) {
         SpreadPhyxel& p = own[k];
         p.support = support_radii({&p.spacing, 1}, rule(b), medians[b])[0];
         most = std::max(most, p.support);

@@ -54,6 +54,7 @@ class SharedFile {
   void close() {
     H5Pclose(transfer_);
     H5Dclose(array_);
+    demand(H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0);
     demand(H5Fclose(file_) >= 0);
   }
 
@@ -74,7 +75,7 @@ class SharedFile {
 
 }  // namespace
 
-bool can_write_together() { return true; }
+bool can_write_together() { return H5open() >= 0; }
 
 void write_together(const Communicator& ranks, const std::string& file, const FileArray& array,
                     Index length, const RowsOf& rows) {

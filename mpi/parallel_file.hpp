@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-/// Whether HDF5 is a parallel one.
+/// Whether HDF5 is a parallel one. Then it starts here, if it has not yet, and talks to MPI.
 bool can_write_together();
 
 /// What each rank writes of an array next: its values, one row after the other. Collective.

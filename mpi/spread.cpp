@@ -265,13 +265,13 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
   const std::vector<Keyed> sorted = keyed(own);
   own = ordered(own, 0, own.size(), [&](std::size_t k) { return sorted[k].here; });
-  const auto stretches = stretches_of_bodies(own);
-  for (const auto& [first, last] : stretches) {
+  for (const auto& [first, last] : stretches_of_bodies(own)) {
     // A rank's first body may have begun on another one.
     const Index begun = first == 0 && own[0].body == first_body ? first_along : 0;
+    const std::size_t begin = first, end = last;  // for clang, whose OpenMP takes no bindings
 #pragma omp parallel for schedule(static)
-    for (std::size_t k = first; k < last; ++k) {
-      own[k].along = begun + static_cast<Index>(k - first);
+    for (std::size_t k = begin; k < end; ++k) {
+      own[k].along = begun + static_cast<Index>(k - begin);
     }
   }
   return own;

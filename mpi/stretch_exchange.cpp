@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "parallel_sort.hpp"
+#include "tabulated.hpp"
+
 namespace phyxel {
 
 template <class Wanted>
@@ -11,9 +14,12 @@ StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& num
   for (Index i = 0; i < static_cast<Index>(numbers.size()); ++i) {
     if (wanted(i)) places.here.push_back(i);
   }
-  std::sort(places.here.begin(), places.here.end(),
-            [&](Index a, Index b) { return numbers[a] < numbers[b]; });
-  for (const Index i : places.here) places.number.push_back(numbers[i]);
+  const auto by_number = [&](Index a, Index b) { return numbers[a] < numbers[b]; };
+  if (!std::is_sorted(places.here.begin(), places.here.end(), by_number)) {
+    parallel_sort(places.here, by_number);
+  }
+  places.number =
+      tabulated(places.here.size(), [&](std::size_t k) { return numbers[places.here[k]]; });
   return places;
 }
 

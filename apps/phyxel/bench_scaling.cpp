@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <set>
 #include <span>
@@ -231,8 +232,13 @@ void bench_scaling(const Options& options) {
     fmt::print("{}", csv_text(table));
   });
   for (const Index size : options.sizes) {
-    const Scene scene = cube_scene(options.weak ? size * ranks().size() : size),
-                scene_of_one = cube_scene(size);
+    const std::int64_t all = options.weak ? std::int64_t{size} * ranks().size() : size;
+    ranks().together([&] {
+      if (all <= std::numeric_limits<Index>::max()) return;
+      throw InputError(fmt::format("--phyxels {} on {} ranks are {}: allowed are {}", size,
+                                   ranks().size(), all, std::numeric_limits<Index>::max()));
+    });
+    const Scene scene = cube_scene(static_cast<Index>(all)), scene_of_one = cube_scene(size);
     std::optional<Model> one;
     ranks().together([&] {
       if (leads && !alone && !options.without_one) one = make_model(scene_of_one, device);

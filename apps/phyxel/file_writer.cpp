@@ -38,7 +38,9 @@ class FileWriter::Asking : public Stretches {
 };
 
 FileWriter::FileWriter(const Ensemble& ensemble, Index length)
-    : ensemble_(ensemble), length_(length) {}
+    : ensemble_(ensemble), length_(length) {
+  can_write_together();  // HDF5 starts on this thread, as MPI wants it
+}
 
 FileWriter::~FileWriter() {
   {

@@ -5,7 +5,16 @@
 
 #include "huge_pages.hpp"
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // which have their own
+// Sanitizers have their own; clang tells of them by features.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PHYXEL_OWN_NEW 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
+    __has_feature(memory_sanitizer)
+#define PHYXEL_OWN_NEW 0
+#endif
+#endif
+#ifndef PHYXEL_OWN_NEW
 
 void* operator new(std::size_t size) {
   for (;;) {

@@ -230,6 +230,8 @@ class Run {
       write_state();
       writer_.finish();
     } catch (const Error& writing) {
+      // What this rank alone knows of must end all.
+      if (ranks().size() > 1 && !dynamic_cast<const AgreedError*>(&writing)) throw;
       return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
     }
     return fmt::format("{}; the last good state, at t = {:g} s, is {}", error, good_->state.time,
@@ -307,7 +309,8 @@ class Run {
   /// Phyxels of which values are brought to the first rank at a time: fewer, in tests.
   static Index stretch_length() {
     const char* said = std::getenv("PHYXEL_STRETCH");
-    return said ? std::max(1, std::atoi(said)) : Stretches::usual_length;
+    const Index length = said ? std::max(1, std::atoi(said)) : Stretches::usual_length;
+    return ranks().broadcast(std::vector{length}).front();
   }
 
   void check_resumed() const {

@@ -13,9 +13,11 @@
 /// others on the host first.
 #pragma once
 
+#include <array>
 #include <cstring>
 #include <exception>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -290,8 +292,13 @@ class DirectExchange {
   Meeting<Points<Real>> meeting_of_pass_2(bool waits) const {
     return meeting(Sent::stresses, Sent::displacements, m_.fields().points, points_, waits);
   }
-  /// Whether there is a block to tell the peers.
-  bool tiles_meet() const { return m_.boundary_tiles() > 0; }
+  /// Whether there is a block to tell the peers, and none that waits keeps another rank's from
+  /// running: MPS lets kernels of several ranks share the GPU at once, without turns.
+  bool tiles_meet() const {
+    int shared_at_once = 0;
+    PHYXEL_CUDA(cudaDeviceGetAttribute(&shared_at_once, cudaDevAttrMpsEnabled, m_.device().index));
+    return m_.boundary_tiles() > 0 && shared_at_once == 0;
+  }
   /// Other ranks' memory is no longer used here, and may be freed once all have done this.
   void close() { opened_.clear(); }
   double waited_seconds() const {
@@ -550,6 +557,21 @@ class DeviceHalo {
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";
     throw DeviceError("--transport direct: " + trouble + "; allowed here: nccl, host, auto");
   }
+  /// Collective.
+  bool gpus_differ() const {
+    cudaDeviceProp properties;
+    PHYXEL_CUDA(cudaGetDeviceProperties(&properties, m_.device().index));
+    std::array<std::int64_t, 2> own;
+    static_assert(sizeof own == sizeof properties.uuid);
+    std::memcpy(own.data(), &properties.uuid, sizeof own);
+    std::vector<std::int64_t> words(2 * static_cast<std::size_t>(others().count()), 0);
+    const auto at = 2 * static_cast<std::size_t>(others().rank());
+    std::copy(own.begin(), own.end(), words.begin() + static_cast<std::ptrdiff_t>(at));
+    others().add(words);
+    std::set<std::pair<std::int64_t, std::int64_t>> gpus;
+    for (std::size_t k = 0; k < words.size(); k += 2) gpus.emplace(words[k], words[k + 1]);
+    return static_cast<int>(gpus.size()) == others().count();
+  }
   /// One rank names the ranks, for all.
   void open_nccl(bool insist) {
     std::string trouble;
@@ -563,8 +585,11 @@ class DeviceHalo {
       }
       return agree(trouble.empty());
     };
+    // Where ranks share a GPU, NCCL may wait for ever.
+    const bool apart = gpus_differ();
     const bool named = attempt([&] {
       if (!has_nccl()) throw DeviceError(nccl_version());
+      if (!apart) throw DeviceError("ranks share a GPU");
       if (others().rank() == 0) name = NcclRanks::make_name();
     });
     if (named) {
@@ -574,6 +599,7 @@ class DeviceHalo {
               [&] { courier = std::make_unique<NcclCourier>(others(), name, send_, receive_); })) {
         return packed_.send_by(std::move(courier));
       }
+      courier.release();  // to end it would be collective, and not all ranks have it
     }
     if (!insist) return;
     if (trouble.empty()) trouble = "another rank cannot use NCCL";

@@ -8,6 +8,7 @@
 #include <nccl.h>
 
 #include <cstring>
+#include <exception>
 
 namespace phyxel::cuda {
 namespace {
@@ -90,7 +91,10 @@ NcclRanks::NcclRanks(const Name& name, int rank, int count) {
   check(nccl().init_rank(&ranks_, count, id, rank), "ncclCommInitRank");
 }
 
-NcclRanks::~NcclRanks() { nccl().destroy(ranks_); }
+NcclRanks::~NcclRanks() {
+  // It waits for the other ranks, who do not come if this one is about to end them all.
+  if (std::uncaught_exceptions() == 0) nccl().destroy(ranks_);
+}
 
 void NcclRanks::exchange(std::span<const Message> outgoing, std::span<const Message> incoming,
                          CUstream_st* stream) const {

@@ -78,12 +78,16 @@ NewFile::NewFile(const fs::path& file, std::uint64_t size)
   fd_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (fd_ < 0) phyxel::fail(file_, "cannot be written", errno);
   if (size == 0) return;
-  int error = 0;
+  int failed = 0;
   do {
-    error = ::posix_fallocate(fd_, 0, static_cast<off_t>(size));
-  } while (error == EINTR);
-  // Some file systems know no such thing: there, writing tells.
-  if (error != 0 && error != EOPNOTSUPP && error != EINVAL) fail(error);
+    failed = ::fallocate(fd_, 0, 0, static_cast<off_t>(size));
+  } while (failed != 0 && errno == EINTR);
+  if (failed == 0) return;
+  // Some file systems know no such thing: there, writing tells. (posix_fallocate would write a byte
+  // into every block of theirs.)
+  for (const int error : {ENOSPC, EDQUOT, EFBIG, EIO}) {
+    if (errno == error) fail(error);
+  }
 }
 
 NewFile::~NewFile() {
@@ -103,12 +107,20 @@ void NewFile::write(std::uint64_t at, std::span<const std::byte> bytes) {
   if (const int error = write_all(fd_, bytes, static_cast<off_t>(at))) fail(error);
 }
 
+void NewFile::sync() {
+  if (::fsync(fd_) != 0) fail(errno);
+}
+
 void NewFile::read(std::uint64_t at, std::uint64_t count,
                    const std::function<void(std::span<const std::byte>)>& take) {
+  // Opened anew, as network file systems then ask what others have written.
+  const Descriptor others(temporary_, O_RDONLY);
+  if (others.get() < 0) fail(errno);
   std::vector<std::byte> some(std::min<std::uint64_t>(count, std::uint64_t{16} << 20));
   for (const std::uint64_t end = at + count; at < end;) {
-    const ssize_t got = ::pread(fd_, some.data(), std::min<std::uint64_t>(some.size(), end - at),
-                                static_cast<off_t>(at));
+    const ssize_t got =
+        ::pread(others.get(), some.data(), std::min<std::uint64_t>(some.size(), end - at),
+                static_cast<off_t>(at));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) fail(got < 0 ? errno : EIO);
     take({some.data(), static_cast<std::size_t>(got)});

@@ -27,7 +27,9 @@ class NewFile {
 
   /// @throws OutputError.
   void write(std::uint64_t at, std::span<const std::byte> bytes);
-  /// Some of what is there by now, piece by piece. @throws OutputError.
+  /// What is written by now is there for others. @throws OutputError.
+  void sync();
+  /// Some of what is there by now, of whoever's writing, piece by piece. @throws OutputError.
   void read(std::uint64_t at, std::uint64_t count,
             const std::function<void(std::span<const std::byte>)>& take);
   const std::filesystem::path& temporary() const { return temporary_; }

@@ -1,5 +1,5 @@
 /// The little of HDF5 that phyxel needs: contiguous arrays, texts and attributes. The C API behind
-/// two classes; nothing else in the project but hdf5_memory includes hdf5.h.
+/// two classes; nothing else in the project but hdf5_memory and mpi/parallel_file includes hdf5.h.
 #pragma once
 
 #include <cstddef>

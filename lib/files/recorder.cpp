@@ -147,11 +147,19 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
       writes_phyxels_(scene.output.phyxels),
       writes_surface_(scene.output.surface && model.whole_surfels() > 0) {
   check_output_folder(directory_, overwrite || resume_after);
+  if (resume_after) remove_unfinished();
   check_space(resume_after.value_or(0));
   if (resume_after) {
     continue_after(*resume_after);
   } else {
     begin_anew();
+  }
+}
+
+void Recorder::remove_unfinished() const {
+  for (const fs::path& file : trajectory_files(directory_)) {
+    std::error_code ignored;
+    if (file.extension() == ".tmp") fs::remove(file, ignored);
   }
 }
 

@@ -86,6 +86,7 @@ void write_together(NewFile& out, const Content& content) {
     }
     at += piece.bytes;
   }
+  out.sync();  // for those on other hosts
   content.write_together(out.temporary());
 }
 

@@ -29,6 +29,7 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
   bucket_start_.assign(table_size + 1, 0);
   entries_.resize(n);
   // Each thread has a stretch of the buckets, and fills them in the order of the points.
+  std::vector<std::uint32_t> next(table_size);
   std::vector<std::size_t> before(static_cast<std::size_t>(omp_get_max_threads()) + 1, 0);
 #pragma omp parallel
   {
@@ -46,14 +47,13 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
 #pragma omp barrier
     std::size_t at = 0;
     for (std::size_t t = 0; t <= thread; ++t) at += before[t];
-    std::vector<std::uint32_t> next(last - first);
     for (std::size_t b = first; b < last; ++b) {
-      next[b - first] = static_cast<std::uint32_t>(at);
+      next[b] = static_cast<std::uint32_t>(at);
       at += bucket_start_[b + 1];
       bucket_start_[b + 1] = static_cast<std::uint32_t>(at);
     }
     for_each_point([&](std::size_t i) {
-      entries_[next[bucket[i] - first]++] = {position[i], cell[i], static_cast<Index>(i)};
+      entries_[next[bucket[i]]++] = {position[i], cell[i], static_cast<Index>(i)};
     });
   }
   // Within a bucket the points of one cell need not be adjacent; counting changes of cell

@@ -97,6 +97,7 @@ class Recorder {
   std::vector<std::filesystem::path> files() const;  ///< Series files and the log, for summaries.
 
  private:
+  void remove_unfinished() const;  ///< What a killed run has left.
   void check_space(std::int64_t frames_before) const;
   void begin_anew();
   void continue_after(std::int64_t frames);
