@@ -1,6 +1,6 @@
-/// Large arrays in pages of 2 MiB, where Linux gives them on request: a step by CPUs is up to twice
-/// as fast, since its scattered reads miss the few entries that a processor has for small pages,
-/// and memory is first touched five hundred times less often.
+/// Large arrays in pages of 2 MiB, where Linux gives them on request: scattered reads of a step by
+/// CPUs then find the few entries that a processor has for pages, and memory is first touched five
+/// hundred times less often.
 #pragma once
 
 #include <cstddef>

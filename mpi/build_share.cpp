@@ -23,8 +23,8 @@
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
-#include "tabulated.hpp"
 #include "shapes/lattice_shapes.hpp"
+#include "tabulated.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -135,9 +135,8 @@ class Builder {
     }
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
-        bodies_[b].kernel_volumes =
-            wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
-                                 static_cast<std::size_t>(bodies_[b].size));
+        bodies_[b].kernel_volumes = wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
+                                                         static_cast<std::size_t>(bodies_[b].size));
       }
     });
     return own;
@@ -274,24 +273,27 @@ class Builder {
     const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
       return scene_.bodies[b].neighbourhood;
     };
+    const auto spacings_of = [&](std::size_t first, std::size_t last) {
+      return tabulated(last - first, [&](std::size_t k) { return own[first + k].spacing; });
+    };
     const auto stretches = stretches_of_bodies(own);
     for (const auto& [first, last] : stretches) {
       const auto b = static_cast<std::size_t>(own[first].body);
       if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
-      spacings[b] =
-          tabulated(last - first, [&own, begin = first](std::size_t k) { return own[begin + k].spacing; });
+      spacings[b] = spacings_of(first, last);
     }
     const std::vector<double> medians = medians_of(ranks_, std::move(spacings));
     std::vector<double> reach(bodies_.size(), 0);
     for (const auto& [first, last] : stretches) {
       const auto b = static_cast<std::size_t>(own[first].body);
-      const std::size_t begin = first, end = last;  // for clang, whose OpenMP takes no bindings
+      const std::vector<double> support =
+          support_radii(spacings_of(first, last), rule(b), medians[b]);
+      const std::size_t begin = first;  // for clang, whose OpenMP takes no bindings
       double most = 0;
 #pragma omp parallel for schedule(static) reduction(max : most)
-      for (std::size_t k = begin; k < end; ++k) {
-        SpreadPhyxel& p = own[k];
-        p.support = support_radii({&p.spacing, 1}, rule(b), medians[b])[0];
-        most = std::max(most, p.support);
+      for (std::size_t k = 0; k < support.size(); ++k) {
+        own[begin + k].support = support[k];
+        most = std::max(most, support[k]);
       }
       reach[b] = most;
     }
@@ -319,10 +321,10 @@ class Builder {
     Local local{std::move(all.phyxels), std::move(all.owner), {}};
     Model& m = local.model;
     ranks_.together([&] {
-      m.position = tabulated(local.phyxels.size(),
-                             [&](std::size_t k) { return local.phyxels[k].position; });
-      m.neighbourhood.support = tabulated(
-          local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].support; });
+      m.position =
+          tabulated(local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].position; });
+      m.neighbourhood.support =
+          tabulated(local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].support; });
       m.parts.resize(bodies_.size());
       for (const auto& [first, last] : stretches_of_bodies(local.phyxels)) {
         Part& part = m.parts[static_cast<std::size_t>(local.phyxels[first].body)];
@@ -339,11 +341,10 @@ class Builder {
           if (rule.one_sided()) m.neighbourhood.symmetric = false;
           continue;
         }
-        const Neighbourhood hood = neighbours_within(
-            of_part(m.position, part),
-            {m.neighbourhood.support.begin() + part.begin,
-             m.neighbourhood.support.begin() + part.end},
-            rule);
+        const Neighbourhood hood = neighbours_within(of_part(m.position, part),
+                                                     {m.neighbourhood.support.begin() + part.begin,
+                                                      m.neighbourhood.support.begin() + part.end},
+                                                     rule);
         append_lists(m.neighbourhood, hood, part.begin);
         std::copy(hood.support.begin(), hood.support.end(),
                   m.neighbourhood.support.begin() + part.begin);
@@ -360,9 +361,9 @@ class Builder {
 
   /// Own phyxels that stand for all, and with whom they share edges.
   struct Samples {
-    SpreadPhyxels phyxels;         ///< Of one group after the other.
+    SpreadPhyxels phyxels;           ///< Of one group after the other.
     std::vector<Offset> offsets{0};  ///< In `group`, of each sample.
-    std::vector<Index> group;      ///< Of who is at the other end of each edge.
+    std::vector<Index> group;        ///< Of who is at the other end of each edge.
     std::span<const Index> edges(std::size_t sample) const {
       return std::span(group).subspan(
           static_cast<std::size_t>(offsets[sample]),
@@ -582,8 +583,8 @@ class Builder {
     const std::vector<double> spacing = bodies_[b].kernel_volumes
                                             ? values_of(local, part, &SpreadPhyxel::spacing)
                                             : std::vector<double>();
-    const auto own = tabulated(
-        static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) -> char {
+    const auto own =
+        tabulated(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) -> char {
           return owns(local, static_cast<std::size_t>(part.begin) + k);
         });
     if (options_.surveyor) {
@@ -600,7 +601,8 @@ class Builder {
     }
   }
 
-  /// Of own phyxels. Others' follow from sums that only their owners have, if they are the kernel's.
+  /// Of own phyxels. Others' follow from sums that only their owners have, if they are the
+  /// kernel's.
   void find_masses(Local& local) const {
     Model& m = local.model;
     std::vector<ExactSum> sums(bodies_.size());
@@ -760,9 +762,8 @@ class Builder {
         const auto size = static_cast<std::size_t>(part.end - part.begin);
         const auto begin = static_cast<std::size_t>(part.begin);
         const std::span<const Vec3d> position = std::span(m.position).subspan(begin, size);
-        Csr rows = phyxels_reaching(
-            surface.position, position,
-            std::span(m.neighbourhood.support).subspan(begin, size));
+        Csr rows = phyxels_reaching(surface.position, position,
+                                    std::span(m.neighbourhood.support).subspan(begin, size));
         // Who has a surfel's first carrier knows all of them.
         std::vector<char> here(static_cast<std::size_t>(all), 0);
         std::int64_t found = 0;
@@ -771,9 +772,8 @@ class Builder {
                     owns(local, begin + static_cast<std::size_t>(rows.row(s).front()));
           found += here[s];
         }
-        const std::vector<Index> nearest = ranks_.sum(found) < all
-                                               ? carriers_of_unreached(local, b, here)
-                                               : std::vector<Index>();
+        const std::vector<Index> nearest =
+            ranks_.sum(found) < all ? carriers_of_unreached(local, b, here) : std::vector<Index>();
         for (Index s = 0; s < all; ++s) {
           const bool lone = !nearest.empty() && nearest[s] >= 0;
           if (!here[s] && !lone) continue;
@@ -961,8 +961,7 @@ Piece piece_of(const Communicator& ranks, std::size_t body) {
 
 }  // namespace
 
-BuiltShare build_share(const Communicator& ranks, const Scene& scene,
-                       const ShareOptions& options) {
+BuiltShare build_share(const Communicator& ranks, const Scene& scene, const ShareOptions& options) {
   // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
   Cloud rest;

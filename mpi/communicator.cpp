@@ -86,11 +86,15 @@ double Communicator::sum(double value) const {
 std::int64_t Communicator::sum(std::int64_t value) const {
   return reduced(size_, value, MPI_INT64_T, MPI_SUM);
 }
-double Communicator::largest(double value) const { return reduced(size_, value, MPI_DOUBLE, MPI_MAX); }
+double Communicator::largest(double value) const {
+  return reduced(size_, value, MPI_DOUBLE, MPI_MAX);
+}
 std::int64_t Communicator::largest(std::int64_t value) const {
   return reduced(size_, value, MPI_INT64_T, MPI_MAX);
 }
-double Communicator::smallest(double value) const { return reduced(size_, value, MPI_DOUBLE, MPI_MIN); }
+double Communicator::smallest(double value) const {
+  return reduced(size_, value, MPI_DOUBLE, MPI_MIN);
+}
 std::int64_t Communicator::smallest(std::int64_t value) const {
   return reduced(size_, value, MPI_INT64_T, MPI_MIN);
 }
@@ -103,10 +107,11 @@ void Communicator::add(std::span<std::int64_t> values) const {
 }
 
 std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
-  const std::vector<std::vector<std::byte>> from_each =
-      exchanged_bytes(std::vector<std::span<const std::byte>>(static_cast<std::size_t>(size_), bytes));
+  const std::vector<std::vector<std::byte>> from_each = exchanged_bytes(
+      std::vector<std::span<const std::byte>>(static_cast<std::size_t>(size_), bytes));
   std::vector<std::byte> all;
-  for (const std::vector<std::byte>& from : from_each) all.insert(all.end(), from.begin(), from.end());
+  for (const std::vector<std::byte>& from : from_each)
+    all.insert(all.end(), from.begin(), from.end());
   return all;
 }
 
@@ -125,8 +130,8 @@ std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
   const auto ranks = static_cast<std::size_t>(size_);
   std::vector<std::int64_t> sizes(ranks), coming(ranks);
   for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send.at(r).size());
-  PHYXEL_MPI_CALL(MPI_Alltoall(sizes.data(), 1, MPI_INT64_T, coming.data(), 1, MPI_INT64_T,
-                               MPI_COMM_WORLD));
+  PHYXEL_MPI_CALL(
+      MPI_Alltoall(sizes.data(), 1, MPI_INT64_T, coming.data(), 1, MPI_INT64_T, MPI_COMM_WORLD));
   std::vector<std::vector<std::byte>> received(ranks);
   std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < ranks; ++r) {

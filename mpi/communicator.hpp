@@ -89,7 +89,8 @@ class Communicator {
   }
 
   /// Does the work of this rank, which must not communicate; then all agree how it went.
-  /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of the
+  /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of
+  /// the
   ///   first rank that failed; what it threw, if there is one rank
   void together(const std::function<void()>& work) const;
 

@@ -12,7 +12,7 @@ struct Pulse {
   std::atomic<std::int64_t> since{0};     ///< [ns], by the host's steady clock: of the last change.
   std::atomic<std::int64_t> watching{0};  ///< The same: when its watchdog last looked.
   std::atomic<std::int64_t> named_at{-1};  ///< The last step that it was named for.
-  std::atomic<int> waiting{0};            ///< Whether it waits for other ranks.
+  std::atomic<int> waiting{0};             ///< Whether it waits for other ranks.
   std::atomic<int> ended{0};
 
   static std::int64_t now() {

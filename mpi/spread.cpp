@@ -156,8 +156,7 @@ Others of_others(const Communicator& ranks, const SpreadPhyxels& own, const Cell
   // Who is where.
   std::vector<std::pair<Cells::Name, int>> elsewhere;
   {
-    const auto from_each =
-        ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
+    const auto from_each = ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
     for (std::size_t r = 0; r < each; ++r) {
       if (static_cast<int>(r) == ranks.rank()) continue;
       for (const Cells::Name name : from_each[r]) elsewhere.emplace_back(name, static_cast<int>(r));
@@ -277,12 +276,11 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
   return own;
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(
-    const SpreadPhyxels& phyxels) {
+std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const SpreadPhyxels& phyxels) {
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
   for (auto first = phyxels.begin(), last = first; first != phyxels.end(); first = last) {
-    last = std::partition_point(
-        first, phyxels.end(), [&](const SpreadPhyxel& p) { return p.body == first->body; });
+    last = std::partition_point(first, phyxels.end(),
+                                [&](const SpreadPhyxel& p) { return p.body == first->body; });
     stretches.emplace_back(first - phyxels.begin(), last - phyxels.begin());
   }
   return stretches;

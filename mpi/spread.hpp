@@ -1,5 +1,5 @@
-/// Phyxels of all bodies spread over ranks, each on one of them, while a model is built that no rank
-/// has whole. Every function that takes the ranks is collective.
+/// Phyxels of all bodies spread over ranks, each on one of them, while a model is built that no
+/// rank has whole. Every function that takes the ranks is collective.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@ namespace phyxel {
 
 /// What is known of a phyxel so far, as ranks send it to each other.
 struct SpreadPhyxel {
-  Vec3d position;         ///< [m]
-  double volume = 0;      ///< [m³], where the cloud tells.
-  double spacing = 0;     ///< r̄ [m], where it is wanted.
-  double support = 0;     ///< h [m]
+  Vec3d position;      ///< [m]
+  double volume = 0;   ///< [m³], where the cloud tells.
+  double spacing = 0;  ///< r̄ [m], where it is wanted.
+  double support = 0;  ///< h [m]
   Index body = 0;
-  Index number = 0;       ///< In its body.
-  Index along = 0;        ///< Where it stands in its body along Hilbert's curve.
+  Index number = 0;           ///< In its body.
+  Index along = 0;            ///< Where it stands in its body along Hilbert's curve.
   std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
 };
 using SpreadPhyxels = std::vector<SpreadPhyxel>;
@@ -48,8 +48,8 @@ std::vector<Index> order_by_number(const SpreadPhyxels& phyxels);
 
 /// Own phyxels and those of other ranks around them.
 struct Surrounded {
-  SpreadPhyxels phyxels;   ///< In the order of bodies and numbers.
-  std::vector<int> owner;  ///< Rank of each.
+  SpreadPhyxels phyxels;    ///< In the order of bodies and numbers.
+  std::vector<int> owner;   ///< Rank of each.
   std::vector<Index> here;  ///< Which own one each is; -1: another rank's.
 };
 /// @param reach of each body [m]: all phyxels nearer than that to an own one are there, and others

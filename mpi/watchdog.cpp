@@ -68,7 +68,8 @@ struct Watchdog::Kennel {
   }
   void look_at(std::size_t k, std::int64_t now) {
     Pulse& pulse = *pulses[k];
-    // Even one that waits looks about; unless its process has been stopped, or its host is too busy.
+    // Even one that waits looks about; unless its process has been stopped, or its host is too
+    // busy.
     const std::int64_t last = pulse.waiting ? pulse.watching : pulse.since;
     const double still = 1e-9 * static_cast<double>(now - last);
     const std::int64_t step = pulse.step;
@@ -84,8 +85,8 @@ struct Watchdog::Kennel {
   MPI_Comm host = MPI_COMM_NULL;
   MPI_Win window = MPI_WIN_NULL;
   Pulse* own = nullptr;
-  std::vector<Pulse*> pulses;       // of the ranks of this host
-  std::vector<int> numbers;         // of those ranks
+  std::vector<Pulse*> pulses;  // of the ranks of this host
+  std::vector<int> numbers;    // of those ranks
   std::mutex mutex;
   std::condition_variable changed;
   bool leave = false;

@@ -11,8 +11,8 @@ namespace phyxel {
 
 /// Vertices with what they cost, edges with what crosses them. Symmetric, without loops.
 struct Graph {
-  std::vector<Offset> offsets{0};  ///< Shape [vertices + 1].
-  std::vector<Index> neighbours;   ///< Ascending in each row.
+  std::vector<Offset> offsets{0};           ///< Shape [vertices + 1].
+  std::vector<Index> neighbours;            ///< Ascending in each row.
   std::vector<std::int64_t> edge_weight;    ///< Of each entry, the same both ways; empty: 1 each.
   std::vector<std::int64_t> vertex_weight;  ///< Shape [vertices].
   std::vector<Vec3d> centre;                ///< [m], shape [vertices].

@@ -53,12 +53,14 @@ std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>
         std::any_of(row.begin(), row.end(), [&](Index w) { return part_of[w] != part_of[v]; });
     if (at_boundary) plan.boundary.push_back(v);
   }
-  std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()), -1);  // the part that last did
+  std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()),
+                           -1);  // the part that last did
   for (HaloPlan& plan : plans) {
     for (const Index v : plan.owned) seen_by[v] = plan.part;
     for (int r = 0; r < rings; ++r) {
       // Only the boundary has neighbours outside.
-      plan.rings.push_back(next_ring(graph, r == 0 ? plan.boundary : plan.rings.back(), plan.part, seen_by));
+      plan.rings.push_back(
+          next_ring(graph, r == 0 ? plan.boundary : plan.rings.back(), plan.part, seen_by));
       for (const Index v : plan.rings.back()) {
         const auto all = static_cast<std::size_t>(rings);
         peer_of(plan, part_of[v], all).receive[r].push_back(v);

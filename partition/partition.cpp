@@ -138,8 +138,9 @@ std::vector<int> make_partition(const Graph& graph, int parts, Partitioner parti
 }
 
 PartCounts::PartCounts(int parts)
-    : parts_(parts), words_(static_cast<std::size_t>(3 * parts + 1) +
-                            static_cast<std::size_t>(parts) * static_cast<std::size_t>(parts)) {}
+    : parts_(parts),
+      words_(static_cast<std::size_t>(3 * parts + 1) +
+             static_cast<std::size_t>(parts) * static_cast<std::size_t>(parts)) {}
 
 void PartCounts::add(int part, std::int64_t own_weight,
                      std::span<const std::pair<int, std::int64_t>> others) {
@@ -174,8 +175,8 @@ PartitionQuality PartCounts::quality() const {
     const std::int64_t ghosts = counts.ghosts(p);
     if (mean > 0) {
       q.imbalance = std::max(q.imbalance, weight / mean - 1);
-      q.slowest = std::max(
-          q.slowest, (weight + ghost_cost * each * static_cast<double>(ghosts)) / mean);
+      q.slowest =
+          std::max(q.slowest, (weight + ghost_cost * each * static_cast<double>(ghosts)) / mean);
     }
     q.ghosts += ghosts;
     q.most_ghosts = std::max(q.most_ghosts, static_cast<Index>(ghosts));

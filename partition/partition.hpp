@@ -31,18 +31,18 @@ std::vector<int> make_partition(const Graph& graph, int parts, Partitioner parti
 
 /// How good a partition is.
 struct PartitionQuality {
-  double imbalance = 0;         ///< Heaviest part over the mean, less one.
-  std::int64_t cut = 0;         ///< Weight of edges between parts.
-  std::int64_t ghosts = 0;      ///< Vertices that a part needs of others, over all parts.
-  Index most_ghosts = 0;        ///< Of one part.
-  int most_peers = 0;           ///< Parts that one part needs anything of.
-  int empty = 0;                ///< Parts without vertices.
+  double imbalance = 0;     ///< Heaviest part over the mean, less one.
+  std::int64_t cut = 0;     ///< Weight of edges between parts.
+  std::int64_t ghosts = 0;  ///< Vertices that a part needs of others, over all parts.
+  Index most_ghosts = 0;    ///< Of one part.
+  int most_peers = 0;       ///< Parts that one part needs anything of.
+  int empty = 0;            ///< Parts without vertices.
   /// What the part with most to do has to do, over the mean weight: its own vertices, and for each
   /// ghost `ghost_cost` of a vertex.
   double slowest = 1;
 };
-/// An estimate: what a ghost costs, which is packed, sent and unpacked twice a step, of what a phyxel
-/// with its neighbours does.
+/// An estimate: what a ghost costs, which is packed, sent and unpacked twice a step, of what a
+/// phyxel with its neighbours does.
 inline constexpr double ghost_cost = 0.3;
 
 /// What the quality of a partition follows from, vertex by vertex; ranks may add their words.

@@ -64,9 +64,7 @@ class Maker {
   }
 
  private:
-  bool has_surfel(Index s) const {
-    return kind_[whole_.surfels.carriers.row(s).front()] == owned;
-  }
+  bool has_surfel(Index s) const { return kind_[whole_.surfels.carriers.row(s).front()] == owned; }
   Index present() const { return static_cast<Index>(out_.share.number.size()); }
 
   void add_part(const Part& part) {

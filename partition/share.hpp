@@ -10,15 +10,15 @@ namespace phyxel {
 
 /// A share that does not know the others yet.
 struct ModelShare {
-  Model model;  ///< `share` is null.
-  Share share;  ///< `others` is null.
+  Model model;             ///< `share` is null.
+  Share share;             ///< `others` is null.
   std::vector<int> owner;  ///< The part that each phyxel belongs to, shape [n].
 };
 
-/// The phyxels that a plan owns and their ghosts, and the surfels whose first carrier it owns. Lists
-/// keep the order that they have in the whole model, so that sums run alike; they are whole for own
-/// phyxels and for ghosts whose stresses are found here, and empty for others; there are none if the
-/// whole model's are left to a device.
+/// The phyxels that a plan owns and their ghosts, and the surfels whose first carrier it owns.
+/// Lists keep the order that they have in the whole model, so that sums run alike; they are whole
+/// for own phyxels and for ghosts whose stresses are found here, and empty for others; there are
+/// none if the whole model's are left to a device.
 /// @param plan of one ring or two
 ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of);
 

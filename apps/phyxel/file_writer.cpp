@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "files/frame_file.hpp"
 #include "mpi/parallel_file.hpp"
 #include "phyxel/error.hpp"
 #include "timeline.hpp"
@@ -136,19 +137,12 @@ void FileWriter::write_array() const {
   const Numbers numbers =
       ranks().broadcast(std::vector{Numbers{asked.as_float, asked.count}}).front();
   const FileArray array{text(told(asked.path)), numbers.as_float, numbers.count, told(asked.terms)};
-  phyxel::write_together(
-      ranks(), file, array, length_, [&](std::span<const StretchExchange::Stretch> of_ranks) {
-        std::vector<double> sum;
-        for (const Quantity term : array.terms) {
-          const auto more = ensemble_.exchange().brought(term, own_values(term), of_ranks);
-          if (sum.empty()) {  // not added to zero, which would lose the sign of another
-            sum = more;
-            continue;
-          }
-          for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
-        }
-        return sum;
-      });
+  phyxel::write_together(ranks(), file, array, length_,
+                         [&](std::span<const StretchExchange::Stretch> of_ranks) {
+                           return sum_of_terms(array, [&](Quantity term) {
+                             return ensemble_.exchange().brought(term, own_values(term), of_ranks);
+                           });
+                         });
 }
 
 FileWriter::Call FileWriter::next_call(bool wait) {

@@ -65,15 +65,11 @@ void write_counts(Hdf5Writer& out, std::int64_t points, std::int64_t cells,
 /// Rows of an array, in the type they are stored as.
 template <class T>
 Hdf5Writer::Fill<T> rows_of(const FileArray& array, Stretches& values) {
-  return [terms = array.terms, &values](std::size_t first, std::span<T> rows) {
+  return [array, &values](std::size_t first, std::span<T> rows) {
     const auto begin = static_cast<Index>(first);
-    const Index end = begin + static_cast<Index>(rows.size() / width_of(terms[0]));
-    const std::span<const double> found = values.values(terms[0], begin, end);
-    std::vector<double> sum(found.begin(), found.end());
-    for (std::size_t t = 1; t < terms.size(); ++t) {
-      const std::span<const double> more = values.values(terms[t], begin, end);
-      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
-    }
+    const Index end = begin + static_cast<Index>(rows.size() / width_of(array.terms[0]));
+    const std::vector<double> sum =
+        sum_of_terms(array, [&](Quantity term) { return values.values(term, begin, end); });
     std::transform(sum.begin(), sum.end(), rows.begin(),
                    [](double value) { return static_cast<T>(value); });
   };

@@ -31,6 +31,19 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
                          const Diagnostics& diagnostics, Stretches& values);
 
+/// Values of an array's rows. @param values_of those of one of its terms
+template <class ValuesOf>
+std::vector<double> sum_of_terms(const FileArray& array, ValuesOf&& values_of) {
+  const auto first = values_of(array.terms[0]);
+  // Not added to zero, which would lose the sign of another.
+  std::vector<double> sum(first.begin(), first.end());
+  for (std::size_t t = 1; t < array.terms.size(); ++t) {
+    const auto more = values_of(array.terms[t]);
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
+  }
+  return sum;
+}
+
 class Hdf5Writer;
 /// An array that comes when the file is written.
 void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values);

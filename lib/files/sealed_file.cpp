@@ -69,10 +69,6 @@ std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
   return digest.hex();
 }
 
-}  // namespace
-
-namespace {
-
 /// The layout first, by which those who write the rest find their way.
 void write_together(NewFile& out, const Content& content) {
   std::uint64_t at = seal_size;
