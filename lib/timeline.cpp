@@ -3,6 +3,8 @@
 #include <mutex>
 #include <thread>
 
+#include "model/host_memory.hpp"
+
 namespace phyxel {
 namespace {
 
@@ -47,7 +49,7 @@ void Timeline::add(const char* what, Clock::time_point since) {
     return;
   }
   r.spans.push_back({what, seconds(since - r.start), seconds(now - since),
-                     std::this_thread::get_id() != r.thread});
+                     std::this_thread::get_id() != r.thread, peak_memory()});
 }
 
 std::vector<Timeline::Span> Timeline::spans() {

@@ -12,6 +12,7 @@ class Timeline {
     const char* what;
     double start, seconds;  ///< [s], from the start of the record.
     bool aside;             ///< On another thread than the one that started it.
+    double peak_memory;     ///< Of the program, when the span ended [bytes].
   };
   /// Enough for a look; what comes later is counted only.
   static constexpr std::size_t most_spans = 200'000;

@@ -15,6 +15,7 @@
 #include "csv.hpp"
 #include "device_option.hpp"
 #include "ensemble.hpp"
+#include "model/host_memory.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
@@ -96,6 +97,7 @@ struct Measured {
   std::optional<Median> alone_per_s;          // steps of one rank's body, by the first rank
   double bytes_per_step = 0, exchanging = 0;  // of the rank that has most; share of the time
   std::string transport;
+  double upload = 0;  // what a device is given after the share is there [s]
 };
 
 /// What takes steps, and how many make a repeat.
@@ -130,7 +132,10 @@ class Repeats {
 Measured measure(const Ensemble& ensemble, const Scene& scene, const Model* one,
                  const Scene& scene_of_one, Precision precision, const ChosenDevice& device,
                  const Options& options) {
+  ranks().barrier();
+  const auto start = Clock::now();
   Stepped shared(ensemble.here(), scene, precision, device, options);
+  const double upload = ranks().largest(seconds_since(start));
   std::optional<Stepped> alone;
   ranks().together([&] {
     if (one) alone.emplace(*one, scene_of_one, precision, device, options);
@@ -149,10 +154,12 @@ Measured measure(const Ensemble& ensemble, const Scene& scene, const Model* one,
     if (by_one) by_one->repeat();
   }
   const Traffic after = most_traffic(shared.backend());
-  Measured m{together.per_second(), std::nullopt,
+  Measured m{together.per_second(),
+             std::nullopt,
              static_cast<double>(after.bytes_sent - before.bytes_sent) / together.steps(),
              (after.seconds - before.seconds) / together.seconds(),
-             shared.backend().exchanges() ? shared.backend().exchanges()->transport : "none"};
+             shared.backend().exchanges() ? shared.backend().exchanges()->transport : "none",
+             upload};
   if (by_one) m.alone_per_s = by_one->per_second();
   ranks().barrier();  // before memory that others store into goes
   return m;
@@ -178,11 +185,13 @@ const std::vector<std::string> columns{"ranks",
                                        "spread_alone",
                                        "bytes_per_step",
                                        "exchanging",
-                                       "transport"};
+                                       "transport",
+                                       "backend_s",
+                                       "host_gb"};
 
 std::vector<std::string> row_of(const Ensemble& ensemble, const std::string& partitioner, int rings,
                                 const std::string& precision, double set_up, Index phyxels_alone,
-                                const Measured& m) {
+                                double host_gb, const Measured& m) {
   const bool alone = ranks().size() == 1;
   const Model& model = ensemble.here();
   const double n = model.whole_size();
@@ -209,8 +218,9 @@ std::vector<std::string> row_of(const Ensemble& ensemble, const std::string& par
   } else {
     row.insert(row.end(), {"", "", ""});
   }
-  row.insert(row.end(), {fmt::format("{:.0f}", m.bytes_per_step),
-                         fmt::format("{:.4f}", m.exchanging), m.transport});
+  row.insert(row.end(),
+             {fmt::format("{:.0f}", m.bytes_per_step), fmt::format("{:.4f}", m.exchanging),
+              m.transport, fmt::format("{:.3g}", m.upload), fmt::format("{:.4g}", host_gb)});
   return row;
 }
 
@@ -253,10 +263,12 @@ void bench_scaling(const Options& options) {
         for (const std::string& precision : options.precisions) {
           const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,
                                      precision_option(precision), device, options);
+          // Of the host, so far: if larger bodies come last, of this one.
+          const double host_gb = 1e-9 * ranks().size() * ranks().largest(peak_memory());
           ranks().together([&] {
             if (!leads) return;
-            table.rows.push_back(
-                row_of(ensemble, partitioner, rings, precision, set_up, one ? one->size() : 0, m));
+            table.rows.push_back(row_of(ensemble, partitioner, rings, precision, set_up,
+                                        one ? one->size() : 0, host_gb, m));
             fmt::print("{}\n", fmt::join(table.rows.back(), ","));
             std::fflush(stdout);
             if (!options.csv.empty()) write_csv(options.csv, table);

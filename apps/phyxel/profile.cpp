@@ -24,11 +24,19 @@ std::string events_of_rank() {
       "\n",
       rank);
   bool writes = false;
+  double peak = 0;
   for (const Timeline::Span& span : Timeline::spans()) {
     text += fmt::format(R"({{"ph":"X","name":"{}","pid":{},"tid":{},"ts":{:.3f},"dur":{:.3f}}},)"
                         "\n",
                         span.what, rank, span.aside ? 1 : 0, 1e6 * span.start, 1e6 * span.seconds);
     writes = writes || span.aside;
+    if (span.peak_memory > peak) {
+      peak = span.peak_memory;
+      text += fmt::format(
+          R"({{"ph":"C","name":"host memory at most","pid":{},"ts":{:.3f},"args":{{"GB":{:.3f}}}}},)"
+          "\n",
+          rank, 1e6 * (span.start + span.seconds), 1e-9 * peak);
+    }
   }
   if (writes) {
     text += fmt::format(

@@ -67,9 +67,9 @@ std::vector<std::string> cells(const CsvTable& table, std::size_t r, double spee
 }
 
 const std::vector<std::string> head_without_one{
-    "phyxels",    "precision", "cut by",         "transport",   "10⁶ phyxel-steps/s",
-    "steps/s",    "spread",    "most of a rank", "most ghosts", "kB sent a step",
-    "exchanging", "set-up [s]"};
+    "phyxels",    "precision",  "cut by",         "transport",   "10⁶ phyxel-steps/s",
+    "steps/s",    "spread",     "most of a rank", "most ghosts", "kB sent a step",
+    "exchanging", "shares [s]", "backend [s]",    "host [GB]"};
 
 std::vector<std::string> cells_without_one(const CsvTable& table, std::size_t r) {
   return {table.text(r, "phyxels"),
@@ -83,7 +83,9 @@ std::vector<std::string> cells_without_one(const CsvTable& table, std::size_t r)
           table.text(r, "most_ghosts"),
           fmt::format("{:.1f}", table.number(r, "bytes_per_step") * 1e-3),
           fmt::format("{:.1f}%", 100 * table.number(r, "exchanging")),
-          table.text(r, "set_up_s")};
+          table.text(r, "set_up_s"),
+          table.text(r, "backend_s"),
+          table.text(r, "host_gb")};
 }
 
 std::string section(const CsvTable& table, int ranks, bool gpus) {
@@ -149,7 +151,9 @@ void write_scaling_page(const fs::path& results, const fs::path& page) {
       "with one rank's part of it, measured in turn with all ranks; *speed-up*: over that; "
       "*efficiency*: that by rank; *spread*: (largest - smallest) / median of the repeats, of all "
       "and of one. *Exchanging* is the largest share of a "
-      "rank's time for packing, waiting and unpacking, in which uneven work shows, too.\n\n";
+      "rank's time for packing, waiting and unpacking, in which uneven work shows, too. *Shares*: "
+      "until each rank has its part of the body; *backend*: from there until it can step; *host*: "
+      "what all ranks' programs have had of the host's memory at most.\n\n";
   text += "## GPUs\n\n";
   text += gpus.empty() ? "Not measured yet.\n\n"
                        : "Asked of 8 GPUs in float: 80% of 17 million phyxels, 50% of 2 million, "

@@ -1,6 +1,7 @@
 #include "model/host_memory.hpp"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,6 +33,12 @@ double usable_memory() {
   const double host = std::min({machine, limit_in("/sys/fs/cgroup/memory.max"),
                                 limit_in("/sys/fs/cgroup/memory/memory.limit_in_bytes")});
   return host / programs_of_host;
+}
+
+double peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
 void require_host_memory(const std::string& what, double phyxels, double bytes_per_phyxel) {

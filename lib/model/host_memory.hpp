@@ -12,6 +12,9 @@ void share_host_memory(int programs);
 /// that.
 double usable_memory();
 
+/// The most that this program has had so far [bytes].
+double peak_memory();
+
 /// @throws InputError naming `what`, how much its phyxels take, how much there is (in a container:
 ///   its limit), and how many would do; or if they are more than an index counts.
 void require_host_memory(const std::string& what, double phyxels, double bytes_per_phyxel);
