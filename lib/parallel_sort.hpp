@@ -5,56 +5,68 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <vector>
 
+#include "bulk.hpp"
+
 namespace phyxel {
 
-/// Each thread sorts a piece; samples of the pieces cut what there is into as many stretches, which
-/// the threads bring together and sort again. Not stable.
-template <class T, class Less = std::less<>>
-void parallel_sort(std::vector<T>& values, Less less = {}) {
-  constexpr std::size_t least = 1 << 16, samples = 64;  // of a piece
-  const std::size_t pieces =
-      std::min(static_cast<std::size_t>(omp_get_max_threads()), values.size() / least);
-  if (pieces < 2) return std::sort(values.begin(), values.end(), less);
-  const auto at = [&](std::size_t piece) {
-    return values.begin() + static_cast<std::ptrdiff_t>(values.size() * piece / pieces);
-  };
-#pragma omp parallel for schedule(static, 1)
-  for (std::size_t p = 0; p < pieces; ++p) std::sort(at(p), at(p + 1), less);
+/// Samples cut what there is into buckets, more of them than threads, each of which is sorted by
+/// itself. Not stable.
+template <class Vector, class Less = std::less<>>
+void parallel_sort(Vector& values, Less less = {}) {
+  using T = typename Vector::value_type;
+  constexpr std::size_t least = 1 << 16, samples = 32;  // of a thread; of a bucket
+  const std::size_t n = values.size();
+  const std::size_t threads =
+      std::min({static_cast<std::size_t>(omp_get_max_threads()), n / least, std::size_t{4096}});
+  if (threads < 2) return std::sort(values.begin(), values.end(), less);
+  const std::size_t buckets = 8 * threads;
+  Bulk<T> ends;  // samples, then the first of each bucket but the first
+  for (std::size_t k = 0; k < buckets * samples; ++k) {
+    ends.push_back(values[n * k / (buckets * samples)]);
+  }
+  std::sort(ends.begin(), ends.end(), less);
+  for (std::size_t b = 1; b < buckets; ++b) ends[b - 1] = ends[b * samples];
+  ends.resize(buckets - 1);
 
-  std::vector<T> sample;
-  for (std::size_t p = 0; p < pieces; ++p) {
-    const auto length = static_cast<std::size_t>(at(p + 1) - at(p));
-    for (std::size_t k = 0; k < samples; ++k) {
-      sample.push_back(at(p)[static_cast<std::ptrdiff_t>(length * k / samples)]);
-    }
-  }
-  std::sort(sample.begin(), sample.end(), less);
-  // Where stretch s begins in piece p.
-  std::vector<typename std::vector<T>::iterator> cut((pieces + 1) * pieces);
-  std::vector<std::size_t> begin(pieces + 1, 0);
-  for (std::size_t s = 0; s <= pieces; ++s) {
-    for (std::size_t p = 0; p < pieces; ++p) {
-      cut[s * pieces + p] = s == 0 ? at(p)
-                            : s == pieces
-                                ? at(p + 1)
-                                : std::lower_bound(at(p), at(p + 1), sample[s * samples], less);
-      begin[s] += static_cast<std::size_t>(cut[s * pieces + p] - at(p));
-    }
-  }
-  std::vector<T> sorted(values.size());
+  // Threads take stretches; where each begins in a bucket.
+  const auto begin_of = [&](std::size_t stretch) { return n * stretch / threads; };
+  Bulk<std::uint16_t> bucket(n);
+  std::vector<std::vector<std::size_t>> at(threads, std::vector<std::size_t>(buckets, 0));
 #pragma omp parallel for schedule(static, 1)
-  for (std::size_t s = 0; s < pieces; ++s) {
-    const auto first = sorted.begin() + static_cast<std::ptrdiff_t>(begin[s]);
-    auto last = first;
-    for (std::size_t p = 0; p < pieces; ++p) {
-      last = std::copy(cut[s * pieces + p], cut[(s + 1) * pieces + p], last);
+  for (std::size_t t = 0; t < threads; ++t) {
+    for (std::size_t k = begin_of(t); k < begin_of(t + 1); ++k) {
+      bucket[k] = static_cast<std::uint16_t>(
+          std::upper_bound(ends.begin(), ends.end(), values[k], less) - ends.begin());
+      ++at[t][bucket[k]];
     }
-    std::sort(first, last, less);
   }
-  values.swap(sorted);
+  std::vector<std::size_t> begin{0};
+  for (std::size_t b = 0, next = 0; b < buckets; ++b) {
+    for (std::size_t t = 0; t < threads; ++t) {
+      const std::size_t count = at[t][b];
+      at[t][b] = next;
+      next += count;
+    }
+    begin.push_back(next);
+  }
+  Bulk<T> sorted(n);
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t t = 0; t < threads; ++t) {
+    for (std::size_t k = begin_of(t); k < begin_of(t + 1); ++k) {
+      sorted[at[t][bucket[k]]++] = values[k];
+    }
+  }
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t b = 0; b < buckets; ++b) {
+    T* const first = sorted.data() + begin[b];
+    T* const last = sorted.data() + begin[b + 1];
+    std::sort(first, last, less);
+    std::copy(first, last, values.data() + begin[b]);
+  }
 }
 
 }  // namespace phyxel

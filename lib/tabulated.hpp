@@ -1,18 +1,60 @@
 /// Arrays filled on all threads.
 #pragma once
 
+#include <omp.h>
+
 #include <cstddef>
 #include <vector>
 
+#include "bulk.hpp"
+#include "phyxel/types.hpp"
+
 namespace phyxel {
+
+template <class Vector, class F>
+Vector filled(std::size_t n, F&& f) {
+  Vector values(n);
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < n; ++k) values[k] = f(k);
+  return values;
+}
 
 /// f(0) to f(n - 1).
 template <class F>
 auto tabulated(std::size_t n, F&& f) {
-  std::vector<decltype(f(std::size_t{0}))> values(n);
-#pragma omp parallel for schedule(static)
-  for (std::size_t k = 0; k < n; ++k) values[k] = f(k);
-  return values;
+  return filled<std::vector<decltype(f(std::size_t{0}))>>(n, f);
+}
+/// The same for what is large and soon gone.
+template <class F>
+auto in_bulk(std::size_t n, F&& f) {
+  return filled<Bulk<decltype(f(std::size_t{0}))>>(n, f);
+}
+
+/// Those from `begin` to `end` that are wanted, ascending.
+/// @param wants is asked twice
+template <class Wants>
+std::vector<Index> chosen(Index begin, Index end, Wants&& wants) {
+  const auto stretches = static_cast<std::size_t>(omp_get_max_threads());
+  const auto first_of = [&](std::size_t s) {
+    return begin + static_cast<Index>(static_cast<std::size_t>(end - begin) * s / stretches);
+  };
+  std::vector<std::size_t> before(stretches + 1, 0);
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t s = 0; s < stretches; ++s) {
+    std::size_t found = 0;
+    for (Index i = first_of(s); i < first_of(s + 1); ++i) found += wants(i) ? 1 : 0;
+    before[s + 1] = found;
+  }
+  for (std::size_t s = 0; s < stretches; ++s) before[s + 1] += before[s];
+  std::vector<Index> all(before.back());
+#pragma omp parallel for schedule(static, 1)
+  for (std::size_t s = 0; s < stretches; ++s) {
+    std::size_t at = before[s];
+    for (Index i = first_of(s); i < first_of(s + 1); ++i) {
+      if (wants(i)) all[at++] = i;
+    }
+  }
+  return all;
 }
 
 /// What add(sum, k) adds for k from `begin` to `end` in any order: to sums without rounding, which

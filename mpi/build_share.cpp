@@ -19,6 +19,7 @@
 #include "model/neighbour_search.hpp"
 #include "model/share_surveyor.hpp"
 #include "model/space_filling_curve.hpp"
+#include "model/spatial_hash.hpp"
 #include "mpi/halo.hpp"
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
@@ -72,10 +73,10 @@ class Builder {
     });
     in_phase("spacings", [&] { find_spacings(own); });
     find_supports(own);
-    const std::vector<int> owner = in_phase("partition", [&] { return partition(own); });
-    own = in_phase("sending to owners", [&] { return sent_to_owners(ranks_, own, owner); });
-    Local local = in_phase("lists", [&] { return surroundings_of(own); });
-    SpreadPhyxels().swap(own);
+    Bulk<int> owner = in_phase("partition", [&] { return partition(own); });
+    own = in_phase("sending to owners",
+                   [&] { return sent_to_owners(ranks_, std::move(own), std::move(owner)); });
+    Local local = in_phase("lists", [&] { return surroundings_of(std::move(own)); });
     in_phase("masses, moments, boundary, surfels", [&] { finish(local); });
     return in_phase("share", [&] { return share_out_of(local); });
   }
@@ -113,12 +114,11 @@ class Builder {
         own.resize(before + more);
 #pragma omp parallel for schedule(static)
         for (std::size_t i = 0; i < more; ++i) {
-          SpreadPhyxel& p = own[before + i];
-          p.position = cloud.position[i];
-          p.volume = cloud.volume.empty() ? 0 : cloud.volume[i];
-          p.body = static_cast<Index>(b);
-          p.number = made.first + static_cast<Index>(i);
-          if (!bits.empty()) p.regions = bits[i];
+          own[before + i] = {.position = cloud.position[i],
+                             .volume = cloud.volume.empty() ? 0 : cloud.volume[i],
+                             .body = static_cast<Index>(b),
+                             .number = made.first + static_cast<Index>(i),
+                             .regions = bits.empty() ? 0 : bits[i]};
         }
         surfaces_[b] = std::move(cloud.surface);
       }
@@ -232,16 +232,19 @@ class Builder {
     }
     if (!any) return;
     for (;;) {
-      const Surrounded all = surrounded(ranks_, own, reach, boxes_);
+      const OthersPhyxels others = others_around(ranks_, own, reach, boxes_);
       std::vector<double> needed(n, 0);
-      for (const auto& [first, last] : stretches_of_bodies(all.phyxels)) {
-        const auto b = static_cast<std::size_t>(all.phyxels[first].body);
+      for (const auto& [first, last] : stretches_of_bodies(own)) {
+        const auto b = static_cast<std::size_t>(own[first].body);
         if (!wants(b)) continue;
-        const std::size_t size = last - first, begin = first;
-        const auto position =
-            tabulated(size, [&](std::size_t k) { return all.phyxels[begin + k].position; });
+        const std::span<SpreadPhyxel> here = std::span(own).subspan(first, last - first);
+        const std::span<const SpreadPhyxel> there = of_body(others.phyxels, b);
+        const std::size_t size = here.size() + there.size();
+        const Bulk<Vec3d> position = in_bulk(size, [&](std::size_t k) {
+          return (k < here.size() ? here[k] : there[k - here.size()]).position;
+        });
         const int nearest = scene_.bodies[b].neighbourhood.nearest;
-        std::vector<double> farthest(size, 0);
+        Bulk<double> farthest = in_bulk(size, [](std::size_t) { return 0.0; });
         const std::vector<double> spacing =
             options_.surveyor ? options_.surveyor->mean_spacing(position, nearest, farthest.data())
                               : mean_spacing(position, nearest, farthest.data());
@@ -249,10 +252,8 @@ class Builder {
         const bool too_few = static_cast<Index>(size) < enough;
         double most = 0;
 #pragma omp parallel for schedule(static) reduction(max : most)
-        for (std::size_t k = 0; k < size; ++k) {
-          const Index here = all.here[begin + k];
-          if (here < 0) continue;
-          own[here].spacing = spacing[k];
+        for (std::size_t k = 0; k < here.size(); ++k) {
+          here[k].spacing = spacing[k];
           most = std::max(most, too_few ? 2 * reach[b] + 1e-300 : farthest[k] * margin);
         }
         needed[b] = most;
@@ -269,12 +270,12 @@ class Builder {
   }
 
   void find_supports(SpreadPhyxels& own) {
-    std::vector<std::vector<double>> spacings(bodies_.size());
+    std::vector<Bulk<double>> spacings(bodies_.size());
     const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
       return scene_.bodies[b].neighbourhood;
     };
     const auto spacings_of = [&](std::size_t first, std::size_t last) {
-      return tabulated(last - first, [&](std::size_t k) { return own[first + k].spacing; });
+      return in_bulk(last - first, [&](std::size_t k) { return own[first + k].spacing; });
     };
     const auto stretches = stretches_of_bodies(own);
     for (const auto& [first, last] : stretches) {
@@ -303,21 +304,29 @@ class Builder {
 
   // --- lists -------------------------------------------------------------------------------------
 
-  Surrounded around(const SpreadPhyxels& own, double supports) const {
+  OthersPhyxels others_within(const SpreadPhyxels& own, double supports) const {
     std::vector<double> reach;
     for (const Body& body : bodies_) reach.push_back(supports * margin * body.reach);
-    return surrounded(ranks_, own, reach, boxes_);
+    return others_around(ranks_, own, reach, boxes_);
+  }
+
+  /// Those of one body, of phyxels that are in the order of bodies.
+  static std::span<const SpreadPhyxel> of_body(const SpreadPhyxels& phyxels, std::size_t b) {
+    const auto body_of = [](const SpreadPhyxel& p) { return static_cast<std::size_t>(p.body); };
+    const auto found = std::ranges::equal_range(phyxels, b, {}, body_of);
+    return {found.begin(), found.end()};
   }
 
   template <class T>
-  static std::span<const T> of_part(const std::vector<T>& values, const Part& part) {
+  static std::span<const typename T::value_type> of_part(const T& values, const Part& part) {
     return std::span(values).subspan(static_cast<std::size_t>(part.begin),
                                      static_cast<std::size_t>(part.end - part.begin));
   }
 
   /// As far as the neighbours of the last ghosts, and the carriers of surfels.
-  Local surroundings_of(const SpreadPhyxels& own) const {
-    Surrounded all = around(own, options_.rings + 1);
+  Local surroundings_of(SpreadPhyxels own) const {
+    Surrounded all = surrounded(ranks_, own, others_within(own, options_.rings + 1));
+    release(own);
     Local local{std::move(all.phyxels), std::move(all.owner), {}};
     Model& m = local.model;
     ranks_.together([&] {
@@ -372,7 +381,7 @@ class Builder {
   };
 
   /// The owner of each own phyxel. @param own along the curve
-  std::vector<int> partition(const SpreadPhyxels& own) {
+  Bulk<int> partition(const SpreadPhyxels& own) {
     const Samples samples = samples_of(own);
     const Graph graph = gathered_graph(samples);
     const int parts = ranks_.size();
@@ -402,47 +411,66 @@ class Builder {
       if (!best) throw InputError(refusal);
     });
     quality_ = *best;
-    std::vector<int> owner(own.size());
-    const auto n = static_cast<Index>(own.size());
-#pragma omp parallel for schedule(static)
-    for (Index i = 0; i < n; ++i) owner[i] = part_of[group_of(own[i])];
-    return owner;
+    return in_bulk(own.size(), [&](std::size_t i) { return part_of[group_of(own[i])]; });
   }
 
   /// Of each group the first, and then some: all if there are not too many.
   Samples samples_of(const SpreadPhyxels& own) const {
-    const Surrounded all = around(own, 1);
+    const OthersPhyxels others = others_within(own, 1);
+    const std::vector<Index> which = chosen(0, static_cast<Index>(own.size()), [&](Index i) {
+      return own[i].along % group_size_ % sample_stride() == 0;
+    });
     Samples samples;
-    for (const SpreadPhyxel& p : own) {
-      if (p.along % group_size_ % sample_stride() == 0) samples.phyxels.push_back(p);
-    }
-    std::size_t sample = 0;
-    for (const auto& [first, last] : stretches_of_bodies(all.phyxels)) {
-      const Index body = all.phyxels[first].body;
-      const auto position = tabulated(last - first, [&all, begin = first](std::size_t k) {
-        return all.phyxels[begin + k].position;
-      });
-      const auto support = tabulated(last - first, [&all, begin = first](std::size_t k) {
-        return all.phyxels[begin + k].support;
-      });
-      std::vector<Vec3d> point;
-      std::vector<double> reach;
-      const std::size_t first_sample = sample;
-      for (; sample < samples.phyxels.size() && samples.phyxels[sample].body == body; ++sample) {
-        point.push_back(samples.phyxels[sample].position);
-        reach.push_back(samples.phyxels[sample].support);
+    samples.phyxels = in_bulk(which.size(), [&](std::size_t s) { return own[which[s]]; });
+    Bulk<std::pair<Index, Index>> edges;  // sample, group
+    std::size_t first_sample = 0;
+    for (const auto& [first, last] : stretches_of_bodies(own)) {
+      const auto body = static_cast<std::size_t>(own[first].body);
+      const std::span<const SpreadPhyxel> of_sampled = of_body(samples.phyxels, body);
+      const auto position =
+          in_bulk(of_sampled.size(), [&](std::size_t s) { return of_sampled[s].position; });
+      const auto support =
+          in_bulk(of_sampled.size(), [&](std::size_t s) { return of_sampled[s].support; });
+      if (!of_sampled.empty()) {
+        const SpatialHash hash(position, median_of(support));
+        const double largest = *std::max_element(support.begin(), support.end());
+        find_edges(std::span(own).subspan(first, last - first), of_sampled, hash, largest,
+                   first_sample, edges);
+        find_edges(of_body(others.phyxels, body), of_sampled, hash, largest, first_sample, edges);
       }
-      const Csr rows = phyxels_reaching(point, position, support, reach);
-      for (Index s = 0; s < rows.rows(); ++s) {
-        const Index self = samples.phyxels[first_sample + static_cast<std::size_t>(s)].number;
-        for (const Index j : rows.row(s)) {
-          const SpreadPhyxel& other = all.phyxels[first + static_cast<std::size_t>(j)];
-          if (other.number != self) samples.group.push_back(group_of(other));
-        }
-        samples.offsets.push_back(static_cast<Offset>(samples.group.size()));
-      }
+      first_sample += of_sampled.size();
     }
+    parallel_sort(edges);
+    samples.group = tabulated(edges.size(), [&](std::size_t e) { return edges[e].second; });
+    std::vector<Offset> length(samples.phyxels.size(), 0);
+    for (const auto& [sample, group] : edges) ++length[sample];
+    for (const Offset more : length) samples.offsets.push_back(samples.offsets.back() + more);
     return samples;
+  }
+  /// What samples share with so many phyxels, each of which looks for the samples around it: they
+  /// are few.
+  void find_edges(std::span<const SpreadPhyxel> phyxels, std::span<const SpreadPhyxel> samples,
+                  const SpatialHash& hash, double largest, std::size_t first_sample,
+                  Bulk<std::pair<Index, Index>>& edges) const {
+#pragma omp parallel
+    {
+      Bulk<std::pair<Index, Index>> mine;
+#pragma omp for schedule(static) nowait
+      for (std::size_t k = 0; k < phyxels.size(); ++k) {
+        const SpreadPhyxel& p = phyxels[k];
+        const int rings = rings_within(std::max(p.support, largest), hash.cell_size());
+        hash.visit_near(p.position, rings, [&](const SpatialHash::Entry& e) {
+          const SpreadPhyxel& sample = samples[static_cast<std::size_t>(e.index)];
+          const double h = std::max(p.support, sample.support);
+          const Vec3d apart = p.position - e.position;
+          if (dot(apart, apart) < h * h && p.number != sample.number) {
+            mine.emplace_back(static_cast<Index>(first_sample) + e.index, group_of(p));
+          }
+        });
+      }
+#pragma omp critical
+      edges.insert(edges.end(), mine.begin(), mine.end());
+    }
   }
   Index sample_stride() const { return 1 + (size_ - 1) / options_.most_samples; }
 
@@ -570,6 +598,13 @@ class Builder {
     add_warnings(m, surfels);
   }
 
+  static void extend(std::vector<double>& values, std::vector<double>&& more) {
+    if (values.empty()) {
+      values = std::move(more);
+    } else {
+      values.insert(values.end(), more.begin(), more.end());
+    }
+  }
   static std::vector<double> values_of(const Local& local, const Part& part,
                                        double SpreadPhyxel::*value) {
     return tabulated(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) {
@@ -584,7 +619,7 @@ class Builder {
                                             ? values_of(local, part, &SpreadPhyxel::spacing)
                                             : std::vector<double>();
     const auto own =
-        tabulated(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) -> char {
+        in_bulk(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) -> char {
           return owns(local, static_cast<std::size_t>(part.begin) + k);
         });
     if (options_.surveyor) {
@@ -620,14 +655,14 @@ class Builder {
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const Part& part = m.parts[b];
       const double density = scene_.bodies[b].material.density;
-      const Masses masses =
+      Masses masses =
           bodies_[b].kernel_volumes
               ? kernel_masses(values_of(local, part, &SpreadPhyxel::spacing),
                               local.around[b].kernel_sum, sums[b].value() / bodies_[b].size,
                               density)
               : geometric_masses(values_of(local, part, &SpreadPhyxel::volume), density);
-      m.mass.insert(m.mass.end(), masses.mass.begin(), masses.mass.end());
-      m.volume.insert(m.volume.end(), masses.volume.begin(), masses.volume.end());
+      extend(m.mass, std::move(masses.mass));
+      extend(m.volume, std::move(masses.volume));
     }
   }
 
@@ -851,31 +886,36 @@ class Builder {
     for (const Index j : hood.inverse().row(i)) visit(j);
   }
 
+  /// What the ring needs, and what needs the ring, that is not there yet.
+  static std::vector<Index> around_ring(const Local& local, const HaloPlan& plan) {
+    std::vector<char> seen(local.phyxels.size(), 0);
+    for (const Index i : plan.owned) seen[i] = 1;
+    for (const Index i : plan.rings[0]) seen[i] = 1;
+    std::vector<Index> ring;
+    for (const Index i : plan.rings[0]) {
+      visit_edges(local.model.neighbourhood, i, [&](Index j) {
+        if (!std::exchange(seen[j], 1)) ring.push_back(j);
+      });
+    }
+    std::sort(ring.begin(), ring.end());
+    return ring;
+  }
+
   BuiltShare share_out_of(Local& local) {
     HaloPlan plan;
     plan.part = ranks_.rank();
-    std::vector<char> seen(local.phyxels.size(), 0);
-    std::vector<Index> ring;
+    const auto n = static_cast<Index>(local.phyxels.size());
+    const auto own = [&](Index i) { return owns(local, static_cast<std::size_t>(i)); };
+    plan.owned = chosen(0, n, own);
+    std::vector<Index>& ring = plan.rings.emplace_back();
     for (std::size_t b = 0; b < bodies_.size(); ++b) {
       const Part& part = local.model.parts[b];
-      for (Index i = part.begin; i < part.end; ++i) {
-        const bool own = owns(local, static_cast<std::size_t>(i));
-        if (own) plan.owned.push_back(i);
-        if (!own && local.around[b].needed[i - part.begin]) ring.push_back(i);
-        seen[i] = own || local.around[b].needed[i - part.begin];
-      }
+      const std::vector<Index> needed = chosen(part.begin, part.end, [&](Index i) {
+        return !own(i) && local.around[b].needed[i - part.begin];
+      });
+      ring.insert(ring.end(), needed.begin(), needed.end());
     }
-    plan.rings.push_back(std::move(ring));
-    if (options_.rings == 2) {
-      ring.clear();
-      for (const Index i : plan.rings[0]) {
-        visit_edges(local.model.neighbourhood, i, [&](Index j) {
-          if (!std::exchange(seen[j], 1)) ring.push_back(j);
-        });
-      }
-      std::sort(ring.begin(), ring.end());
-      plan.rings.push_back(std::move(ring));
-    }
+    if (options_.rings == 2) plan.rings.push_back(around_ring(local, plan));
     ModelShare made = share_of(local.model, plan, local.owner);
     Share& share = made.share;
     std::vector<Index> place = own_places(local, share);
@@ -908,33 +948,34 @@ class Builder {
     const auto phyxel = [&](Index k) -> const SpreadPhyxel& {
       return local.phyxels[share.number[k]];
     };
-    std::vector<Index> owned;
-    for (std::size_t k = 0; k < place.size(); ++k) {
-      if (share.owned[k]) owned.push_back(static_cast<Index>(k));
-    }
     // body, along, which of the share
-    auto sorted = tabulated(owned.size(), [&](std::size_t k) {
+    const std::vector<Index> owned =
+        chosen(0, static_cast<Index>(place.size()), [&](Index k) { return share.owned[k]; });
+    auto sorted = in_bulk(owned.size(), [&](std::size_t k) {
       const SpreadPhyxel& p = phyxel(owned[k]);
       return std::tuple(p.body, p.along, owned[k]);
     });
     parallel_sort(sorted);
-    auto own = tabulated(sorted.size(), [&](std::size_t k) { return std::get<2>(sorted[k]); });
+    auto own = in_bulk(sorted.size(), [&](std::size_t k) { return std::get<2>(sorted[k]); });
     const auto tile_of = [&](std::size_t k) {
       return bodies_[std::get<0>(sorted[k])].tile + std::get<1>(sorted[k]) / options_.tile;
     };
-    std::vector<std::size_t> begin;  // of each tile
-    for (std::size_t k = 0; k < own.size(); ++k) {
-      if (k == 0 || tile_of(k) != tile_of(k - 1)) begin.push_back(k);
-    }
-    begin.push_back(own.size());
+    const auto n = static_cast<Index>(own.size());
+    std::vector<Index> begin = chosen(0, n, [&](Index k) {  // of each tile
+      const auto at = static_cast<std::size_t>(k);
+      return at == 0 || tile_of(at) != tile_of(at - 1);
+    });
+    begin.push_back(n);
 #pragma omp parallel for schedule(dynamic, 64)
     for (std::size_t t = 0; t < begin.size() - 1; ++t) {
-      order_in_tile(std::span(own).subspan(begin[t], begin[t + 1] - begin[t]), [&](Index k) {
+      const auto first = static_cast<std::size_t>(begin[t]);
+      const auto last = static_cast<std::size_t>(begin[t + 1]);
+      order_in_tile(std::span(own).subspan(first, last - first), [&](Index k) {
         const Index i = share.number[k], b = phyxel(k).body;
         return local.around[b].length[i - local.model.parts[b].begin];
       });
-      for (std::size_t k = begin[t]; k < begin[t + 1]; ++k) {
-        place[own[k]] = tile_of(begin[t]) * options_.tile + static_cast<Index>(k - begin[t]);
+      for (std::size_t k = first; k < last; ++k) {
+        place[own[k]] = tile_of(first) * options_.tile + static_cast<Index>(k - first);
       }
     }
     return place;

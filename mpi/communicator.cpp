@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <numeric>
 
+#include "mpi/copy_bytes.hpp"
 #include "mpi/pulse.hpp"
 
 namespace phyxel {
@@ -107,11 +108,18 @@ void Communicator::add(std::span<std::int64_t> values) const {
 }
 
 std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
-  const std::vector<std::vector<std::byte>> from_each = exchanged_bytes(
-      std::vector<std::span<const std::byte>>(static_cast<std::size_t>(size_), bytes));
-  std::vector<std::byte> all;
-  for (const std::vector<std::byte>& from : from_each)
-    all.insert(all.end(), from.begin(), from.end());
+  const auto ranks = static_cast<std::size_t>(size_);
+  const auto size = static_cast<std::int64_t>(bytes.size());
+  const std::vector<std::int64_t> sizes = told(std::vector<std::int64_t>(ranks, size));
+  std::vector<std::byte> all(
+      static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0})));
+  std::vector<std::span<std::byte>> from_each;
+  std::size_t at = 0;
+  for (const std::int64_t more : sizes) {
+    from_each.push_back(std::span(all).subspan(at, static_cast<std::size_t>(more)));
+    at += static_cast<std::size_t>(more);
+  }
+  exchange(std::vector<std::span<const std::byte>>(ranks, bytes), from_each);
   return all;
 }
 
@@ -123,33 +131,36 @@ void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
   });
 }
 
-std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
-    const std::vector<std::span<const std::byte>>& send) const {
-  if (size_ == 1) return {{send.at(0).begin(), send.at(0).end()}};
+std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& numbers) const {
+  if (size_ == 1) return numbers;
   const Waiting waiting;
-  const auto ranks = static_cast<std::size_t>(size_);
-  std::vector<std::int64_t> sizes(ranks), coming(ranks);
-  for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send.at(r).size());
-  PHYXEL_MPI_CALL(
-      MPI_Alltoall(sizes.data(), 1, MPI_INT64_T, coming.data(), 1, MPI_INT64_T, MPI_COMM_WORLD));
-  std::vector<std::vector<std::byte>> received(ranks);
+  std::vector<std::int64_t> from_each(numbers.size());
+  PHYXEL_MPI_CALL(MPI_Alltoall(numbers.data(), 1, MPI_INT64_T, from_each.data(), 1, MPI_INT64_T,
+                               MPI_COMM_WORLD));
+  return from_each;
+}
+
+void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
+                            const std::vector<std::span<std::byte>>& receive) const {
+  const Waiting waiting;
   std::vector<MPI_Request> requests;
-  for (std::size_t r = 0; r < ranks; ++r) {
-    received[r].resize(static_cast<std::size_t>(coming[r]));
-    in_pieces(received[r].size(), [&](std::size_t at, int count) {
-      PHYXEL_MPI_CALL(MPI_Irecv(received[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0,
-                                MPI_COMM_WORLD, &requests.emplace_back()));
+  for (int r = 0; r < size_; ++r) {
+    if (r == rank_) continue;
+    in_pieces(receive.at(r).size(), [&](std::size_t at, int count) {
+      PHYXEL_MPI_CALL(MPI_Irecv(receive[r].data() + at, count, MPI_BYTE, r, 0, MPI_COMM_WORLD,
+                                &requests.emplace_back()));
     });
   }
-  for (std::size_t r = 0; r < ranks; ++r) {
-    in_pieces(send[r].size(), [&](std::size_t at, int count) {
-      PHYXEL_MPI_CALL(MPI_Isend(send[r].data() + at, count, MPI_BYTE, static_cast<int>(r), 0,
-                                MPI_COMM_WORLD, &requests.emplace_back()));
+  for (int r = 0; r < size_; ++r) {
+    if (r == rank_) continue;
+    in_pieces(send.at(r).size(), [&](std::size_t at, int count) {
+      PHYXEL_MPI_CALL(MPI_Isend(send[r].data() + at, count, MPI_BYTE, r, 0, MPI_COMM_WORLD,
+                                &requests.emplace_back()));
     });
   }
+  copy_bytes(send.at(rank_), receive.at(rank_));
   PHYXEL_MPI_CALL(
       MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
-  return received;
 }
 
 struct Transfers::Requests {

@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "bulk.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
@@ -25,6 +26,18 @@ inline constexpr const char* out_of_memory =
 class AgreedError : public Error {
  public:
   using Error::Error;
+};
+
+/// Values for each rank, or from each: one rank's after the other's.
+template <class T>
+struct ByRank {
+  Bulk<T> values;
+  std::vector<std::size_t> begin{0};  ///< Of each rank's, and where all end; shape [ranks + 1].
+
+  std::span<const T> of(int rank) const {
+    const auto r = static_cast<std::size_t>(rank);
+    return {values.data() + begin[r], begin[r + 1] - begin[r]};
+  }
 };
 
 /// One for the whole program: MPI starts with it and ends with it. Every function but `rank`,
@@ -79,12 +92,41 @@ class Communicator {
   template <class T>
   std::vector<std::vector<T>> exchanged(const std::vector<std::vector<T>>& send) const {
     static_assert(std::is_trivially_copyable_v<T>);
-    std::vector<std::span<const std::byte>> bytes;
-    for (const std::vector<T>& values : send) bytes.push_back(std::as_bytes(std::span(values)));
-    std::vector<std::vector<T>> received;
-    for (const std::vector<std::byte>& from : exchanged_bytes(bytes)) {
-      received.push_back(from_bytes<T>(from));
+    const std::size_t ranks = send.size();
+    std::vector<std::int64_t> sizes(ranks);
+    for (std::size_t r = 0; r < ranks; ++r) sizes[r] = static_cast<std::int64_t>(send[r].size());
+    sizes = told(sizes);
+    std::vector<std::vector<T>> received(ranks);
+    std::vector<std::span<const std::byte>> out;
+    std::vector<std::span<std::byte>> in;
+    for (std::size_t r = 0; r < ranks; ++r) {
+      received[r].resize(static_cast<std::size_t>(sizes[r]));
+      out.push_back(std::as_bytes(std::span(send[r])));
+      in.push_back(std::as_writable_bytes(std::span(received[r])));
     }
+    exchange(out, in);
+    return received;
+  }
+  /// The same for what is large.
+  template <class T>
+  ByRank<T> exchanged(const ByRank<T>& send) const {
+    static_assert(std::is_trivially_copyable_v<T>);
+    std::vector<std::int64_t> sizes;
+    for (int r = 0; r < size_; ++r) sizes.push_back(static_cast<std::int64_t>(send.of(r).size()));
+    ByRank<T> received;
+    for (const std::int64_t size : told(sizes)) {
+      received.begin.push_back(received.begin.back() + static_cast<std::size_t>(size));
+    }
+    received.values.resize(received.begin.back());
+    std::vector<std::span<const std::byte>> out;
+    std::vector<std::span<std::byte>> in;
+    for (int r = 0; r < size_; ++r) {
+      const std::span<const T> from = received.of(r);
+      out.push_back(std::as_bytes(send.of(r)));
+      in.push_back(std::as_writable_bytes(
+          std::span(received.values).subspan(from.data() - received.values.data(), from.size())));
+    }
+    exchange(out, in);
     return received;
   }
 
@@ -115,8 +157,11 @@ class Communicator {
   }
   std::vector<std::byte> gathered_bytes(std::span<const std::byte> bytes) const;
   void broadcast_bytes(std::span<std::byte> bytes, int from) const;
-  std::vector<std::vector<std::byte>> exchanged_bytes(
-      const std::vector<std::span<const std::byte>>& send) const;
+  /// A number for each rank. @returns from each
+  std::vector<std::int64_t> told(const std::vector<std::int64_t>& numbers) const;
+  /// Both sides know the lengths.
+  void exchange(const std::vector<std::span<const std::byte>>& send,
+                const std::vector<std::span<std::byte>>& receive) const;
 
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
   std::vector<int> hosts_{0};  // of each rank

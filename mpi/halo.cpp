@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cstring>
 
+#include "parallel_sort.hpp"
+#include "tabulated.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -12,21 +14,17 @@ Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
   const std::vector<Index>& number = share.share.number;
   const auto each = static_cast<std::size_t>(ranks.size());
   std::vector<std::vector<Index>> ghosts(each), wanted(each);  // here; their numbers
-  std::vector<std::pair<Index, Index>> own;                    // number, here
-  for (Index i = 0; i < static_cast<Index>(number.size()); ++i) {
-    const int owner = share.owner[i];
-    if (owner == ranks.rank()) {
-      own.emplace_back(number[i], i);
-    } else {
-      ghosts[owner].push_back(i);
-    }
+  const auto size = static_cast<Index>(number.size());
+  for (const Index i : chosen(0, size, [&](Index i) { return share.owner[i] != ranks.rank(); })) {
+    ghosts[share.owner[i]].push_back(i);
   }
-  std::sort(own.begin(), own.end());
+  const auto by_number = [&](Index a, Index b) { return number[a] < number[b]; };
   for (std::size_t r = 0; r < each; ++r) {
-    std::sort(ghosts[r].begin(), ghosts[r].end(),
-              [&](Index a, Index b) { return number[a] < number[b]; });
+    std::sort(ghosts[r].begin(), ghosts[r].end(), by_number);
     for (const Index i : ghosts[r]) wanted[r].push_back(number[i]);
   }
+  std::vector<Index> own = chosen(0, size, [&](Index i) { return share.owner[i] == ranks.rank(); });
+  parallel_sort(own, by_number);
   const std::vector<std::vector<Index>> asked = ranks.exchanged(wanted);
   for (std::size_t r = 0; r < each; ++r) {
     if (ghosts[r].empty() && asked[r].empty()) continue;
@@ -35,7 +33,9 @@ Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
     peer.same_host = ranks.host_of(peer.rank) == ranks.host_of(ranks.rank());
     peer.receive = ghosts[r];
     for (const Index n : asked[r]) {
-      peer.send.push_back(std::lower_bound(own.begin(), own.end(), std::pair{n, Index{0}})->second);
+      peer.send.push_back(
+          *std::lower_bound(own.begin(), own.end(), n,
+                            [&](Index i, Index wanted_one) { return number[i] < wanted_one; }));
     }
   }
   outgoing_.resize(peers_.size());

@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <tuple>
 #include <utility>
 
 #include "model/space_filling_curve.hpp"
@@ -16,52 +18,32 @@
 namespace phyxel {
 namespace {
 
-/// Those of each rank, joined; they are gone afterwards.
-SpreadPhyxels joined(std::vector<SpreadPhyxels> parts) {
-  SpreadPhyxels all;
-  std::size_t size = 0;
-  for (const SpreadPhyxels& part : parts) size += part.size();
-  all.reserve(size);
-  for (SpreadPhyxels& part : parts) {
-    all.insert(all.end(), part.begin(), part.end());
-    SpreadPhyxels().swap(part);
-  }
-  return all;
-}
-
-/// phyxels[order(k)] for k in [first, last).
-template <class Order>
-SpreadPhyxels ordered(const SpreadPhyxels& phyxels, std::size_t first, std::size_t last,
-                      Order&& order) {
-  SpreadPhyxels result(last - first);
-#pragma omp parallel for schedule(static)
-  for (std::size_t k = first; k < last; ++k) {
-    result[k - first] = phyxels[static_cast<std::size_t>(order(k))];
-  }
-  return result;
-}
-
 /// A phyxel's place in the order of all.
 struct Key {
   Index body = 0;
   std::uint64_t key = 0;  ///< Of the curve.
   Index number = 0;
-  friend auto operator<=>(const Key&, const Key&) = default;
 };
+/// What is sorted in its stead: phyxels of one place have their numbers looked up.
 struct Keyed {
-  Key key;
-  Index here = 0;
+  std::uint64_t key;
+  Index body;
+  Index here;
 };
+using KeyedPhyxels = Bulk<Keyed>;
 
 /// Which is the first that is not before a key.
-std::ptrdiff_t first_from(const std::vector<Keyed>& sorted, const Key& key) {
-  return std::lower_bound(sorted.begin(), sorted.end(), key,
-                          [](const Keyed& a, const Key& b) { return a.key < b; }) -
-         sorted.begin();
+std::ptrdiff_t first_from(const SpreadPhyxels& phyxels, const KeyedPhyxels& sorted,
+                          const Key& key) {
+  const auto before = [&](const Keyed& a, const Key& b) {
+    return std::tuple(a.body, a.key, phyxels[a.here].number) < std::tuple(b.body, b.key, b.number);
+  };
+  return std::lower_bound(sorted.begin(), sorted.end(), key, before) - sorted.begin();
 }
 
 /// The start of the stretch of each rank but the first: nothing before it belongs there.
-std::vector<Key> find_splitters(const Communicator& ranks, const std::vector<Keyed>& sorted,
+std::vector<Key> find_splitters(const Communicator& ranks, const SpreadPhyxels& phyxels,
+                                const KeyedPhyxels& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
   std::vector<Key> splitters;
   for (const auto& [body, offset] : starts) splitters.push_back({body, 0, 0});
@@ -70,7 +52,8 @@ std::vector<Key> find_splitters(const Communicator& ranks, const std::vector<Key
     std::vector<Key> trials;
     for (const Key& splitter : splitters) {
       const Key trial = trials.emplace_back(with_bit(splitter));
-      before.push_back(first_from(sorted, trial) - first_from(sorted, {trial.body, 0, 0}));
+      before.push_back(first_from(phyxels, sorted, trial) -
+                       first_from(phyxels, sorted, {trial.body, 0, 0}));
     }
     ranks.add(before);
     for (std::size_t s = 0; s < splitters.size(); ++s) {
@@ -102,20 +85,24 @@ class Cells {
       inverse_edge_.push_back(edge > 0 ? 1 / edge : 0);
     }
   }
-  Name name_of(const SpreadPhyxel& p) const {
+  /// @param log_edge of blocks of so many cells a side, instead of a cell
+  Name name_of(const SpreadPhyxel& p, int log_edge = 0) const {
     const auto b = static_cast<std::size_t>(p.body);
     const Vec3d at = inverse_edge_[b] * (p.position - boxes_[b].low);
-    return name(b, static_cast<Name>(at.x) + 1, static_cast<Name>(at.y) + 1,
-                static_cast<Name>(at.z) + 1);
+    const auto along = [&](double x) { return (static_cast<Name>(x) >> log_edge) + 1; };
+    return name(b, along(at.x), along(at.y), along(at.z));
   }
-  /// Calls visit(name) for a cell and those next to it.
-  template <class Visit>
-  static void visit_around(Name cell, Visit&& visit) {
+  /// Whether any(name) is true of a cell or one of those next to it.
+  template <class Any>
+  static bool any_around(Name cell, Any&& any) {
     for (Name z = 0; z < 3; ++z) {
       for (Name y = 0; y < 3; ++y) {
-        for (Name x = 0; x < 3; ++x) visit(cell + name(0, x, y, z) - name(0, 1, 1, 1));
+        for (Name x = 0; x < 3; ++x) {
+          if (any(cell + name(0, x, y, z) - name(0, 1, 1, 1))) return true;
+        }
       }
     }
+    return false;
   }
 
  private:
@@ -127,88 +114,86 @@ class Cells {
   const std::vector<Box>& boxes_;
   std::vector<double> inverse_edge_;
 };
+using Names = std::vector<Cells::Name>;
 
-/// The order of all phyxels: by body, then by number.
-std::uint64_t numbered(const SpreadPhyxel& p) {
-  return static_cast<std::uint64_t>(p.body) << 32 | static_cast<std::uint64_t>(p.number);
+/// Where a rank has phyxels.
+struct Occupied {
+  Cells::Name name;
+  int rank;
+  friend auto operator<=>(const Occupied&, const Occupied&) = default;
+};
+/// Cells of other ranks, in their order. @param own of this rank
+Bulk<Occupied> of_other_ranks(const Communicator& ranks, const Names& own) {
+  const std::vector<Names> from_each =
+      ranks.exchanged(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
+  Bulk<Occupied> all;
+  for (int r = 0; r < ranks.size(); ++r) {
+    if (r == ranks.rank()) continue;
+    for (const Cells::Name name : from_each[r]) all.push_back({name, r});
+  }
+  parallel_sort(all);
+  return all;
+}
+/// Of one cell.
+std::span<const Occupied> at_cell(const Bulk<Occupied>& all, Cells::Name name) {
+  const auto first = std::lower_bound(all.begin(), all.end(), Occupied{name, 0});
+  auto last = first;
+  while (last != all.end() && last->name == name) ++last;
+  return {first, last};
 }
 
-struct Others {
-  SpreadPhyxels phyxels;
-  std::vector<int> owner;
-};
-/// Phyxels of other ranks in the cells that have own ones, or next to them.
-Others of_others(const Communicator& ranks, const SpreadPhyxels& own, const Cells& cells) {
-  const auto each = static_cast<std::size_t>(ranks.size());
-  using Placed = std::pair<Cells::Name, Index>;
-  auto here = tabulated(own.size(), [&](std::size_t i) {
-    return Placed{cells.name_of(own[i]), static_cast<Index>(i)};
-  });
-  parallel_sort(here);
-  std::vector<Cells::Name> occupied;
-  std::vector<std::size_t> begin;  // of their cells, in `here`
-  for (std::size_t k = 0; k < here.size(); ++k) {
-    if (k > 0 && here[k].first == here[k - 1].first) continue;
-    occupied.push_back(here[k].first);
-    begin.push_back(k);
-  }
-  begin.push_back(here.size());
-  // Who is where.
-  std::vector<std::pair<Cells::Name, int>> elsewhere;
-  {
-    const auto from_each = ranks.exchanged(std::vector<std::vector<Cells::Name>>(each, occupied));
-    for (std::size_t r = 0; r < each; ++r) {
-      if (static_cast<int>(r) == ranks.rank()) continue;
-      for (const Cells::Name name : from_each[r]) elsewhere.emplace_back(name, static_cast<int>(r));
-    }
-  }
-  parallel_sort(elsewhere);
-  std::vector<SpreadPhyxels> send(each);
+/// Own phyxels in blocks of cells next to which another rank has some: few, if the body is large.
+std::vector<Index> near_others(const Communicator& ranks, const SpreadPhyxels& own,
+                               const Cells& cells) {
+  constexpr int log_edge = 3;
+  const auto n = static_cast<Index>(own.size());
+  const Bulk<Cells::Name> block =
+      in_bulk(own.size(), [&](std::size_t i) { return cells.name_of(own[i], log_edge); });
+  Names blocks;
 #pragma omp parallel
   {
-    std::vector<SpreadPhyxels> mine(each);
-    std::vector<int> wanted_by;
-#pragma omp for schedule(dynamic, 256) nowait
-    for (std::size_t c = 0; c < occupied.size(); ++c) {
-      wanted_by.clear();
-      Cells::visit_around(occupied[c], [&](Cells::Name next) {
-        for (auto at = std::lower_bound(elsewhere.begin(), elsewhere.end(), std::pair{next, -1});
-             at != elsewhere.end() && at->first == next; ++at) {
-          wanted_by.push_back(at->second);
-        }
-      });
-      sort_unique(wanted_by);
-      for (const int rank : wanted_by) {
-        for (std::size_t k = begin[c]; k < begin[c + 1]; ++k) {
-          mine[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
-        }
-      }
+    Names mine;  // neighbours along a curve or a lattice are in one, mostly
+    Cells::Name last = ~Cells::Name{0};
+#pragma omp for schedule(static) nowait
+    for (Index i = 0; i < n; ++i) {
+      if (block[i] != last) mine.push_back(block[i]);
+      last = block[i];
     }
+    sort_unique(mine);
 #pragma omp critical
-    for (std::size_t r = 0; r < each; ++r) {
-      send[r].insert(send[r].end(), mine[r].begin(), mine[r].end());
-    }
+    blocks.insert(blocks.end(), mine.begin(), mine.end());
   }
-  std::vector<SpreadPhyxels> received = ranks.exchanged(send);
-  Others others;
-  for (std::size_t r = 0; r < each; ++r) {
-    others.owner.insert(others.owner.end(), received[r].size(), static_cast<int>(r));
-  }
-  others.phyxels = joined(std::move(received));
-  return others;
+  sort_unique(blocks);
+  const Bulk<Occupied> others = of_other_ranks(ranks, blocks);
+  std::erase_if(blocks, [&](Cells::Name own_block) {
+    return !Cells::any_around(own_block,
+                              [&](Cells::Name next) { return !at_cell(others, next).empty(); });
+  });
+  return chosen(
+      0, n, [&](Index i) { return std::binary_search(blocks.begin(), blocks.end(), block[i]); });
 }
 
 }  // namespace
 
 std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies) {
   constexpr double far = std::numeric_limits<double>::infinity();
-  std::vector<Box> boxes(bodies, {{far, far, far}, {-far, -far, -far}});
+  const std::vector<Box> none(bodies, {{far, far, far}, {-far, -far, -far}});
+  std::vector<Box> boxes = none;
   const auto stretch = [](Box& box, const Vec3d& low, const Vec3d& high) {
     box.low = {std::min(box.low.x, low.x), std::min(box.low.y, low.y), std::min(box.low.z, low.z)};
     box.high = {std::max(box.high.x, high.x), std::max(box.high.y, high.y),
                 std::max(box.high.z, high.z)};
   };
-  for (const SpreadPhyxel& p : own) stretch(boxes[p.body], p.position, p.position);
+#pragma omp parallel
+  {
+    std::vector<Box> mine = none;
+#pragma omp for schedule(static) nowait
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      stretch(mine[own[i].body], own[i].position, own[i].position);
+    }
+#pragma omp critical
+    for (std::size_t b = 0; b < bodies; ++b) stretch(boxes[b], mine[b].low, mine[b].high);
+  }
   const std::vector<Box> all = ranks.gathered(std::span<const Box>(boxes));
   for (std::size_t k = 0; k < all.size(); ++k) {
     stretch(boxes[k % bodies], all[k].low, all[k].high);
@@ -223,14 +208,15 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
   std::vector<HilbertFrame> frames;
   for (const Box& box : boxes) frames.push_back(HilbertFrame::around(box.low, box.high));
   const auto keyed = [&](const SpreadPhyxels& phyxels) {
-    const auto n = static_cast<Index>(phyxels.size());
-    std::vector<Keyed> keys(phyxels.size());
-#pragma omp parallel for schedule(static)
-    for (Index i = 0; i < n; ++i) {
+    KeyedPhyxels keys = in_bulk(phyxels.size(), [&](std::size_t i) {
       const SpreadPhyxel& p = phyxels[i];
-      keys[i] = {{p.body, frames[p.body].key_of(p.position), p.number}, i};
-    }
-    parallel_sort(keys, [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
+      return Keyed{frames[p.body].key_of(p.position), p.body, static_cast<Index>(i)};
+    });
+    parallel_sort(keys, [&](const Keyed& a, const Keyed& b) {
+      if (a.body != b.body) return a.body < b.body;
+      if (a.key != b.key) return a.key < b.key;
+      return phyxels[a.here].number < phyxels[b.here].number;
+    });
     return keys;
   };
   const auto groups_of = [&](Index size) { return (std::int64_t{size} + group - 1) / group; };
@@ -244,26 +230,24 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     while (body + 1 < sizes.size() && at >= groups_of(sizes[body])) at -= groups_of(sizes[body++]);
     starts.emplace_back(static_cast<Index>(body), static_cast<Index>(at * group));
   }
+  const auto ordered = [](const SpreadPhyxels& phyxels, const KeyedPhyxels& sorted) {
+    return in_bulk(sorted.size(), [&](std::size_t k) { return phyxels[sorted[k].here]; });
+  };
+  ByRank<SpreadPhyxel> send;
   {
-    const std::vector<Keyed> sorted = keyed(own);
-    const std::vector<Key> splitters =
-        find_splitters(ranks, sorted, {starts.begin() + 1, starts.end()});
-    std::vector<SpreadPhyxels> send;
-    std::size_t first = 0;
-    for (int r = 0; r < parts; ++r) {
-      std::size_t last = sorted.size();
-      if (r + 1 < parts) {
-        last = static_cast<std::size_t>(first_from(sorted, splitters[static_cast<std::size_t>(r)]));
-      }
-      send.push_back(ordered(own, first, last, [&](std::size_t k) { return sorted[k].here; }));
-      first = last;
+    const KeyedPhyxels sorted = keyed(own);
+    for (const Key& splitter :
+         find_splitters(ranks, own, sorted, {starts.begin() + 1, starts.end()})) {
+      send.begin.push_back(static_cast<std::size_t>(first_from(own, sorted, splitter)));
     }
-    SpreadPhyxels().swap(own);
-    own = joined(ranks.exchanged(send));
+    send.begin.push_back(own.size());
+    send.values = ordered(own, sorted);
   }
+  release(own);
+  own = ranks.exchanged(send).values;
+  release(send.values);
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
-  const std::vector<Keyed> sorted = keyed(own);
-  own = ordered(own, 0, own.size(), [&](std::size_t k) { return sorted[k].here; });
+  own = ordered(own, keyed(own));
   for (const auto& [first, last] : stretches_of_bodies(own)) {
     // A rank's first body may have begun on another one.
     const Index begun = first == 0 && own[0].body == first_body ? first_along : 0;
@@ -286,24 +270,26 @@ std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const Sprea
   return stretches;
 }
 
-std::vector<Index> order_by_number(const SpreadPhyxels& phyxels) {
-  std::int64_t descents = 0;
-  const auto n = static_cast<Index>(phyxels.size());
-#pragma omp parallel for schedule(static) reduction(+ : descents)
-  for (Index i = 1; i < n; ++i) descents += numbered(phyxels[i]) < numbered(phyxels[i - 1]);
-  if (descents == 0) {
-    return tabulated(phyxels.size(), [](std::size_t i) { return static_cast<Index>(i); });
-  }
-  auto keys = tabulated(phyxels.size(), [&](std::size_t i) {
-    return std::pair(numbered(phyxels[i]), static_cast<Index>(i));
-  });
-  parallel_sort(keys);
-  return tabulated(keys.size(), [&](std::size_t k) { return keys[k].second; });
+namespace {
+
+/// The order of all phyxels: by body, then by number.
+std::uint64_t numbered(const SpreadPhyxel& p) {
+  return static_cast<std::uint64_t>(p.body) << 32 | static_cast<std::uint64_t>(p.number);
 }
 
-SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
-                             const std::vector<int>& owner) {
-  const auto parts = static_cast<std::size_t>(ranks.size());
+/// Which one is first, second, ... in that order.
+Bulk<Index> order_by_number(const SpreadPhyxels& phyxels) {
+  using Numbered = std::pair<std::uint64_t, Index>;
+  auto keys = in_bulk(phyxels.size(), [&](std::size_t i) {
+    return Numbered{numbered(phyxels[i]), static_cast<Index>(i)};
+  });
+  parallel_sort(keys);
+  return in_bulk(keys.size(), [&](std::size_t k) { return keys[k].second; });
+}
+
+/// Phyxels go where `owner` says, in the order in which they are.
+ByRank<SpreadPhyxel> by_owner(const SpreadPhyxels& own, const Bulk<int>& owner, int ranks) {
+  const auto parts = static_cast<std::size_t>(ranks);
   // Threads take stretches; where each begins among what a rank gets.
   const auto threads = static_cast<std::size_t>(omp_get_max_threads());
   const auto begin_of = [&](std::size_t stretch) { return own.size() * stretch / threads; };
@@ -314,61 +300,122 @@ SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own
       ++at[t][static_cast<std::size_t>(owner[k])];
     }
   }
-  std::vector<SpreadPhyxels> send(parts);
+  ByRank<SpreadPhyxel> send{SpreadPhyxels(own.size())};
   for (std::size_t r = 0; r < parts; ++r) {
-    std::size_t size = 0;
-    for (std::size_t t = 0; t < threads; ++t) size += std::exchange(at[t][r], size);
-    send[r].resize(size);
+    std::size_t next = send.begin.back();
+    for (std::size_t t = 0; t < threads; ++t) next += std::exchange(at[t][r], next);
+    send.begin.push_back(next);
   }
 #pragma omp parallel for schedule(static, 1)
   for (std::size_t t = 0; t < threads; ++t) {
     for (std::size_t k = begin_of(t); k < begin_of(t + 1); ++k) {
-      const auto r = static_cast<std::size_t>(owner[k]);
-      send[r][at[t][r]++] = own[k];
+      send.values[at[t][static_cast<std::size_t>(owner[k])]++] = own[k];
     }
   }
-  const SpreadPhyxels received = joined(ranks.exchanged(send));
-  const std::vector<Index> order = order_by_number(received);
-  return ordered(received, 0, received.size(), [&](std::size_t k) { return order[k]; });
+  return send;
+}
+
+}  // namespace
+
+SpreadPhyxels sent_to_owners(const Communicator& ranks, SpreadPhyxels own, Bulk<int> owner) {
+  ByRank<SpreadPhyxel> send = by_owner(own, owner, ranks.size());
+  release(own);
+  release(owner);
+  const SpreadPhyxels received = ranks.exchanged(send).values;
+  release(send.values);
+  const Bulk<Index> order = order_by_number(received);
+  return in_bulk(order.size(), [&](std::size_t k) { return received[order[k]]; });
+}
+
+OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
+                            const std::vector<double>& reach, const std::vector<Box>& boxes) {
+  OthersPhyxels others;
+  if (ranks.size() == 1) return others;
+  const Cells cells(reach, boxes);
+  const std::vector<Index> near = near_others(ranks, own, cells);
+  using Placed = std::pair<Cells::Name, Index>;
+  auto here = in_bulk(near.size(), [&](std::size_t k) {
+    return Placed{cells.name_of(own[near[k]]), near[k]};
+  });
+  parallel_sort(here);
+  Names occupied;
+  std::vector<std::size_t> begin;  // of their cells, in `here`
+  for (std::size_t k = 0; k < here.size(); ++k) {
+    if (k > 0 && here[k].first == here[k - 1].first) continue;
+    occupied.push_back(here[k].first);
+    begin.push_back(k);
+  }
+  begin.push_back(here.size());
+  const Bulk<Occupied> elsewhere = of_other_ranks(ranks, occupied);
+  std::vector<SpreadPhyxels> send(static_cast<std::size_t>(ranks.size()));
+#pragma omp parallel
+  {
+    std::vector<SpreadPhyxels> mine(send.size());
+    std::vector<int> wanted_by;
+#pragma omp for schedule(dynamic, 256) nowait
+    for (std::size_t c = 0; c < occupied.size(); ++c) {
+      wanted_by.clear();
+      Cells::any_around(occupied[c], [&](Cells::Name next) {
+        for (const Occupied& there : at_cell(elsewhere, next)) wanted_by.push_back(there.rank);
+        return false;
+      });
+      sort_unique(wanted_by);
+      for (const int rank : wanted_by) {
+        for (std::size_t k = begin[c]; k < begin[c + 1]; ++k) {
+          mine[static_cast<std::size_t>(rank)].push_back(own[here[k].second]);
+        }
+      }
+    }
+#pragma omp critical
+    for (std::size_t r = 0; r < send.size(); ++r) {
+      send[r].insert(send[r].end(), mine[r].begin(), mine[r].end());
+    }
+  }
+  ByRank<SpreadPhyxel> joined;
+  for (SpreadPhyxels& of_rank : send) {
+    joined.values.insert(joined.values.end(), of_rank.begin(), of_rank.end());
+    joined.begin.push_back(joined.values.size());
+    release(of_rank);
+  }
+  ByRank<SpreadPhyxel> received = ranks.exchanged(joined);
+  const Bulk<Index> order = order_by_number(received.values);
+  others.phyxels = in_bulk(order.size(), [&](std::size_t k) { return received.values[order[k]]; });
+  others.owner = in_bulk(order.size(), [&](std::size_t k) {
+    const auto end = std::upper_bound(received.begin.begin(), received.begin.end(),
+                                      static_cast<std::size_t>(order[k]));
+    return static_cast<int>(end - received.begin.begin()) - 1;
+  });
+  return others;
 }
 
 Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
-                      const std::vector<double>& reach, const std::vector<Box>& boxes) {
-  const Others others = of_others(ranks, own, Cells(reach, boxes));
-  // Both in the order of numbers, then each knows how many of the other come before it.
-  const std::vector<Index> own_order = order_by_number(own),
-                           order = order_by_number(others.phyxels);
-  const auto before = [](const SpreadPhyxels& phyxels, const std::vector<Index>& sorted,
-                         const SpreadPhyxel& p) {
-    return static_cast<std::size_t>(
-        std::partition_point(sorted.begin(), sorted.end(),
-                             [&](Index k) { return numbered(phyxels[k]) < numbered(p); }) -
-        sorted.begin());
+                      const OthersPhyxels& others) {
+  // Each knows how many of the other kind come before it.
+  const auto before = [](const SpreadPhyxels& phyxels, const SpreadPhyxel& p) {
+    const std::uint64_t at = numbered(p);
+    const auto first = std::partition_point(
+        phyxels.begin(), phyxels.end(), [&](const SpreadPhyxel& q) { return numbered(q) < at; });
+    return static_cast<std::size_t>(first - phyxels.begin());
   };
   Surrounded all;
   all.phyxels.resize(own.size() + others.phyxels.size());
   all.owner.resize(all.phyxels.size(), ranks.rank());
-  all.here.resize(all.phyxels.size(), -1);
 #pragma omp parallel for schedule(static)
   for (std::size_t k = 0; k < own.size(); ++k) {
-    const SpreadPhyxel& p = own[own_order[k]];
-    const std::size_t at = k + before(others.phyxels, order, p);
-    all.phyxels[at] = p;
-    all.here[at] = own_order[k];
+    all.phyxels[k + before(others.phyxels, own[k])] = own[k];
   }
 #pragma omp parallel for schedule(static)
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const SpreadPhyxel& p = others.phyxels[order[k]];
-    const std::size_t at = k + before(own, own_order, p);
-    all.phyxels[at] = p;
-    all.owner[at] = others.owner[order[k]];
+  for (std::size_t k = 0; k < others.phyxels.size(); ++k) {
+    const std::size_t at = k + before(own, others.phyxels[k]);
+    all.phyxels[at] = others.phyxels[k];
+    all.owner[at] = others.owner[k];
   }
   return all;
 }
 
-std::vector<double> medians_of(const Communicator& ranks, std::vector<std::vector<double>> values) {
+std::vector<double> medians_of(const Communicator& ranks, std::vector<Bulk<double>> values) {
   std::vector<std::int64_t> sizes;
-  for (std::vector<double>& list : values) {
+  for (Bulk<double>& list : values) {
     parallel_sort(list);
     sizes.push_back(static_cast<std::int64_t>(list.size()));
   }

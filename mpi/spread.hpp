@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "bulk.hpp"
 #include "model/box.hpp"
 #include "mpi/communicator.hpp"
 
@@ -22,7 +23,7 @@ struct SpreadPhyxel {
   Index along = 0;            ///< Where it stands in its body along Hilbert's curve.
   std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
 };
-using SpreadPhyxels = std::vector<SpreadPhyxel>;
+using SpreadPhyxels = Bulk<SpreadPhyxel>;
 
 /// The box of each body.
 std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies);
@@ -36,29 +37,34 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
                                  const std::vector<Index>& sizes, const std::vector<Box>& boxes,
                                  Index group);
 
-/// Phyxels go to their owners, and are there in the order of bodies and numbers.
-SpreadPhyxels sent_to_owners(const Communicator& ranks, const SpreadPhyxels& own,
-                             const std::vector<int>& owner);
+/// Phyxels go to their owners, and are there in the order of bodies and numbers. @param owner of
+///   each
+SpreadPhyxels sent_to_owners(const Communicator& ranks, SpreadPhyxels own, Bulk<int> owner);
 
 /// First and last of each body that is there, which follow each other.
 std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const SpreadPhyxels& phyxels);
 
-/// Which one is first, second, ... in the order of bodies and numbers.
-std::vector<Index> order_by_number(const SpreadPhyxels& phyxels);
-
-/// Own phyxels and those of other ranks around them.
-struct Surrounded {
-  SpreadPhyxels phyxels;    ///< In the order of bodies and numbers.
-  std::vector<int> owner;   ///< Rank of each.
-  std::vector<Index> here;  ///< Which own one each is; -1: another rank's.
+/// Other ranks' phyxels, in the order of bodies and numbers, and whose each is.
+struct OthersPhyxels {
+  SpreadPhyxels phyxels;
+  Bulk<int> owner;
 };
 /// @param reach of each body [m]: all phyxels nearer than that to an own one are there, and others
+OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
+                            const std::vector<double>& reach, const std::vector<Box>& boxes);
+
+/// Own phyxels and those of other ranks around them, in the order of bodies and numbers.
+struct Surrounded {
+  SpreadPhyxels phyxels;
+  std::vector<int> owner;  ///< Rank of each.
+};
+/// @param own in that order, too
 Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
-                      const std::vector<double>& reach, const std::vector<Box>& boxes);
+                      const OthersPhyxels& others);
 
 /// The value in the middle of each list, as `median_of`; 0 for none. @param values [list], none
 ///   below 0
-std::vector<double> medians_of(const Communicator& ranks, std::vector<std::vector<double>> values);
+std::vector<double> medians_of(const Communicator& ranks, std::vector<Bulk<double>> values);
 
 /// The largest of each over the ranks.
 std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values);

@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include "mpi/communicator.hpp"
+#include "mpi/copy_bytes.hpp"
 #include "mpi/watchdog.hpp"
 
 namespace phyxel {
@@ -30,9 +31,12 @@ std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> b
   return {bytes.begin(), bytes.end()};
 }
 void Communicator::broadcast_bytes(std::span<std::byte>, int) const {}
-std::vector<std::vector<std::byte>> Communicator::exchanged_bytes(
-    const std::vector<std::span<const std::byte>>& send) const {
-  return {{send.at(0).begin(), send.at(0).end()}};
+std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& numbers) const {
+  return numbers;
+}
+void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
+                            const std::vector<std::span<std::byte>>& receive) const {
+  copy_bytes(send.at(0), receive.at(0));
 }
 
 struct Transfers::Requests {};

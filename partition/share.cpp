@@ -20,10 +20,9 @@ class Maker {
         here_(kind_.size(), -1) {
     out_.share.whole = whole.size();
     out_.share.rings = static_cast<int>(plan.rings.size());
-    for (const Index i : plan.owned) kind_[i] = owned;
+    mark(plan.owned, owned);
     for (std::size_t r = 0; r < plan.rings.size(); ++r) {
-      const bool last = r + 1 == plan.rings.size();
-      for (const Index i : plan.rings[r]) kind_[i] = last ? far_ghost : near_ghost;
+      mark(plan.rings[r], r + 1 == plan.rings.size() ? far_ghost : near_ghost);
     }
     for (Index s = 0; s < static_cast<Index>(whole.surfels.position.size()); ++s) {
       if (!has_surfel(s)) continue;
@@ -64,6 +63,10 @@ class Maker {
   }
 
  private:
+  void mark(const std::vector<Index>& phyxels, Kind kind) {
+#pragma omp parallel for schedule(static)
+    for (std::size_t k = 0; k < phyxels.size(); ++k) kind_[phyxels[k]] = kind;
+  }
   bool has_surfel(Index s) const { return kind_[whole_.surfels.carriers.row(s).front()] == owned; }
   Index present() const { return static_cast<Index>(out_.share.number.size()); }
 
@@ -73,13 +76,13 @@ class Maker {
     Index count[far_ghost + 1] = {};
     for (const Kind kind : {owned, near_ghost, far_ghost}) {
       const Index first = present();
-      for (Index i = part.begin; i < part.end; ++i) {
-        if (kind_[i] != kind) continue;
-        here_[i] = present();
-        out_.share.number.push_back(i);
-        out_.share.owned.push_back(kind == owned);
-      }
-      count[kind] = present() - first;
+      const std::vector<Index> found =
+          chosen(part.begin, part.end, [&](Index i) { return kind_[i] == kind; });
+      count[kind] = static_cast<Index>(found.size());
+#pragma omp parallel for schedule(static)
+      for (Index k = 0; k < count[kind]; ++k) here_[found[k]] = first + k;
+      out_.share.number.insert(out_.share.number.end(), found.begin(), found.end());
+      out_.share.owned.insert(out_.share.owned.end(), found.size(), kind == owned);
     }
     own.end = present();
     own.far_ghosts = count[far_ghost];

@@ -9,6 +9,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -28,7 +29,10 @@ Mat3d rotation_matrix(Vec3d degrees) {
 void place(Cloud& cloud, const BodyRequest& request) {
   const Mat3d rotation = rotation_matrix(request.rotation);
   const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
-  for (Vec3d& p : cloud.position) p = placed(p);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    cloud.position[i] = placed(cloud.position[i]);
+  }
   for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
   for (Vec3d& p : cloud.surface.position) p = placed(p);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
@@ -75,6 +79,7 @@ Masses kernel_masses(const std::vector<double>& spacing, const std::vector<doubl
                      double mean, double density) {
   const std::size_t n = spacing.size();
   Masses result{std::vector<double>(n), std::vector<double>(n)};
+#pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     const double r = spacing[i];
     result.mass[i] = r * r * r * density / mean;
@@ -84,10 +89,7 @@ Masses kernel_masses(const std::vector<double>& spacing, const std::vector<doubl
 }
 
 Masses geometric_masses(const std::vector<double>& volume, double density) {
-  Masses result{std::vector<double>(volume.size()), volume};
-  std::transform(volume.begin(), volume.end(), result.mass.begin(),
-                 [&](double v) { return v * density; });
-  return result;
+  return {tabulated(volume.size(), [&](std::size_t i) { return volume[i] * density; }), volume};
 }
 
 std::string in_words(const NeighbourhoodRule& rule) {
