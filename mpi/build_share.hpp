@@ -24,7 +24,7 @@ struct ShareOptions {
   /// the curve.
   Index most_groups = 100'000;
   /// Of more phyxels than these, only some tell whom they share edges with, for all.
-  Index most_samples = 4'000'000;
+  Index most_samples = 1'000'000;
 };
 
 struct BuiltShare {

@@ -280,9 +280,16 @@ class CudaShareSurveyor final : public ShareSurveyor {
         {position.data(), support.data(), spacing.data(), own.data(), one_sided ? largest : 0},
         findings.data(), kernel_sum.data(), needed.data());
     around.needed = fetched(needed);
-    const std::vector<Finding> found = fetched(findings);
-    for (const Finding& f : found) around.length.push_back(f.length);
-    around.degenerate = degenerate_of(found);
+    const thrust::transform_iterator lengths(findings.data(), AsLengths{});
+    const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),
+                               Lengths{0, static_cast<Index>(n), 0, 0}, AddLengths{});
+    if (all.degenerate > 0) around.degenerate = degenerate_of(fetched(findings));
+    const DeviceArray<Index> length(n, what);
+    for_each("list_lengths", static_cast<std::int64_t>(n),
+             [findings = findings.data(), length = length.data()] __device__(std::int64_t i) {
+               length[i] = findings[i].length;
+             });
+    around.length = fetched(length);
     if (!host_spacing.empty()) around.kernel_sum = fetched(kernel_sum);
     return around;
   }

@@ -10,13 +10,16 @@
 #include <utility>
 
 #include "model/space_filling_curve.hpp"
+#include "parallel_sort.hpp"
 #include "phyxel/error.hpp"
 #include "setup/wait_free.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel::cuda {
 namespace {
 
 void find_places(Tiling& tiling) {
+#pragma omp parallel for schedule(static)
   for (Index place = 0; place < tiling.places(); ++place) {
     if (tiling.phyxel[place] >= 0) tiling.place[tiling.phyxel[place]] = place;
   }
@@ -62,50 +65,64 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
   const std::vector<Index>& whole = model.share->place;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
   const auto sorted = [&](Index begin, Index end) {
-    std::vector<Index> phyxels(static_cast<std::size_t>(end - begin));
-    std::iota(phyxels.begin(), phyxels.end(), begin);
-    std::sort(phyxels.begin(), phyxels.end(),
-              [&](Index a, Index b) { return whole[a] < whole[b]; });
-    return phyxels;
+    using Placed = std::pair<Index, Index>;
+    auto pairs = in_bulk(static_cast<std::size_t>(end - begin), [&](std::size_t k) {
+      const Index i = begin + static_cast<Index>(k);
+      return Placed{whole[i], i};
+    });
+    parallel_sort(pairs);
+    return in_bulk(pairs.size(), [&](std::size_t k) { return pairs[k].second; });
   };
-  const auto add_tile = [&](std::size_t part) {
-    tiling.part.push_back(static_cast<Index>(part));
-    tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
-  };
-  struct OwnTile {
-    std::size_t part;
-    std::vector<Index> phyxels;
-    bool reaches_ghosts = false;
-  };
-  std::vector<OwnTile> own;
+  // Own phyxels, tile by tile of the whole.
+  Bulk<Index> own;
+  std::vector<Index> begin, part_of;  // of each tile
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
-    Index tile = -1;  // of the whole
-    for (const Index i : sorted(model.parts[p].begin, model.parts[p].owned_end())) {
-      if (std::exchange(tile, whole[i] / tile_size) != whole[i] / tile_size) own.push_back({p, {}});
-      own.back().phyxels.push_back(i);
-      if (reaches_ghosts[i]) own.back().reaches_ghosts = true;
+    const Bulk<Index> of_part = sorted(model.parts[p].begin, model.parts[p].owned_end());
+    const auto before = static_cast<Index>(own.size());
+    for (const Index k : chosen(0, static_cast<Index>(of_part.size()), [&](Index k) {
+           return k == 0 || whole[of_part[k]] / tile_size != whole[of_part[k - 1]] / tile_size;
+         })) {
+      begin.push_back(before + k);
+      part_of.push_back(static_cast<Index>(p));
+    }
+    own.insert(own.end(), of_part.begin(), of_part.end());
+  }
+  const auto tiles = static_cast<Index>(begin.size());
+  begin.push_back(static_cast<Index>(own.size()));
+  const auto at_boundary = in_bulk(part_of.size(), [&](std::size_t t) -> char {
+    return std::any_of(own.begin() + begin[t], own.begin() + begin[t + 1],
+                       [&](Index i) { return reaches_ghosts[i]; });
+  });
+  std::vector<Index> order = chosen(0, tiles, [&](Index t) { return at_boundary[t]; });
+  tiling.boundary_tiles = static_cast<Index>(order.size());
+  const std::vector<Index> inside = chosen(0, tiles, [&](Index t) { return !at_boundary[t]; });
+  order.insert(order.end(), inside.begin(), inside.end());
+  tiling.phyxel.assign(order.size() * tile_size, -1);
+  tiling.part = tabulated(order.size(), [&](std::size_t t) { return part_of[order[t]]; });
+#pragma omp parallel for schedule(static)
+  for (Index t = 0; t < tiles; ++t) {
+    for (Index k = begin[order[t]]; k < begin[order[t] + 1]; ++k) {
+      tiling.phyxel[t * tile_size + whole[own[k]] % tile_size] = own[k];
     }
   }
-  for (const bool boundary : {true, false}) {
-    for (const OwnTile& of : own) {
-      if (of.reaches_ghosts != boundary) continue;
-      add_tile(of.part);
-      for (const Index i : of.phyxels) {
-        tiling.phyxel[(tiling.part.size() - 1) * tile_size +
-                      static_cast<std::size_t>(whole[i] % tile_size)] = i;
-      }
-    }
-    if (boundary) tiling.boundary_tiles = tiling.tiles();
-  }
-  tiling.own_tiles = tiling.tiles();
+  tiling.own_tiles = tiles;
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     std::size_t next = 0;  // in the last tile
     for (const Index i : sorted(model.parts[p].owned_end(), model.parts[p].end)) {
-      if (next % tile_size == 0) add_tile(p);
+      if (next % tile_size == 0) {
+        tiling.part.push_back(static_cast<Index>(p));
+        tiling.phyxel.resize(tiling.part.size() * tile_size, -1);
+      }
       tiling.phyxel[(tiling.part.size() - 1) * tile_size + next++ % tile_size] = i;
     }
   }
   find_places(tiling);
+}
+
+std::vector<Index> numbers_at(const Model& model, const std::vector<Index>& phyxel) {
+  return tabulated(phyxel.size(), [&](std::size_t place) {
+    return phyxel[place] < 0 ? -1 : model.number(phyxel[place]);
+  });
 }
 
 namespace {

@@ -93,4 +93,8 @@ Tiling make_tiling(const Model& model);
 /// @param reaches_ghosts whether each phyxel needs a ghost in either pass, shape [n]
 void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Tiling& tiling);
 
+/// Of each place, the number of its phyxel in the whole model; -1: nobody. @param phyxel of each
+///   place
+std::vector<Index> numbers_at(const Model& model, const std::vector<Index>& phyxel);
+
 }  // namespace phyxel::cuda

@@ -307,9 +307,7 @@ class DeviceModel {
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
     if (share()) {
-      std::vector<Index> number;
-      for (const Index i : tiling_.phyxel) number.push_back(i < 0 ? -1 : share()->number[i]);
-      number_at_ = sent(number, "places");
+      number_at_ = sent(numbers_at(model_, tiling_.phyxel), "places");
     }
     send_constants(0);
     put_all_constants();

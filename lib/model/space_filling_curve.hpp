@@ -13,34 +13,35 @@ namespace phyxel {
 /// Bits of each coordinate in a key.
 inline constexpr int hilbert_bits = 21;
 
+/// Two zeros between any two bits of the lowest 21.
+PHYXEL_HD std::uint64_t spread_bits(std::uint64_t bits) {
+  bits = (bits | bits << 32) & 0x001f00000000ffff;
+  bits = (bits | bits << 16) & 0x001f0000ff0000ff;
+  bits = (bits | bits << 8) & 0x100f00f00f00f00f;
+  bits = (bits | bits << 4) & 0x10c30c30c30c30c3;
+  bits = (bits | bits << 2) & 0x1249249249249249;
+  return bits;
+}
+
 /// Position along the curve of a cell of a 2²¹ × 2²¹ × 2²¹ grid. Source: J. Skilling, Programming
 /// the Hilbert curve, AIP Conf. Proc. 707 (2004) 381, coordinates to transpose to key.
 PHYXEL_HD std::uint64_t hilbert_key(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
   std::uint32_t axis[3] = {x, y, z};
-  constexpr std::uint32_t top = std::uint32_t{1} << (hilbert_bits - 1);
-  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
-    const std::uint32_t below = bit - 1;
-    for (int a = 0; a < 3; ++a) {
-      if (axis[a] & bit) {
-        axis[0] ^= below;
-      } else {
-        const std::uint32_t swap = (axis[0] ^ axis[a]) & below;
-        axis[0] ^= swap;
-        axis[a] ^= swap;
-      }
+  for (int b = hilbert_bits - 1; b > 0; --b) {
+    const std::uint32_t below = (std::uint32_t{1} << b) - 1;
+    for (int a = 0; a < 3; ++a) {  // without branches, which nobody could foretell
+      const std::uint32_t inverted = 0 - (axis[a] >> b & 1);
+      const std::uint32_t swapped = (axis[0] ^ axis[a]) & below & ~inverted;
+      axis[a] ^= swapped;
+      axis[0] ^= swapped | (below & inverted);
     }
   }
   axis[1] ^= axis[0];
   axis[2] ^= axis[1];
-  std::uint32_t flip = 0;
-  for (std::uint32_t bit = top; bit > 1; bit >>= 1) {
-    if (axis[2] & bit) flip ^= bit - 1;
-  }
-  std::uint64_t key = 0;
-  for (int b = hilbert_bits - 1; b >= 0; --b) {
-    for (int a = 0; a < 3; ++a) key = key << 1 | ((axis[a] ^ flip) >> b & 1);
-  }
-  return key;
+  std::uint32_t flip = axis[2] >> 1;  // of each bit: the parity of those above
+  for (int shift = 1; shift < hilbert_bits; shift *= 2) flip ^= flip >> shift;
+  return spread_bits(axis[0] ^ flip) << 2 | spread_bits(axis[1] ^ flip) << 1 |
+         spread_bits(axis[2] ^ flip);
 }
 
 /// The grid over a cloud's box.

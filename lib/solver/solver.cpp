@@ -8,14 +8,15 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.velocity.resize(state.displacement.size());
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     const Part& part = model.parts[p];
+    // The stored velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest
+    // there are no internal forces.
+#pragma omp parallel for schedule(static)
     for (Index i = part.begin; i < part.end; ++i) {
       state.velocity[i] =
           scene.bodies[p].velocity + cross(scene.bodies[p].spin, model.position[i] - part.centre);
+      state.velocity[i] -= (dt / 2) * model.gravity;
     }
   }
-  // The stored velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest
-  // there are no internal forces.
-  for (Vec3d& v : state.velocity) v -= (dt / 2) * model.gravity;
   for (const Load& load : model.loads) {
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
       const Index i = load.phyxels[k];
