@@ -180,7 +180,7 @@ class Builder {
     // At any time, with lists: those around and the copy that a share is included.
     ranks_.together([&] {
       require_host_memory("the scene", static_cast<double>(size),
-                          (options_.surveyor ? 330.0 : 1700.0) / ranks_.size());
+                          (options_.surveyor ? 280.0 : 1700.0) / ranks_.size());
       std::int64_t places = 0;  // in tiles, of which bodies fill whole ones
       for (const Body& body : bodies_) places += count_of(body.size, options_.tile) * options_.tile;
       if (places > std::numeric_limits<Index>::max()) {
@@ -283,7 +283,7 @@ class Builder {
       if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
       spacings[b] = spacings_of(first, last);
     }
-    const std::vector<double> medians = medians_of(ranks_, std::move(spacings));
+    const std::vector<double> medians = medians_of(ranks_, spacings);
     std::vector<double> reach(bodies_.size(), 0);
     for (const auto& [first, last] : stretches) {
       const auto b = static_cast<std::size_t>(own[first].body);

@@ -159,6 +159,7 @@ void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
     });
   }
   copy_bytes(send.at(rank_), receive.at(rank_));
+  if (size_ == 1) return;  // MPI may not run
   PHYXEL_MPI_CALL(
       MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
 }
@@ -192,6 +193,14 @@ void Transfers::wait() {
   list.clear();
 }
 
+bool mpi_takes_device_memory() {
+#ifdef MPIX_CUDA_AWARE_SUPPORT
+  return MPIX_Query_cuda_support() != 0;
+#else
+  return false;  // or it would have a word for it
+#endif
+}
+
 std::string mpi_description() {
   char text[MPI_MAX_LIBRARY_VERSION_STRING] = "";
   int length = 0;
@@ -199,7 +208,7 @@ std::string mpi_description() {
   std::string name(text);
   name = name.substr(0, name.find_first_of(",\n"));  // Open MPI goes on about who built it
 #ifdef MPIX_CUDA_AWARE_SUPPORT
-  name += MPIX_Query_cuda_support() ? ", CUDA-aware" : ", not CUDA-aware";
+  name += mpi_takes_device_memory() ? ", CUDA-aware" : ", not CUDA-aware";
 #endif
   return name;
 }

@@ -171,6 +171,9 @@ class Communicator {
 /// Whether mpirun, srun or another launcher has started this program as one of several.
 bool launched_as_rank();
 
+/// Whether messages may be in a GPU's memory, as the MPI library says that runs.
+bool mpi_takes_device_memory();
+
 /// e.g. "Open MPI v4.1.4, not CUDA-aware", or that there is none.
 std::string mpi_description();
 

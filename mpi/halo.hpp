@@ -22,6 +22,7 @@ class Halo final : public Others {
   const std::vector<Peer>& peers() const override { return peers_; }
   std::vector<std::vector<std::byte>> told(
       const std::vector<std::vector<std::byte>>& words) const override;
+  bool takes_device_memory() const override { return mpi_takes_device_memory(); }
   void begin(const Bytes& outgoing, const Bytes& incoming) const override;
   void begin(const Records& records) const override;
   void finish() const override;

@@ -413,28 +413,35 @@ Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
   return all;
 }
 
-std::vector<double> medians_of(const Communicator& ranks, std::vector<Bulk<double>> values) {
-  std::vector<std::int64_t> sizes;
-  for (Bulk<double>& list : values) {
-    parallel_sort(list);
-    sizes.push_back(static_cast<std::int64_t>(list.size()));
-  }
-  ranks.add(sizes);
-  // Bits of numbers that are not negative are in the order of the numbers.
+std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<double>> values) {
+  // Bits of numbers that are not negative are in the order of the numbers: digit by digit, those
+  // are counted that begin as the median does.
+  constexpr int digit_bits = 8, digits = 1 << digit_bits;
   std::vector<std::uint64_t> medians(values.size(), 0);
-  for (int bit = 62; bit >= 0; --bit) {
-    std::vector<std::int64_t> below;
+  std::vector<std::int64_t> sizes;
+  for (const Bulk<double>& list : values) sizes.push_back(static_cast<std::int64_t>(list.size()));
+  ranks.add(sizes);
+  std::vector<std::int64_t> before;  // of those that are left, how many come before the median
+  for (const std::int64_t size : sizes) before.push_back(size / 2);
+  for (int shift = 64 - digit_bits; shift >= 0; shift -= digit_bits) {
+    std::vector<std::int64_t> counts(values.size() * digits, 0);
     for (std::size_t k = 0; k < values.size(); ++k) {
-      const auto trial = std::bit_cast<double>(medians[k] | std::uint64_t{1} << bit);
-      // No list holds a NaN, so all of it is below one.
-      below.push_back(std::isnan(trial)
-                          ? static_cast<std::int64_t>(values[k].size())
-                          : std::lower_bound(values[k].begin(), values[k].end(), trial) -
-                                values[k].begin());
+      const std::uint64_t begins = medians[k];
+      std::int64_t* const of_list = counts.data() + k * digits;
+#pragma omp parallel for schedule(static) reduction(+ : of_list[:digits])
+      for (std::size_t i = 0; i < values[k].size(); ++i) {
+        const std::uint64_t bits = std::bit_cast<std::uint64_t>(values[k][i]) ^ begins;
+        if (shift + digit_bits < 64 && bits >> (shift + digit_bits) != 0) continue;
+        ++of_list[bits >> shift & (digits - 1)];
+      }
     }
-    ranks.add(below);
+    ranks.add(counts);
     for (std::size_t k = 0; k < values.size(); ++k) {
-      if (sizes[k] > 0 && below[k] <= sizes[k] / 2) medians[k] |= std::uint64_t{1} << bit;
+      if (sizes[k] == 0) continue;
+      const std::int64_t* const of_list = counts.data() + k * digits;
+      std::uint64_t digit = 0;
+      while (digit < digits - 1 && before[k] >= of_list[digit]) before[k] -= of_list[digit++];
+      medians[k] |= digit << shift;
     }
   }
   std::vector<double> result;

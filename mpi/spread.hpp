@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -64,7 +65,7 @@ Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
 
 /// The value in the middle of each list, as `median_of`; 0 for none. @param values [list], none
 ///   below 0
-std::vector<double> medians_of(const Communicator& ranks, std::vector<Bulk<double>> values);
+std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<double>> values);
 
 /// The largest of each over the ranks.
 std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values);

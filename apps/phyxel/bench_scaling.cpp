@@ -297,7 +297,8 @@ void add_bench_scaling(CLI::App& bench) {
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_choices()));
   command->add_option("--device", options->device, device_help);
-  command->add_option("--transport", options->transport, "auto, direct, nccl, host: between GPUs")
+  command
+      ->add_option("--transport", options->transport, "auto, direct, nccl, mpi, host: between GPUs")
       ->check(CLI::IsMember(transport_names()));
   command->add_option("--ghost-rings", options->rings, "1, 2; GPUs: 1")
       ->delimiter(',')

@@ -75,7 +75,7 @@ ChosenDevice choose_device_of_rank(const std::string& name, const std::string& w
 }
 
 const std::vector<std::string>& transport_names() {
-  static const std::vector<std::string> names{"auto", "direct", "nccl", "host"};
+  static const std::vector<std::string> names{"auto", "direct", "nccl", "mpi", "host"};
   return names;
 }
 

@@ -78,8 +78,9 @@ std::string transport_of_ranks(const ChosenDevice& device) {
   if (!device.gpu) return "MPI";
   if (all_direct) return "direct: stores into other GPUs' memory (CUDA IPC)";
   const bool nccl = ranks().smallest(std::int64_t{cuda::has_nccl()}) == 1;
-  return nccl ? "nccl, where every rank has a GPU of its own; else host: host memory and MPI"
-              : "host: host memory and MPI";
+  const std::string by_mpi =
+      mpi_takes_device_memory() ? "mpi: CUDA-aware MPI" : "host: host memory and MPI";
+  return nccl ? "nccl, where every rank has a GPU of its own; else " + by_mpi : by_mpi;
 }
 
 Findings facts() {

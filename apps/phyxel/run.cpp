@@ -618,8 +618,8 @@ void add_run(CLI::App& program) {
       ->check(CLI::Range(1, 2));
   command
       ->add_option("--transport", options->transport,
-                   "How ranks' GPUs exchange: direct (stores into each other's memory), nccl, host "
-                   "(MPI), or auto")
+                   "How ranks' GPUs exchange: direct (stores into each other's memory), nccl, mpi "
+                   "(a CUDA-aware one), host (MPI through the host's memory), or auto")
       ->check(CLI::IsMember(transport_names()));
   command->add_flag("--force", options->force,
                     "Replace an earlier trajectory in the output folder");

@@ -18,6 +18,7 @@ enum class Transport {
   automatic,  ///< The first of the following that all ranks can.
   direct,     ///< Stores into the memory of other ranks' GPUs, on one host: CUDA IPC.
   nccl,       ///< NVIDIA's NCCL, where every rank has a GPU of its own.
+  mpi,        ///< By an MPI that takes memory of GPUs.
   host,       ///< Through host memory, by MPI.
 };
 

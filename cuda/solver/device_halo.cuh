@@ -3,9 +3,9 @@
 ///
 /// Two ways. *Direct*: kernels store the records where the other ranks' kernels read them and raise
 /// a flag there, for which those wait (peers.cuh); the passes of a step do so themselves. The host
-/// takes no part. *Packed*: a kernel packs, and NCCL or the host and MPI carry, for which either
-/// way `begin` and `finish` only queue what the device does, so that what is launched in between
-/// overlaps.
+/// takes no part. *Packed*: a kernel packs, and NCCL, an MPI that takes the device's memory, or the
+/// host and MPI carry, for which each time `begin` and `finish` only queue what the device does, so
+/// that what is launched in between overlaps.
 ///
 /// Nothing says that an array may be written again, because the order of a step says it: who sends
 /// stresses has received displacements, which their owner sends after it has read the stresses of
@@ -141,6 +141,27 @@ class HostCourier final : public Courier {
   const Others& others_;
   const PeerLists &send_, &receive_;
   PinnedBytes outgoing_, incoming_;
+};
+
+/// By MPI, which gets the device's memory itself.
+class MpiCourier final : public Courier {
+ public:
+  MpiCourier(const Others& others, const PeerLists& send, const PeerLists& receive)
+      : others_(others), send_(send), receive_(receive) {}
+
+  void reserve(std::size_t, std::size_t) override {}
+  void begin(std::byte* packed, std::byte*, std::size_t) override { packed_ = packed; }
+  void finish(std::byte* arrived, std::size_t bytes_each) override {
+    PHYXEL_CUDA(cudaStreamSynchronize(queue()));
+    others_.begin(send_.in(packed_, bytes_each), receive_.in(arrived, bytes_each));
+    others_.finish();
+  }
+  std::string describe() const override { return "CUDA-aware MPI"; }
+
+ private:
+  const Others& others_;
+  const PeerLists &send_, &receive_;
+  std::byte* packed_ = nullptr;
 };
 
 /// By NCCL; the host only queues.
@@ -459,9 +480,9 @@ class DeviceHalo {
     if (wanted == Transport::automatic || wanted == Transport::direct) {
       open_direct(wanted == Transport::direct);
     }
-    if (wanted == Transport::nccl || (wanted == Transport::automatic && !direct_)) {
-      open_nccl(wanted == Transport::nccl);
-    }
+    const bool any = wanted == Transport::automatic && !direct_;
+    const bool nccl = (any || wanted == Transport::nccl) && open_nccl(!any);
+    if (wanted == Transport::mpi || (any && !nccl)) open_mpi(!any);
   }
   DeviceHalo(const DeviceHalo&) = delete;
   DeviceHalo& operator=(const DeviceHalo&) = delete;
@@ -555,7 +576,7 @@ class DeviceHalo {
     direct_.reset();
     if (!insist) return;
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";
-    throw DeviceError("--transport direct: " + trouble + "; allowed here: nccl, host, auto");
+    throw DeviceError("--transport direct: " + trouble + "; allowed here: nccl, mpi, host, auto");
   }
   /// Collective.
   bool gpus_differ() const {
@@ -572,8 +593,16 @@ class DeviceHalo {
     for (std::size_t k = 0; k < words.size(); k += 2) gpus.emplace(words[k], words[k + 1]);
     return static_cast<int>(gpus.size()) == others().count();
   }
-  /// One rank names the ranks, for all.
-  void open_nccl(bool insist) {
+  void open_mpi(bool insist) {
+    if (others().smallest(others().takes_device_memory()) > 0) {
+      packed_.send_by(std::make_unique<MpiCourier>(others(), send_, receive_));
+    } else if (insist) {
+      throw DeviceError(
+          "--transport mpi: this MPI is not CUDA-aware; allowed here: direct, nccl, host, auto");
+    }
+  }
+  /// One rank names the ranks, for all. @returns whether exchanges go by it
+  bool open_nccl(bool insist) {
     std::string trouble;
     NcclRanks::Name name{};
     const auto agree = [&](bool fine) { return others().smallest(fine) > 0; };
@@ -597,13 +626,14 @@ class DeviceHalo {
       std::unique_ptr<Courier> courier;
       if (attempt(
               [&] { courier = std::make_unique<NcclCourier>(others(), name, send_, receive_); })) {
-        return packed_.send_by(std::move(courier));
+        packed_.send_by(std::move(courier));
+        return true;
       }
       courier.release();  // to end it would be collective, and not all ranks have it
     }
-    if (!insist) return;
+    if (!insist) return false;
     if (trouble.empty()) trouble = "another rank cannot use NCCL";
-    throw DeviceError("--transport nccl: " + trouble + "; allowed here: direct, host, auto");
+    throw DeviceError("--transport nccl: " + trouble + "; allowed here: direct, mpi, host, auto");
   }
 
   const Model& m_;

@@ -64,7 +64,7 @@ const Model& whole_of(const ShareCase& c) {
 }
 
 /// What steps a share, and how values travel.
-enum class Way { one_ring, two_rings, gpu_direct, gpu_nccl, gpu_host };
+enum class Way { one_ring, two_rings, gpu_direct, gpu_nccl, gpu_mpi, gpu_host };
 
 class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
  protected:
@@ -77,6 +77,7 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
     if (way_ == Way::gpu_nccl && world().smallest(std::int64_t{own_gpu && cuda::has_nccl()}) == 0) {
       GTEST_SKIP() << "NCCL needs a GPU for each rank, and itself: " << cuda::nccl_version();
     }
+    if (way_ == Way::gpu_mpi && !mpi_takes_device_memory()) GTEST_SKIP() << mpi_description();
     const int rings = way_ == Way::two_rings ? 2 : 1, parts = world().size();
     const Graph graph = phyxel_graph(whole_);
     const Groups tiles = curve_groups(whole_, cuda::tile_size);
@@ -106,6 +107,8 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
         return Transport::direct;
       case Way::gpu_nccl:
         return Transport::nccl;
+      case Way::gpu_mpi:
+        return Transport::mpi;
       default:
         return Transport::host;
     }
@@ -234,7 +237,7 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
 }
 
 std::string name_of(const ::testing::TestParamInfo<std::tuple<ShareCase, Way>>& test) {
-  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuNccl", "GpuHost"};
+  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuNccl", "GpuMpi", "GpuHost"};
   const auto& [body, way] = test.param;
   return std::string(body.name) + ways[static_cast<int>(way)];
 }
@@ -242,7 +245,7 @@ INSTANTIATE_TEST_SUITE_P(Bodies, Shares,
                          ::testing::Combine(::testing::ValuesIn(share_cases()),
                                             ::testing::Values(Way::one_ring, Way::two_rings,
                                                               Way::gpu_direct, Way::gpu_nccl,
-                                                              Way::gpu_host)),
+                                                              Way::gpu_mpi, Way::gpu_host)),
                          name_of);
 
 }  // namespace

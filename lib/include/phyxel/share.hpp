@@ -55,6 +55,8 @@ class Others {
   virtual std::vector<std::vector<std::byte>> told(
       const std::vector<std::vector<std::byte>>& words) const = 0;
 
+  /// Whether `outgoing` and `incoming` may be memory of a GPU.
+  virtual bool takes_device_memory() const = 0;
   /// Sends `outgoing` of each peer to it, and takes `incoming` from it. Between `begin` and
   /// `finish` neither may be touched, and nothing else may begin.
   using Bytes = std::vector<std::span<std::byte>>;
