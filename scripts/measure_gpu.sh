@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
 # On a machine with a GPU: the measurements behind docs/performance.md, into a folder of CSV files.
 #
-#   scripts/measure_gpu.sh [folder]     after cmake --preset cuda && cmake --build --preset cuda
+#   scripts/measure_gpu.sh [folder [part...]]   after cmake --preset cuda && cmake --build --preset cuda
 #
+# Parts: sizes, terms, small, setup; all of these, if none is named. And for hosts of several GPUs,
+# behind docs/scaling.md: ranks (2, 4, 8 GPUs), and large (a billion phyxels on all GPUs, at least 4).
 # PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes some 100 GB of the
 # GPU's memory while it is set up, and nearly as much of the host's.
 set -euo pipefail
@@ -10,20 +12,26 @@ cd "$(dirname "$0")/.."
 out=${1:-docs/results}
 program=${PHYXEL:-build/cuda/bin/phyxel}
 mkdir -p "$out"
+shift || true
+parts=" ${*:-sizes terms small setup} "
+has() { [[ $parts == *" $1 "* ]]; }
 step() {
   local name=$1
   shift
   echo "== $name"
   "$program" bench "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
 }
-small=125,343,1000,2197,4096,8000,15625,27000
-medium=50653,103823,250047,512000,1000000
-large=2097152,4096000,8000000,16974593
-
-step gpu_sizes step --phyxels "$small,$medium,$large" --terms green --seconds 0.2
-step gpu_terms step --phyxels 2097152
-step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
-step gpu_cantilever cantilever
+if has sizes; then
+  small=125,343,1000,2197,4096,8000,15625,27000
+  medium=50653,103823,250047,512000,1000000
+  large=2097152,4096000,8000000,16974593
+  step gpu_sizes step --phyxels "$small,$medium,$large" --terms green --seconds 0.2
+fi
+if has terms; then
+  step gpu_terms step --phyxels 2097152
+  step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
+  step gpu_cantilever cantilever
+fi
 # One table of several: one <table> <first>...
 one() {
   local table=$1 part
@@ -34,19 +42,50 @@ one() {
     rm "$out/$part.csv"
   done
 }
-small=()
-surfels=()
-for body in dino alien_head horn_bug; do
-  for count in 1 10 100; do
-    step "gpu_small_${body}_$count" step --shape $body --bodies $count --terms green \
-      --precision float
-    small+=("gpu_small_${body}_$count")
+if has small; then
+  small=()
+  surfels=()
+  for body in dino alien_head horn_bug; do
+    for count in 1 10 100; do
+      step "gpu_small_${body}_$count" step --shape $body --bodies $count --terms green \
+        --precision float
+      small+=("gpu_small_${body}_$count")
+    done
+    step "gpu_surfels_$body" step --shape $body --terms green,surfels --precision float
+    surfels+=("gpu_surfels_$body")
   done
-  step "gpu_surfels_$body" step --shape $body --terms green,surfels --precision float
-  surfels+=("gpu_surfels_$body")
-done
-step gpu_surfels_cube step --phyxels 27000,103823,1000000 --terms green,surfels --precision float
-one gpu_small "${small[@]}"
-one gpu_surfels "${surfels[@]}" gpu_surfels_cube
-step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
-step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3
+  step gpu_surfels_cube step --phyxels 27000,103823,1000000 --terms green,surfels --precision float
+  one gpu_small "${small[@]}"
+  one gpu_surfels "${surfels[@]}" gpu_surfels_cube
+fi
+if has setup; then
+  step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
+  step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3
+fi
+
+gpus=$(nvidia-smi -L | wc -l)
+# ranks <n> <name> <options>...: a table of n ranks
+ranks() {
+  local n=$1 name=$2
+  shift 2
+  echo "== $name"
+  OMP_NUM_THREADS=$(($(nproc) / n)) OMP_WAIT_POLICY=passive mpirun --allow-run-as-root --oversubscribe \
+    --bind-to none -n "$n" "$program" bench scaling --device cuda --force --csv "$out/$name.csv" "$@" |
+    grep -v '^#'
+}
+if has ranks; then
+  for n in 2 4 8; do
+    ((n <= gpus)) || break
+    ranks $n gpu_ranks_${n}a --phyxels 2000376 --seconds 0.3
+    ranks $n gpu_ranks_${n}b --phyxels 16974593 --partitioner curve --seconds 0.3
+    ranks $n gpu_ranks_${n}c --phyxels 16003008 --weak --partitioner curve --seconds 0.3
+    for transport in nccl host; do
+      ranks $n gpu_ranks_${n}d_$transport --phyxels 2000376,16974593 --partitioner curve --seconds 0.3 \
+        --without-one --transport $transport
+    done
+  done
+fi
+if has large; then
+  ranks "$gpus" gpu_ranks_${gpus}e --phyxels 1000000000 --partitioner curve --seconds 2 --repeat 3 \
+    --without-one
+fi

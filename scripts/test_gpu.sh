@@ -30,33 +30,51 @@ run_tests() {
   say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
 }
 
+# Several at a time, a GPU each if there are several: a tool keeps a core busy more than a GPU.
+gpus=$(nvidia-smi -L | wc -l)
+most_jobs=$((4 * gpus))
+jobs_started=0
+job_logs=()
+# start <log> <what> <command>...
+start() {
+  local log=$logs/$1.log what=$2
+  shift 2
+  while (($(jobs -rp | wc -l) >= most_jobs)); do wait -n || true; done
+  (
+    CUDA_VISIBLE_DEVICES=$((jobs_started % gpus)) "$@" >"$log" 2>&1 || touch "$log.failed"
+    # Or none ran:
+    grep -qE '^\[==========\] [1-9][0-9]* tests? from .* ran' "$log" || touch "$log.failed"
+    echo "$what, $(grep -E '^\[==========\] [0-9]+ tests? from .* ran' "$log" | head -1 |
+      sed -E 's/.*\] ([0-9]+ tests?) .*/\1/'): $(grep SUMMARY "$log" | sed 's/^=* //' | paste -sd ';')" \
+      >"$log.line"
+  ) &
+  job_logs+=("$log")
+  ((++jobs_started))
+}
+
 # Two ranks, each with its own tool: what they store in each other's memory is not seen as a race.
 # check_ranks <program> <filter>
 check_ranks() {
-  local program=$1 filter=$2 tool log
+  local program=$1 filter=$2 tool
   for tool in memcheck initcheck; do
-    log=$logs/${program}_ranks_$tool.log
-    mpirun --allow-run-as-root --oversubscribe -n 2 compute-sanitizer --tool "$tool" \
-      --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" >"$log" 2>&1 || failed=1
-    grep -qE '^\[==========\] [1-9][0-9]* tests? from .* ran' "$log" || failed=1  # or none ran
-    say "compute-sanitizer $tool, $program on 2 ranks: $(grep SUMMARY "$log" | sed 's/^=* //' | paste -sd ';')"
+    start "${program}_ranks_$tool" "compute-sanitizer $tool, $program on 2 ranks" \
+      env -u CUDA_VISIBLE_DEVICES mpirun --allow-run-as-root --oversubscribe --bind-to none -n 2 \
+      compute-sanitizer --tool "$tool" \
+      --error-exitcode 9 "$tests/$program" --gtest_filter="$filter"
   done
 }
 
 # Small cases: each tool slows kernels down a hundredfold. `device_test` faults on purpose.
 # check <program> <filter> [tools]
 check() {
-  local program=$1 filter=$2 tool log
+  local program=$1 filter=$2 tool
   for tool in ${3:-memcheck racecheck initcheck synccheck}; do
-    log=$logs/${program}_${filter//[^A-Za-z]/}_$tool.log
-    compute-sanitizer --tool "$tool" --error-exitcode 9 "$tests/$program" --gtest_filter="$filter" \
-      >"$log" 2>&1 || failed=1
-    grep -qE '^\[==========\] [1-9][0-9]* tests? from .* ran' "$log" || failed=1  # or none ran
-    say "compute-sanitizer $tool, $program, $(grep -E '^\[==========\] [0-9]+ tests? from .* ran' "$log" |
-      sed -E 's/.*\] ([0-9]+ tests?) .*/\1/'): $(grep SUMMARY "$log" | tail -1 | sed 's/^=* //')"
+    start "${program}_${filter//[^A-Za-z]/}_$tool" "compute-sanitizer $tool, $program" \
+      compute-sanitizer --tool "$tool" --error-exitcode 9 "$tests/$program" --gtest_filter="$filter"
   done
 }
 run_sanitizers() {
+  rm -f "$logs"/*.failed "$logs"/*.line
   check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
   check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
   # Blocks that wait for each other's mail take hours where every access is recorded for races.
@@ -64,6 +82,11 @@ run_sanitizers() {
   check setup_test '*Overlapping*'
   check physics_device_test '*'
   check_ranks share_test 'Bodies/Shares.MayBeLookedAtAtAnyTime/*Apart*Gpu*'
+  wait
+  for log in "${job_logs[@]}"; do
+    say "$(cat "$log.line")"
+    [[ -e $log.failed ]] && failed=1
+  done
 }
 
 case $part in
