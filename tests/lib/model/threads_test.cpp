@@ -86,6 +86,32 @@ TEST_P(Threads, FillAndAddAsOne) {
   EXPECT_EQ(all.value(), one.value());
 }
 
+TEST_P(Threads, ChooseAsOne) {
+  const auto wanted = [](Index i) { return i % 7 == 3 || i > 990; };
+  std::vector<Index> expected;
+  for (Index i = 5; i < 1000; ++i) {
+    if (wanted(i)) expected.push_back(i);
+  }
+  EXPECT_EQ(chosen(5, 1000, wanted), expected);
+  EXPECT_TRUE(chosen(5, 5, wanted).empty());
+  EXPECT_EQ(chosen(3, 4, wanted), std::vector<Index>{3});
+  EXPECT_TRUE(chosen(0, 1000, [](Index) { return false; }).empty());
+}
+
+TEST_P(Threads, SortWhatHasNoFirstValue) {
+  Bulk<std::pair<std::uint64_t, Index>> values = in_bulk(many, [](std::size_t k) {
+    return std::pair<std::uint64_t, Index>(k * 2654435761U % 65536, static_cast<Index>(k));
+  });
+  parallel_sort(values);
+  EXPECT_TRUE(std::is_sorted(values.begin(), values.end()));
+  std::vector<char> seen(many, 0);
+  for (const auto& [key, k] : values) {
+    EXPECT_EQ(key, static_cast<std::size_t>(k) * 2654435761U % 65536);
+    seen[k] = 1;
+  }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), many);
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, Threads, ::testing::Values(1, 2, 3, 5));
 
 }  // namespace
