@@ -312,9 +312,12 @@ class Builder {
 
   /// Those of one body, of phyxels that are in the order of bodies.
   static std::span<const SpreadPhyxel> of_body(const SpreadPhyxels& phyxels, std::size_t b) {
-    const auto body_of = [](const SpreadPhyxel& p) { return static_cast<std::size_t>(p.body); };
-    const auto found = std::ranges::equal_range(phyxels, b, {}, body_of);
-    return {found.begin(), found.end()};
+    const auto first_from = [&](std::size_t body) {
+      return std::partition_point(phyxels.begin(), phyxels.end(), [&](const SpreadPhyxel& p) {
+        return static_cast<std::size_t>(p.body) < body;
+      });
+    };
+    return {first_from(b), first_from(b + 1)};
   }
 
   template <class T>
