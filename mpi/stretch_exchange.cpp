@@ -10,7 +10,8 @@ namespace phyxel {
 template <class Wanted>
 StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& numbers,
                                                    Wanted&& wanted) {
-  Places places{chosen(0, static_cast<Index>(numbers.size()), wanted), {}};
+  Places places;
+  places.here = chosen(0, static_cast<Index>(numbers.size()), wanted);
   const auto by_number = [&](Index a, Index b) { return numbers[a] < numbers[b]; };
   if (!std::is_sorted(places.here.begin(), places.here.end(), by_number)) {
     parallel_sort(places.here, by_number);
