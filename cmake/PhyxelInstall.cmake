@@ -42,7 +42,7 @@ if(TARGET phyxel_ranks)
   if(PHYXEL_HAVE_MPI)
     list(APPEND private ${MPI_CXX_LIBRARIES})
   endif()
-  if(PHYXEL_HAVE_CUDA)
+  if(PHYXEL_HAVE_CUDA AND NOT BUILD_SHARED_LIBS)
     list(APPEND private ${CUDAToolkit_LIBRARY_DIR}/libcudart_static.a -lrt -lpthread -ldl)
   endif()
   phyxel_pkg_config(phyxel-ranks "phyxel on the ranks of a program, and on GPUs" phyxel "" phyxel_ranks

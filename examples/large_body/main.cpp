@@ -80,7 +80,7 @@ int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
   const std::int64_t sent = bytes_sent(ranks, *backend) - sent_before;
   const phyxel::Diagnostics end = phyxel::diagnose(share, *backend, solver.steps(), step);
 
-  // A sum over the whole body: every phyxel is one rank's own, and a ghost on others.
+  // A sum over the whole body: every phyxel is one rank's own, and of ghosts a state says nothing.
   const phyxel::State state = solver.state();
   std::vector<double> terms;
   for (phyxel::Index i = 0; i < share.size(); ++i) {

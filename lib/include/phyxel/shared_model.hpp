@@ -46,7 +46,7 @@ class SharedModel {
   SharedModel(const SharedModel&) = delete;
   SharedModel& operator=(const SharedModel&) = delete;
 
-  /// What this rank steps.
+  /// What this rank steps. A state says nothing of its ghosts: see `Model::owns`.
   const Model& here() const { return here_; }
   std::uint64_t digest() const { return digest_; }  ///< Of the whole, as `model_digest`.
   /// Phyxels of each rank.
