@@ -16,6 +16,9 @@ if(NOT PHYXEL_CUDA STREQUAL "OFF")
     endif()
     enable_language(CUDA)
     find_package(CUDAToolkit REQUIRED)
+    if(BUILD_SHARED_LIBS)  # one runtime a program, not one in each library
+      set(CMAKE_CUDA_RUNTIME_LIBRARY Shared)
+    endif()
     set(CMAKE_CUDA_STANDARD 20)
     if(NOT CMAKE_CUDA20_STANDARD_COMPILE_OPTION)  # CMake before 3.26 does not know that nvcc has it
       set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)

@@ -22,6 +22,22 @@ if(PHYXEL_SANITIZE)
   target_link_options(phyxel_flags INTERFACE -fsanitize=${PHYXEL_SANITIZE})
 endif()
 
+# phyxel_library(NAME source...): an installed library beside the first one, static or shared as
+# that; a source folder's headers are found from the root of the tree, and installed by nobody.
+function(phyxel_library name)
+  string(REPLACE phyxel_ "" export_name ${name})
+  add_library(${name} ${ARGN})
+  add_library(phyxel::${export_name} ALIAS ${name})
+  set_target_properties(${name} PROPERTIES
+    EXPORT_NAME ${export_name} POSITION_INDEPENDENT_CODE ON
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    INSTALL_RPATH $ORIGIN INSTALL_RPATH_USE_LINK_PATH ON)
+  target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+                                     PRIVATE ${PROJECT_SOURCE_DIR}/lib)
+  target_link_libraries(${name} PUBLIC phyxel
+                        PRIVATE $<BUILD_INTERFACE:phyxel_flags> fmt::fmt OpenMP::OpenMP_CXX)
+endfunction()
+
 # What a test may need of the tree: where the sources are, and the two folders of headers.
 function(phyxel_configure_test name)
   target_link_libraries(${name} PRIVATE phyxel phyxel_flags)

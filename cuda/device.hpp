@@ -5,16 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace phyxel {
+#include "phyxel/device.hpp"
 
-struct Device {
-  int index = 0;
-  std::string name;          ///< e.g. "NVIDIA H200".
-  int major = 0, minor = 0;  ///< Compute capability.
-  int multiprocessors = 0;
-  std::size_t memory = 0;        ///< Bytes in all.
-  std::string describe() const;  ///< "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
-};
+namespace phyxel {
 
 /// The devices found; if there are none, `why` says for what reason.
 std::vector<Device> cuda_devices(std::string* why = nullptr);

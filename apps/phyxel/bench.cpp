@@ -236,7 +236,7 @@ void bench_step(const BenchOptions& options) {
     const bool surfels = terms == "surfels";
     clouds.push_back(bench_cloud(options.shape, size, surfels));
     clouds.resize(scene.bodies.size(), clouds[0]);
-    const Model model = make_model(scene, clouds, device);
+    const Model model = build_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);
     const double pairs = static_cast<double>(model.pairs());
     for (const std::string& precision : options.precisions) {
@@ -387,7 +387,7 @@ void bench_cantilever(const BenchOptions& options) {
   for (const int across : options.across) {
     for (const double factor : options.factors) {
       const Scene scene = cantilever_scene(across, factor);
-      const Model model = make_model(scene, device);
+      const Model model = build_model(scene, device);
       const double n = model.size();
       Settled exact;
       for (const Precision precision : precisions) {

@@ -14,10 +14,10 @@
 
 #include "csv.hpp"
 #include "device_option.hpp"
-#include "ensemble.hpp"
 #include "model/host_memory.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
+#include "program_ranks.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
 
@@ -129,7 +129,7 @@ class Repeats {
 
 /// All ranks and, in turn with them, the first one alone: the machine may be slower a minute later.
 /// @param one what the first rank steps alone; null on the others, and if nobody does
-Measured measure(const Ensemble& ensemble, const Scene& scene, const Model* one,
+Measured measure(const SharedModel& ensemble, const Scene& scene, const Model* one,
                  const Scene& scene_of_one, Precision precision, const ChosenDevice& device,
                  const Options& options) {
   ranks().barrier();
@@ -189,13 +189,13 @@ const std::vector<std::string> columns{"ranks",
                                        "backend_s",
                                        "host_gb"};
 
-std::vector<std::string> row_of(const Ensemble& ensemble, const std::string& partitioner, int rings,
-                                const std::string& precision, double set_up, Index phyxels_alone,
-                                double host_gb, const Measured& m) {
+std::vector<std::string> row_of(const SharedModel& ensemble, const std::string& partitioner,
+                                int rings, const std::string& precision, double set_up,
+                                Index phyxels_alone, double host_gb, const Measured& m) {
   const bool alone = ranks().size() == 1;
   const Model& model = ensemble.here();
   const double n = model.whole_size();
-  const Ensemble::Shares& shares = ensemble.shares();
+  const SharedModel::Shares& shares = ensemble.shares();
   std::vector<std::string> row{std::to_string(ranks().size()),
                                "1",
                                alone ? "none" : partitioner,
@@ -226,7 +226,7 @@ std::vector<std::string> row_of(const Ensemble& ensemble, const std::string& par
 
 void bench_scaling(const Options& options) {
   const bool leads = ranks().rank() == 0, alone = ranks().size() == 1;
-  const ChosenDevice device = choose_device_of_rank(options.device);
+  const ChosenDevice device = choose_device(options.device);
   // Of all ranks, which may be bound to some.
   const auto cores = static_cast<int>(std::min<std::int64_t>(
       ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
@@ -251,14 +251,14 @@ void bench_scaling(const Options& options) {
     const Scene scene = cube_scene(static_cast<Index>(all)), scene_of_one = cube_scene(size);
     std::optional<Model> one;
     ranks().together([&] {
-      if (leads && !alone && !options.without_one) one = make_model(scene_of_one, device);
+      if (leads && !alone && !options.without_one) one = build_model(scene_of_one, device);
     });
     for (const std::string& partitioner : options.partitioners) {
       for (const int rings : options.rings) {
         if (device.gpu && rings != 1) continue;
         ranks().barrier();
         const auto start = Clock::now();
-        const Ensemble ensemble(scene, device, {partitioner, rings});
+        const SharedModel ensemble(all_ranks(), scene, device, {partitioner, rings});
         const double set_up = ranks().largest(seconds_since(start));
         for (const std::string& precision : options.precisions) {
           const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,

@@ -9,10 +9,10 @@
 #include "command.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
-#include "ensemble.hpp"
 #include "files/hdf5_file.hpp"
 #include "model/host_memory.hpp"
 #include "mpi/parallel_file.hpp"
+#include "program_ranks.hpp"
 #include "solver/nccl.hpp"
 #include "version.hpp"
 
@@ -86,7 +86,7 @@ std::string transport_of_ranks(const ChosenDevice& device) {
 Findings facts() {
   std::string why;
   const std::vector<Device> devices = cuda_devices(&why);
-  const ChosenDevice device = choose_device_of_rank("auto");
+  const ChosenDevice device = choose_device("auto");
   const std::string chosen =
       device.gpu ? fmt::format("cuda:{}", device.gpu->index) : std::string("cpu");
   const std::string transport = transport_of_ranks(device);

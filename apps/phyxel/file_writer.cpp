@@ -23,7 +23,7 @@ class FileWriter::Asking : public Stretches {
   std::span<const double> values(Quantity quantity, Index begin, Index end) override {
     return values_ = writer_.asked(quantity, {begin, end});
   }
-  std::span<const Triangle> triangles() const override { return writer_.ensemble_.triangles(); }
+  std::span<const Triangle> triangles() const override { return writer_.shared_.triangles(); }
   /// Where they are more than the first rank can be brought at once.
   bool writes_together(Index count) const override {
     return can_write_together() && count > length();
@@ -38,8 +38,7 @@ class FileWriter::Asking : public Stretches {
   std::vector<double> values_;
 };
 
-FileWriter::FileWriter(const Ensemble& ensemble, Index length)
-    : ensemble_(ensemble), length_(length) {
+FileWriter::FileWriter(const SharedModel& shared, Index length) : shared_(shared), length_(length) {
   can_write_together();  // HDF5 starts on this thread, as MPI wants it
 }
 
@@ -54,7 +53,7 @@ FileWriter::~FileWriter() {
 void FileWriter::submit(std::shared_ptr<const Moment> moment, Job job) {
   if (alone()) {
     writer_.submit([this, moment = std::move(moment), job = std::move(job)] {
-      FrameStretches values(ensemble_.here(), moment->frame, length_);
+      FrameStretches values(shared_.here(), moment->frame, length_);
       job(values);
     });
     return;
@@ -103,7 +102,8 @@ void FileWriter::serve(bool wait) {
   std::vector<double> values;
   if (call.ask == Call::Ask::stretch) {
     const Phase phase("bringing values together");
-    values = ensemble_.exchange().gathered(call.quantity, own_values(call.quantity), call.stretch);
+    values = shared_.gathered(call.quantity, own_values(call.quantity), call.stretch.begin,
+                              call.stretch.end);
   } else {
     const Phase phase("writing together");
     write_array();
@@ -118,7 +118,7 @@ void FileWriter::serve(bool wait) {
 }
 
 std::span<const double> FileWriter::own_values(Quantity quantity) const {
-  return values_of(ensemble_.here(), open_.front()->frame, quantity);
+  return values_of(shared_.here(), open_.front()->frame, quantity);
 }
 
 void FileWriter::write_array() const {
@@ -140,7 +140,7 @@ void FileWriter::write_array() const {
   phyxel::write_together(ranks(), file, array, length_,
                          [&](std::span<const StretchExchange::Stretch> of_ranks) {
                            return sum_of_terms(array, [&](Quantity term) {
-                             return ensemble_.exchange().brought(term, own_values(term), of_ranks);
+                             return shared_.exchange().brought(term, own_values(term), of_ranks);
                            });
                          });
 }

@@ -12,8 +12,10 @@
 #include <vector>
 
 #include "background_writer.hpp"
-#include "ensemble.hpp"
+#include "mpi/stretch_exchange.hpp"
 #include "phyxel/recorder.hpp"
+#include "phyxel/shared_model.hpp"
+#include "program_ranks.hpp"
 
 namespace phyxel::app {
 
@@ -37,9 +39,9 @@ class FileWriter {
   /// Called on the first rank's thread, with values that its thread alone may ask for.
   using Job = std::function<void(Stretches&)>;
 
-  /// @param ensemble must outlive this
+  /// @param shared whose values are written; must outlive this
   /// @param length of a stretch
-  FileWriter(const Ensemble& ensemble, Index length);
+  FileWriter(const SharedModel& shared, Index length);
   /// On one rank, does what still waits; on several, drops it.
   ~FileWriter();
   FileWriter(const FileWriter&) = delete;
@@ -80,7 +82,7 @@ class FileWriter {
   void write_array() const;
   void ended(bool well);
 
-  const Ensemble& ensemble_;
+  const SharedModel& shared_;
   Index length_;
   std::deque<std::shared_ptr<const Moment>> open_;
   std::int64_t done_ = 0;  // as all ranks know

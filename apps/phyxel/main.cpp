@@ -1,35 +1,16 @@
-/// phyxel: the command-line program. Subcommands live in one file each; this one turns errors
-/// into messages and exit codes.
+/// phyxel: the command-line program. Subcommands live in one file each; what they throw becomes a
+/// message and an exit code.
 #include <fmt/format.h>
 
-#include <cstdio>
-#include <exception>
-#include <new>
-#include <optional>
-
 #include "command.hpp"
-#include "ensemble.hpp"
-#include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/ranks.hpp"
+#include "program_ranks.hpp"
 #include "version.hpp"
 
 namespace {
 
 using phyxel::app::ranks;
-
-/// What all ranks know of, the first one tells; what one alone has met ends them all.
-int fail(phyxel::ExitCode code, const char* message, bool agreed = false) {
-  if (ranks().size() == 1) {
-    fmt::print(stderr, "phyxel: error: {}\n", message);
-  } else if (!agreed) {
-    fmt::print(stderr, "phyxel: error: rank {} of {}: {}\n", ranks().rank(), ranks().size(),
-               message);
-    ranks().abort(code);
-  } else if (ranks().rank() == 0) {
-    fmt::print(stderr, "phyxel: error: {}\n", message);
-  }
-  return static_cast<int>(code);
-}
 
 /// What several ranks can do.
 void check_ranks(const CLI::App& program) {
@@ -72,27 +53,17 @@ int main(int argc, char** argv) {
   phyxel::app::add_bench(program);
   phyxel::app::add_paper(program);
   phyxel::app::add_doctor(program);
-  std::optional<phyxel::Communicator> world;
-  try {
-    if (phyxel::launched_as_rank()) {
-      phyxel::app::set_ranks(world.emplace(argc, argv));
-      phyxel::share_host_memory(world->host_size());
-      program.parse_complete_callback([&] { check_ranks(program); });
+  return phyxel::on_ranks(argc, argv, [&](const phyxel::Ranks& all) {
+    phyxel::app::set_ranks(all);
+    program.parse_complete_callback([&] { check_ranks(program); });
+    try {
+      program.parse(argc, argv);
+      return static_cast<int>(ExitCode::success);
+    } catch (const CLI::Success& help) {  // --help, --version
+      return all.leads() ? program.exit(help) : 0;
+    } catch (const CLI::ParseError& error) {
+      if (all.leads()) program.exit(error);
+      return static_cast<int>(ExitCode::bad_input);
     }
-    program.parse(argc, argv);
-    return static_cast<int>(ExitCode::success);
-  } catch (const CLI::Success& help) {  // --help, --version
-    return ranks().rank() == 0 ? program.exit(help) : 0;
-  } catch (const CLI::ParseError& error) {
-    if (ranks().rank() == 0) program.exit(error);
-    return static_cast<int>(ExitCode::bad_input);
-  } catch (const phyxel::AgreedError& error) {
-    return fail(error.code(), error.what(), true);
-  } catch (const phyxel::Error& error) {
-    return fail(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return fail(ExitCode::bad_input, phyxel::out_of_memory);
-  } catch (const std::exception& error) {
-    return fail(ExitCode::bad_input, error.what());
-  }
+  });
 }

@@ -6,9 +6,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "ensemble.hpp"
 #include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
+#include "program_ranks.hpp"
 #include "timeline.hpp"
 
 namespace phyxel::app {

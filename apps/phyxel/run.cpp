@@ -9,12 +9,12 @@
 
 #include "command.hpp"
 #include "device_option.hpp"
-#include "ensemble.hpp"
 #include "file_writer.hpp"
 #include "mpi/watchdog.hpp"
 #include "phyxel/phyxel.hpp"
 #include "picture.hpp"
 #include "profile.hpp"
+#include "program_ranks.hpp"
 #include "progress.hpp"
 #include "setup.hpp"
 #include "stop_signal.hpp"
@@ -66,10 +66,15 @@ class Run {
   explicit Run(const RunOptions& options)
       : options_(options),
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
-        device_(device_of_ranks()),
+        device_(choose_device(scene_.solver.device, "device")),
         begin_(checkpoint_for_all()),
-        ensemble_(in_phase("model", [&] { return Ensemble(scene_, device_, options_.cut); })),
-        backend_(in_phase("backend", [&] { return make_backend_of_rank(); })),
+        shared_(in_phase("model",
+                         [&] { return SharedModel(all_ranks(), scene_, device_, options_.cut); })),
+        backend_(in_phase("backend",
+                          [&] {
+                            return shared_.make_backend(scene_.solver.precision,
+                                                        scene_.solver.threads, options_.transport);
+                          })),
         plan_(alike([&] {
           const Phase phase("time step");
           return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
@@ -86,6 +91,8 @@ class Run {
     });
     if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
     if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
+    const BoundarySize boundary = boundary_size(model());
+    boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
     setup_seconds_ = seconds_since(start_);
   }
 
@@ -192,35 +199,17 @@ class Run {
   static constexpr std::int64_t watch_interval = 250;
   static constexpr double watch_share = 50;
 
-  const Model& model() const { return ensemble_.here(); }
+  const Model& model() const { return shared_.here(); }
   /// Whether this rank speaks and writes.
   static bool leads() { return ranks().rank() == 0; }
   /// Ranks ask each other now and then, and one alone itself after every step.
   static std::int64_t agree_interval() { return ranks().size() > 1 ? 10 : 1; }
   static bool anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
 
-  ChosenDevice device_of_ranks() const {
-    ChosenDevice device = choose_device_of_rank(scene_.solver.device, "device");
-    if (device.gpu && ranks().size() > 1 && options_.cut.rings != 1) {
-      throw AgreedError(ExitCode::bad_input,
-                        "--ghost-rings 2: GPUs exchange displacements and stresses; allowed: 1, or "
-                        "--device cpu");
-    }
-    return device;
-  }
   /// How long a rank may stay where it is before it is named.
   static double watchdog_seconds() {
     const char* said = std::getenv("PHYXEL_WATCHDOG_SECONDS");
     return said ? std::atof(said) : 60;
-  }
-
-  /// Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
-  std::unique_ptr<Backend> make_backend_of_rank() const {
-    const auto make = [&] {
-      return make_backend(model(), scene_.solver.precision, device_, scene_.solver.threads,
-                          options_.transport);
-    };
-    return device_.gpu ? make() : ranks().agreed(make);
   }
 
   /// Writes it, and says so.
@@ -298,11 +287,8 @@ class Run {
     }
     ranks().together([&] { check_resumed(); });
     const CheckpointReader* const reader = checkpoint_reader_ ? &*checkpoint_reader_ : nullptr;
-    State state = ensemble_.state_of(reader, stretch_length());
+    State state = shared_.state_of(reader, stretch_length());
     checkpoint_reader_.reset();
-    state.step = begin_->state.step;
-    state.time = begin_->state.time;
-    state.dt = begin_->state.dt;
     return state;
   }
 
@@ -316,7 +302,7 @@ class Run {
   void check_resumed() const {
     const bool as_many =
         !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().whole_size();
-    if (begin_->info.model_digest != ensemble_.digest() || !as_many) {
+    if (begin_->info.model_digest != shared_.digest() || !as_many) {
       throw InputError(
           fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
                       "neighbourhoods, loads and "
@@ -395,7 +381,7 @@ class Run {
       info.program = program_version();
       info.precision = scene_.solver.precision;
       info.scene_text = scene_.text;
-      info.model_digest = ensemble_.digest();
+      info.model_digest = shared_.digest();
       info.total_energy = good->diagnostics.total_energy();
       info.initial_energy = initial_energy_;
       info.frames_written = recorder_->frames_written();
@@ -408,14 +394,14 @@ class Run {
     if (options_.json || options_.quiet || !leads()) return;
     fmt::print("{}: {}\n", program_version(),
                scene_.title.empty() ? scene_.file.string() : scene_.title);
-    fmt::print("{}", describe_model(scene_, model(), ensemble_.boundary()));
+    fmt::print("{}", describe_model(scene_, model(), boundary_));
     fmt::print("  device      {}\n", backend_->name());
     if (ranks().size() > 1) {
-      const Ensemble::Shares& shares = ensemble_.shares();
+      const SharedModel::Shares& shares = shared_.shares();
       fmt::print(
           "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
           "exchanged through {}\n",
-          ranks().size(), ensemble_.partitioner(), shares.fewest, shares.most, shares.most_ghosts,
+          ranks().size(), shared_.partitioner(), shares.fewest, shares.most, shares.most_ghosts,
           options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings",
           transport_);
       if (!gpus_.empty()) fmt::print("  gpus        {}, by rank\n", fmt::join(gpus_, ", "));
@@ -536,9 +522,10 @@ class Run {
   ChosenDevice device_;
   std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until its state is read
   std::optional<Checkpoint> begin_;                    // without arrays
-  Ensemble ensemble_;
+  SharedModel shared_;
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
+  BoundarySize boundary_;  // of the whole
   Solver solver_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_;
@@ -552,7 +539,7 @@ class Run {
   std::filesystem::path checkpoint_;
   std::vector<std::filesystem::path> pictures_;
   // Last: it ends first, and its jobs use the recorder.
-  FileWriter writer_{ensemble_, stretch_length()};
+  FileWriter writer_{shared_, stretch_length()};
 };
 
 void run(const RunOptions& options) {
@@ -573,7 +560,7 @@ void run(const RunOptions& options) {
 void check(const Overrides& overrides) {
   const Scene scene = scene_with(overrides);
   const ChosenDevice device = choose_device(scene.solver.device, "device");
-  const Model model = make_model(scene, device);
+  const Model model = build_model(scene, device);
   const auto backend = make_backend(model, scene.solver.precision, device, scene.solver.threads);
   const StepPlan plan = plan_steps(scene, model, *backend, overrides.unsafe_step);
   fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model, boundary_size(model)));

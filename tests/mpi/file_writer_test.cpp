@@ -72,7 +72,7 @@ std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
 /// The ranks, as this program's.
 class SharedFiles : public phyxel::test::Folder {
  protected:
-  static void SetUpTestSuite() { set_ranks(world()); }
+  static void SetUpTestSuite() { set_ranks(phyxel::test::all_ranks()); }
 
   bool leads() const { return world().rank() == 0; }
   static CheckpointInfo info() {
@@ -82,27 +82,27 @@ class SharedFiles : public phyxel::test::Folder {
   }
 
   Scene scene_ = two_bodies(folder_ / "shared");
-  Ensemble ensemble_{scene_, {}, {}};
+  SharedModel shared_{phyxel::test::all_ranks(), scene_, ChosenDevice{}};
 };
 
 TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
   constexpr Index length = 37;
   constexpr int frames = 4;
   std::optional<Recorder> recorder;
-  if (leads()) recorder.emplace(ensemble_.here(), scene_, false);
+  if (leads()) recorder.emplace(shared_.here(), scene_, false);
   {
-    FileWriter writer(ensemble_, length);
+    FileWriter writer(shared_, length);
     for (int k = 0; k < frames; ++k) {
-      const auto moment = moment_at(k, ensemble_.here());
+      const auto moment = moment_at(k, shared_.here());
       writer.submit(moment, [&, now = moment->frame.diagnostics](Stretches& values) {
         EXPECT_EQ(values.length(), length);
         recorder->write(now, values);
       });
       writer.serve();  // and the ranks go on
     }
-    const auto moment = moment_at(frames, ensemble_.here());
+    const auto moment = moment_at(frames, shared_.here());
     writer.submit(moment, [&](Stretches& values) {
-      write_checkpoint(recorder->directory(), *moment->state, info(), ensemble_.here().whole_size(),
+      write_checkpoint(recorder->directory(), *moment->state, info(), shared_.here().whole_size(),
                        values);
     });
     writer.finish();
@@ -125,9 +125,9 @@ TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
 /// No call for more than a stretch: what the first rank holds beside its own.
 TEST_F(SharedFiles, TakeAStretchOfTheFirstRanksMemory) {
   if (world().size() == 1) GTEST_SKIP() << "one rank has all values anyway";
-  const Index all = ensemble_.here().whole_size();
-  const auto moment = moment_at(0, ensemble_.here());
-  FileWriter writer(ensemble_, 50);
+  const Index all = shared_.here().whole_size();
+  const auto moment = moment_at(0, shared_.here());
+  FileWriter writer(shared_, 50);
   std::size_t most = 0;
   Index found = 0;
   writer.submit(moment, [&](Stretches& values) {
@@ -147,8 +147,8 @@ TEST_F(SharedFiles, TakeAStretchOfTheFirstRanksMemory) {
 }
 
 TEST_F(SharedFiles, AnErrorOfTheWriterIsThatOfAllRanks) {
-  FileWriter writer(ensemble_, 50);
-  const auto moment = moment_at(0, ensemble_.here());
+  FileWriter writer(shared_, 50);
+  const auto moment = moment_at(0, shared_.here());
   const auto message_of = [](auto&& work) -> std::string {
     try {
       work();
@@ -178,8 +178,8 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
   if (world().size() == 1) GTEST_SKIP() << "one rank writes what waits";
   std::string error;
   {
-    FileWriter writer(ensemble_, 50);
-    const auto moment = moment_at(0, ensemble_.here());
+    FileWriter writer(shared_, 50);
+    const auto moment = moment_at(0, shared_.here());
     writer.submit(moment, [&](Stretches& values) {
       try {
         values.values(Quantity::mass, 0, 10);
@@ -198,10 +198,10 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
 /// A state of the whole reaches owners and ghosts, whatever the length of a stretch.
 TEST_F(SharedFiles, StatesComeBackToAllRanks) {
   if (world().size() == 1) GTEST_SKIP() << "one rank reads all";
-  const Model& here = ensemble_.here();
+  const Model& here = shared_.here();
   for (const Index length : {1000, here.whole_size(), Stretches::usual_length}) {
     Index most = 0;
-    const State state = ensemble_.exchange().scattered(length, [&](Index begin, Index end) {
+    const State state = shared_.exchange().scattered(length, [&](Index begin, Index end) {
       most = std::max(most, end - begin);
       State some;
       for (Index i = begin; i < end; ++i) {
@@ -225,7 +225,7 @@ TEST_F(SharedFiles, AnErrorOfTheReaderIsThatOfAllRanks) {
     if (begin > 0) throw InputError("checkpoint.h5: /state/velocity is not finite in row 12");
     return {.displacement = std::vector<Vec3d>(10), .velocity = std::vector<Vec3d>(10)};
   };
-  EXPECT_THROW(ensemble_.exchange().scattered(10, read), AgreedError);
+  EXPECT_THROW(shared_.exchange().scattered(10, read), AgreedError);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace phyxel::test {
 namespace {
 
-std::optional<Communicator> the_world;
+std::optional<Ranks> the_ranks;
 
 /// Other ranks speak only of failures.
 class OnlyFailures : public ::testing::EmptyTestEventListener {
@@ -31,14 +31,15 @@ class EndsAllAtExceptions : public ::testing::EmptyTestEventListener {
 
 }  // namespace
 
-const Communicator& world() { return *the_world; }
+const Ranks& all_ranks() { return *the_ranks; }
+const Communicator& world() { return all_ranks().communicator(); }
 
 }  // namespace phyxel::test
 
 int main(int argc, char** argv) {
   using namespace phyxel::test;
   ::testing::InitGoogleTest(&argc, argv);
-  the_world.emplace(argc, argv);
+  the_ranks.emplace(argc, argv);
   auto& listeners = ::testing::UnitTest::GetInstance()->listeners();
   if (world().rank() > 0) {
     delete listeners.Release(listeners.default_result_printer());
@@ -47,6 +48,6 @@ int main(int argc, char** argv) {
   if (world().size() > 1) listeners.Append(new EndsAllAtExceptions);
   const int failed = RUN_ALL_TESTS();
   const auto all_failed = world().largest(static_cast<std::int64_t>(failed));
-  the_world.reset();
+  the_ranks.reset();
   return static_cast<int>(all_failed);
 }

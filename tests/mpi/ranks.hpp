@@ -2,9 +2,12 @@
 #pragma once
 
 #include "mpi/communicator.hpp"
+#include "phyxel/ranks.hpp"
 
 namespace phyxel::test {
 
+const Ranks& all_ranks();
+/// What they talk through.
 const Communicator& world();
 
 }  // namespace phyxel::test

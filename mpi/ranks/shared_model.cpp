@@ -1,0 +1,139 @@
+#include "phyxel/shared_model.hpp"
+
+#include <fmt/format.h>
+
+#include "mpi/build_share.hpp"
+#include "mpi/communicator.hpp"
+#include "mpi/stretch_exchange.hpp"
+#include "partition/partition.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/ranks.hpp"
+#include "setup/survey.hpp"
+#include "setup/tiling.hpp"
+
+namespace phyxel {
+namespace {
+
+std::vector<Partitioner> candidates_of(const std::string& name) {
+  if (name != "auto") return {partitioner_of(name)};
+  return {Partitioner::bisection, Partitioner::curve, Partitioner::metis};
+}
+
+void check_rings(int rings, const ChosenDevice& device) {
+  if (rings == 1 || (rings == 2 && !device.gpu)) return;
+  throw InputError(fmt::format("{} rings of ghosts: allowed are 1 or, on CPU ranks, 2", rings));
+}
+
+/// Of all bodies, as the whole model numbers their surfels.
+std::vector<Triangle> triangles_of(const std::vector<Surface>& surfaces) {
+  std::vector<Triangle> triangles;
+  Index shift = 0;
+  for (const Surface& surface : surfaces) {
+    for (const Triangle& t : surface.triangle) {
+      triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+    }
+    shift += static_cast<Index>(surface.position.size());
+  }
+  return triangles;
+}
+
+}  // namespace
+
+std::vector<std::string> partitioner_choices() {
+  std::vector<std::string> names = partitioner_names();
+  names.push_back("auto");
+  return names;
+}
+
+SharedModel::SharedModel(const Ranks& ranks, const Scene& scene, const ChosenDevice& device,
+                         const CutOptions& cut)
+    : ranks_(ranks), device_(device) {
+  build(scene, nullptr, cut);
+}
+SharedModel::SharedModel(const Ranks& ranks, const Scene& scene, const std::vector<Cloud>& clouds,
+                         const ChosenDevice& device, const CutOptions& cut)
+    : ranks_(ranks), device_(device) {
+  build(scene, &clouds, cut);
+}
+SharedModel::~SharedModel() = default;
+
+void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
+                        const CutOptions& cut) {
+  ShareOptions options;
+  ranks_.together([&] {
+    options.candidates = candidates_of(cut.partitioner);
+    options.rings = cut.rings;
+    if (ranks_.size() > 1) check_rings(cut.rings, device_);
+  });
+  if (ranks_.size() == 1) {
+    here_ = clouds ? build_model(scene, *clouds, device_) : build_model(scene, device_);
+    shares_ = {here_.size(), here_.size(), 0};
+    digest_ = model_digest(here_);
+    return;
+  }
+  std::unique_ptr<ShareSurveyor> surveyor;
+  if (device_.gpu) {
+    options.tile = cuda::tile_size;
+    if (can_survey_on_cuda(scene)) surveyor = cuda_share_surveyor(device_.gpu->index);
+    options.surveyor = surveyor.get();
+  }
+  const Communicator& all = ranks_.communicator();
+  BuiltShare built =
+      clouds ? build_share(all, scene, *clouds, options) : build_share(all, scene, options);
+  here_ = std::move(built.model);
+  exchange_ = std::make_unique<const StretchExchange>(all, here_);
+  if (ranks_.leads()) triangles_ = triangles_of(built.surfaces);
+  partitioner_ = partitioner_name(built.partitioner);
+  digest_ = model_digest(here_);
+  std::int64_t own = 0;
+  for (const Part& part : here_.parts) own += part.owned_end() - part.begin;
+  const std::int64_t ghosts = here_.size() - own;
+  shares_ = {ranks_.smallest(own), ranks_.largest(own), ranks_.largest(ghosts)};
+}
+
+std::unique_ptr<Backend> SharedModel::make_backend(Precision precision, int threads,
+                                                   const std::string& transport) const {
+  const auto make = [&] {
+    return phyxel::make_backend(here_, precision, device_, threads, transport);
+  };
+  // Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
+  return device_.gpu ? make() : ranks_.agreed(make);
+}
+
+std::vector<double> SharedModel::gathered(Quantity quantity, std::span<const double> here,
+                                          Index begin, Index end) const {
+  if (here_.share) return exchange_->gathered(quantity, here, {begin, end});
+  const std::size_t width = width_of(quantity);
+  const auto of_range = here.subspan(begin * width, (end - begin) * width);
+  return {of_range.begin(), of_range.end()};
+}
+
+State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) const {
+  struct Instant {
+    std::int64_t step;
+    double time, dt;
+  };
+  Instant now{};
+  ranks_.together([&] {
+    if (!ranks_.leads()) return;
+    if (checkpoint->info().model_digest != digest_ || checkpoint->phyxels() != here_.whole_size()) {
+      throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
+    }
+    const State header = checkpoint->state(0, 0);
+    now = {header.step, header.time, header.dt};
+  });
+  if (!here_.share) return checkpoint->state(0, here_.size());
+  State state = exchange_->scattered(
+      length, [&](Index begin, Index end) { return checkpoint->state(begin, end); });
+  now = ranks_.communicator().broadcast(std::vector{now}).front();
+  state.step = now.step;
+  state.time = now.time;
+  state.dt = now.dt;
+  return state;
+}
+
+std::span<const Triangle> SharedModel::triangles() const {
+  return here_.share ? triangles_ : here_.surfels.triangle;
+}
+
+}  // namespace phyxel
