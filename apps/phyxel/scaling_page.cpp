@@ -19,8 +19,15 @@ namespace fs = std::filesystem;
 /// What two ranks on two cores are to reach from 200,000 phyxels on.
 constexpr double asked_of_two = 1.8;
 
+/// Both, unless one says what the other does.
+void add_fact(CsvTable& table, const std::string& name, const std::string& more) {
+  for (auto& [key, value] : table.facts) {
+    if (key == name && value.find(more) == std::string::npos) value += ", " + more;
+  }
+}
+
 /// The tables `<kind>_ranks_<n>*.csv` there are, by their number of ranks: rows of several calls
-/// are those of one.
+/// are those of one, which tells all commits and days.
 std::map<int, CsvTable> tables_in(const fs::path& results, const std::string& kind) {
   std::map<int, CsvTable> tables;
   std::vector<fs::path> files;
@@ -37,6 +44,12 @@ std::map<int, CsvTable> tables_in(const fs::path& results, const std::string& ki
       of_ranks = std::move(table);
     } else {
       of_ranks.rows.insert(of_ranks.rows.end(), table.rows.begin(), table.rows.end());
+      // Older tables have fewer columns: new ones come last.
+      if (table.columns.size() > of_ranks.columns.size()) of_ranks.columns = table.columns;
+      for (auto& row : of_ranks.rows) row.resize(of_ranks.columns.size());
+      add_fact(of_ranks, "program", table.fact("program"));
+      add_fact(of_ranks, "compiler", table.fact("compiler"));
+      add_fact(of_ranks, "date", table.fact("date"));
     }
   }
   return tables;

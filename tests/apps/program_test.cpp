@@ -331,6 +331,8 @@ TEST_F(Program, MemoryThatRunsOutLeavesTheLastGoodState) {
 gravity = [0.0, 0.0, -9.81]
 [time]
 end = 10
+[solver]
+device = "cpu"
 [output]
 directory = "out"
 frames_per_second = 50
@@ -357,7 +359,7 @@ density = 1000
   }
   std::size_t pages = 0;
   std::ifstream("/proc/" + std::to_string(child) + "/statm") >> pages;
-  // 40 MB more than now: energies need some 60, a checkpoint 20.
+  // 40 MB more than now: energies need some 60 on a CPU, a checkpoint 20.
   const rlim_t bytes = pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + 40'000'000;
   const rlimit limit{bytes, bytes};
   ASSERT_EQ(prlimit(child, RLIMIT_AS, &limit, nullptr), 0);
