@@ -24,7 +24,8 @@ configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/phyxelConfig.cmake.in
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/phyxelConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/phyxelConfig.cmake ${PROJECT_BINARY_DIR}/phyxelConfigVersion.cmake
-              ${PROJECT_SOURCE_DIR}/cmake/PhyxelHdf5.cmake ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/PhyxelHdf5.cmake ${PROJECT_SOURCE_DIR}/cmake/PhyxelMpi.cmake
+              ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake
         DESTINATION ${phyxel_cmake_dir})
 
 # Linking a static library takes `pkg-config --static`.

@@ -22,12 +22,6 @@ namespace phyxel {
 inline constexpr const char* out_of_memory =
     "out of memory: fewer phyxels, or a machine with more memory, are needed";
 
-/// What every rank throws when one has failed: the message says which.
-class AgreedError : public Error {
- public:
-  using Error::Error;
-};
-
 /// Values for each rank, or from each: one rank's after the other's.
 template <class T>
 struct ByRank {

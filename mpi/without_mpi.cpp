@@ -8,11 +8,15 @@
 namespace phyxel {
 
 Communicator::Communicator(int&, char**&) {
-  for (const char* variable : {"OMPI_COMM_WORLD_SIZE", "PMI_SIZE"}) {
-    const char* count = std::getenv(variable);
-    if (count && std::atoi(count) > 1) {
-      throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
-    }
+  const auto above = [](const char* variable, int limit) {
+    const char* number = std::getenv(variable);
+    return number && std::atoi(number) > limit;
+  };
+  // PMIx tells no number of ranks, but Slurm does.
+  const bool by_slurm = std::getenv("PMIX_RANK") && above("SLURM_NTASKS", 1);
+  if (above("OMPI_COMM_WORLD_SIZE", 1) || above("PMI_SIZE", 1) || above("PMIX_RANK", 0) ||
+      by_slurm) {
+    throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
   }
 }
 Communicator::~Communicator() = default;

@@ -4,7 +4,7 @@
 #   scripts/measure_gpu.sh [folder [part...]]   after cmake --preset cuda && cmake --build --preset cuda
 #
 # Parts: sizes, terms, small, setup; all of these, if none is named. And for hosts of several GPUs,
-# behind docs/scaling.md: ranks (2, 4, 8 GPUs), and large (a billion phyxels on all GPUs, at least 4).
+# behind docs/scaling.md: ranks (2, 4, 8 GPUs), and large (LARGE phyxels on all GPUs; a billion, for 4 or more).
 # PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes some 100 GB of the
 # GPU's memory while it is set up, and nearly as much of the host's.
 set -euo pipefail
@@ -73,19 +73,25 @@ ranks() {
     --bind-to none -n "$n" "$program" bench scaling --device cuda --force --csv "$out/$name.csv" "$@" |
     grep -v '^#'
 }
+if (has ranks || has large) && ((gpus < 2)); then
+  echo "scripts/measure_gpu.sh: ranks and large take 2 GPUs or more; here is $gpus" >&2
+  exit 1
+fi
 if has ranks; then
   for n in 2 4 8; do
     ((n <= gpus)) || break
     ranks $n gpu_ranks_${n}a --phyxels 2000376 --seconds 0.3
     ranks $n gpu_ranks_${n}b --phyxels 16974593 --partitioner curve --seconds 0.3
     ranks $n gpu_ranks_${n}c --phyxels 16003008 --weak --partitioner curve --seconds 0.3
-    for transport in nccl host; do
+    transports=(nccl host)
+    if "$program" doctor | grep -q ", CUDA-aware"; then transports+=(mpi); fi
+    for transport in "${transports[@]}"; do
       ranks $n gpu_ranks_${n}d_$transport --phyxels 2000376,16974593 --partitioner curve --seconds 0.3 \
         --without-one --transport $transport
     done
   done
 fi
 if has large; then
-  ranks "$gpus" gpu_ranks_${gpus}e --phyxels 1000000000 --partitioner curve --seconds 2 --repeat 3 \
+  ranks "$gpus" gpu_ranks_${gpus}e --phyxels "${LARGE:-1000000000}" --partitioner curve --seconds 2 --repeat 3 \
     --without-one
 fi

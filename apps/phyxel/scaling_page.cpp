@@ -60,6 +60,12 @@ const std::vector<std::string> head{
     "one alone",  "speed-up",  "efficiency", "spread",      "most ghosts", "kB sent a step",
     "exchanging", "set-up [s]"};
 
+/// NCCL does not tell how long it waits.
+std::string exchanging(const CsvTable& table, std::size_t r) {
+  if (table.text(r, "transport").starts_with("NCCL")) return "–";
+  return fmt::format("{:.1f}%", 100 * table.number(r, "exchanging"));
+}
+
 std::vector<std::string> cells(const CsvTable& table, std::size_t r, double speed_up, int ranks) {
   const std::string asked = table.text(r, "partitioner"), cut_by = table.text(r, "cut_by");
   return {table.text(r, "phyxels"),
@@ -75,7 +81,7 @@ std::vector<std::string> cells(const CsvTable& table, std::size_t r, double spee
                       100 * table.number(r, "spread_alone")),
           table.text(r, "most_ghosts"),
           fmt::format("{:.1f}", table.number(r, "bytes_per_step") * 1e-3),
-          fmt::format("{:.1f}%", 100 * table.number(r, "exchanging")),
+          exchanging(table, r),
           table.text(r, "set_up_s")};
 }
 
@@ -85,6 +91,9 @@ const std::vector<std::string> head_without_one{
     "exchanging", "shares [s]", "backend [s]",    "host [GB]"};
 
 std::vector<std::string> cells_without_one(const CsvTable& table, std::size_t r) {
+  const auto newer = [&](const char* column) {
+    return table.has(column) ? table.text(r, column) : std::string();
+  };
   return {table.text(r, "phyxels"),
           table.text(r, "precision"),
           table.text(r, "cut_by"),
@@ -95,10 +104,10 @@ std::vector<std::string> cells_without_one(const CsvTable& table, std::size_t r)
           table.text(r, "most"),
           table.text(r, "most_ghosts"),
           fmt::format("{:.1f}", table.number(r, "bytes_per_step") * 1e-3),
-          fmt::format("{:.1f}%", 100 * table.number(r, "exchanging")),
+          exchanging(table, r),
           table.text(r, "set_up_s"),
-          table.text(r, "backend_s"),
-          table.text(r, "host_gb")};
+          newer("backend_s"),
+          newer("host_gb")};
 }
 
 std::string section(const CsvTable& table, int ranks, bool gpus) {
@@ -131,7 +140,7 @@ std::string section(const CsvTable& table, int ranks, bool gpus) {
   if (!strong.empty()) text += "The same body on more ranks:\n\n" + table_text(head, strong);
   if (!weak.empty()) text += "A body that grows with the ranks:\n\n" + table_text(head, weak);
   if (!large.empty()) {
-    text += "Bodies that one rank was not measured with:\n\n" + table_text(head_without_one, large);
+    text += "Measured without one rank beside:\n\n" + table_text(head_without_one, large);
   }
   return text;
 }

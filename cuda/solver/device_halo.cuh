@@ -576,7 +576,13 @@ class DeviceHalo {
     direct_.reset();
     if (!insist) return;
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";
-    throw DeviceError("--transport direct: " + trouble + "; allowed here: nccl, mpi, host, auto");
+    refuse("direct", trouble, "nccl, mpi, host, auto");
+  }
+  /// All ranks know, though maybe one of them alone knows why.
+  [[noreturn]] static void refuse(const char* transport, const std::string& why,
+                                  const char* allowed) {
+    throw AgreedError(ExitCode::device_failed, std::string("transport ") + transport + ": " + why +
+                                                   "; allowed here: " + allowed);
   }
   /// Collective.
   bool gpus_differ() const {
@@ -597,8 +603,7 @@ class DeviceHalo {
     if (others().smallest(others().takes_device_memory()) > 0) {
       packed_.send_by(std::make_unique<MpiCourier>(others(), send_, receive_));
     } else if (insist) {
-      throw DeviceError(
-          "--transport mpi: this MPI is not CUDA-aware; allowed here: direct, nccl, host, auto");
+      refuse("mpi", "this MPI is not CUDA-aware", "direct, nccl, host, auto");
     }
   }
   /// One rank names the ranks, for all. @returns whether exchanges go by it
@@ -633,7 +638,7 @@ class DeviceHalo {
     }
     if (!insist) return false;
     if (trouble.empty()) trouble = "another rank cannot use NCCL";
-    throw DeviceError("--transport nccl: " + trouble + "; allowed here: direct, mpi, host, auto");
+    refuse("nccl", trouble, "direct, mpi, host, auto");
   }
 
   const Model& m_;

@@ -41,12 +41,12 @@ phyxel::Scene falling_block(int phyxels) {
   phyxel::BodyRequest& block = scene.bodies.emplace_back();
   block.name = "block";
   block.material = {.young = 1e5, .poisson = 0.3, .density = 1000};
-  block.spin = {0, 1, 2};                            // [rad/s]
-  phyxel::ShapeRequest& shape = block.source.shape;  // made piece by piece, by all ranks
+  block.spin = {0, 1, 2};          // [rad/s]
+  block.source.phyxels = phyxels;  // made piece by piece, by all ranks
+  phyxel::ShapeRequest& shape = block.source.shape;
   shape.name = "block";
   shape.size = {1, 1, 1};
   shape.surface = false;
-  shape.spacing = phyxel::spacing_for(shape, phyxels);
   return scene;
 }
 
@@ -91,7 +91,9 @@ int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
   if (!ranks.leads()) return 0;
   const double n = share.whole_size(), t = solver.time();
   const phyxel::SharedModel::Shares& shares = block.shares();
-  std::printf("%d ranks, each on %s\n", ranks.size(), backend->name().c_str());
+  std::printf("%d ranks, each on %s: %s\n", ranks.size(),
+              device.gpu ? device.gpu->describe().c_str() : device.why_no_gpu.c_str(),
+              backend->name().c_str());
   std::printf("shares: %lld to %lld of %d phyxels, and at most %lld ghosts\n",
               static_cast<long long>(shares.fewest), static_cast<long long>(shares.most),
               share.whole_size(), static_cast<long long>(shares.most_ghosts));

@@ -25,10 +25,9 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
                                 const NeighbourhoodRule& rule);
 
 /// `phyxels_near` without the nearest where none reaches: such rows are empty.
-/// @param reach of each point [m], too: whom it reaches is in its row; empty: points reach nobody.
 ///   None is larger than the largest support
 Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,
-                     std::span<const double> support, std::span<const double> reach = {});
+                     std::span<const double> support);
 
 /// The first of the nearest, after its squared distance [m²]; -1 if there is none.
 std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position);

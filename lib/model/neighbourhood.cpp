@@ -168,7 +168,7 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
 }
 
 Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,
-                     std::span<const double> support, std::span<const double> reach) {
+                     std::span<const double> support) {
   Csr csr;
   if (position.empty()) {
     csr.offsets.assign(point.size() + 1, 0);
@@ -179,9 +179,8 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
   const int rings = rings_within(largest, hash.cell_size());
   return build_rows(static_cast<Index>(point.size()), [&](Index s, std::vector<Index>& row) {
     const Vec3d here = point[s];
-    const double own = reach.empty() ? 0 : reach[s];
     hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
-      const double h = std::max(own, support[e.index]);
+      const double h = support[e.index];
       if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
     });
   });

@@ -160,10 +160,12 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     vibration.advance(beta);
   }
   if (!(limit.omega_max > 0) || !std::isfinite(limit.omega_max)) {
-    throw InputError(
+    const std::string why =
         fmt::format("nothing in this model resists deformation (largest eigenfrequency {}): {}",
                     limit.omega_max,
-                    model.degenerate.none() ? "check the material" : model.degenerate.describe()));
+                    model.degenerate.none() ? "check the material" : model.degenerate.describe());
+    if (model.share) throw AgreedError(ExitCode::bad_input, why);
+    throw InputError(why);
   }
   limit.largest_step = 2 / limit.omega_max;
   return limit;

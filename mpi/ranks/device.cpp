@@ -89,15 +89,19 @@ const std::vector<std::string>& transport_names() {
   return names;
 }
 
+void check_transport_name(const std::string& name) {
+  const auto& names = transport_names();
+  if (std::find(names.begin(), names.end(), name) != names.end()) return;
+  throw InputError(fmt::format("transport {}: unknown{}; allowed: {}", name,
+                               did_you_mean(name, names), fmt::join(names, ", ")));
+}
+
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
                                       const ChosenDevice& device, int threads,
                                       const std::string& transport) {
+  check_transport_name(transport);
   const auto& names = transport_names();
   const auto which = std::find(names.begin(), names.end(), transport);
-  if (which == names.end()) {
-    throw InputError(fmt::format("transport {}: unknown{}; allowed: {}", transport,
-                                 did_you_mean(transport, names), fmt::join(names, ", ")));
-  }
   if (!device.gpu) return make_cpu_backend(model, precision, threads);
   return make_cuda_backend(model, precision, device.gpu->index, CudaPath::automatic,
                            static_cast<Transport>(which - names.begin()));

@@ -96,6 +96,7 @@ std::unique_ptr<Backend> SharedModel::make_backend(Precision precision, int thre
   const auto make = [&] {
     return phyxel::make_backend(here_, precision, device_, threads, transport);
   };
+  ranks_.together([&] { check_transport_name(transport); });
   // Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
   return device_.gpu ? make() : ranks_.agreed(make);
 }
@@ -115,6 +116,8 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   };
   Instant now{};
   ranks_.together([&] {
+    if (length < 1)
+      throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));
     if (!ranks_.leads()) return;
     if (checkpoint->info().model_digest != digest_ || checkpoint->phyxels() != here_.whole_size()) {
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");

@@ -55,12 +55,15 @@ Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Chose
 /// (stores into each other's memory, on one host), "nccl", "mpi" (one that is CUDA-aware) and
 /// "host" (MPI through host memory).
 const std::vector<std::string>& transport_names();
+/// @throws InputError for another name
+void check_transport_name(const std::string& name);
 
 /// The backend of a model, or of a rank's share, on that device. The model must outlive it.
 /// Of a share on a GPU: collective, and none is destroyed before all ranks have waited.
 /// @param threads of the CPU; 0: OpenMP's choice
 /// @param transport of ranks' GPUs
-/// @throws DeviceError of this rank's GPU; InputError for another transport
+/// @throws DeviceError of this rank's GPU; InputError for another transport; AgreedError, on all
+///   ranks, for one that cannot be had
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
                                       const ChosenDevice& device, int threads = 0,
                                       const std::string& transport = "auto");

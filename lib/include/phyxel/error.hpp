@@ -49,6 +49,12 @@ class DeviceError : public Error {
   explicit DeviceError(const std::string& message) : Error(ExitCode::device_failed, message) {}
 };
 
+/// What every rank of a program throws alike: all have met it, or have agreed on what one has met.
+class AgreedError : public Error {
+ public:
+  using Error::Error;
+};
+
 /// The simulation became unstable.
 class DivergedError : public Error {
  public:

@@ -14,8 +14,9 @@ namespace phyxel {
 class Communicator;
 
 /// One for the whole program: MPI starts with it and ends with it, unless the program has started
-/// it itself. Every function but `rank`, `size`, `leads`, those of the host and `abort` is
-/// collective: all ranks call it, in the same order.
+/// it itself. Every function but `rank`, `size`, `leads` and those of the host is collective: all
+/// ranks call it, in the same order. An error that one rank meets alone has to leave through
+/// `on_ranks`, which ends the others.
 class Ranks {
  public:
   /// Of a program whose main() was given these. Ranks of one host share its memory in the checks

@@ -1,5 +1,4 @@
-/// What needs no CUDA.
-#include "device.hpp"
+#include "phyxel/device.hpp"
 
 #include <cstdio>
 
