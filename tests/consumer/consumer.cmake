@@ -50,9 +50,12 @@ function(check_fall)
   set(out "${out}" PARENT_SCOPE)
 endfunction()
 
+# In the environment: `run` would take a list of several folders apart.
+list(JOIN PREFIX_PATH ":" more)
+set(ENV{CMAKE_PREFIX_PATH} "${prefix}:${more}")
 function(build example)
   run(${CMAKE_COMMAND} -S ${EXAMPLES}/${example} -B ${WORK}/build/${example} -G ${GENERATOR}
-      "-DCMAKE_PREFIX_PATH=${prefix};${PREFIX_PATH}" -DCMAKE_CXX_COMPILER=${COMPILER}
+      -DCMAKE_CXX_COMPILER=${COMPILER}
       -DCMAKE_BUILD_TYPE=${CONFIG} -DCMAKE_CXX_FLAGS=${FLAGS})
   run(${CMAKE_COMMAND} --build ${WORK}/build/${example} --config ${CONFIG})
 endfunction()
