@@ -135,6 +135,7 @@ class Builder {
     }
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
+        check_terms(scene_.bodies[b]);
         bodies_[b].kernel_volumes = wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
                                                          static_cast<std::size_t>(bodies_[b].size));
       }

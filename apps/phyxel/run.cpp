@@ -107,7 +107,7 @@ class Run {
 
     Diagnostics now = start_diagnostics_;
     initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
-    peak_energy_ = now.kinetic_energy + now.strain_energy + now.volume_energy;
+    peak_energy_ = now.kinetic_energy + now.elastic_energy();
     StabilityWatch watch = alike([&] { return StabilityWatch(model(), now); });
     good_ = good_state(now);
     // Without a rate only the last frame is wanted.
@@ -148,7 +148,7 @@ class Run {
                        [&] { return diagnose(model(), backend, solver.steps(), solver.dt()); });
         watch.check(now);
         peak_energy_ =
-            std::max(peak_energy_, now.kinetic_energy + now.strain_energy + now.volume_energy);
+            std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
         auto good = good_state(now);
         look_seconds = seconds_since(look_start);
         if (frame) write_frame(good);

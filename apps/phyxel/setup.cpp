@@ -15,6 +15,7 @@ std::string terms_of(const Material& m) {
   std::string terms = m.strain == Strain::green ? "Green strain" : "Cauchy strain";
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
+  if (m.hourglass > 0) terms += fmt::format(", hourglass control ({:g} E)", m.hourglass);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
   return terms;
 }

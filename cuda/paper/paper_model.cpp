@@ -113,9 +113,12 @@ void check_paper_model(const Model& model) {
     refuse(
         fmt::format("body \"{}\" has geometric volumes; allowed: volumes = \"kernel\"", part.name));
   }
-  if (part.material.damping > 0 || part.material.volume_stiffness > 0) {
+  if (part.material.damping > 0 || part.material.volume_stiffness > 0 ||
+      part.material.hourglass > 0) {
     refuse(
-        fmt::format("body \"{}\" has damping or volume conservation; allowed: neither", part.name));
+        fmt::format("body \"{}\" has damping, volume conservation or hourglass control; allowed: "
+                    "none of them",
+                    part.name));
   }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {

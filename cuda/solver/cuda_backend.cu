@@ -107,7 +107,9 @@ class CudaBackend final : public Backend {
   std::optional<Diagnostics> diagnostics(double time, double dt) override {
     settle();
     boundary_.sum_loads(time);
-    const DeviceArray<Real> forces = passes_.forces(), gradients = passes_.gradients();
+    const DeviceArray<Real> forces = passes_.forces(),
+                            gradients = m_.fields().pull ? passes_.gradients_and_residuals()
+                                                         : passes_.gradients();
     const Index tiles = m_.tiles();
     const DeviceArray<TileTotals> each(static_cast<std::size_t>(tiles), "sums of " + m_.subject());
     ExactTotals none{};
@@ -153,6 +155,17 @@ class CudaBackend final : public Backend {
     }
   }
 
+  void fit_residuals(std::vector<double>& residual) override {
+    settle();
+    const DeviceArray<Real> rows = passes_.gradients_and_residuals();
+    wait();
+    const std::vector<Real> values = fetched(rows);
+    residual.resize(static_cast<std::size_t>(size()));
+    for (Index i = 0; i < size(); ++i) {
+      residual[i] = values[9 * m_.places() + static_cast<std::size_t>(m_.tiling().place[i])];
+    }
+  }
+
   std::unique_ptr<Vibration> vibration() override {
     settle();
     passes_.receive_displacements();
@@ -188,7 +201,8 @@ class CudaBackend final : public Backend {
     if (residence_) list.push_back({"what stays in shared memory", residence_->bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
-    list.push_back({"while energies are summed", 12 * sizeof(Real) * m_.places()});
+    const std::size_t rows = m_.fields().pull ? 13 : 12;
+    list.push_back({"while energies are summed", rows * sizeof(Real) * m_.places()});
     return list;
   }
   std::size_t step_traffic() const override { return m_.step_traffic(); }

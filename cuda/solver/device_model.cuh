@@ -16,6 +16,7 @@
 #include "setup/primitives.cuh"
 #include "solver/crossings.cuh"
 #include "solver/diagnose.cuh"
+#include "solver/hourglass.hpp"
 #include "solver/kernels.cuh"
 
 namespace phyxel::cuda {
@@ -230,6 +231,7 @@ class DeviceModel {
     if (own_supports_) list.push_back({"supports", supports_.bytes()});
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
     if (load_.size()) list.push_back({"loads", load_.bytes()});
+    if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
   }
   std::size_t step_traffic() const {
     const std::size_t lists = tiling_.neighbours.bytes() + tiling_.second().bytes();
@@ -237,6 +239,7 @@ class DeviceModel {
     each += (7 + 4) * sizeof(Real) + 6 * sizeof(StateReal);
     if (mixed) each += 6 * sizeof(StateReal);
     if (load_.size()) each += 3 * sizeof(Real);
+    if (pull_.size()) each += 6 * sizeof(Real);
     return lists + each * places();
   }
 
@@ -288,11 +291,16 @@ class DeviceModel {
     if (own_supports_) supports_ = {places(), "supports" + of};
     velocity_ = {3 * places(), "velocities" + of};
     if (mixed) displacement_ = {3 * places(), "displacements" + of};
+    if (has_hourglass_control(model_)) {
+      pull_ = {3 * places(), "hourglass control" + of};
+      pull_.clear();
+    }
     tiles_ = {tiling_.part.size(), "tiles" + of};
     std::vector<TileMaterial> materials;
     for (const Index part : tiling_.part) {
       const Material& m = model_.parts[part].material;
-      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness, m.damping,
+      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness,
+                           hourglass_stiffness(model_, model_.parts[part]), m.damping,
                            origin_of(part), m.strain == Strain::green});
     }
     materials_ = {materials.size(), "tiles" + of};
@@ -303,6 +311,7 @@ class DeviceModel {
     fields_.force_constants = force_constants_.data();
     fields_.velocity = velocity_.data();
     fields_.displacement = displacement_.data();
+    fields_.pull = pull_.data();
     fields_.tiles = tiles_.data();
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
@@ -348,6 +357,7 @@ class DeviceModel {
     return {static_cast<Real>(m.lame_lambda()),
             static_cast<Real>(m.lame_mu()),
             static_cast<Real>(m.volume_stiffness),
+            static_cast<Real>(hourglass_stiffness(model_, part)),
             static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
             static_cast<StateReal>((1 - half) / (1 + half)),
             static_cast<StateReal>(dt / (1 + half)),
@@ -369,7 +379,7 @@ class DeviceModel {
   AllFields fields_{};
   DeviceLists lists_{}, second_lists_{};
   DeviceArray<std::byte> points_, stresses_;
-  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_;
+  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, pull_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;

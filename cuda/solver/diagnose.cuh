@@ -13,7 +13,7 @@ namespace phyxel::cuda {
 
 /// What the sums need of a tile's body.
 struct TileMaterial {
-  double lambda, mu, volume_stiffness, damping;
+  double lambda, mu, volume_stiffness, hourglass, damping;
   Vec3<double> origin;  ///< What positions are taken from [m].
   int green;
 };
@@ -23,6 +23,7 @@ enum Sum : int {
   kinetic_energy,
   strain_energy,
   volume_energy,
+  hourglass_energy,
   gravity_energy,
   load_energy,
   force_scale,
@@ -88,7 +89,8 @@ __device__ void put3(double* sum, Vec3<T> v) {
 }
 inline constexpr int diagnose_threads = 128;
 
-/// @param force,gradient of the present displacements
+/// @param force,gradient of the present displacements; with hourglass control, row 9 of `gradient`
+///   has the residuals
 /// @param moved phyxels on a path, or null
 /// @param number_at of each place: its phyxel's number
 template <class Real, class StateReal>
@@ -145,6 +147,10 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
                                                : CauchyHooke<double>{hooke}.energy(grad_u));
       const VolumeConservation<double> conservation{m.volume_stiffness};
       if (m.volume_stiffness > 0) t.sum[volume_energy] = volume * conservation.energy(grad_u);
+      if (m.hourglass > 0) {
+        t.sum[hourglass_energy] =
+            phyxel::hourglass_energy(m.hourglass, gradient[9 * f.places + place]);
+      }
       t.sum[inverted] = conservation.volume_change(grad_u) <= -1 ? 1 : 0;
       put3(t.sum + internal_force, internal);
       put3(t.sum + internal_torque, cross(x, internal));

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "phyxel/physics/force.hpp"
+#include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
@@ -22,6 +23,7 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 struct TileConstants {
   Real lambda, mu, volume_stiffness;  ///< [Pa]
+  Real hourglass;                     ///< κ [N/m], 0: none.
   Real inverse_h_squared;             ///< [1/m²], where the body has one support.
   StateReal keep, gain;               ///< Damped Verlet's factors; gain is the step where undamped.
   bool green, damped;                 ///< For kernels that serve bodies of any law.
@@ -44,6 +46,7 @@ struct Fields {
   const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
   const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m: held; 0: nobody.
   const Real* load;               ///< [3, places], or null.
+  Real* pull;                     ///< Of hourglass control: [3, places], or null.
   StateReal* velocity;            ///< [3, places]
   StateReal* displacement;        ///< [3, places] where StateReal is not Real, or null.
   const TileConstants<Real, StateReal>* tiles;
@@ -195,11 +198,12 @@ struct Gradients {
   Real* values;
   std::size_t stride;
   const Index* tile_of_block;  ///< Null: all.
+  Real* residuals = nullptr;   ///< What the gradients do not follow (`add_residual`); null: unasked.
 };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-template <class Real, class StateReal, bool green, bool volume, bool only_gradient,
+template <class Real, class StateReal, bool green, bool volume, bool hourglass, bool only_gradient,
           class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
@@ -224,10 +228,13 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
 
   const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
   Mat3<Real> sum;
+  Vec3<Real> pull;
   walk(lists, row, first, [&](unsigned offset) {
     const auto p = Points<Real>::at(image, lists.slots, offset);
-    const Vec3<Real> x = p.x - own.x;
-    add_gradient_term(sum, p.u - own.u, weight_shape_anywhere(dot(x, x), inverse_h_squared) * x);
+    const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
+    const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
+    add_gradient_term(sum, u, w * x);
+    if constexpr (hourglass) add_pull(pull, u, w);
   });
 
   const Real* c = f.moment_constants + place;
@@ -237,18 +244,32 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
   if constexpr (only_gradient) {
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
+    if (!gradients.residuals) return;
+    Real residual{};
+    walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
+      const auto p = Points<Real>::at(image, lists.slots, offset);
+      const Vec3<Real> x = p.x - own.x;
+      const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
+      // Nobody is far away: their distance alone would leave the range of float.
+      if (w > Real(0)) add_residual(residual, p.u - own.u, grad_u, x, w);
+    });
+    gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
     const auto law = law_of<Real, green, volume>(body);
-    const Mat3<Real> q =
-        pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
+    Mat3<Real> q = pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
+    if constexpr (hourglass) {
+      q = with_hourglass(q, body.hourglass, grad_u);
+      set_column3(f.pull, f.places, place, pull_force(body.hourglass, pull));
+    }
     f.stresses.set(place, {own.x, q});
     others.after(tile);
   }
 }
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
-/// `force`, shape [3, places], and nothing else is written.
-template <class Real, class StateReal, bool own_supports, bool damped, bool loaded, bool only_force,
+/// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of loads
+/// and pulls is added.
+template <class Real, class StateReal, bool own_supports, bool damped, bool more, bool only_force,
           class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
@@ -291,13 +312,17 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
   const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;
   sum += own_force(q_i, column3(f.force_constants, f.places, place));
   if constexpr (only_force) {
+    if (f.pull) sum += column3(f.pull, f.places, place);
     set_column3(force, f.places, place, sum);
     return;
   }
 
   const Real inverse_mass = f.force_constants[3 * f.places + place];
   if (inverse_mass > Real(0)) {
-    if constexpr (loaded) sum += column3(f.load, f.places, place);
+    if constexpr (more) {
+      if (f.pull) sum += column3(f.pull, f.places, place);
+      if (f.load) sum += column3(f.load, f.places, place);
+    }
     const Vec3<StateReal> velocity = next_velocity<Real, StateReal, damped>(
         column3(f.velocity, f.places, place), sum, inverse_mass, f.gravity, dt, body);
     set_column3(f.velocity, f.places, place, velocity);

@@ -67,8 +67,11 @@ class Passes {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
-    launch_pass_1<Alone>(fields, {pass_1<Real, StateReal, false, false, false>, 0, m_.tiles()}, {},
-                         {});
+    launch_pass_1<Alone>(fields,
+                         {fields.pull ? pass_1<Real, StateReal, false, false, true, false>
+                                      : pass_1<Real, StateReal, false, false, false, false>,
+                          0, m_.tiles()},
+                         {}, {});
     send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
@@ -91,10 +94,16 @@ class Passes {
     put_gradients({gradients.data(), m_.places(), nullptr}, m_.tiles());
     return gradients;
   }
+  /// And, in row 9, what they do not follow of the neighbours' displacements (`add_residual`).
+  DeviceArray<Real> gradients_and_residuals() const {
+    DeviceArray<Real> rows = without_ghosts(10, "displacement gradients of ");
+    put_gradients({rows.data(), m_.places(), nullptr, rows.data() + 9 * m_.places()}, m_.tiles());
+    return rows;
+  }
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    launch_pass_1<Alone>(m_.fields(), {pass_1<Real, StateReal, true, false, true>, 0, tiles},
+    launch_pass_1<Alone>(m_.fields(), {pass_1<Real, StateReal, true, false, false, true>, 0, tiles},
                          gradients, {});
   }
 
@@ -157,22 +166,26 @@ class Passes {
   /// Terms chosen at run time become kernels: the one place.
   template <class Others>
   static Pass1<Others> pass_1_of(const Material& m) {
+    return m.hourglass > 0 ? pass_1_of<true, Others>(m) : pass_1_of<false, Others>(m);
+  }
+  template <bool hourglass, class Others>
+  static Pass1<Others> pass_1_of(const Material& m) {
     const bool volume = m.volume_stiffness > 0;
     if (m.strain == Strain::green) {
-      return volume ? cuda::pass_1<Real, StateReal, true, true, false, Others>
-                    : cuda::pass_1<Real, StateReal, true, false, false, Others>;
+      return volume ? cuda::pass_1<Real, StateReal, true, true, hourglass, false, Others>
+                    : cuda::pass_1<Real, StateReal, true, false, hourglass, false, Others>;
     }
-    return volume ? cuda::pass_1<Real, StateReal, false, true, false, Others>
-                  : cuda::pass_1<Real, StateReal, false, false, false, Others>;
+    return volume ? cuda::pass_1<Real, StateReal, false, true, hourglass, false, Others>
+                  : cuda::pass_1<Real, StateReal, false, false, hourglass, false, Others>;
   }
   template <bool own_supports, class Others>
   Pass2<Others> pass_2_of(const Material& m) const {
-    const bool loaded = !m_.model().loads.empty();
+    const bool more = !m_.model().loads.empty() || m_.fields().pull;
     if (m.damping > 0) {
-      return loaded ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
+      return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
                     : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;
     }
-    return loaded ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
+    return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
                   : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
   }
 

@@ -26,7 +26,7 @@ class Residence {
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
   }
   std::size_t bytes() const {
-    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() +
+    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() + weights_.bytes() +
            destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
   }
 
@@ -68,9 +68,10 @@ class Residence {
       stresses_ = {stress_letters<Real> * m_.places(), what};
     }
     view_ = {slices_.data(),         place_.data(),
-             pairs_.data(),          destinations_.data(),
-             slice_of_block_.data(), displacements_.data(),
-             stresses_.data(),       plan.most_slots,
+             pairs_.data(),          weights_.data(),
+             destinations_.data(),   slice_of_block_.data(),
+             displacements_.data(),  stresses_.data(),
+             plan.most_slots,
              plan.most_destinations, {plan.longest[0], second_longest(plan)}};
     clear_mail();
     return true;
@@ -79,10 +80,11 @@ class Residence {
     constexpr unsigned threads = 256;
     const DeviceArray<std::uint16_t> entries = sent(plan.entries, what);
     pairs_ = {plan.entries.size(), what};
+    if (hourglass()) weights_ = {plan.entries.size(), what};
     const auto slices = static_cast<unsigned>(plan.slices.size());
     weigh_pairs<<<slices, threads, 0, m_.stream()>>>(m_.fields(), slices_.data(), place_.data(),
                                                      entries.data(), m_.tiling().inverse ? 2 : 1,
-                                                     pairs_.data());
+                                                     pairs_.data(), weights_.data());
     m_.launched("weigh_pairs", slices, threads);
     m_.wait();
   }
@@ -96,15 +98,18 @@ class Residence {
     return in_clusters ||
            static_cast<std::size_t>(m_.model().pairs()) * sizeof(Pair<Real>) <= shared;
   }
+  bool hourglass() const { return m_.fields().pull; }
   int second_longest(const ResidentPlan& plan) const {
     return m_.tiling().inverse ? plan.longest[1] : 0;
   }
   template <class Post>
   void use_post(const ResidentPlan& plan) {
-    kernel_ = reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post>);
+    kernel_ = hourglass()
+                  ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, true>)
+                  : reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, false>);
     threads_ = Post::threads;
     shared_bytes_ =
-        ResidentMemory<Real>::bytes(plan.most_slots, plan.longest[0], second_longest(plan),
+        ResidentMemory<Real>::bytes(plan.most_slots, plan.longest[0], second_longest(plan), hourglass(),
                                     Post::bytes(plan.most_slots, plan.most_destinations));
   }
   /// One cluster a body, as many blocks each as the largest has slices.
@@ -183,6 +188,7 @@ class Residence {
   DeviceArray<int> slice_of_block_;
   DeviceArray<Index> place_;
   DeviceArray<Pair<Real>> pairs_;
+  DeviceArray<Real> weights_;
   DeviceArray<std::uint32_t> destinations_;
   DeviceArray<Letter> displacements_, stresses_;
   ResidentView<Real> view_{};

@@ -93,6 +93,7 @@ struct ResidentView {
   const Slice* slices;
   const Index* place;
   const Pair<Real>* pairs;  ///< In the order of `ResidentPlan::entries`.
+  const Real* weights;      ///< w_ij of those of the first pass, for hourglass control; or null.
   const std::uint32_t* destinations;
   const int* slice_of_block;  ///< -1: none.
   Letter* displacements;      ///< [letters, places], for mail
@@ -119,6 +120,7 @@ template <class Real>
 struct ResidentMemory {
   SlotImage displacements, stresses;
   Pair<Real>*pairs, *second_pairs;
+  Real* weights;                 ///< For hourglass control.
   Index* place_of_slot;          ///< For mail.
   unsigned long long* barriers;  ///< For clusters: two.
   std::uint32_t* destinations;   ///< Likewise.
@@ -131,15 +133,24 @@ struct ResidentMemory {
     Pair<Real>* end = pairs + r.longest[0] * slice_size;
     second_pairs = r.longest[1] ? end : pairs;
     end += r.longest[1] * slice_size;
+    weights = reinterpret_cast<Real*>(end);
+    if (r.weights) end += weight_pairs(r.longest[0]);
     place_of_slot = reinterpret_cast<Index*>(end);
     barriers = reinterpret_cast<unsigned long long*>(end);
     destinations = reinterpret_cast<std::uint32_t*>(barriers + 2);
   }
+  /// As many pairs take the room of the weights of `longest` entries a lane.
+  __host__ __device__ static int weight_pairs(int longest) {
+    return longest * slice_size * static_cast<int>(sizeof(Real)) /
+           static_cast<int>(sizeof(Pair<Real>));
+  }
   /// @param tail what the way of sending needs
-  static int bytes(int most_slots, int longest, int second_longest, int tail) {
+  static int bytes(int most_slots, int longest, int second_longest, bool weights, int tail) {
+    const int pairs =
+        (longest + second_longest) * slice_size + (weights ? weight_pairs(longest) : 0);
     return most_slots * static_cast<int>(sizeof(Letter)) *
-               (displacement_letters<Real> + stress_letters<Real>)+(longest + second_longest) *
-               slice_size * static_cast<int>(sizeof(Pair<Real>)) +
+               (displacement_letters<Real> + stress_letters<Real>)+pairs *
+               static_cast<int>(sizeof(Pair<Real>)) +
            tail;
   }
 };
@@ -379,11 +390,11 @@ struct ClusterPost {
 // --- the steps -----------------------------------------------------------------------------------
 
 /// The weighted distances of all slices, one block each: for the first pass by the phyxel's
-/// support, for the second by the neighbour's.
+/// support, for the second by the neighbour's. @param weights of the first pass, where wanted
 template <class Real, class StateReal>
 __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, const Slice* slices,
                             const Index* place, const std::uint16_t* entries, int passes,
-                            Pair<Real>* pairs) {
+                            Pair<Real>* pairs, Real* weights) {
   const Slice& slice = slices[blockIdx.x];
   const Real body_support = f.tiles[slice.first_place / tile_size].inverse_h_squared;
   for (int pass = 0; pass < passes; ++pass) {
@@ -393,15 +404,18 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
       const int p = k % slice_size;
       const std::uint16_t entry = entries[rows.first_entry + k];
       Pair<Real> pair{{}, static_cast<decltype(Pair<Real>::slot)>(p)};  // its own: zero from itself
+      Real weight{};
       if (!(entry & far_entry)) {
         const auto own = static_cast<std::size_t>(slice.first_place) + p;
         const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
         const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
         const Real inverse_h_squared =
             f.inverse_h_squared ? f.inverse_h_squared[pass == 0 ? own : other] : body_support;
-        pair = {weight_shape_anywhere(dot(x, x), inverse_h_squared) * x, entry};
+        weight = weight_shape_anywhere(dot(x, x), inverse_h_squared);
+        pair = {weight * x, entry};
       }
       pairs[rows.first_entry + k] = pair;
+      if (weights && pass == 0) weights[rows.first_entry + k] = weight;
     }
   }
 }
@@ -418,7 +432,18 @@ __device__ void fetch_pairs(const ResidentView<Real>& r, const Slice::Rows& rows
   }
 }
 
-/// Calls visit(numbers of the neighbour, w x) in the order of the list, with the next group's pairs
+/// The same of the first pass's weights.
+template <class Real>
+__device__ void fetch_weights(const ResidentView<Real>& r, const Slice::Rows& rows, Real* weights) {
+  constexpr int each = 16 / sizeof(Real);
+  const Real* from = r.weights + rows.first_entry;
+  for (int k = static_cast<int>(threadIdx.x) * each; k < rows.longest * slice_size;
+       k += static_cast<int>(blockDim.x) * each) {
+    copy_async<16>(weights + k, from + k);
+  }
+}
+
+/// Calls visit(numbers of the neighbour, w x, number of the entry) in the order of the list, with the next group's pairs
 /// under way. A longer loop, with the next group's numbers under way too, is slower: a warp or two
 /// on a multiprocessor wait for its instructions.
 template <class Real, int letters, class Visit>
@@ -449,13 +474,13 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
       Real n[numbers];
 #pragma unroll
       for (int l = 0; l < letters; ++l) Mail<Real>::open(got[k][l], n + l * Mail<Real>::numbers);
-      visit(n, wx[k]);
+      visit(n, wx[k], length - left + k);
     }
   }
 }
 
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
-template <class Real, class StateReal, class Post>
+template <class Real, class StateReal, class Post, bool hourglass>
 __global__ void __launch_bounds__(Post::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
@@ -474,6 +499,7 @@ __global__ void __launch_bounds__(Post::threads)
   const ResidentMemory<Real> memory(shared, r);
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_pairs(r, slice.rows[0], memory.pairs);
+  if constexpr (hourglass) fetch_weights(r, slice.rows[0], memory.weights);
   if (r.longest[1]) fetch_pairs(r, slice.rows[1], memory.second_pairs);
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
@@ -516,11 +542,17 @@ __global__ void __launch_bounds__(Post::threads)
     post.template send<u_letters>(0, memory.displacements, place, somebody, u);
     post.template receive<u_letters>(0, memory.displacements);
     Mat3<Real> q;
+    [[maybe_unused]] Vec3<Real> pull;
     if (owner) {
       Mat3<Real> sum;
       walk_pairs<Real, u_letters>(
-          memory.pairs + thread, length, memory.displacements, [&](const Real* u_j, Vec3<Real> wx) {
-            add_gradient_term(sum, Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u, wx);
+          memory.pairs + thread, length, memory.displacements,
+          [&](const Real* u_j, Vec3<Real> wx, [[maybe_unused]] int entry) {
+            const Vec3<Real> u_ij = Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u;
+            add_gradient_term(sum, u_ij, wx);
+            if constexpr (hourglass) {
+              add_pull(pull, u_ij, memory.weights[entry * slice_size + thread]);
+            }
           });
       const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
       if (trail.gradients && step > 0) {
@@ -531,6 +563,10 @@ __global__ void __launch_bounds__(Post::threads)
         set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
       q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
+      if constexpr (hourglass) {
+        q = with_hourglass(q, body.hourglass, grad_u);
+        pull = pull_force(body.hourglass, pull);
+      }
     }
     if (step == steps) break;
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1),
@@ -541,12 +577,13 @@ __global__ void __launch_bounds__(Post::threads)
       Vec3<Real> sum;
       walk_pairs<Real, q_letters>(
           memory.second_pairs + thread, second_length, memory.stresses,
-          [&](const Real* n, Vec3<Real> wx) {
+          [&](const Real* n, Vec3<Real> wx, int) {
             const Mat3<Real> q_j{{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, {n[6], n[7], n[8]}}};
             add_neighbour_force(sum, q_j, wx);
           });
       sum += own_force(q, moment_offset);
       if (inverse_mass > Real(0)) {
+        if constexpr (hourglass) sum += pull;
         if (f.load) sum += load;
         velocity = body.damped ? next_velocity<Real, StateReal, true>(velocity, sum, inverse_mass,
                                                                       f.gravity, dt, body)

@@ -123,6 +123,7 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
       {"kinetic_energy", "J", [](D d) { return d.kinetic_energy; }},
       {"strain_energy", "J", [](D d) { return d.strain_energy; }},
       {"volume_energy", "J", [](D d) { return d.volume_energy; }},
+      {"hourglass_energy", "J", [](D d) { return d.hourglass_energy; }},
       {"gravity_energy", "J", [](D d) { return d.gravity_energy; }},
       {"load_energy", "J", [](D d) { return d.load_energy; }},
       {"total_energy", "J", [](D d) { return d.total_energy(); }},

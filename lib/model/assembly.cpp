@@ -38,6 +38,14 @@ void place(Cloud& cloud, const BodyRequest& request) {
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
 }
 
+void check_terms(const BodyRequest& request) {
+  if (!(request.material.hourglass > 0) || !request.neighbourhood.one_sided()) return;
+  throw InputError(fmt::format(
+      "{}: body \"{}\" has hourglass control ({:g}), which needs one support for the body: allowed "
+      "are neighbours.support = \"uniform\" without max_neighbours, or hourglass = 0",
+      request.where, request.name, request.material.hourglass));
+}
+
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {
   const bool kernel = request.volume_rule == VolumeRule::kernel ||
                       (request.volume_rule == VolumeRule::automatic && !has_volumes);

@@ -21,6 +21,9 @@ std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);
 
+/// @throws InputError if a body asks for terms that do not go together
+void check_terms(const BodyRequest& request);
+
 /// Whether the volumes of a body follow from the kernel.
 /// @throws InputError if it can have none as asked
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels);

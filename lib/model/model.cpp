@@ -53,6 +53,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
       surveyor ? 300 : 950);
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
+  check_terms(request);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
   Survey survey;

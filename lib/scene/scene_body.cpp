@@ -18,7 +18,7 @@ struct SourceKeys {
 };
 
 SourceKeys lattice_keys(std::vector<const char*> needed) {
-  return {std::move(needed), {"spacing", "phyxels", "jitter", "seed", "surfels"}, true};
+  return {std::move(needed), {"spacing", "phyxels", "lattice", "jitter", "seed", "surfels"}, true};
 }
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
@@ -36,8 +36,8 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
   const std::string source = shape.empty() ? kind : fmt::format("shape = \"{}\"", shape);
   std::vector<std::string> used(keys.needed.begin(), keys.needed.end());
   used.insert(used.end(), keys.optional.begin(), keys.optional.end());
-  for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "jitter", "seed",
-                           "relaxations", "surfels"}) {
+  for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "lattice", "jitter",
+                           "seed", "relaxations", "surfels"}) {
     if (!body.has(name) || std::find(used.begin(), used.end(), name) != used.end()) continue;
     body.refuse(name,
                 fmt::format("found, but {} does not use it; allowed with {}: {}", source, source,
@@ -94,6 +94,7 @@ BodySource read_source(const SceneTable& body) {
   body.read("size", shape.size);
   body.read("radius", shape.radius);
   body.read("length", shape.length);
+  body.read_choice("lattice", shape.placement);
   body.read("jitter", shape.jitter);
   body.read("surfels", shape.surface);
   body.read("seed", source.seed);
@@ -110,6 +111,7 @@ Material read_material(const SceneTable& table) {
   table.read_choice("strain", material.strain);
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
+  table.read("hourglass", material.hourglass);
   return material;
 }
 

@@ -29,7 +29,7 @@ std::vector<SceneSection> make_sections() {
        "rest shape comes from:\n\n"
        "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
        "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
-       "`phyxels`, and may have `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
+       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
        "along x from the origin, with its axis on the x axis; the others are centred on the "
        "origin, the cylinder along z.\n"
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
@@ -159,6 +159,10 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Of a cylinder or sphere."},
       {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = above(0),
        .meaning = "Of a cylinder."},
+      {.section = "body", .name = "lattice", .type = KeyType::choice, .fallback = "\"cells\"",
+       .words = {"cells", "nodes"},
+       .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", at the "
+           "cells' corners, on faces too (beam and block): far more accurate in bending."},
       {.section = "body", .name = "jitter", .fallback = "0", .range = between(0, 0.5),
        .meaning = "Each phyxel of a lattice is moved at random by up to this many spacings."},
       {.section = "body", .name = "seed", .type = KeyType::integer, .fallback = "1",
@@ -214,6 +218,10 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "damping", .unit = "1/s", .fallback = "0",
        .range = at_least(0),
        .meaning = "Slows every velocity v by damping * v each second; 0: none."},
+      {.section = "body.material", .name = "hourglass", .fallback = "0", .range = at_least(0),
+       .meaning = "Strength of hourglass control, as a share of young: energy of what does not "
+           "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
+           "see; 0: none. Needs one support for the body."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
        .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},

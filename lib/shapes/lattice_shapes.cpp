@@ -35,7 +35,7 @@ class Filling {
   Filling(const Lattice& lattice, double jitter, std::uint64_t seed)
       : lattice_(lattice), cell_(lattice.cell()), jitter_(jitter), salt_(mix_bits(seed)) {
     for (int axis = 0; axis < 3; ++axis) {
-      end_[axis] = static_cast<std::int64_t>(lattice.cells[axis]);
+      end_[axis] = static_cast<std::int64_t>(lattice.places(axis));
       block_end_[axis] = (end_[axis] + block_side - 1) / block_side;
     }
   }
@@ -52,11 +52,19 @@ class Filling {
     Cloud& cloud = made.cloud;
     const auto phyxels = static_cast<std::size_t>(first_[end] - first_[begin]);
     cloud.position.resize(phyxels);
-    cloud.volume.assign(phyxels, lattice_.volume() / static_cast<double>(whole));
+    const double inner =
+        lattice_.nodes ? cell_.x * cell_.y * cell_.z : lattice_.volume() / static_cast<double>(whole);
+    cloud.volume.assign(phyxels, inner);
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::ptrdiff_t b = begin; b < end; ++b) {
-      Vec3d* next = cloud.position.data() + (first_[b] - first_[begin]);
-      visit_inside(b, [&](const Cell& c, Vec3d centre) { *next++ = jittered(c, centre); });
+      auto next = static_cast<std::size_t>(first_[b] - first_[begin]);
+      visit_inside(b, [&](const Cell& c, Vec3d centre) {
+        cloud.position[next] = jittered(c, centre);
+        for (int axis = 0; axis < 3; ++axis) {
+          if (on_face(c, axis)) cloud.volume[next] *= 0.5;
+        }
+        ++next;
+      });
     }
     add_regions(cloud, begin, end);
     return made;
@@ -96,12 +104,18 @@ class Filling {
     const Cell corner{at[0] * block_side, at[1] * block_side, at[2] * block_side};
     const auto visit_cell = [&](const Cell& c) {
       if (!lattice_.holds(c)) return;
-      const Vec3d centre = lattice_.low + Vec3d{(static_cast<double>(c[0]) + 0.5) * cell_.x,
-                                                (static_cast<double>(c[1]) + 0.5) * cell_.y,
-                                                (static_cast<double>(c[2]) + 0.5) * cell_.z};
+      const double within = lattice_.nodes ? 0 : 0.5;
+      const Vec3d centre = lattice_.low + Vec3d{(static_cast<double>(c[0]) + within) * cell_.x,
+                                                (static_cast<double>(c[1]) + within) * cell_.y,
+                                                (static_cast<double>(c[2]) + within) * cell_.z};
       visit(c, centre);
     };
     visit_cells(corner, block_level, end_, visit_cell);
+  }
+
+  /// Whether a node lies on a face across `axis`. Cells do not.
+  bool on_face(const Cell& c, int axis) const {
+    return lattice_.nodes && (c[axis] == 0 || c[axis] == end_[axis] - 1);
   }
 
   Vec3d jittered(const Cell& c, Vec3d centre) const {
@@ -112,13 +126,17 @@ class Filling {
     Vec3d move{jitter_ * cell_.x * signed_fraction(bits),
                jitter_ * cell_.y * signed_fraction(bits >> 21),
                jitter_ * cell_.z * signed_fraction(bits >> 42)};
+    if (lattice_.nodes) {  // of others than those on faces, none comes as far as a face
+      return centre + Vec3d{on_face(c, 0) ? 0 : move.x, on_face(c, 1) ? 0 : move.y,
+                            on_face(c, 2) ? 0 : move.z};
+    }
     for (int attempt = 0; attempt < 4; ++attempt, move = 0.5 * move) {
       if (lattice_.contains(centre + move)) return centre + move;
     }
     return centre;
   }
 
-  /// The outermost layer of cells on each side that is flat.
+  /// The outermost layer of phyxels on each side that is flat.
   void add_regions(Cloud& cloud, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     if (lattice_.solid == Lattice::Solid::sphere) return;
     static constexpr const char* names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
@@ -173,7 +191,7 @@ bool Lattice::holds(const std::array<std::int64_t, 3>& cell) const {
 }
 
 double Lattice::phyxels() const {
-  const double box_cells = cells[0] * cells[1] * cells[2];
+  const double box_cells = places(0) * places(1) * places(2);
   if (solid == Solid::box) return box_cells;
   if (box_cells > 1e11) return box_cells * (volume() / (extent.x * extent.y * extent.z));
   // Row by row in half cells: a row holds odd numbers if n is even, and even ones if it is odd.
@@ -206,6 +224,7 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
   } else {
     lattice.extent = request.size;
   }
+  lattice.nodes = request.placement == ShapeRequest::Placement::nodes;
   lattice.low = -0.5 * lattice.extent;
   if (request.name == "beam") lattice.low.x = 0;
   const auto count = [&](double extent) { return std::max(1.0, std::round(extent / spacing)); };

@@ -1,4 +1,4 @@
-/// Boxes, cylinders and spheres filled by a lattice of cells with a phyxel in each.
+/// Boxes, cylinders and spheres filled by a lattice of cells with a phyxel in each, or at each corner.
 #pragma once
 
 #include <array>
@@ -16,22 +16,25 @@ struct Lattice {
   Vec3d low;                    ///< Lower corner of the box [m].
   Vec3d extent;                 ///< [m]
   std::array<double, 3> cells;  ///< Whole numbers, 1 or more; doubles because they may be absurd.
+  bool nodes = false;           ///< Boxes only: phyxels at the cells' corners.
 
   Vec3d cell() const { return {extent.x / cells[0], extent.y / cells[1], extent.z / cells[2]}; }
   double volume() const;         ///< Of the solid [m^3].
   bool contains(Vec3d p) const;  ///< Strictly inside the solid.
-  /// Whether the centre of a cell is inside the solid, free of rounding.
-  bool holds(const std::array<std::int64_t, 3>& cell) const;
-  /// Cells whose centres are inside, one phyxel each; estimated where that is beyond 1e11.
+  /// Places of phyxels along an axis.
+  double places(int axis) const { return cells[axis] + (nodes ? 1 : 0); }
+  /// Whether the place of a phyxel is in the solid, free of rounding.
+  bool holds(const std::array<std::int64_t, 3>& place) const;
+  /// Places in the solid; estimated where that is beyond 1e11.
   double phyxels() const;
 };
 
 /// The solid of a checked request, in cells of about `spacing` [m].
 Lattice make_lattice(const ShapeRequest& request, double spacing);
 
-/// A phyxel in each cell whose centre is inside the solid, all with the same volume, in the order
-/// of a Morton curve over the cells; with regions. Phyxels are moved by up to `jitter` cells in
-/// each direction, but not out of the solid.
+/// A phyxel at each place in the solid, all with the same volume but for shares of nodes on faces,
+/// in the order of a Morton curve over the places; with regions. Phyxels are moved by up to `jitter`
+/// cells in each direction, but not out of the solid, nor off its faces.
 CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed,
                         Piece piece = {});
 

@@ -33,6 +33,12 @@ void check_size(const ShapeRequest& request) {
     check_positive(request.name, "size.y", request.size.y);
     check_positive(request.name, "size.z", request.size.z);
   } else {
+    if (request.placement == ShapeRequest::Placement::nodes) {
+      throw InputError(fmt::format(
+          "shape \"{}\": lattice \"nodes\", whose outer layer would not lie on a round surface: "
+          "allowed are \"cells\", or the shapes beam and block",
+          request.name));
+    }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
   }

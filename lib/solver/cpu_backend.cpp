@@ -14,12 +14,14 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/physics/force.hpp"
+#include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/cpu_layout.hpp"
 #include "solver/cpu_surfels.hpp"
+#include "solver/hourglass.hpp"
 #include "solver/pack.hpp"
 #include "timeline.hpp"
 
@@ -63,6 +65,7 @@ class CpuBackend final : public Backend {
     displacement_.assign(slots * 3, StateReal(0));
     velocity_.assign(slots * 3, StateReal(0));
     if (!model.loads.empty()) load_.assign(slots * 3, Real(0));
+    if (has_hourglass_control(model)) pull_.assign(slots * 3, Real(0));
     for (std::size_t p = 0; p < model.parts.size(); ++p) pack_part(p);
     model_loads(0);
   }
@@ -111,7 +114,7 @@ class CpuBackend final : public Backend {
     if (!load_.empty()) model_loads(time);
     for (const Run& run : runs_) {
       const bool damped = run.material.damping > 0;
-      if (load_.empty()) {
+      if (load_.empty() && pull_.empty()) {
         damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
       } else {
         damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
@@ -131,7 +134,7 @@ class CpuBackend final : public Backend {
     std::vector<Vec3d> by_slot(static_cast<std::size_t>(layout_.slots()));
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Vec3<P> f = force_of(p);
+      const Vec3<P> f = pull_.empty() ? force_of<false>(p) : force_of<true>(p);
       for (int l = 0; l < W; ++l) by_slot[p * W + l] = {f.x[l], f.y[l], f.z[l]};
     }
     for (Index i = 0; i < model_.size(); ++i) force[i] = by_slot[layout_.slot(i)];
@@ -141,13 +144,28 @@ class CpuBackend final : public Backend {
     std::vector<Mat3d> by_slot(static_cast<std::size_t>(layout_.slots()));
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Mat3<P> g = displacement_gradient_of(p);
+      const Mat3<P> g = displacement_gradient_of<false>(p, nullptr);
       for (int l = 0; l < W; ++l) {
         for (int e = 0; e < 9; ++e) by_slot[p * W + l](e / 3, e % 3) = g(e / 3, e % 3)[l];
       }
     }
     gradient.resize(static_cast<std::size_t>(model_.size()));
     for (Index i = 0; i < model_.size(); ++i) gradient[i] = by_slot[layout_.slot(i)];
+  }
+
+  void fit_residuals(std::vector<double>& residual) override {
+    std::vector<double> by_slot(static_cast<std::size_t>(layout_.slots()));
+#pragma omp parallel for schedule(static) num_threads(threads_)
+    for (Index p = 0; p < layout_.packs(); ++p) {
+      const Mat3<P> grad_u = displacement_gradient_of<false>(p, nullptr);
+      P sum(Real(0));
+      visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
+        add_residual(sum, u_ij, grad_u, x_ij, w);
+      });
+      for (int l = 0; l < W; ++l) by_slot[p * W + l] = sum[l];
+    }
+    residual.resize(static_cast<std::size_t>(model_.size()));
+    for (Index i = 0; i < model_.size(); ++i) residual[i] = by_slot[layout_.slot(i)];
   }
 
   void update_surfels() override { advect_surfels(moved_surfels_); }
@@ -157,7 +175,7 @@ class CpuBackend final : public Backend {
                                      CarrierRecord::size);
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Mat3<P> grad_u = displacement_gradient_of(p);
+      const Mat3<P> grad_u = displacement_gradient_of<false>(p, nullptr);
       const Vec3<P> x = point_of(p, PointRecord::position);
       const Vec3<S> u = vec3_of<S>(displacement_, p);
       for (int l = 0; l < W; ++l) {
@@ -196,6 +214,7 @@ class CpuBackend final : public Backend {
         {"neighbour lists", lists_.bytes()}};
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
     if (!load_.empty()) list.push_back({"loads", load_.size() * sizeof(Real)});
+    if (!pull_.empty()) list.push_back({"hourglass control", pull_.size() * sizeof(Real)});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -207,31 +226,42 @@ class CpuBackend final : public Backend {
     const std::size_t pass_2 =
         (inverse_.start.empty() ? lists_ : inverse_).bytes() +
         slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
-        load_.size() * sizeof(Real);
+        (load_.size() + 2 * pull_.size()) * sizeof(Real);
     return pass_1 + pass_2;
   }
 
  private:
   // --- the two neighbour loops ------------------------------------------------------------------
 
-  /// Pass 1: ∇u of the phyxels of pack p.
-  PHYXEL_HD Mat3<P> displacement_gradient_of(Index p) const {
+  /// Calls visit(x_ij, u_ij, w_ij) for the neighbours of the phyxels of pack p.
+  template <class Visit>
+  PHYXEL_HD void visit_neighbours(Index p, Visit&& visit) const {
     const Vec3<P> x_i = point_of(p, PointRecord::position),
                   u_i = point_of(p, PointRecord::displacement);
     const P inverse_h_squared = own_point_value(p, PointRecord::inverse_h_squared);
-    Mat3<P> sum;
     const Index* end = lists_.indices.data() + lists_.start[p + 1];
     for (const Index* j = lists_.indices.data() + lists_.start[p]; j != end; j += W) {
       P point[PointRecord::size];
       load_records<PointRecord::size>(points_.data(), j, point);
       const Vec3<P> x_ij = vec3_at(point, PointRecord::position) - x_i;
       const Vec3<P> u_ij = vec3_at(point, PointRecord::displacement) - u_i;
-      add_gradient_term(sum, u_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared) * x_ij);
+      visit(x_ij, u_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared));
     }
+  }
+
+  /// Pass 1: ∇u of the phyxels of pack p and, if they are controlled, how their neighbours pull.
+  template <bool Controlled>
+  PHYXEL_HD Mat3<P> displacement_gradient_of(Index p, [[maybe_unused]] Vec3<P>* pull) const {
+    Mat3<P> sum;
+    visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
+      add_gradient_term(sum, u_ij, w * x_ij);
+      if constexpr (Controlled) add_pull(*pull, u_ij, w);
+    });
     return displacement_gradient(sum, inverse_moment_of(p));
   }
 
   /// Pass 2: internal forces on the phyxels of pack p.
+  template <bool Controlled>
   PHYXEL_HD Vec3<P> force_of(Index p) const {
     const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
     Index own[W];
@@ -247,12 +277,14 @@ class CpuBackend final : public Backend {
       const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
       add_neighbour_force(force, mat3_at(record), x_ij, w_ji);
     }
+    if constexpr (Controlled) force += vec3_of<P>(pull_, p);
     return force;
   }
 
   /// Neighbouring bodies of one material: one loop over all of them.
   struct Run {
     Material material;
+    double hourglass;  ///< κ [N/m]
     PackRange range;
   };
 
@@ -260,12 +292,14 @@ class CpuBackend final : public Backend {
     std::vector<Run> runs;
     for (std::size_t part = 0; part < model_.parts.size(); ++part) {
       const Material& material = model_.parts[part].material;
+      const double hourglass = hourglass_stiffness(model_, model_.parts[part]);
       const PackRange range = (layout_.*range_of)(part);
       if (range.begin == range.end) continue;
-      if (!runs.empty() && runs.back().material == material) {
+      if (!runs.empty() && runs.back().material == material &&
+          runs.back().hourglass == hourglass) {
         runs.back().range.end = range.end;
       } else {
-        runs.push_back({material, range});
+        runs.push_back({material, hourglass, range});
       }
     }
     return runs;
@@ -277,8 +311,8 @@ class CpuBackend final : public Backend {
     return std::clamp((range.end - range.begin) * W / 400, 1, threads_);
   }
 
-  /// Force, loads, gravity and the Verlet step.
-  template <bool Damped, bool Loaded>
+  /// Force, gravity and the Verlet step; with `More` what the scene has of loads and pulls.
+  template <bool Damped, bool More>
   void advance_run(const Run& run, double dt) {
     const double half_damping = run.material.damping * dt / 2;
     const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
@@ -286,8 +320,11 @@ class CpuBackend final : public Backend {
     const PackRange range = run.range;
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
-      Vec3<P> force = force_of(p);
-      if constexpr (Loaded) force += vec3_of<P>(load_, p);
+      Vec3<P> force = force_of<false>(p);
+      if constexpr (More) {
+        if (!pull_.empty()) force += vec3_of<P>(pull_, p);
+        if (!load_.empty()) force += vec3_of<P>(load_, p);
+      }
       const Vec3<P> f_over_m = load<P>(&inverse_mass_[p * W]) * force;
       const Vec3<S> acceleration =
           Vec3<S>{convert<StateReal>(f_over_m.x), convert<StateReal>(f_over_m.y),
@@ -314,18 +351,29 @@ class CpuBackend final : public Backend {
   }
 
   void find_stresses(const std::vector<Run>& runs) {
-    for_each_law(runs, [&](const auto& law, PackRange range) {
-#pragma omp parallel for schedule(static) num_threads(threads_for(range))
-      for (Index p = range.begin; p < range.end; ++p) {
-        const Mat3<P> grad_u = displacement_gradient_of(p);
-        const Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
-                                      inverse_moment_of(p));
-        store_pair_stress(p, q);
-      }
+    for_each_law(runs, [&](const auto& law, const Run& run) {
+      run.hourglass > 0 ? find_stresses<true>(law, run) : find_stresses<false>(law, run);
     });
   }
+  template <bool Controlled, class Law>
+  void find_stresses(const Law& law, const Run& run) {
+    const PackRange range = run.range;
+    const P kappa(static_cast<Real>(run.hourglass));
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+    for (Index p = range.begin; p < range.end; ++p) {
+      Vec3<P> pull{P(Real(0)), P(Real(0)), P(Real(0))};
+      const Mat3<P> grad_u = displacement_gradient_of<Controlled>(p, &pull);
+      Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
+                              inverse_moment_of(p));
+      if constexpr (Controlled) {
+        q = with_hourglass(q, kappa, grad_u);
+        store3(pull_, p, pull_force(kappa, pull));
+      }
+      store_pair_stress(p, q);
+    }
+  }
 
-  /// Calls apply(law, packs) for each run of bodies, with the law its scene asks for: the one place
+  /// Calls apply(law, run) for each run of bodies, with the law its scene asks for: the one place
   /// where terms chosen at run time become code chosen at compile time.
   template <class Apply>
   static void for_each_law(const std::vector<Run>& runs, Apply&& apply) {
@@ -333,17 +381,16 @@ class CpuBackend final : public Backend {
       const Material& m = run.material;
       const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
-      const PackRange range = run.range;
       if (m.strain == Strain::green) {
         const GreenHooke<P> law{hooke};
         m.volume_stiffness > 0
-            ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, range)
-            : apply(law, range);
+            ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, run)
+            : apply(law, run);
       } else {
         const CauchyHooke<P> law{hooke};
         m.volume_stiffness > 0
-            ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, range)
-            : apply(law, range);
+            ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, run)
+            : apply(law, run);
       }
     }
   }
@@ -501,6 +548,7 @@ class CpuBackend final : public Backend {
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
   AlignedVector<Real> load_;  // empty unless the scene has loads
+  AlignedVector<Real> pull_;  // of hourglass control; empty unless the scene has any
   double load_scales_ = -1;
   std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
   SurfelState moved_surfels_;                     // of `update_surfels`

@@ -7,7 +7,9 @@
 #include <limits>
 
 #include "phyxel/error.hpp"
+#include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/stress.hpp"
+#include "solver/hourglass.hpp"
 #include "solver/totals.hpp"
 
 namespace phyxel {
@@ -60,6 +62,8 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
   backend.internal_forces(force);
   std::vector<Mat3d> gradient;
   backend.displacement_gradients(gradient);
+  std::vector<double> residual;
+  if (has_hourglass_control(model)) backend.fit_residuals(residual);
 
   // Total force with loads, for the velocity at t; the loads' potential on the way.
   Totals all;
@@ -84,6 +88,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
       const Material& m = part.material;
       const Hooke<double> hooke{m.lame_lambda(), m.lame_mu()};
       const VolumeConservation<double> volume_law{m.volume_stiffness};
+      const double kappa = hourglass_stiffness(model, part);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const Vec3d u = state.displacement[i], x = model.position[i] + u;
@@ -107,6 +112,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
         if (m.volume_stiffness > 0) {
           own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
         }
+        if (kappa > 0) own.hourglass_energy.add(hourglass_energy(kappa, residual[i]));
         own.inverted += VolumeConservation<double>::volume_change(gradient[i]) <= -1;
         own.internal_force.add(force[i]);
         own.internal_torque.add(cross(x, force[i]));
@@ -170,7 +176,6 @@ void StabilityWatch::check(const Diagnostics& now) {
         "of its material{}",
         body_of(now.fastest_phyxel), now.largest_speed, when, advice));
   }
-  const double elastic = now.strain_energy + now.volume_energy;
   const double gained = now.total_energy() - start_energy_;
   const double turnover = std::max({exchanged_, std::abs(now.gravity_energy + now.load_energy)});
   // Verlet's energy error is bounded by a share of what moves; gaining as much as has ever moved
@@ -181,7 +186,7 @@ void StabilityWatch::check(const Diagnostics& now) {
         "in motion; fastest is {}{}",
         gained, when, turnover, body_of(now.fastest_phyxel), advice));
   }
-  exchanged_ = std::max(exchanged_, now.kinetic_energy + elastic);
+  exchanged_ = std::max(exchanged_, now.kinetic_energy + now.elastic_energy());
 }
 
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,

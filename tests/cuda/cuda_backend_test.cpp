@@ -39,6 +39,7 @@ Scene scene_of(const Case& c) {
   if (c.everything) {
     first.material.volume_stiffness = 2e5;
     first.material.damping = 1.5;
+    if (!c.adaptive) first.material.hourglass = 0.2;  // and the second has none
     second.material.strain = Strain::cauchy;
     LoadRequest load;
     load.select.box = Selection::Box{{1.2, -1, -1}, {3, 3, 3}};
@@ -289,6 +290,8 @@ TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
   EXPECT_NEAR(d.kinetic_energy, e.kinetic_energy, 1e-12 * energy);
   EXPECT_NEAR(d.strain_energy, e.strain_energy, 1e-12 * energy);
   EXPECT_NEAR(d.volume_energy, e.volume_energy, 1e-12 * energy);
+  EXPECT_NEAR(d.hourglass_energy, e.hourglass_energy, 1e-12 * energy);
+  EXPECT_EQ(e.hourglass_energy > 0, GetParam().everything && !GetParam().adaptive);
   EXPECT_NEAR(d.gravity_energy, e.gravity_energy, 1e-12 * energy);
   EXPECT_NEAR(d.load_energy, e.load_energy, 1e-12 * energy);
   EXPECT_GT(e.kinetic_energy, 0.1 * energy);

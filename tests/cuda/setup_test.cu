@@ -253,6 +253,7 @@ TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
       Bodies b = overlapping();
       b.scene.bodies[1].material.strain = strain;
       if (volume) b.scene.bodies[1].material.volume_stiffness = 3e6;
+      if (volume) b.scene.bodies[1].material.hourglass = 5;  // so that it sets the limit
       const Model model = build_model(b.scene, b.clouds);
       const StepLimit expected = step_limit(model);
       const std::pair<Precision, double> precisions[] = {

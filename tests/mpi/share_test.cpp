@@ -45,6 +45,14 @@ Model everything() {
   return build_model(scene);
 }
 
+/// A cube whose hourglass modes are held.
+Model controlled() {
+  Scene scene = testing::one_body();
+  scene.bodies[0].material.hourglass = 0.2;
+  scene.bodies[0].spin = {1, 2, 3};
+  return testing::model_of(scene, testing::lattice(12, 11, 10, 0.1, 0.3));
+}
+
 struct ShareCase {
   const char* name;
   Model (*make)();
@@ -52,7 +60,8 @@ struct ShareCase {
 const std::vector<ShareCase>& share_cases() {
   static const std::vector<ShareCase> cases{
       {"Cube", testing::cube},   {"Coil", testing::coil}, {"Thread", testing::thread},
-      {"Apart", testing::apart}, {"Tiny", testing::tiny}, {"Everything", everything}};
+      {"Apart", testing::apart}, {"Tiny", testing::tiny}, {"Everything", everything},
+      {"Controlled", controlled}};
   return cases;
 }
 

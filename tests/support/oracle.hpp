@@ -17,6 +17,7 @@ struct Body {
   std::vector<double> v, h;
   std::vector<std::vector<int>> neighbours;
   double young = 0, poisson = 0, volume_stiffness = 0;
+  double hourglass = 0;  // κ [N/m]
   bool green = true;
 };
 
@@ -83,8 +84,28 @@ inline M3 stress(const Body& b, const M3& e) {
   return sigma;
 }
 
-inline double energy(const Body& b, const std::vector<V3>& u) {
+/// What the linear fit at i leaves of the motion of j.
+inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
+  return u[j] - u[i] - g * (b.x[j] - b.x[i]);
+}
+/// (1 - r²/h²)³: w without its unit.
+inline double shape(const Body& b, int i, int j) {
+  return w((b.x[j] - b.x[i]).norm(), b.h[i]) / w(0, b.h[i]);
+}
+
+inline double hourglass_energy(const Body& b, const std::vector<V3>& u) {
   double total = 0;
+  for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
+    const M3 g = grad_u(b, u, i);
+    for (const int j : b.neighbours[i]) {
+      total += 0.5 * b.hourglass * shape(b, i, j) * residual(b, u, g, i, j).squaredNorm();
+    }
+  }
+  return total;
+}
+
+inline double energy(const Body& b, const std::vector<V3>& u) {
+  double total = b.hourglass > 0 ? hourglass_energy(b, u) : 0;
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const M3 g = grad_u(b, u, i), e = strain(b, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
@@ -110,7 +131,8 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     }
     for (const int n : b.neighbours[i]) {
       const V3 xij = b.x[n] - b.x[i];
-      const V3 push = -b.v[i] * p * (a * xij * w(xij.norm(), b.h[i]));
+      V3 push = -b.v[i] * p * (a * xij * w(xij.norm(), b.h[i]));
+      if (b.hourglass > 0) push -= b.hourglass * shape(b, i, n) * residual(b, u, g, i, n);
       f[n] += push;
       f[i] -= push;
     }

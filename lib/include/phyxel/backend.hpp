@@ -66,6 +66,10 @@ class Backend {
   virtual void internal_forces(std::vector<Vec3d>& force) = 0;
   /// Displacement gradients at the present displacements, shape [n].
   virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
+  /// Σ_j w_ij |u_j - u_i - ∇u_i x_ij|² at the present displacements [m²], shape [n]: what hourglass
+  /// control holds small.
+  /// @throws InputError if this backend has no such control.
+  virtual void fit_residuals(std::vector<double>& residual);
   /// Energies, momenta and the rest of the present state, at `time`, where the device sums them
   /// itself; nothing where that is left to the host (see `diagnose`).
   virtual std::optional<Diagnostics> diagnostics([[maybe_unused]] double time,

@@ -17,7 +17,9 @@ struct Material {
   Strain strain = Strain::green;
   double volume_stiffness =
       0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
-  double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
+  double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
+  double hourglass = 0;  ///< Strength α of hourglass control, in shares of E; 0: none. Needs one
+                         ///< support for the body.
 
   /// Lamé's first parameter [Pa].
   double lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }

@@ -29,10 +29,13 @@ struct Diagnostics {
   double kinetic_energy = 0;  ///< [J], at t (velocity centred with the force).
   double strain_energy = 0;   ///< [J]
   double volume_energy = 0;   ///< [J], of the volume-conservation term.
+  double hourglass_energy = 0;  ///< [J], of hourglass control.
   double gravity_energy = 0;  ///< [J], zero at rest.
   double load_energy = 0;     ///< [J], potential of the point and body loads.
+  /// [J], of the deformation.
+  double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
   double total_energy() const {
-    return kinetic_energy + strain_energy + volume_energy + gravity_energy + load_energy;
+    return kinetic_energy + elastic_energy() + gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

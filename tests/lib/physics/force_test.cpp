@@ -3,6 +3,7 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/oracle.hpp"
@@ -18,6 +19,7 @@ struct Terms {
   double volume_stiffness;
   NeighbourhoodRule::Support support;
   std::optional<int> max_neighbours;
+  double hourglass = 0;
 };
 
 void PrintTo(const Terms& terms, std::ostream* out) { *out << terms.name; }
@@ -29,6 +31,8 @@ const Terms all_terms[] = {
     {"CauchyVolumeAdaptive", Strain::cauchy, 3e5, NeighbourhoodRule::Support::adaptive, {}},
     {"GreenAdaptive", Strain::green, 0, NeighbourhoodRule::Support::adaptive, {}},
     {"GreenVolumeCapped", Strain::green, 2e5, NeighbourhoodRule::Support::adaptive, 12},
+    {"GreenHourglass", Strain::green, 0, NeighbourhoodRule::Support::uniform, {}, 0.3},
+    {"CauchyVolumeHourglass", Strain::cauchy, 2e5, NeighbourhoodRule::Support::uniform, {}, 0.1},
 };
 
 /// An irregular cloud of 5 x 4 x 6 phyxels with the given terms.
@@ -42,6 +46,7 @@ Case make_case(const Terms& terms) {
   Material material = rubber();
   material.strain = terms.strain;
   material.volume_stiffness = terms.volume_stiffness;
+  material.hourglass = terms.hourglass;
   NeighbourhoodRule rule;
   rule.support = terms.support;
   rule.max_neighbours = terms.max_neighbours;
@@ -59,6 +64,15 @@ Case make_case(const Terms& terms) {
   c.body.poisson = material.poisson;
   c.body.green = terms.strain == Strain::green;
   c.body.volume_stiffness = terms.volume_stiffness;
+  // κ = α E v / tr A, where tr A sums w r² over a continuum of density 1 / v: by many shells.
+  const double h = c.body.h[0], v = c.model.parts[0].volume / c.model.size();
+  double sum = 0;
+  const int shells = 100'000;
+  for (int k = 0; k < shells; ++k) {
+    const double t = (k + 0.5) / shells;
+    sum += std::pow(1 - t * t, 3) * t * t * 4 * M_PI * t * t / shells;
+  }
+  c.body.hourglass = terms.hourglass * material.young * v * v / (sum * std::pow(h, 5));
   return c;
 }
 
@@ -91,8 +105,10 @@ TEST_P(Force, EqualsTheOracle) {
   const double scale = largest_norm(expected);
   // Double: some 40 neighbours' rounding through an inverse matrix. Float: the same at 6e-8, with
   // strains of order one.
+  // Hourglass control is known to the shells of its oracle.
+  const double exact = GetParam().hourglass > 0 ? 1e-9 : 1e-12;
   const std::pair<Precision, double> cases[] = {
-      {Precision::double_, 1e-12}, {Precision::single, 2e-5}, {Precision::mixed, 2e-5}};
+      {Precision::double_, exact}, {Precision::single, 2e-5}, {Precision::mixed, 2e-5}};
   for (const auto& [precision, tolerance] : cases) {
     const auto force = backend_forces(c.model, c.u, precision);
     double worst = 0;
@@ -131,7 +147,9 @@ TEST_P(Force, ReportedEnergyIsTheOracles) {
   backend->upload(state_of(c.u));
   const Diagnostics d = diagnose(c.model, *backend, 0, 1e-3);
   const double expected = oracle::energy(c.body, to_eigen(c.u));
-  EXPECT_NEAR(d.strain_energy + d.volume_energy, expected, 1e-12 * expected);
+  EXPECT_NEAR(d.elastic_energy(), expected, 1e-9 * expected);  // κ's shells: 1e-10
+  EXPECT_NEAR(d.hourglass_energy, oracle::hourglass_energy(c.body, to_eigen(c.u)), 1e-9 * expected);
+  EXPECT_EQ(d.hourglass_energy > 0, GetParam().hourglass > 0);
   EXPECT_EQ(d.volume_energy > 0, GetParam().volume_stiffness > 0);
 }
 
@@ -184,10 +202,49 @@ TEST_P(Force, TranslationAndRotationCostNothing) {
   // of 0.01 m² a phyxel.
   EXPECT_LT(d.force_scale, 1e-13 * 1e5 * 0.01 * c.model.size());
   EXPECT_LT(d.strain_energy, 1e-20);
+  EXPECT_LT(d.hourglass_energy, 1e-20);
 }
 
 INSTANTIATE_TEST_SUITE_P(Terms, Force, ::testing::ValuesIn(all_terms),
                          [](const auto& test) { return std::string(test.param.name); });
+
+/// Every second layer of phyxels to one side, the others to the other: a motion whose gradient is
+/// zero where neighbours lie symmetrically, so that hourglass control alone holds it.
+TEST(Force, HourglassModesAreSeenByTheResidualAlone) {
+  Material material = rubber();
+  material.hourglass = 0.1;
+  const Model model = model_of(one_body(material), lattice(9, 9, 9, 0.1, 0));
+  std::vector<Vec3d> u;
+  for (Index i = 0; i < model.size(); ++i) {
+    const auto row = static_cast<int>(model.position[i].x / 0.1);
+    u.push_back({0, row % 2 ? 0.001 : -0.001, 0});
+  }
+  const auto backend = make_test_backend(model, Precision::double_);
+  backend->upload(state_of(u));
+  std::vector<Mat3d> gradient;
+  backend->displacement_gradients(gradient);
+  std::vector<double> residual;
+  backend->fit_residuals(residual);
+  const Index centre = 4 + 9 * (4 + 9 * 4);
+  for (int e = 0; e < 9; ++e) EXPECT_NEAR(gradient[centre](e / 3, e % 3), 0, 1e-16);  // of 0.02
+  const double h = model.neighbourhood.support[centre];
+  double expected = 0;
+  for (const Index j : model.neighbourhood.neighbours.row(centre)) {
+    const Vec3d x = model.position[j] - model.position[centre];
+    const double apart = norm(u[j] - u[centre]);
+    expected += std::pow(1 - dot(x, x) / (h * h), 3) * apart * apart;
+  }
+  EXPECT_GT(expected, 1e-6);
+  EXPECT_NEAR(residual[centre], expected, 1e-13 * expected);
+}
+
+TEST(Force, HourglassControlNeedsOneSupport) {
+  Material material = rubber();
+  material.hourglass = 0.1;
+  NeighbourhoodRule rule;
+  rule.support = NeighbourhoodRule::Support::adaptive;
+  EXPECT_THROW(model_of(one_body(material, rule), lattice(4, 4, 4, 0.1, 0)), InputError);
+}
 
 TEST(Force, CauchyStrainSeesARotationAsStrain) {
   Terms terms = all_terms[1];

@@ -35,6 +35,7 @@ std::string digest(const Scene& s) {
     for (const Vec3d v : {b.rotation, b.translation, b.velocity, b.spin}) vector(v);
     text << static_cast<int>(b.volume_rule) << ' ' << static_cast<int>(b.material.strain) << ' '
          << b.material.volume_stiffness << ' ' << b.material.damping << ' '
+         << b.material.hourglass << ' '
          << static_cast<int>(b.neighbourhood.support) << ' ' << b.neighbourhood.nearest << ' '
          << b.neighbourhood.factor << '\n';
     for (const MotionRequest& m : b.motions) {
@@ -76,7 +77,7 @@ TEST_F(SceneFiles, DocumentedDefaultsAreTheDefaults) {
       defaults_of("body.material") + "[body.neighbours]\n" + defaults_of("body.neighbours") +
       motion + defaults_of("body.motion", {"displacement", "amplitude"}) + load +
       defaults_of("body.load", {"force_density"}) + mesh +
-      defaults_of("body", {"jitter", "surfels"}) + material;
+      defaults_of("body", {"lattice", "jitter", "surfels"}) + material;
   const fs::path file = folder_ / "s.toml";
   EXPECT_EQ(digest(parse_scene(without, file)), digest(parse_scene(with, file)));
 }

@@ -45,6 +45,7 @@ name = "bar"
 shape = "block"
 size = [1, 2, 3]
 spacing = 0.25
+lattice = "nodes"
 jitter = 0.1
 seed = 7
 surfels = false
@@ -61,6 +62,7 @@ density = 1234
 strain = "cauchy"
 volume_stiffness = 5e4
 damping = 0.125
+hourglass = 0.0625
 [body.neighbours]
 support = "adaptive"
 nearest = 12
@@ -121,6 +123,7 @@ TEST(Scene, BodyKeysAreReadExactly) {
   EXPECT_EQ(body.source.shape.name, "block");
   expect_vector(body.source.shape.size, {1, 2, 3});
   EXPECT_EQ(body.source.shape.spacing, 0.25);
+  EXPECT_EQ(body.source.shape.placement, ShapeRequest::Placement::nodes);
   EXPECT_EQ(body.source.shape.jitter, 0.1);
   EXPECT_EQ(body.source.seed, 7u);
   EXPECT_EQ(body.source.shape.seed, 7u);
@@ -139,6 +142,7 @@ TEST(Scene, BodyKeysAreReadExactly) {
   EXPECT_EQ(body.material.strain, Strain::cauchy);
   EXPECT_EQ(body.material.volume_stiffness, 5e4);
   EXPECT_EQ(body.material.damping, 0.125);
+  EXPECT_EQ(body.material.hourglass, 0.0625);
   EXPECT_EQ(body.neighbourhood.support, NeighbourhoodRule::Support::adaptive);
   EXPECT_EQ(body.neighbourhood.nearest, 12);
   EXPECT_EQ(body.neighbourhood.factor, 3);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -253,6 +254,41 @@ TEST(Shapes, TheSpacingGivesTheCountAskedFor) {
   ShapeRequest cube{.name = "block", .size = {1, 1, 1}};
   EXPECT_NEAR(spacing_for(cube, 1000), 0.1, rounding);
   EXPECT_NEAR(spacing_for(cube, 1), 1, rounding);
+}
+
+/// Nodes fill the box to its faces, and share its volume out.
+TEST(Shapes, NodesLieOnFacesEdgesAndCorners) {
+  ShapeRequest request = beam();
+  request.size = {2, 0.5, 0.25};
+  request.spacing = 0.0625;
+  request.placement = ShapeRequest::Placement::nodes;
+  for (const double jitter : {0.0, 0.5}) {
+    request.jitter = jitter;
+    const Cloud cloud = make_shape(request);
+    ASSERT_EQ(cloud.position.size(), 33u * 9 * 5);
+    double volume = 0;
+    std::map<double, int> shares;
+    for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+      const Vec3d p = cloud.position[i];
+      volume += cloud.volume[i];
+      ++shares[cloud.volume[i] / (0.0625 * 0.0625 * 0.0625)];
+      const int faces = (p.x == 0 || p.x == 2) + (std::abs(p.y) == 0.25) + (std::abs(p.z) == 0.125);
+      EXPECT_EQ(cloud.volume[i], std::ldexp(0.0625 * 0.0625 * 0.0625, -faces));
+      EXPECT_TRUE(p.x >= 0 && p.x <= 2 && std::abs(p.y) <= 0.25 && std::abs(p.z) <= 0.125);
+    }
+    EXPECT_NEAR(volume, 0.25, rounding);
+    EXPECT_EQ(shares[0.125], 8);                      // corners
+    EXPECT_EQ(shares[0.25], 4 * (31 + 7 + 3));        // edges
+    EXPECT_EQ(shares[1], 31 * 7 * 3);                 // inside
+    for (const Index i : cloud.regions.at("x-")) EXPECT_EQ(cloud.position[i].x, 0);
+    for (const Index i : cloud.regions.at("z+")) EXPECT_EQ(cloud.position[i].z, 0.125);
+    EXPECT_EQ(cloud.regions.at("x-").size(), 45u);
+    EXPECT_EQ(cloud.regions.at("z+").size(), 33u * 9);
+  }
+  EXPECT_NEAR(spacing_for(request, 33 * 9 * 5), 0.0625, 0.003);
+  ShapeRequest ball = sphere();
+  ball.placement = ShapeRequest::Placement::nodes;
+  EXPECT_THAT(message_of(ball), AllOf(HasSubstr("nodes"), HasSubstr("beam and block")));
 }
 
 // --- Refusals -----------------------------------------------------------------------------------

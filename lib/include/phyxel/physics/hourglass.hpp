@@ -1,0 +1,63 @@
+/// Hourglass control: what a phyxel's linear fit does not follow, costs energy,
+///   Σ_i ½ κ Σ_j w_ij |r_ij|²,   r_ij = u_j - u_i - ∇u_i x_ij,
+/// so that motions which no ∇u sees (hourglass modes) are held. Affine motions cost nothing, and
+/// rotations turn r without stretching it: both momenta are conserved. Sources: the energy is that
+/// of Ganzenmüller 2015 (An hourglass control algorithm for Lagrangian smooth particle
+/// hydrodynamics) with the weights of the moment matrix in place of w / r². With these,
+/// Σ_j w_ij r_ij x_ijᵀ = 0, since ∇u_i is the fit that makes phyxel i's share smallest; its
+/// derivative by ∇u_i vanishes, and with symmetric lists and weights
+///   f_i = 2 κ Σ_j w_ij (u_j - u_i)  -  κ Σ_j w_ij (∇u_i + ∇u_j) x_ij.
+/// The second part is that of a pair stress -κ ∇u (see force.hpp): the second pass does not change.
+#pragma once
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// κ [N/m] = α E v / tr A of a phyxel amid a uniform cloud: a residual of a tenth of the distance
+/// then costs α times what a strain of a tenth costs a rod of modulus E. tr A is that of a
+/// continuum, 4π h⁵/v ∫ (1 - t²)³ t⁴ dt from 0 to 1.
+/// @param strength α, without unit
+/// @param volume v of a phyxel [m³]
+/// @param support h [m]
+inline double hourglass_stiffness(double strength, double young, double volume, double support) {
+  constexpr double integral = 1.0 / 5 - 3.0 / 7 + 3.0 / 9 - 1.0 / 11;
+  constexpr double sphere = 4 * 3.14159265358979323846;
+  if (!(support > 0)) return 0;
+  return strength * young * (volume / support) * (volume / support) /
+         (sphere * integral * support * support * support);
+}
+
+/// Adds one neighbour's share of Σ_j w_ij (u_j - u_i).
+template <class Real>
+PHYXEL_HD void add_pull(Vec3<Real>& sum, Vec3<Real> u_ij, Real w) {
+  sum = fused(w, u_ij, sum);
+}
+
+/// 2 κ Σ_j w_ij (u_j - u_i) [N]. @param pull the sum
+template <class Real>
+PHYXEL_HD Vec3<Real> pull_force(Real kappa, Vec3<Real> pull) {
+  return (Real(2) * kappa) * pull;
+}
+
+/// Q - κ ∇u.
+template <class Real>
+PHYXEL_HD Mat3<Real> with_hourglass(const Mat3<Real>& pair_stress, Real kappa,
+                                    const Mat3<Real>& grad_u) {
+  return fused(-kappa, grad_u, pair_stress);
+}
+
+/// Adds one neighbour's share of Σ_j w_ij |r_ij|² [m²].
+template <class Real>
+PHYXEL_HD void add_residual(Real& sum, Vec3<Real> u_ij, const Mat3<Real>& grad_u, Vec3<Real> x_ij,
+                            Real w) {
+  const Vec3<Real> r = u_ij - grad_u * x_ij;
+  sum = fused(w, dot(r, r), sum);
+}
+
+/// ½ κ Σ_j w_ij |r_ij|² [J].
+PHYXEL_HD double hourglass_energy(double kappa, double residual) {
+  return 0.5 * kappa * residual;
+}
+
+}  // namespace phyxel
