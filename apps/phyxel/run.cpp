@@ -147,8 +147,7 @@ class Run {
         now = in_phase("energies",
                        [&] { return diagnose(model(), backend, solver.steps(), solver.dt()); });
         watch.check(now);
-        peak_energy_ =
-            std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
+        peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
         auto good = good_state(now);
         look_seconds = seconds_since(look_start);
         if (frame) write_frame(good);

@@ -198,7 +198,7 @@ struct Gradients {
   Real* values;
   std::size_t stride;
   const Index* tile_of_block;  ///< Null: all.
-  Real* residuals = nullptr;   ///< What the gradients do not follow (`add_residual`); null: unasked.
+  Real* residuals = nullptr;  ///< What the gradients do not follow (`add_residual`); null: unasked.
 };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
@@ -267,8 +267,8 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
 }
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
-/// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of loads
-/// and pulls is added.
+/// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of
+/// loads and pulls is added.
 template <class Real, class StateReal, bool own_supports, bool damped, bool more, bool only_force,
           class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)

@@ -183,10 +183,10 @@ class Passes {
     const bool more = !m_.model().loads.empty() || m_.fields().pull;
     if (m.damping > 0) {
       return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
-                    : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;
+                  : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;
     }
     return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
-                  : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
+                : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
   }
 
   template <class Others>

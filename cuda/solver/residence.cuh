@@ -26,8 +26,8 @@ class Residence {
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
   }
   std::size_t bytes() const {
-    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() + weights_.bytes() +
-           destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
+    return slices_.bytes() + slice_of_block_.bytes() + place_.bytes() + pairs_.bytes() +
+           weights_.bytes() + destinations_.bytes() + displacements_.bytes() + stresses_.bytes();
   }
 
   void launch(double dt, int steps, Trail<Real, StateReal> trail = {}) {
@@ -67,12 +67,17 @@ class Residence {
       displacements_ = {displacement_letters<Real> * m_.places(), what};
       stresses_ = {stress_letters<Real> * m_.places(), what};
     }
-    view_ = {slices_.data(),         place_.data(),
-             pairs_.data(),          weights_.data(),
-             destinations_.data(),   slice_of_block_.data(),
-             displacements_.data(),  stresses_.data(),
+    view_ = {slices_.data(),
+             place_.data(),
+             pairs_.data(),
+             weights_.data(),
+             destinations_.data(),
+             slice_of_block_.data(),
+             displacements_.data(),
+             stresses_.data(),
              plan.most_slots,
-             plan.most_destinations, {plan.longest[0], second_longest(plan)}};
+             plan.most_destinations,
+             {plan.longest[0], second_longest(plan)}};
     clear_mail();
     return true;
   }
@@ -108,9 +113,9 @@ class Residence {
                   ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, true>)
                   : reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, false>);
     threads_ = Post::threads;
-    shared_bytes_ =
-        ResidentMemory<Real>::bytes(plan.most_slots, plan.longest[0], second_longest(plan), hourglass(),
-                                    Post::bytes(plan.most_slots, plan.most_destinations));
+    shared_bytes_ = ResidentMemory<Real>::bytes(
+        plan.most_slots, plan.longest[0], second_longest(plan), hourglass(),
+        Post::bytes(plan.most_slots, plan.most_destinations));
   }
   /// One cluster a body, as many blocks each as the largest has slices.
   bool fits_clusters(const ResidentPlan& plan) {

@@ -443,9 +443,9 @@ __device__ void fetch_weights(const ResidentView<Real>& r, const Slice::Rows& ro
   }
 }
 
-/// Calls visit(numbers of the neighbour, w x, number of the entry) in the order of the list, with the next group's pairs
-/// under way. A longer loop, with the next group's numbers under way too, is slower: a warp or two
-/// on a multiprocessor wait for its instructions.
+/// Calls visit(numbers of the neighbour, w x, number of the entry) in the order of the list, with
+/// the next group's pairs under way. A longer loop, with the next group's numbers under way too, is
+/// slower: a warp or two on a multiprocessor wait for its instructions.
 template <class Real, int letters, class Visit>
 __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image, Visit&& visit) {
   constexpr int numbers = letters * Mail<Real>::numbers;

@@ -52,8 +52,8 @@ class Filling {
     Cloud& cloud = made.cloud;
     const auto phyxels = static_cast<std::size_t>(first_[end] - first_[begin]);
     cloud.position.resize(phyxels);
-    const double inner =
-        lattice_.nodes ? cell_.x * cell_.y * cell_.z : lattice_.volume() / static_cast<double>(whole);
+    const double inner = lattice_.nodes ? cell_.x * cell_.y * cell_.z
+                                        : lattice_.volume() / static_cast<double>(whole);
     cloud.volume.assign(phyxels, inner);
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::ptrdiff_t b = begin; b < end; ++b) {

@@ -1,4 +1,5 @@
-/// Boxes, cylinders and spheres filled by a lattice of cells with a phyxel in each, or at each corner.
+/// Boxes, cylinders and spheres filled by a lattice of cells with a phyxel in each, or at each
+/// corner.
 #pragma once
 
 #include <array>
@@ -33,8 +34,8 @@ struct Lattice {
 Lattice make_lattice(const ShapeRequest& request, double spacing);
 
 /// A phyxel at each place in the solid, all with the same volume but for shares of nodes on faces,
-/// in the order of a Morton curve over the places; with regions. Phyxels are moved by up to `jitter`
-/// cells in each direction, but not out of the solid, nor off its faces.
+/// in the order of a Morton curve over the places; with regions. Phyxels are moved by up to
+/// `jitter` cells in each direction, but not out of the solid, nor off its faces.
 CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t seed,
                         Piece piece = {});
 

@@ -159,9 +159,8 @@ class CpuBackend final : public Backend {
     for (Index p = 0; p < layout_.packs(); ++p) {
       const Mat3<P> grad_u = displacement_gradient_of<false>(p, nullptr);
       P sum(Real(0));
-      visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
-        add_residual(sum, u_ij, grad_u, x_ij, w);
-      });
+      visit_neighbours(
+          p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) { add_residual(sum, u_ij, grad_u, x_ij, w); });
       for (int l = 0; l < W; ++l) by_slot[p * W + l] = sum[l];
     }
     residual.resize(static_cast<std::size_t>(model_.size()));
@@ -295,8 +294,7 @@ class CpuBackend final : public Backend {
       const double hourglass = hourglass_stiffness(model_, model_.parts[part]);
       const PackRange range = (layout_.*range_of)(part);
       if (range.begin == range.end) continue;
-      if (!runs.empty() && runs.back().material == material &&
-          runs.back().hourglass == hourglass) {
+      if (!runs.empty() && runs.back().material == material && runs.back().hourglass == hourglass) {
         runs.back().range.end = range.end;
       } else {
         runs.push_back({material, hourglass, range});

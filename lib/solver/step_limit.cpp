@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "exact_sum.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/owned_vectors.hpp"
 #include "solver/start_vector.hpp"
 
 namespace phyxel {
@@ -19,93 +19,55 @@ namespace {
 class CpuVibration final : public Vibration {
  public:
   CpuVibration(const Model& model, int threads)
-      : model_(model), backend_(make_cpu_backend(model, Precision::double_, threads)) {
-    const auto n = static_cast<std::size_t>(model.size());
-    previous_.resize(n);
-    current_.resize(n);
-    next_.resize(n);
-    for_owned([&](Index i) { current_[i] = start_component(model.number(i)); });
-    const double length = std::sqrt(product(current_, current_));
-    for_owned([&](Index i) { current_[i] = current_[i] / length; });
-    state_.displacement.resize(n);
-    state_.velocity.resize(n);
-    for (Index i = 0; i < model.size(); ++i) {
-      const double h = model.neighbourhood.support[i];
-      if (h > 0) smallest_support_ = std::min(smallest_support_, h);
-    }
-    if (model.share) smallest_support_ = model.share->others->smallest(smallest_support_);
+      : model_(model),
+        backend_(make_cpu_backend(model, Precision::double_, threads)),
+        vectors_(model, backend_->threads()),
+        previous_(vectors_.make()),
+        current_(vectors_.make()),
+        next_(vectors_.make()),
+        smallest_support_(vectors_.smallest_support()) {
+    vectors_.for_each([&](Index i) { current_[i] = start_component(model.number(i)); });
+    const double length = std::sqrt(vectors_.product(current_, current_));
+    vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
+    state_.displacement = vectors_.make();
+    state_.velocity = vectors_.make();
   }
 
   double apply(double beta) override {
-    double largest = 0;
-    for (const Part& part : model_.parts) {
-      for (Index i = part.begin; i < part.owned_end(); ++i) {
-        largest = std::max(largest, norm(current_[i]) / std::sqrt(model_.mass[i]));
-      }
-    }
-    if (model_.share) largest = model_.share->others->largest(largest);
+    const double largest =
+        vectors_.largest([&](Index i) { return norm(current_[i]) / std::sqrt(model_.mass[i]); });
     // Strains of 1e-8: second-order terms are 1e-8 of the force, rounding 1e-8 of the strain.
     const double amplitude = 1e-8 * smallest_support_ / largest;
-    for_owned([&](Index i) {
+    vectors_.for_each([&](Index i) {
       state_.displacement[i] = (amplitude / std::sqrt(model_.mass[i])) * current_[i];
     });
-    if (model_.share) refresh_ghosts();
+    vectors_.refresh_ghosts(state_.displacement);
     backend_->upload(state_);
     backend_->internal_forces(force_);
-    for_owned([&](Index i) {
+    vectors_.for_each([&](Index i) {
       next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * force_[i] - beta * previous_[i];
     });
-    return product(next_, current_);
+    return vectors_.product(next_, current_);
   }
 
   double subtract(double alpha) override {
-    for_owned([&](Index i) { next_[i] -= alpha * current_[i]; });
-    return std::sqrt(product(next_, next_));
+    vectors_.for_each([&](Index i) { next_[i] -= alpha * current_[i]; });
+    return std::sqrt(vectors_.product(next_, next_));
   }
 
   void advance(double norm) override {
     previous_.swap(current_);
-    for_owned([&](Index i) { current_[i] = next_[i] / norm; });
+    vectors_.for_each([&](Index i) { current_[i] = next_[i] / norm; });
   }
 
  private:
-  using Vectors = std::vector<Vec3d>;
-
-  template <class Each>
-  void for_owned(Each&& each) const {
-    for (const Part& part : model_.parts) {
-#pragma omp parallel for schedule(static) num_threads(backend_->threads())
-      for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
-    }
-  }
-  double product(const Vectors& a, const Vectors& b) const {
-    ExactSum all;
-#pragma omp parallel num_threads(backend_->threads())
-    {
-      ExactSum own;
-      for (const Part& part : model_.parts) {
-#pragma omp for schedule(static) nowait
-        for (Index i = part.begin; i < part.owned_end(); ++i) own.add(dot(a[i], b[i]));
-      }
-#pragma omp critical
-      all.add(own);
-    }
-    if (model_.share) model_.share->others->add(all.ready());
-    return all.value();
-  }
-  void refresh_ghosts() {
-    const Others& others = *model_.share->others;
-    others.begin({reinterpret_cast<std::byte*>(state_.displacement.data()), sizeof(Vec3d),
-                  sizeof(Vec3d), nullptr});
-    others.finish();
-  }
-
   const Model& model_;
   std::unique_ptr<Backend> backend_;
-  Vectors previous_, current_, next_;
+  OwnedVectors vectors_;
+  OwnedVectors::Vector previous_, current_, next_;
   State state_;
   std::vector<Vec3d> force_;
-  double smallest_support_ = std::numeric_limits<double>::infinity();
+  double smallest_support_;
 };
 
 /// An upper bound of the largest eigenvalue of a tridiagonal matrix that a residual `beta` may

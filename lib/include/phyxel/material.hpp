@@ -16,7 +16,7 @@ struct Material {
   double density = 0;  ///< [kg/m^3], > 0.
   Strain strain = Strain::green;
   double volume_stiffness =
-      0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
+      0;                 ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
   double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
   double hourglass = 0;  ///< Strength α of hourglass control, in shares of E; 0: none. Needs one
                          ///< support for the body.

@@ -11,10 +11,10 @@ namespace phyxel {
 /// Request for a built-in shape. Which members matter depends on the shape:
 /// "beam", "block": `size` (beam lies along x, its end x = 0 at the origin and its axis on the
 /// x axis; the block is centred on the origin); "cylinder": `radius`, `length` (along z, centred);
-/// "sphere": `radius` (centred). These are filled by a lattice of `spacing`, each phyxel moved by up
-/// to `jitter` spacings in each direction, but not off a face that it lies on.
-/// "alien_head" (238 phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504):
-/// the bodies of Farias et al. 2008, section 6; their counts are fixed, about 1 m tall.
+/// "sphere": `radius` (centred). These are filled by a lattice of `spacing`, each phyxel moved by
+/// up to `jitter` spacings in each direction, but not off a face that it lies on. "alien_head" (238
+/// phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
+/// et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
   /// Where a lattice has its phyxels. `cells`: one in the middle of each cell. `nodes`: one at each
   /// corner of cells, so on the body's faces, edges and corners too, with its share of the volume
@@ -23,11 +23,11 @@ struct ShapeRequest {
   enum class Placement { cells, nodes };
 
   std::string name;
-  Vec3d size;              ///< Extents [m].
-  double radius = 0;       ///< [m]
-  double length = 0;       ///< [m]
-  double spacing = 0;      ///< Lattice spacing [m].
-  double jitter = 0;       ///< Fraction of the spacing, 0 to 0.5.
+  Vec3d size;          ///< Extents [m].
+  double radius = 0;   ///< [m]
+  double length = 0;   ///< [m]
+  double spacing = 0;  ///< Lattice spacing [m].
+  double jitter = 0;   ///< Fraction of the spacing, 0 to 0.5.
   Placement placement = Placement::cells;
   std::uint64_t seed = 1;  ///< Of the jitter; the same on any number of threads.
   bool surface = true;     ///< Whether to make surfels.

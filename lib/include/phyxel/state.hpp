@@ -25,13 +25,13 @@ struct SurfelState {
 /// Energies and conserved quantities at one instant, all bodies together.
 struct Diagnostics {
   std::int64_t step = 0;
-  double time = 0;            ///< [s]
-  double kinetic_energy = 0;  ///< [J], at t (velocity centred with the force).
-  double strain_energy = 0;   ///< [J]
-  double volume_energy = 0;   ///< [J], of the volume-conservation term.
+  double time = 0;              ///< [s]
+  double kinetic_energy = 0;    ///< [J], at t (velocity centred with the force).
+  double strain_energy = 0;     ///< [J]
+  double volume_energy = 0;     ///< [J], of the volume-conservation term.
   double hourglass_energy = 0;  ///< [J], of hourglass control.
-  double gravity_energy = 0;  ///< [J], zero at rest.
-  double load_energy = 0;     ///< [J], potential of the point and body loads.
+  double gravity_energy = 0;    ///< [J], zero at rest.
+  double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// [J], of the deformation.
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
   double total_energy() const {

@@ -154,7 +154,7 @@ TEST(Scene, BoundaryKeysAreReadExactly) {
   const BodyRequest body = parse_scene(full_scene, "all.toml").bodies.at(0);
   ASSERT_EQ(body.fixed.size(), 2u);
   EXPECT_EQ(body.fixed[0].select.region, "x-");
-  EXPECT_EQ(body.fixed[0].select.where, "all.toml:51:10");
+  EXPECT_EQ(body.fixed[0].select.where, "all.toml:53:10");
   EXPECT_EQ(body.fixed[1].select.indices, (std::vector<Index>{5, 3}));
   ASSERT_EQ(body.motions.size(), 1u);
   const MotionRequest& motion = body.motions[0];

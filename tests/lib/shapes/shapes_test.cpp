@@ -277,9 +277,9 @@ TEST(Shapes, NodesLieOnFacesEdgesAndCorners) {
       EXPECT_TRUE(p.x >= 0 && p.x <= 2 && std::abs(p.y) <= 0.25 && std::abs(p.z) <= 0.125);
     }
     EXPECT_NEAR(volume, 0.25, rounding);
-    EXPECT_EQ(shares[0.125], 8);                      // corners
-    EXPECT_EQ(shares[0.25], 4 * (31 + 7 + 3));        // edges
-    EXPECT_EQ(shares[1], 31 * 7 * 3);                 // inside
+    EXPECT_EQ(shares[0.125], 8);                // corners
+    EXPECT_EQ(shares[0.25], 4 * (31 + 7 + 3));  // edges
+    EXPECT_EQ(shares[1], 31 * 7 * 3);           // inside
     for (const Index i : cloud.regions.at("x-")) EXPECT_EQ(cloud.position[i].x, 0);
     for (const Index i : cloud.regions.at("z+")) EXPECT_EQ(cloud.position[i].z, 0.125);
     EXPECT_EQ(cloud.regions.at("x-").size(), 45u);

@@ -56,8 +56,6 @@ PHYXEL_HD void add_residual(Real& sum, Vec3<Real> u_ij, const Mat3<Real>& grad_u
 }
 
 /// ½ κ Σ_j w_ij |r_ij|² [J].
-PHYXEL_HD double hourglass_energy(double kappa, double residual) {
-  return 0.5 * kappa * residual;
-}
+PHYXEL_HD double hourglass_energy(double kappa, double residual) { return 0.5 * kappa * residual; }
 
 }  // namespace phyxel

@@ -1,0 +1,90 @@
+/// Vectors of three numbers a phyxel on the host, of which a rank has those of its own phyxels.
+/// Sums over all ranks are exact: they depend neither on the number of threads nor on that of
+/// ranks.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/share.hpp"
+
+namespace phyxel {
+
+class OwnedVectors {
+ public:
+  using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; of ghosts it says nothing
+
+  OwnedVectors(const Model& model, int threads) : model_(model), threads_(threads) {}
+
+  Vector make() const { return Vector(static_cast<std::size_t>(model_.size())); }
+
+  /// Calls each(i) for the phyxels that are no ghosts.
+  template <class Each>
+  void for_each(Each&& each) const {
+    for (const Part& part : model_.parts) {
+#pragma omp parallel for schedule(static) num_threads(threads_)
+      for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
+    }
+  }
+
+  /// Σ term(i) over all phyxels of all ranks, rounded once. Collective.
+  template <class Term>
+  double sum(Term&& term) const {
+    ExactSum all;
+#pragma omp parallel num_threads(threads_)
+    {
+      ExactSum own;
+      for (const Part& part : model_.parts) {
+#pragma omp for schedule(static) nowait
+        for (Index i = part.begin; i < part.owned_end(); ++i) own.add(term(i));
+      }
+#pragma omp critical
+      all.add(own);
+    }
+    if (model_.share) model_.share->others->add(all.ready());
+    return all.value();
+  }
+  double product(const Vector& a, const Vector& b) const {
+    return sum([&](Index i) { return dot(a[i], b[i]); });
+  }
+
+  /// The largest of value(i) over all phyxels of all ranks, at least 0. Collective.
+  template <class Value>
+  double largest(Value&& value) const {
+    double largest = 0;
+    for (const Part& part : model_.parts) {
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        largest = std::max(largest, value(i));
+      }
+    }
+    return model_.share ? model_.share->others->largest(largest) : largest;
+  }
+
+  /// Ghosts take their owners' values. Collective.
+  void refresh_ghosts(Vector& values) const {
+    if (!model_.share) return;
+    const Others& others = *model_.share->others;
+    others.begin(
+        {reinterpret_cast<std::byte*>(values.data()), sizeof(Vec3d), sizeof(Vec3d), nullptr});
+    others.finish();
+  }
+
+  /// The smallest support of all ranks' phyxels [m]; infinite, if there is none. Collective.
+  double smallest_support() const {
+    double smallest = std::numeric_limits<double>::infinity();
+    for (Index i = 0; i < model_.size(); ++i) {
+      const double h = model_.neighbourhood.support[i];
+      if (h > 0) smallest = std::min(smallest, h);
+    }
+    return model_.share ? model_.share->others->smallest(smallest) : smallest;
+  }
+
+ private:
+  const Model& model_;
+  int threads_;
+};
+
+}  // namespace phyxel
