@@ -125,7 +125,8 @@ struct ResidentMemory {
   unsigned long long* barriers;  ///< For clusters: two.
   std::uint32_t* destinations;   ///< Likewise.
 
-  __device__ ResidentMemory(char* shared, const ResidentView<Real>& r) {
+  /// @param hourglass known when compiled, like all that a scene may leave out
+  __device__ ResidentMemory(char* shared, const ResidentView<Real>& r, bool hourglass) {
     const int slots = r.most_slots;
     displacements = {reinterpret_cast<Letter*>(shared), slots};
     stresses = {displacements.letters + displacement_letters<Real> * slots, slots};
@@ -134,7 +135,7 @@ struct ResidentMemory {
     second_pairs = r.longest[1] ? end : pairs;
     end += r.longest[1] * slice_size;
     weights = reinterpret_cast<Real*>(end);
-    if (r.weights) end += weight_pairs(r.longest[0]);
+    if (hourglass) end += weight_pairs(r.longest[0]);
     place_of_slot = reinterpret_cast<Index*>(end);
     barriers = reinterpret_cast<unsigned long long*>(end);
     destinations = reinterpret_cast<std::uint32_t*>(barriers + 2);
@@ -496,7 +497,7 @@ __global__ void __launch_bounds__(Post::threads)
   }
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
-  const ResidentMemory<Real> memory(shared, r);
+  const ResidentMemory<Real> memory(shared, r, hourglass);
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_pairs(r, slice.rows[0], memory.pairs);
   if constexpr (hourglass) fetch_weights(r, slice.rows[0], memory.weights);
