@@ -157,31 +157,9 @@ std::string force_error(const Model& model, Backend& backend, const std::vector<
   return exact.empty() ? "" : largest_error(forces_of(backend, deformed(model)), exact);
 }
 
-/// Rows go to the terminal as they come; the CSV file is written whole after each.
-class Table {
- public:
+struct Table : PrintedTable {
   Table(const BenchOptions& options, const std::vector<std::string>& columns, Facts more = {})
-      : file_(options.csv), table_{machine_facts(), columns, {}} {
-    table_.facts.insert(table_.facts.end(), more.begin(), more.end());
-    fmt::print("{}", csv_text(table_));
-    if (!file_.empty() && std::filesystem::exists(file_) && !options.force) {
-      throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
-    }
-    write();
-  }
-  void row(const std::vector<std::string>& cells) {
-    fmt::print("{}\n", fmt::join(cells, ","));
-    std::fflush(stdout);
-    table_.rows.push_back(cells);
-    write();
-  }
-
- private:
-  void write() const {
-    if (!file_.empty()) write_csv(file_, table_);
-  }
-  std::filesystem::path file_;
-  CsvTable table_;
+      : PrintedTable(options.csv, options.force, columns, std::move(more)) {}
 };
 
 /// How a backend steps: what follows its precision in its name.

@@ -13,6 +13,7 @@ void add_info(CLI::App& program);
 void add_export(CLI::App& program);
 void add_render(CLI::App& program);
 void add_bench(CLI::App& program);
+void add_accuracy(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_doctor(CLI::App& program);
 

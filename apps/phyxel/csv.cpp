@@ -150,6 +150,28 @@ CsvTable read_csv(const std::filesystem::path& file) {
   return table;
 }
 
+PrintedTable::PrintedTable(const std::string& file, bool force,
+                           const std::vector<std::string>& columns, Facts more)
+    : file_(file), table_{machine_facts(), columns, {}} {
+  table_.facts.insert(table_.facts.end(), more.begin(), more.end());
+  fmt::print("{}", csv_text(table_));
+  if (!file_.empty() && std::filesystem::exists(file_) && !force) {
+    throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", file));
+  }
+  write();
+}
+
+void PrintedTable::row(const std::vector<std::string>& cells) {
+  fmt::print("{}\n", fmt::join(cells, ","));
+  std::fflush(stdout);
+  table_.rows.push_back(cells);
+  write();
+}
+
+void PrintedTable::write() const {
+  if (!file_.empty()) write_csv(file_, table_);
+}
+
 Median median_of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t half = values.size() / 2;

@@ -50,6 +50,23 @@ std::string csv_text(const CsvTable& table);
 ///   header.
 CsvTable read_csv(const std::filesystem::path& file);
 
+/// A table whose rows go to the terminal as they come; the CSV file, if there is to be one, is
+/// written whole after each.
+class PrintedTable {
+ public:
+  /// @param force whether the file may be replaced
+  /// @throws InputError if the file is there and must not be replaced
+  PrintedTable(const std::string& file, bool force, const std::vector<std::string>& columns,
+               Facts more = {});
+  void row(const std::vector<std::string>& cells);
+
+ private:
+  void write() const;
+
+  std::filesystem::path file_;
+  CsvTable table_;
+};
+
 /// The median and the spread, (largest - smallest) / median. @param values at least one
 struct Median {
   double value = 0, spread = 0;

@@ -51,6 +51,7 @@ int main(int argc, char** argv) {
   phyxel::app::add_info(program);
   phyxel::app::add_export(program);
   phyxel::app::add_bench(program);
+  phyxel::app::add_accuracy(program);
   phyxel::app::add_paper(program);
   phyxel::app::add_doctor(program);
   return phyxel::on_ranks(argc, argv, [&](const phyxel::Ranks& all) {

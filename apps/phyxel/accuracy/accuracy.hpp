@@ -1,0 +1,47 @@
+/// Problems with known answers, and how far from them phyxels come.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "phyxel/model.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel::app {
+
+/// What a problem is solved with.
+struct Discretisation {
+  ShapeRequest::Placement placement = ShapeRequest::Placement::nodes;
+  double jitter = 0;     ///< In spacings.
+  double factor = 1.8;   ///< Of the support.
+  double hourglass = 0;  ///< Strength of hourglass control.
+  int across = 6;        ///< Cells across the thinner sides.
+};
+
+struct Quantity {
+  std::string name;
+  double value = 0;
+  double reference = 0;  ///< 0: the value is an error itself.
+  double error() const { return reference == 0 ? value : value / reference - 1; }
+};
+
+struct Solution {
+  Index phyxels = 0;
+  double neighbours = 0;         ///< Mean.
+  std::int64_t evaluations = 0;  ///< Of all phyxels' forces.
+  double seconds = 0;            ///< That they and what belongs to them took.
+  std::vector<Quantity> found;
+};
+
+struct AccuracyCase {
+  std::string name;
+  std::string what;         ///< The problem and where its answer comes from, in a sentence or two.
+  std::vector<int> across;  ///< Resolutions that it is run with if none are asked for.
+  Solution (*solve)(const Discretisation&);
+};
+
+/// Those at rest.
+std::vector<AccuracyCase> static_cases();
+
+}  // namespace phyxel::app

@@ -1,0 +1,140 @@
+/// phyxel accuracy: problems with known answers, over resolutions and ways to discretise.
+#include "command.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "accuracy/accuracy.hpp"
+#include "csv.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct AccuracyOptions {
+  std::vector<std::string> cases{"all"};
+  std::vector<int> across;  ///< Empty: each case's own.
+  std::vector<std::string> lattices{"nodes", "cells"};
+  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1, 0.3};
+  std::string csv;
+  bool force = false;
+};
+
+std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
+  const std::vector<AccuracyCase> all = static_cases();
+  std::vector<AccuracyCase> chosen;
+  std::vector<std::string> known{"all"};
+  for (const AccuracyCase& c : all) known.push_back(c.name);
+  for (const std::string& name : names) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw InputError(fmt::format("case {}: unknown{}; allowed: {}", name,
+                                   did_you_mean(name, known), fmt::join(known, ", ")));
+    }
+  }
+  for (const AccuracyCase& c : all) {
+    const bool asked = std::find(names.begin(), names.end(), c.name) != names.end() ||
+                       std::find(names.begin(), names.end(), "all") != names.end();
+    if (asked) chosen.push_back(c);
+  }
+  return chosen;
+}
+
+std::vector<Discretisation> discretisations(const AccuracyOptions& options) {
+  std::vector<Discretisation> list;
+  for (const std::string& lattice : options.lattices) {
+    for (const double jitter : options.jitters) {
+      for (const double factor : options.factors) {
+        for (const double hourglass : options.hourglass) {
+          list.push_back({.placement = lattice == "nodes" ? ShapeRequest::Placement::nodes
+                                                          : ShapeRequest::Placement::cells,
+                          .jitter = jitter,
+                          .factor = factor,
+                          .hourglass = hourglass});
+        }
+      }
+    }
+  }
+  return list;
+}
+
+/// The order in the spacing by which errors fall from one resolution to the next; "" where it says
+/// nothing: first ones, and errors that change their sign.
+std::string order_of(double coarse, double fine, int across_coarse, int across_fine) {
+  if (coarse * fine <= 0) return "";
+  return fmt::format("{:.2f}", std::log(coarse / fine) /
+                                   std::log(static_cast<double>(across_fine) / across_coarse));
+}
+
+void measure(const AccuracyOptions& options) {
+  const std::vector<AccuracyCase> cases = chosen_cases(options.cases);
+  PrintedTable table(
+      options.csv, options.force,
+      {"case", "quantity", "lattice", "jitter", "factor", "hourglass", "across", "phyxels",
+       "neighbours", "value", "reference", "error", "order", "evaluations", "seconds"});
+  for (const AccuracyCase& c : cases) {
+    for (Discretisation d : discretisations(options)) {
+      std::vector<double> before;
+      int across_before = 0;
+      for (const int across : options.across.empty() ? c.across : options.across) {
+        d.across = across;
+        const Solution solution = c.solve(d);
+        for (std::size_t q = 0; q < solution.found.size(); ++q) {
+          const Quantity& found = solution.found[q];
+          table.row(
+              {c.name, found.name,
+               d.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells",
+               fmt::format("{:g}", d.jitter), fmt::format("{:g}", d.factor),
+               fmt::format("{:g}", d.hourglass), std::to_string(across),
+               std::to_string(solution.phyxels), fmt::format("{:.1f}", solution.neighbours),
+               fmt::format("{:.7g}", found.value), fmt::format("{:.7g}", found.reference),
+               fmt::format("{:.3e}", found.error()),
+               before.empty() ? "" : order_of(before[q], found.error(), across_before, across),
+               std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds)});
+        }
+        before.clear();
+        for (const Quantity& found : solution.found) before.push_back(found.error());
+        across_before = across;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void add_accuracy(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "accuracy", "Problems with known answers: errors beside time, on the CPU in double");
+  auto options = std::make_shared<AccuracyOptions>();
+  std::string known = "Which, of:";
+  for (const AccuracyCase& c : static_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
+  command->add_option("cases", options->cases, known)->capture_default_str();
+  command->add_option("--across", options->across, "Cells across the thinner sides")
+      ->delimiter(',')
+      ->check(CLI::Range(2, 200));
+  command->add_option("--lattice", options->lattices, "nodes, cells")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"nodes", "cells"}))
+      ->capture_default_str();
+  command->add_option("--jitter", options->jitters, "Phyxels moved by so many spacings")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 0.5))
+      ->capture_default_str();
+  command
+      ->add_option("--factor", options->factors,
+                   "Supports, as multiples of the mean distance to the 10 nearest")
+      ->delimiter(',')
+      ->check(CLI::Range(1.0, 4.0))
+      ->capture_default_str();
+  command->add_option("--hourglass", options->hourglass, "Strengths of hourglass control")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command->add_option("--csv", options->csv, "Also write the table to this file");
+  command->add_flag("--force", options->force, "Replace the CSV file");
+  command->callback([options] { measure(*options); });
+}
+
+}  // namespace phyxel::app
