@@ -70,6 +70,19 @@ TEST_F(AccuracyCommand, PrintsATableAndWritesIt) {
   EXPECT_EQ(run({"accuracy", "rotation", "--csv", "a.csv"}).code, 2);  // not without --force
 }
 
+TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
+  EXPECT_EQ(run({"accuracy", "gravity", "--across", "2,3", "--lattice", "nodes", "--jitter", "0",
+                 "--hourglass", "0.3", "--csv", "accuracy.csv"})
+                .code,
+            0);
+  const auto page = run({"accuracy", "page", "--results", ".", "--out", "page.md"});
+  EXPECT_EQ(page.code, 0) << page.err;
+  const std::string text = test::text_of(folder_ / "page.md");
+  EXPECT_THAT(text, HasSubstr("## gravity: deflection"));
+  EXPECT_THAT(text, HasSubstr("**nodes, α = 0.3** | 3 | 256 |"));  // finer is better, and slower
+  EXPECT_EQ(run({"accuracy", "page", "--results", "nowhere"}).code, 2);
+}
+
 TEST_F(AccuracyCommand, AnswersAnUnknownCaseWithTheNearest) {
   const auto wrong = run({"accuracy", "tensoin"});
   EXPECT_EQ(wrong.code, 2);

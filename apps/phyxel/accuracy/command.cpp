@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "accuracy/accuracy.hpp"
+#include "accuracy/page.hpp"
 #include "csv.hpp"
 #include "phyxel/error.hpp"
 
@@ -134,7 +135,13 @@ void add_accuracy(CLI::App& program) {
       ->capture_default_str();
   command->add_option("--csv", options->csv, "Also write the table to this file");
   command->add_flag("--force", options->force, "Replace the CSV file");
-  command->callback([options] { measure(*options); });
+  auto results = std::make_shared<std::string>("docs/results");
+  auto out = std::make_shared<std::string>("docs/accuracy.md");
+  CLI::App* page = command->add_subcommand("page", "Write the page from the table accuracy.csv");
+  page->add_option("--results", *results, "Folder of the table")->capture_default_str();
+  page->add_option("--out", *out, "The page")->capture_default_str();
+  command->callback(
+      [=] { page->parsed() ? write_accuracy_page(*results, *out) : measure(*options); });
 }
 
 }  // namespace phyxel::app

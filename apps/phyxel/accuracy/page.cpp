@@ -1,0 +1,151 @@
+#include "accuracy/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "accuracy/accuracy.hpp"
+#include "csv.hpp"
+#include "files/atomic_file.hpp"
+#include "markdown.hpp"
+#include "plot.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// How a row was discretised, but for its resolution.
+std::string way_of(const CsvTable& t, std::size_t r) {
+  std::string way = t.text(r, "lattice");
+  if (t.number(r, "jitter") > 0) way += fmt::format(", jitter {}", t.text(r, "jitter"));
+  if (t.number(r, "factor") != NeighbourhoodRule{}.factor) {
+    way += fmt::format(", factor {}", t.text(r, "factor"));
+  }
+  way += t.number(r, "hourglass") > 0 ? fmt::format(", α = {}", t.text(r, "hourglass")) : ", plain";
+  return way;
+}
+
+double error_of(const CsvTable& t, std::size_t r) { return std::abs(t.number(r, "error")); }
+
+/// A row that no other one of these is both faster and more accurate than.
+std::vector<std::size_t> front_of(const CsvTable& t, std::vector<std::size_t> rows) {
+  std::sort(rows.begin(), rows.end(), [&](std::size_t a, std::size_t b) {
+    return t.number(a, "seconds") < t.number(b, "seconds");
+  });
+  std::vector<std::size_t> front;
+  double best = std::numeric_limits<double>::infinity();
+  for (const std::size_t r : rows) {
+    if (!(error_of(t, r) < best)) continue;
+    best = error_of(t, r);
+    front.push_back(r);
+  }
+  return front;
+}
+
+class AccuracyPage {
+ public:
+  AccuracyPage(const fs::path& results, const fs::path& page)
+      : results_(results),
+        link_(fs::relative(results, page.parent_path()) / ""),
+        table_(read_csv(results / "accuracy.csv")) {}
+
+  std::string text() {
+    text_ = fmt::format(
+        "# Accuracy\n\nWritten by `phyxel accuracy page` from the table of `phyxel accuracy` in "
+        "`docs/results/`: problems with known answers, solved on the CPU in double. *Cells*: a "
+        "phyxel in the middle of each cell of a lattice; *nodes*: one at each corner, so on faces, "
+        "edges and corners of the body, too. *Jitter*: phyxels moved at random by up to so many "
+        "spacings, with the volumes of the lattice. *Plain*: without hourglass control; α: its "
+        "strength. "
+        "*Order*: by which "
+        "power of the spacing the error fell since the row before. *Evaluations*: of all phyxels' "
+        "forces, in Newton's method and what it needs. Errors are relative to the reference, or to "
+        "what the quantity says.\n\nMeasured by {} on {}; {}; {}.\n\n",
+        table_.fact("program"), table_.fact("hardware"), table_.fact("compiler"),
+        table_.fact("date"));
+    for (const AccuracyCase& c : static_cases()) {
+      for (const std::string& quantity : table_.values("quantity", {{"case", c.name}})) {
+        section(c, quantity);
+      }
+    }
+    return text_;
+  }
+
+ private:
+  void section(const AccuracyCase& c, const std::string& quantity) {
+    text_ += fmt::format("## {}: {}\n\n{}\n\n", c.name, quantity, c.what);
+    std::vector<std::size_t> rows;
+    for (std::size_t r = 0; r < table_.rows.size(); ++r) {
+      if (table_.matches(r, {{"case", c.name}, {"quantity", quantity}})) rows.push_back(r);
+    }
+    chart(c, quantity, rows);
+    const std::vector<std::size_t> front = front_of(table_, rows);
+    std::vector<std::vector<std::string>> cells;
+    for (const std::size_t r : rows) {
+      const bool best = std::find(front.begin(), front.end(), r) != front.end();
+      cells.push_back({best ? "**" + way_of(table_, r) + "**" : way_of(table_, r),
+                       table_.text(r, "across"), table_.text(r, "phyxels"),
+                       table_.text(r, "neighbours"), table_.text(r, "value"),
+                       table_.text(r, "error"), table_.text(r, "order"),
+                       table_.text(r, "evaluations"), table_.text(r, "seconds")});
+    }
+    text_ += "In bold: nothing measured here is both faster and more accurate.\n\n";
+    text_ += table_text({"discretisation", "across", "phyxels", "neighbours", "value", "error",
+                         "order", "evaluations", "s"},
+                        cells);
+  }
+
+  /// Error against time, a curve for each way on regular lattices, and the front.
+  void chart(const AccuracyCase& c, const std::string& quantity,
+             const std::vector<std::size_t>& rows) {
+    LineChart chart{.title = fmt::format("{}: {}", c.name, quantity),
+                    .x_label = "time to solution [s]",
+                    .y_label = "error",
+                    .log_x = true,
+                    .log_y = true,
+                    .curves = {}};
+    std::vector<std::size_t> shown;
+    for (const std::size_t r : rows) {
+      if (table_.number(r, "jitter") > 0 || !(error_of(table_, r) > 0)) continue;
+      shown.push_back(r);
+      const std::string way = way_of(table_, r);
+      auto curve = std::find_if(chart.curves.begin(), chart.curves.end(),
+                                [&](const Curve& known) { return known.label == way; });
+      if (curve == chart.curves.end()) {
+        chart.curves.push_back(Curve{way, {}, {}});
+        curve = chart.curves.end() - 1;
+      }
+      curve->x.push_back(table_.number(r, "seconds"));
+      curve->y.push_back(error_of(table_, r));
+    }
+    if (shown.size() < 2 || c.name == "rotation") return;  // rounding has no order
+    Curve front{"Pareto front", {}, {}, 0, true};
+    for (const std::size_t r : front_of(table_, shown)) {
+      front.x.push_back(table_.number(r, "seconds"));
+      front.y.push_back(error_of(table_, r));
+    }
+    chart.curves.push_back(front);
+    const std::string name = fmt::format("accuracy_{}_{}", c.name, charts_++);
+    const fs::path file = results_ / (name + ".svg");
+    if (can_plot()) draw_svg(script_of(chart), file);
+    if (fs::exists(file)) {
+      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_.string(), name);
+    }
+  }
+
+  fs::path results_, link_;
+  CsvTable table_;
+  std::string text_;
+  int charts_ = 0;
+};
+
+}  // namespace
+
+void write_accuracy_page(const fs::path& results, const fs::path& page) {
+  write_whole_file(page, AccuracyPage(results, page).text(), Durable::no);
+}
+
+}  // namespace phyxel::app
