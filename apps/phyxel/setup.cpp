@@ -12,7 +12,9 @@ namespace phyxel::app {
 namespace {
 
 std::string terms_of(const Material& m) {
-  std::string terms = m.strain == Strain::green ? "Green strain" : "Cauchy strain";
+  std::string terms = m.law == Law::neo_hooke     ? "neo-Hookean law"
+                      : m.strain == Strain::green ? "Green strain"
+                                                  : "Cauchy strain";
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.hourglass > 0) terms += fmt::format(", hourglass control ({:g} E)", m.hourglass);

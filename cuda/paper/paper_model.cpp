@@ -120,6 +120,9 @@ void check_paper_model(const Model& model) {
                     "none of them",
                     part.name));
   }
+  if (part.material.law != Law::hooke) {
+    refuse(fmt::format("body \"{}\" is neo-Hookean; allowed: law = \"hooke\"", part.name));
+  }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) refuse("phyxels that are moved; allowed: phyxels that are held");

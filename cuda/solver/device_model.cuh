@@ -301,7 +301,7 @@ class DeviceModel {
       const Material& m = model_.parts[part].material;
       materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness,
                            hourglass_stiffness(model_, model_.parts[part]), m.damping,
-                           origin_of(part), m.strain == Strain::green});
+                           origin_of(part), m.elasticity()});
     }
     materials_ = {materials.size(), "tiles" + of};
     materials_.upload(materials.data());
@@ -361,8 +361,8 @@ class DeviceModel {
             static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
             static_cast<StateReal>((1 - half) / (1 + half)),
             static_cast<StateReal>(dt / (1 + half)),
-            m.strain == Strain::green,
-            m.damping > 0};
+            m.damping > 0,
+            m.elasticity()};
   }
 
   const Model& model_;

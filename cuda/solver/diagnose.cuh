@@ -15,7 +15,7 @@ namespace phyxel::cuda {
 struct TileMaterial {
   double lambda, mu, volume_stiffness, hourglass, damping;
   Vec3<double> origin;  ///< What positions are taken from [m].
-  int green;
+  Elasticity elasticity;
 };
 
 /// Everything that adds up, in the order of `Totals::for_each_sum`.
@@ -143,15 +143,15 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       t.sum[load_energy] = -dot(load, u);
       const double volume = f.moment_constants[6 * f.places + place];
       const Hooke<double> hooke{m.lambda, m.mu};
-      t.sum[strain_energy] = volume * (m.green ? GreenHooke<double>{hooke}.energy(grad_u)
-                                               : CauchyHooke<double>{hooke}.energy(grad_u));
+      t.sum[strain_energy] = volume * with_law(m.elasticity, hooke,
+                                               [&](const auto& law) { return law.energy(grad_u); });
       const VolumeConservation<double> conservation{m.volume_stiffness};
       if (m.volume_stiffness > 0) t.sum[volume_energy] = volume * conservation.energy(grad_u);
       if (m.hourglass > 0) {
         t.sum[hourglass_energy] =
             phyxel::hourglass_energy(m.hourglass, gradient[9 * f.places + place]);
       }
-      t.sum[inverted] = conservation.volume_change(grad_u) <= -1 ? 1 : 0;
+      t.sum[inverted] = volume_change(grad_u) <= -1 ? 1 : 0;
       put3(t.sum + internal_force, internal);
       put3(t.sum + internal_torque, cross(x, internal));
       t.sum[force_scale] = sqrt(dot(internal, internal));

@@ -26,7 +26,8 @@ struct TileConstants {
   Real hourglass;                     ///< κ [N/m], 0: none.
   Real inverse_h_squared;             ///< [1/m²], where the body has one support.
   StateReal keep, gain;               ///< Damped Verlet's factors; gain is the step where undamped.
-  bool green, damped;                 ///< For kernels that serve bodies of any law.
+  bool damped;                        ///< For kernels that serve bodies of any law.
+  Elasticity elasticity;              ///< Likewise.
 };
 
 /// `TileLists` in device memory.
@@ -54,10 +55,10 @@ struct Fields {
   std::size_t places;
 };
 
-template <class Real, bool green, bool volume, class Constants>
+template <class Real, Elasticity elasticity, bool volume, class Constants>
 __device__ auto law_of(const Constants& body) {
   const Hooke<Real> hooke{body.lambda, body.mu};
-  using Elastic = std::conditional_t<green, GreenHooke<Real>, CauchyHooke<Real>>;
+  using Elastic = ElasticLaw<elasticity, Real>;
   if constexpr (volume) {
     return SumOf<Elastic, VolumeConservation<Real>>{Elastic{hooke}, {body.volume_stiffness}};
   } else {
@@ -65,16 +66,23 @@ __device__ auto law_of(const Constants& body) {
   }
 }
 
-/// The stress of a tile's body, whatever its law.
-template <class Real, class Constants>
+/// The stress of a tile's body, whatever its law. @tparam any not Hooke's alone
+template <class Real, bool any, class Constants>
 __device__ Mat3<Real> first_piola_stress_of(const Constants& body, const Mat3<Real>& grad_u) {
   const bool volume = body.volume_stiffness > Real(0);
-  if (body.green) {
-    return volume ? law_of<Real, true, true>(body).first_piola_stress(grad_u)
-                  : law_of<Real, true, false>(body).first_piola_stress(grad_u);
+  const auto stress = [&]<Elasticity elasticity>() {
+    return volume ? law_of<Real, elasticity, true>(body).first_piola_stress(grad_u)
+                  : law_of<Real, elasticity, false>(body).first_piola_stress(grad_u);
+  };
+  if constexpr (any) {
+    if (body.elasticity == Elasticity::neo_hooke) {
+      return stress.template operator()<Elasticity::neo_hooke>();
+    }
   }
-  return volume ? law_of<Real, false, true>(body).first_piola_stress(grad_u)
-                : law_of<Real, false, false>(body).first_piola_stress(grad_u);
+  if (body.elasticity == Elasticity::green_hooke) {
+    return stress.template operator()<Elasticity::green_hooke>();
+  }
+  return stress.template operator()<Elasticity::cauchy_hooke>();
 }
 
 /// The velocity after a step. `force` is all but gravity; damping by the body's factors.
@@ -203,8 +211,8 @@ struct Gradients {
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-template <class Real, class StateReal, bool green, bool volume, bool hourglass, bool only_gradient,
-          class Others = Alone>
+template <class Real, class StateReal, Elasticity elasticity, bool volume, bool hourglass,
+          bool only_gradient, class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
@@ -255,7 +263,7 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
-    const auto law = law_of<Real, green, volume>(body);
+    const auto law = law_of<Real, elasticity, volume>(body);
     Mat3<Real> q = pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
     if constexpr (hourglass) {
       q = with_hourglass(q, body.hourglass, grad_u);

@@ -67,11 +67,12 @@ class Passes {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
-    launch_pass_1<Alone>(fields,
-                         {fields.pull ? pass_1<Real, StateReal, false, false, true, false>
-                                      : pass_1<Real, StateReal, false, false, false, false>,
-                          0, m_.tiles()},
-                         {}, {});
+    launch_pass_1<Alone>(
+        fields,
+        {fields.pull ? pass_1<Real, StateReal, Elasticity::cauchy_hooke, false, true, false>
+                     : pass_1<Real, StateReal, Elasticity::cauchy_hooke, false, false, false>,
+         0, m_.tiles()},
+        {}, {});
     send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
@@ -103,8 +104,10 @@ class Passes {
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    launch_pass_1<Alone>(m_.fields(), {pass_1<Real, StateReal, true, false, false, true>, 0, tiles},
-                         gradients, {});
+    launch_pass_1<Alone>(
+        m_.fields(),
+        {pass_1<Real, StateReal, Elasticity::green_hooke, false, false, true>, 0, tiles}, gradients,
+        {});
   }
 
  private:
@@ -170,13 +173,21 @@ class Passes {
   }
   template <bool hourglass, class Others>
   static Pass1<Others> pass_1_of(const Material& m) {
-    const bool volume = m.volume_stiffness > 0;
-    if (m.strain == Strain::green) {
-      return volume ? cuda::pass_1<Real, StateReal, true, true, hourglass, false, Others>
-                    : cuda::pass_1<Real, StateReal, true, false, hourglass, false, Others>;
+    switch (m.elasticity()) {
+      case Elasticity::green_hooke:
+        return pass_1_of<Elasticity::green_hooke, hourglass, Others>(m);
+      case Elasticity::cauchy_hooke:
+        return pass_1_of<Elasticity::cauchy_hooke, hourglass, Others>(m);
+      case Elasticity::neo_hooke:
+        break;
     }
-    return volume ? cuda::pass_1<Real, StateReal, false, true, hourglass, false, Others>
-                  : cuda::pass_1<Real, StateReal, false, false, hourglass, false, Others>;
+    return pass_1_of<Elasticity::neo_hooke, hourglass, Others>(m);
+  }
+  template <Elasticity elasticity, bool hourglass, class Others>
+  static Pass1<Others> pass_1_of(const Material& m) {
+    return m.volume_stiffness > 0
+               ? cuda::pass_1<Real, StateReal, elasticity, true, hourglass, false, Others>
+               : cuda::pass_1<Real, StateReal, elasticity, false, hourglass, false, Others>;
   }
   template <bool own_supports, class Others>
   Pass2<Others> pass_2_of(const Material& m) const {

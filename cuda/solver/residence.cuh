@@ -109,7 +109,9 @@ class Residence {
   }
   template <class Post>
   void use_post(const ResidentPlan& plan) {
-    kernel_ = hourglass()
+    const auto is_hooke = [](const Part& part) { return part.material.law == Law::hooke; };
+    const auto& parts = m_.model().parts;
+    kernel_ = hourglass() || !std::all_of(parts.begin(), parts.end(), is_hooke)
                   ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, true>)
                   : reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, false>);
     threads_ = Post::threads;

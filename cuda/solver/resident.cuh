@@ -125,7 +125,6 @@ struct ResidentMemory {
   unsigned long long* barriers;  ///< For clusters: two.
   std::uint32_t* destinations;   ///< Likewise.
 
-  /// @param hourglass known when compiled, like all that a scene may leave out
   __device__ ResidentMemory(char* shared, const ResidentView<Real>& r, bool hourglass) {
     const int slots = r.most_slots;
     displacements = {reinterpret_cast<Letter*>(shared), slots};
@@ -481,7 +480,8 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
 }
 
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
-template <class Real, class StateReal, class Post, bool hourglass>
+/// @tparam more some bodies have hourglass control, or a law that is not Hooke's
+template <class Real, class StateReal, class Post, bool more>
 __global__ void __launch_bounds__(Post::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
@@ -497,10 +497,11 @@ __global__ void __launch_bounds__(Post::threads)
   }
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
+  const bool hourglass = more && r.weights;
   const ResidentMemory<Real> memory(shared, r, hourglass);
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_pairs(r, slice.rows[0], memory.pairs);
-  if constexpr (hourglass) fetch_weights(r, slice.rows[0], memory.weights);
+  if (hourglass) fetch_weights(r, slice.rows[0], memory.weights);
   if (r.longest[1]) fetch_pairs(r, slice.rows[1], memory.second_pairs);
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
@@ -551,7 +552,7 @@ __global__ void __launch_bounds__(Post::threads)
           [&](const Real* u_j, Vec3<Real> wx, [[maybe_unused]] int entry) {
             const Vec3<Real> u_ij = Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u;
             add_gradient_term(sum, u_ij, wx);
-            if constexpr (hourglass) {
+            if (hourglass) {
               add_pull(pull, u_ij, memory.weights[entry * slice_size + thread]);
             }
           });
@@ -563,8 +564,8 @@ __global__ void __launch_bounds__(Post::threads)
         }
         set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
-      q = pair_stress(volume, first_piola_stress_of<Real>(body, grad_u), inverse_moment);
-      if constexpr (hourglass) {
+      q = pair_stress(volume, first_piola_stress_of<Real, more>(body, grad_u), inverse_moment);
+      if (hourglass) {
         q = with_hourglass(q, body.hourglass, grad_u);
         pull = pull_force(body.hourglass, pull);
       }
@@ -584,7 +585,7 @@ __global__ void __launch_bounds__(Post::threads)
           });
       sum += own_force(q, moment_offset);
       if (inverse_mass > Real(0)) {
-        if constexpr (hourglass) sum += pull;
+        if (hourglass) sum += pull;
         if (f.load) sum += load;
         velocity = body.damped ? next_velocity<Real, StateReal, true>(velocity, sum, inverse_mass,
                                                                       f.gravity, dt, body)

@@ -59,9 +59,9 @@ std::uint64_t model_digest(const Model& model) {
     const Material& m = part.material;
     add(state.get(), std::vector<char>(part.neighbourhood.begin(), part.neighbourhood.end()));
     add(state.get(), std::vector<Index>{part.size});
-    add(state.get(),
-        std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness, m.damping,
-                            m.strain == Strain::green ? 1.0 : 0.0, m.hourglass});
+    add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
+                                         m.damping, m.strain == Strain::green ? 1.0 : 0.0,
+                                         m.hourglass, static_cast<double>(m.law)});
   }
   for (const Motion& motion : model.motions) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;

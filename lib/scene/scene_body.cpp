@@ -108,7 +108,11 @@ Material read_material(const SceneTable& table) {
   table.read("young", material.young);
   table.read("poisson", material.poisson);
   table.read("density", material.density);
+  table.read_choice("law", material.law);
   table.read_choice("strain", material.strain);
+  if (material.law != Law::hooke && table.has("strain")) {
+    table.refuse("strain", "found, but only law = \"hooke\" uses it; allowed: one of them");
+  }
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
   table.read("hourglass", material.hourglass);

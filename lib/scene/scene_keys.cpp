@@ -208,6 +208,10 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."},
       {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
        .range = above(0), .meaning = "Mass density at rest: water 1000."},
+      {.section = "body.material", .name = "law", .type = KeyType::choice,
+       .fallback = "\"hooke\"", .words = {"hooke", "neo-hookean"},
+       .meaning = "\"hooke\": stress in proportion to `strain`, which gives way under strong "
+           "compression; \"neo-hookean\" (Smith et al. 2018) does not, not even turned inside out."},
       {.section = "body.material", .name = "strain", .type = KeyType::choice,
        .fallback = "\"green\"", .words = {"green", "cauchy"},
        .meaning = "\"green\" is right under any rotation; \"cauchy\" is cheaper, and only right "

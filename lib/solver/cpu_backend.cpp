@@ -379,17 +379,11 @@ class CpuBackend final : public Backend {
       const Material& m = run.material;
       const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
-      if (m.strain == Strain::green) {
-        const GreenHooke<P> law{hooke};
-        m.volume_stiffness > 0
-            ? apply(SumOf<GreenHooke<P>, VolumeConservation<P>>{law, volume}, run)
-            : apply(law, run);
-      } else {
-        const CauchyHooke<P> law{hooke};
-        m.volume_stiffness > 0
-            ? apply(SumOf<CauchyHooke<P>, VolumeConservation<P>>{law, volume}, run)
-            : apply(law, run);
-      }
+      with_law(m.elasticity(), hooke, [&](const auto& law) {
+        using Law = std::decay_t<decltype(law)>;
+        m.volume_stiffness > 0 ? apply(SumOf<Law, VolumeConservation<P>>{law, volume}, run)
+                               : apply(law, run);
+      });
     }
   }
 

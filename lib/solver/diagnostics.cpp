@@ -23,9 +23,8 @@ bool all_finite(const Mat3d& m) {
 
 Mat3d first_piola_stress(const Material& material, const Mat3d& grad_u) {
   const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
-  Mat3d p = material.strain == Strain::green
-                ? GreenHooke<double>{hooke}.first_piola_stress(grad_u)
-                : CauchyHooke<double>{hooke}.first_piola_stress(grad_u);
+  Mat3d p = with_law(material.elasticity(), hooke,
+                     [&](const auto& law) { return law.first_piola_stress(grad_u); });
   if (material.volume_stiffness > 0) {
     p += VolumeConservation<double>{material.volume_stiffness}.first_piola_stress(grad_u);
   }
@@ -106,14 +105,13 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
         own.angular_momentum.add(cross(x, p));
         own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
         own.strain_energy.add(model.volume[i] *
-                              (m.strain == Strain::green
-                                   ? GreenHooke<double>{hooke}.energy(gradient[i])
-                                   : CauchyHooke<double>{hooke}.energy(gradient[i])));
+                              with_law(m.elasticity(), hooke,
+                                       [&](const auto& law) { return law.energy(gradient[i]); }));
         if (m.volume_stiffness > 0) {
           own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
         }
         if (kappa > 0) own.hourglass_energy.add(hourglass_energy(kappa, residual[i]));
-        own.inverted += VolumeConservation<double>::volume_change(gradient[i]) <= -1;
+        own.inverted += volume_change(gradient[i]) <= -1;
         own.internal_force.add(force[i]);
         own.internal_torque.add(cross(x, force[i]));
         own.force_scale.add(norm(force[i]));
@@ -199,7 +197,7 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
     for (Index i = part.begin; i < part.end; ++i) {
       const Mat3d& g = gradient[i];
       if (von_mises) (*von_mises)[i] = von_mises_stress(first_piola_stress(part.material, g), g);
-      if (volume_ratio) (*volume_ratio)[i] = 1 + VolumeConservation<double>::volume_change(g);
+      if (volume_ratio) (*volume_ratio)[i] = 1 + volume_change(g);
     }
   }
 }

@@ -40,6 +40,7 @@ Scene scene_of(const Case& c) {
     first.material.volume_stiffness = 2e5;
     first.material.damping = 1.5;
     if (!c.adaptive) first.material.hourglass = 0.2;  // and the second has none
+    if (c.adaptive) first.material.law = Law::neo_hooke;
     second.material.strain = Strain::cauchy;
     LoadRequest load;
     load.select.box = Selection::Box{{1.2, -1, -1}, {3, 3, 3}};
@@ -271,6 +272,8 @@ INSTANTIATE_TEST_SUITE_P(
         ResidentCase{"Cluster", "clusters", {"", false, false, false}, small_clouds()},
         ResidentCase{"ClusterAdaptive", "clusters", {"", true, false, false}, small_clouds()},
         ResidentCase{"ClusterEverything", "clusters", {"", false, false, true}, small_clouds()},
+        ResidentCase{
+            "ClusterAdaptiveEverything", "clusters", {"", true, false, true}, small_clouds()},
         ResidentCase{"ManyClusters", "clusters", {"", false, false, false}, many_clouds()}),
     [](const auto& test) { return std::string(test.param.name); });
 

@@ -88,8 +88,9 @@ PHYXEL_HD void evaluate_formulas(const Inputs<Real>& in, Outputs<Real>& out) {
   const CauchyHooke<Real> cauchy{hooke};
   out.add(cauchy.energy(g));
   out.add(cauchy.first_piola_stress(g));
+  out.add(NeoHooke<Real>{hooke}.first_piola_stress(g));  // its energy takes a library's logarithm
   const VolumeConservation<Real> conservation{in.stiffness};
-  out.add(VolumeConservation<Real>::volume_change(g));
+  out.add(volume_change(g));
   out.add(conservation.energy(g));
   out.add(conservation.first_piola_stress(g));
   const SumOf<GreenHooke<Real>, VolumeConservation<Real>> both{green, conservation};

@@ -19,6 +19,7 @@ struct Body {
   double young = 0, poisson = 0, volume_stiffness = 0;
   double hourglass = 0;  // κ [N/m]
   bool green = true;
+  bool neo_hooke = false;
 };
 
 inline double w(double r, double h) {
@@ -84,6 +85,34 @@ inline M3 stress(const Body& b, const M3& e) {
   return sigma;
 }
 
+/// Smith, de Goes and Kim 2018, equations 13 and 14: parameters, energy, stress.
+struct NeoHooke {
+  double mu, lambda, alpha;
+  explicit NeoHooke(const Body& b) {
+    const double shear = b.young / (2 * (1 + b.poisson));
+    mu = 4 * shear / 3;
+    lambda = b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson)) + 5 * shear / 6;
+    alpha = 1 + mu / lambda - mu / (4 * lambda);
+  }
+  /// Zero at rest.
+  double energy(const M3& j) const {
+    const auto whole = [&](double i, double det) {
+      return mu / 2 * (i - 3) + lambda / 2 * std::pow(det - alpha, 2) - mu / 2 * std::log(i + 1);
+    };
+    return whole(j.squaredNorm(), j.determinant()) - whole(3, 1);
+  }
+  M3 stress(const M3& j, const M3& cof) const {
+    return mu * (1 - 1 / (j.squaredNorm() + 1)) * j + lambda * (j.determinant() - alpha) * cof;
+  }
+};
+inline M3 cofactor(const M3& j) {
+  M3 cof;
+  cof.col(0) = j.col(1).cross(j.col(2));
+  cof.col(1) = j.col(2).cross(j.col(0));
+  cof.col(2) = j.col(0).cross(j.col(1));
+  return cof;
+}
+
 /// What the linear fit at i leaves of the motion of j.
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
@@ -109,8 +138,9 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const M3 g = grad_u(b, u, i), e = strain(b, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    total +=
-        b.v[i] * (0.5 * e.cwiseProduct(stress(b, e)).sum() + 0.5 * b.volume_stiffness * dj * dj);
+    const double elastic = b.neo_hooke ? NeoHooke(b).energy(M3::Identity() + g)
+                                       : 0.5 * e.cwiseProduct(stress(b, e)).sum();
+    total += b.v[i] * (elastic + 0.5 * b.volume_stiffness * dj * dj);
   }
   return total;
 }
@@ -122,13 +152,8 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     const M3 g = grad_u(b, u, i), j = M3::Identity() + g, a = inverse_moment(b, i);
     M3 p = stress(b, strain(b, g));
     if (b.green) p = j * p;
-    if (b.volume_stiffness > 0) {
-      M3 cof;
-      cof.col(0) = j.col(1).cross(j.col(2));
-      cof.col(1) = j.col(2).cross(j.col(0));
-      cof.col(2) = j.col(0).cross(j.col(1));
-      p += b.volume_stiffness * (j.determinant() - 1) * cof;
-    }
+    if (b.neo_hooke) p = NeoHooke(b).stress(j, cofactor(j));
+    if (b.volume_stiffness > 0) p += b.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
       const V3 xij = b.x[n] - b.x[i];
       V3 push = -b.v[i] * p * (a * xij * w(xij.norm(), b.h[i]));

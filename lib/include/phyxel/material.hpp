@@ -9,18 +9,31 @@ namespace phyxel {
 /// (equation 3) is its linearisation, cheaper and only right for small rotations.
 enum class Strain { green, cauchy };
 
-/// Isotropic Hookean material, one per body.
+/// How stress follows from strain. `hooke`: in proportion, which softens where a body is pressed to
+/// half its size and no longer resists beyond. `neo_hooke` (Smith, de Goes and Kim 2018) resists
+/// until it is turned inside out, and still then; the same at small strains.
+enum class Law { hooke, neo_hooke };
+
+/// Strain and law in one.
+enum class Elasticity { green_hooke, cauchy_hooke, neo_hooke };
+
+/// Isotropic elastic material, one per body.
 struct Material {
-  double young = 0;    ///< Young's modulus E [Pa], > 0.
-  double poisson = 0;  ///< Poisson's ratio, -1 < nu < 0.5.
-  double density = 0;  ///< [kg/m^3], > 0.
-  Strain strain = Strain::green;
+  double young = 0;               ///< Young's modulus E [Pa], > 0.
+  double poisson = 0;             ///< Poisson's ratio, -1 < nu < 0.5.
+  double density = 0;             ///< [kg/m^3], > 0.
+  Strain strain = Strain::green;  ///< Of Hooke's law.
+  Law law = Law::hooke;
   double volume_stiffness =
       0;                 ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
   double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
   double hourglass = 0;  ///< Strength α of hourglass control, in shares of E; 0: none. Needs one
                          ///< support for the body.
 
+  Elasticity elasticity() const {
+    if (law == Law::neo_hooke) return Elasticity::neo_hooke;
+    return strain == Strain::green ? Elasticity::green_hooke : Elasticity::cauchy_hooke;
+  }
   /// Lamé's first parameter [Pa].
   double lame_lambda() const { return young * poisson / ((1 + poisson) * (1 - 2 * poisson)); }
   /// Shear modulus [Pa], Lamé's second parameter.

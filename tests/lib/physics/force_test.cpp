@@ -4,6 +4,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/stress.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/oracle.hpp"
@@ -20,6 +21,7 @@ struct Terms {
   NeighbourhoodRule::Support support;
   std::optional<int> max_neighbours;
   double hourglass = 0;
+  Law law = Law::hooke;
 };
 
 void PrintTo(const Terms& terms, std::ostream* out) { *out << terms.name; }
@@ -33,6 +35,14 @@ const Terms all_terms[] = {
     {"GreenVolumeCapped", Strain::green, 2e5, NeighbourhoodRule::Support::adaptive, 12},
     {"GreenHourglass", Strain::green, 0, NeighbourhoodRule::Support::uniform, {}, 0.3},
     {"CauchyVolumeHourglass", Strain::cauchy, 2e5, NeighbourhoodRule::Support::uniform, {}, 0.1},
+    {"NeoHooke", Strain::green, 0, NeighbourhoodRule::Support::adaptive, {}, 0, Law::neo_hooke},
+    {"NeoHookeVolumeHourglass",
+     Strain::green,
+     2e5,
+     NeighbourhoodRule::Support::uniform,
+     {},
+     0.1,
+     Law::neo_hooke},
 };
 
 /// An irregular cloud of 5 x 4 x 6 phyxels with the given terms.
@@ -47,6 +57,7 @@ Case make_case(const Terms& terms) {
   material.strain = terms.strain;
   material.volume_stiffness = terms.volume_stiffness;
   material.hourglass = terms.hourglass;
+  material.law = terms.law;
   NeighbourhoodRule rule;
   rule.support = terms.support;
   rule.max_neighbours = terms.max_neighbours;
@@ -63,6 +74,7 @@ Case make_case(const Terms& terms) {
   c.body.young = material.young;
   c.body.poisson = material.poisson;
   c.body.green = terms.strain == Strain::green;
+  c.body.neo_hooke = terms.law == Law::neo_hooke;
   c.body.volume_stiffness = terms.volume_stiffness;
   // κ = α E v / tr A, where tr A sums w r² over a continuum of density 1 / v: by many shells.
   const double h = c.body.h[0], v = c.model.parts[0].volume / c.model.size();
@@ -236,6 +248,39 @@ TEST(Force, HourglassModesAreSeenByTheResidualAlone) {
   }
   EXPECT_GT(expected, 1e-6);
   EXPECT_NEAR(residual[centre], expected, 1e-13 * expected);
+}
+
+/// Pressed flat along x, and turned inside out: Hooke's law in Green's strain gives way where the
+/// body is pressed below 1/√3 of its length; the neo-Hookean one pushes harder the further.
+TEST(Force, NeoHookeResistsUntilTheBodyIsInsideOut) {
+  for (const Law law : {Law::hooke, Law::neo_hooke}) {
+    double before = 0;
+    bool resists = true;
+    for (const double stretch : {0.9, 0.7, 0.5, 0.3, 0.1, 0.0, -0.2, -0.5}) {
+      Mat3d g{};
+      g(0, 0) = stretch - 1;
+      const Hooke<double> hooke{1e5, 8e4};
+      const double push = law == Law::hooke ? GreenHooke<double>{hooke}.first_piola_stress(g)(0, 0)
+                                            : NeoHooke<double>{hooke}.first_piola_stress(g)(0, 0);
+      resists = resists && push < before;
+      before = push;
+    }
+    EXPECT_EQ(resists, law == Law::neo_hooke);
+  }
+}
+
+TEST(Force, NeoHookeIsHookeAtSmallStrains) {
+  std::mt19937_64 engine(5);
+  for (int trial = 0; trial < 20; ++trial) {
+    Mat3d g;
+    for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = uniform(engine, -1e-6, 1e-6);
+    const Hooke<double> hooke{3e5, 8e4};
+    const Mat3d p = NeoHooke<double>{hooke}.first_piola_stress(g),
+                s = full(hooke.stress(cauchy_strain(g)));
+    // What is of second order is 1e-6 of it; and no digits are lost by what cancels at rest.
+    for (int e = 0; e < 9; ++e) EXPECT_NEAR(p(e / 3, e % 3), s(e / 3, e % 3), 1e-5);
+    EXPECT_NEAR(NeoHooke<double>{hooke}.energy(g), hooke.energy(cauchy_strain(g)), 1e-11);
+  }
 }
 
 TEST(Force, HourglassControlNeedsOneSupport) {

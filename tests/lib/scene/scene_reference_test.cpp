@@ -34,9 +34,10 @@ std::string digest(const Scene& s) {
          << b.scale << '\n';
     for (const Vec3d v : {b.rotation, b.translation, b.velocity, b.spin}) vector(v);
     text << static_cast<int>(b.volume_rule) << ' ' << static_cast<int>(b.material.strain) << ' '
-         << b.material.volume_stiffness << ' ' << b.material.damping << ' ' << b.material.hourglass
-         << ' ' << static_cast<int>(b.neighbourhood.support) << ' ' << b.neighbourhood.nearest
-         << ' ' << b.neighbourhood.factor << '\n';
+         << static_cast<int>(b.material.law) << ' ' << b.material.volume_stiffness << ' '
+         << b.material.damping << ' ' << b.material.hourglass << ' '
+         << static_cast<int>(b.neighbourhood.support) << ' ' << b.neighbourhood.nearest << ' '
+         << b.neighbourhood.factor << '\n';
     for (const MotionRequest& m : b.motions) {
       for (const Vec3d v : {m.displacement, m.velocity, m.amplitude}) vector(v);
     }

@@ -3,6 +3,9 @@
 /// template on the law.
 #pragma once
 
+#include <cmath>
+
+#include "phyxel/material.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/types.hpp"
 
@@ -53,18 +56,104 @@ struct CauchyHooke {
   }
 };
 
+namespace detail {
+/// Sum of the principal minors: the second invariant.
+template <class Real>
+PHYXEL_HD Real minors(const Mat3<Real>& g) {
+  return minor(g(0, 0), g(1, 1), g(0, 1), g(1, 0)) + minor(g(0, 0), g(2, 2), g(0, 2), g(2, 0)) +
+         minor(g(1, 1), g(2, 2), g(1, 2), g(2, 1));
+}
+/// Σ g(a, b)².
+template <class Real>
+PHYXEL_HD Real squares(const Mat3<Real>& g) {
+  Real sum = g(0, 0) * g(0, 0);
+  for (int e = 1; e < 9; ++e) sum = fused(g(e / 3, e % 3), g(e / 3, e % 3), sum);
+  return sum;
+}
+}  // namespace detail
+
+/// det F - 1 from ∇u, without cancellation: tr G + ½(tr² G - tr G²) + det G.
+template <class Real>
+PHYXEL_HD Real volume_change(const Mat3<Real>& g) {
+  return g(0, 0) + g(1, 1) + g(2, 2) + detail::minors(g) + determinant(g);
+}
+
+/// The stable neo-Hookean law of Smith, de Goes and Kim 2018 (Stable Neo-Hookean Flesh Simulation,
+/// equations 13 and 14):
+///   ψ = μ' / 2 (I - 3) + λ' / 2 (J - α)² - μ' / 2 log(I + 1),   I = F:F, J = det F,
+/// with μ' = 4/3 μ, λ' = λ + 5/6 μ and α = 1 + 3/4 μ'/λ', which is Hooke's law of λ and μ at small
+/// strains. Defined for every F: it pushes back where a body is flattened or turned inside out.
+/// Written in ∇u, so that small strains keep their digits; zero at rest.
+template <class Real>
+struct NeoHooke {
+  Hooke<Real> hooke;
+
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    using std::log1p;
+    const Real quarter = Real(0.25) * excess(grad_u), change = volume_change(grad_u);
+    const Real shape = Real(0.375) * detail::squares(grad_u) -
+                       Real(0.75) * (detail::minors(grad_u) + determinant(grad_u)) +
+                       Real(0.5) * (quarter - log1p(quarter));
+    return shear() * shape + Real(0.5) * bulk() * change * change;
+  }
+  /// μ' (1 - 1/(I + 1)) F + λ' (J - α) cof F [Pa].
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    const Mat3<Real> f = identity<Real>() + grad_u, cof = cofactor(grad_u);
+    const Real trace = grad_u(0, 0) + grad_u(1, 1) + grad_u(2, 2), i = excess(grad_u);
+    // F - cof F, and of what 1 - 1/(I + 1) is beyond 3/4.
+    const Real beyond = Real(0.25) * (i / (Real(4) + i));
+    Mat3<Real> p;
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b < 3; ++b) {
+        Real difference = grad_u(a, b) + grad_u(b, a) - cof(a, b);
+        if (a == b) difference = difference - trace;
+        p(a, b) = shear() * fused(beyond, f(a, b), Real(0.75) * difference);
+      }
+    }
+    return fused(bulk() * volume_change(grad_u), cofactor(f), p);
+  }
+
+ private:
+  PHYXEL_HD Real shear() const { return Real(4.0 / 3.0) * hooke.mu; }
+  PHYXEL_HD Real bulk() const { return fused(Real(5.0 / 6.0), hooke.mu, hooke.lambda); }
+  /// I - 3.
+  PHYXEL_HD static Real excess(const Mat3<Real>& g) {
+    return fused(Real(2), g(0, 0) + g(1, 1) + g(2, 2), detail::squares(g));
+  }
+};
+
+namespace detail {
+template <Elasticity, class Real>
+struct ElasticLawOf {
+  using type = GreenHooke<Real>;
+};
+template <class Real>
+struct ElasticLawOf<Elasticity::cauchy_hooke, Real> {
+  using type = CauchyHooke<Real>;
+};
+template <class Real>
+struct ElasticLawOf<Elasticity::neo_hooke, Real> {
+  using type = NeoHooke<Real>;
+};
+}  // namespace detail
+
+/// Each law as a type: all are made of Hooke's parameters.
+template <Elasticity elasticity, class Real>
+using ElasticLaw = typename detail::ElasticLawOf<elasticity, Real>::type;
+
+/// Calls apply(law) with the law of that name: the one place where names become types.
+template <class Real, class Apply>
+PHYXEL_HD auto with_law(Elasticity elasticity, const Hooke<Real>& hooke, Apply&& apply) {
+  if (elasticity == Elasticity::green_hooke) return apply(GreenHooke<Real>{hooke});
+  if (elasticity == Elasticity::cauchy_hooke) return apply(CauchyHooke<Real>{hooke});
+  return apply(NeoHooke<Real>{hooke});
+}
+
 /// Volume conservation, energy ½ k_v (det F - 1)². Source: Mueller et al. 2004, section 4.3.
 template <class Real>
 struct VolumeConservation {
   Real stiffness;  ///< k_v [Pa]
 
-  /// det F - 1 from ∇u, without cancellation: tr G + ½(tr² G - tr G²) + det G.
-  PHYXEL_HD static Real volume_change(const Mat3<Real>& g) {
-    const Real minors = detail::minor(g(0, 0), g(1, 1), g(0, 1), g(1, 0)) +
-                        detail::minor(g(0, 0), g(2, 2), g(0, 2), g(2, 0)) +
-                        detail::minor(g(1, 1), g(2, 2), g(1, 2), g(2, 1));
-    return g(0, 0) + g(1, 1) + g(2, 2) + minors + determinant(g);
-  }
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     const Real change = volume_change(grad_u);
     return Real(0.5) * stiffness * change * change;
