@@ -136,6 +136,12 @@ class Builder {
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
         check_terms(scene_.bodies[b]);
+        if (scene_.bodies[b].closure > 0 && ranks_.size() > 1) {
+          throw InputError(fmt::format(
+              "{}: body \"{}\" has closed gradients (closure = {:g}), which one rank has to find: "
+              "allowed are one rank, or closure = 0",
+              scene_.bodies[b].where, scene_.bodies[b].name, scene_.bodies[b].closure));
+        }
         bodies_[b].kernel_volumes = wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
                                                          static_cast<std::size_t>(bodies_[b].size));
       }

@@ -102,6 +102,7 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   if (terms == "cauchy") body.material.strain = Strain::cauchy;
   if (terms == "volume") body.material.volume_stiffness = 1e6;
   if (terms == "hourglass") body.material.hourglass = 0.1;
+  if (terms == "closure") body.closure = 0.01;
   if (terms == "damping") body.material.damping = 0.1;
   if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
   if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
@@ -110,9 +111,9 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   return scene;
 }
 /// "surfels": moved after every step.
-const std::vector<std::string> all_terms = {"green",  "cauchy",    "neo-hookean",
-                                            "volume", "hourglass", "damping",
-                                            "load",   "adaptive",  "surfels"};
+const std::vector<std::string> all_terms = {"green",     "cauchy",  "neo-hookean", "volume",
+                                            "hourglass", "closure", "damping",     "load",
+                                            "adaptive",  "surfels"};
 
 /// A deformation of 10%.
 State deformed(const Model& model) {
@@ -215,7 +216,8 @@ void bench_step(const BenchOptions& options) {
     const Scene scene = bench_scene(terms, factor, options.bodies);
     std::vector<Cloud> clouds;
     const bool surfels = terms == "surfels";
-    clouds.push_back(bench_cloud(options.shape, size, surfels));
+    // Closed gradients need a surface, too, which then stays at rest.
+    clouds.push_back(bench_cloud(options.shape, size, surfels || terms == "closure"));
     clouds.resize(scene.bodies.size(), clouds[0]);
     const Model model = build_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);
@@ -428,9 +430,10 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   if (std::string(name) != "neighbours") add_device_options(*command, *options);
   if (std::string(name) == "step") {
     command
-        ->add_option("--terms", options->terms,
-                     "Term sets: green, cauchy, neo-hookean, volume, hourglass, damping, load, "
-                     "adaptive, surfels")
+        ->add_option(
+            "--terms", options->terms,
+            "Term sets: green, cauchy, neo-hookean, volume, hourglass, closure, damping, load, "
+            "adaptive, surfels")
         ->delimiter(',');
     command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
         ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));

@@ -11,13 +11,15 @@
 namespace phyxel::app {
 namespace {
 
-std::string terms_of(const Material& m) {
+std::string terms_of(const Part& part) {
+  const Material& m = part.material;
   std::string terms = m.law == Law::neo_hooke     ? "neo-Hookean law"
                       : m.strain == Strain::green ? "Green strain"
                                                   : "Cauchy strain";
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.hourglass > 0) terms += fmt::format(", hourglass control ({:g} E)", m.hourglass);
+  if (part.closure > 0) terms += fmt::format(", closed gradients (to {:g})", part.closure);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
   return terms;
 }
@@ -132,7 +134,7 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
     text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
-                        m.poisson, m.density, terms_of(m));
+                        m.poisson, m.density, terms_of(part));
   }
   if (shown < model.parts.size()) {
     text += fmt::format("              and {} more bodies\n", model.parts.size() - shown);

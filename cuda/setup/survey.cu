@@ -315,7 +315,9 @@ Surveyor cuda_surveyor(int device) {
 
 bool can_survey_on_cuda(const Scene& scene) {
   return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
-    return body.neighbourhood.max_neighbours || body.neighbourhood.nearest > most_nearest;
+    // Closing vectors are found on the host, from its lists.
+    return body.closure > 0 || body.neighbourhood.max_neighbours ||
+           body.neighbourhood.nearest > most_nearest;
   });
 }
 

@@ -15,8 +15,8 @@ Surveyor cuda_surveyor(int device = 0);
 /// For `build_share`, on ranks whose GPUs find their lists themselves. @throws DeviceError
 std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device);
 
-/// Whether those surveyors know the rules of all bodies: not `max_neighbours`, and `nearest` up to
-/// 256.
+/// Whether those surveyors know what all bodies ask for: not `max_neighbours`, nor `closure`, and
+/// `nearest` up to 256.
 bool can_survey_on_cuda(const Scene& scene);
 
 }  // namespace phyxel

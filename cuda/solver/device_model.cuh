@@ -91,6 +91,7 @@ class DeviceModel {
   Index boundary_tiles() const { return tiling_.boundary_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
+  bool closed() const { return !model_.closing.empty(); }         ///< Whether gradients are.
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
 
   const AllFields& fields() const { return fields_; }
@@ -214,7 +215,9 @@ class DeviceModel {
   }
   /// Shared memory of a block of pass 2, which takes more than pass 1.
   int pass_2_bytes(int slots) const {
-    return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0)) * slots;
+    return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0) +
+            (closed() ? ClosingStresses<Real>::bytes : 0)) *
+           slots;
   }
 
   // --- accounts ---------------------------------------------------------------------------------
@@ -232,6 +235,10 @@ class DeviceModel {
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
     if (load_.size()) list.push_back({"loads", load_.bytes()});
     if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
+    if (closed()) {
+      list.push_back(
+          {"closing vectors and stresses", closing_.bytes() + closing_stresses_.bytes()});
+    }
   }
   std::size_t step_traffic() const {
     const std::size_t lists = tiling_.neighbours.bytes() + tiling_.second().bytes();
@@ -240,6 +247,7 @@ class DeviceModel {
     if (mixed) each += 6 * sizeof(StateReal);
     if (load_.size()) each += 3 * sizeof(Real);
     if (pull_.size()) each += 6 * sizeof(Real);
+    if (closed()) each += 6 * sizeof(Real) + 2 * ClosingStresses<Real>::bytes;
     return lists + each * places();
   }
 
@@ -295,6 +303,12 @@ class DeviceModel {
       pull_ = {3 * places(), "hourglass control" + of};
       pull_.clear();
     }
+    if (closed()) {
+      closing_ = sent(closing_by_place(), "closing vectors" + of);
+      closing_stresses_ = {ClosingStresses<Real>::bytes * places(), "closing stresses" + of};
+      closing_stresses_.clear();
+      fields_.closing_stresses = ClosingStresses<Real>::in(closing_stresses_.data(), places());
+    }
     tiles_ = {tiling_.part.size(), "tiles" + of};
     std::vector<TileMaterial> materials;
     for (const Index part : tiling_.part) {
@@ -312,6 +326,7 @@ class DeviceModel {
     fields_.velocity = velocity_.data();
     fields_.displacement = displacement_.data();
     fields_.pull = pull_.data();
+    fields_.closing = closing_.data();
     fields_.tiles = tiles_.data();
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
@@ -322,6 +337,18 @@ class DeviceModel {
     put_all_constants();
     velocity_.clear();
     if constexpr (mixed) displacement_.clear();
+  }
+
+  std::vector<Real> closing_by_place() const {
+    std::vector<Real> values(3 * places());
+    for (Index i = 0; i < size(); ++i) {
+      const auto place = static_cast<std::size_t>(tiling_.place[i]);
+      const Vec3<Real> c = to<Real>(model_.closing[i]);
+      values[place] = c.x;
+      values[places() + place] = c.y;
+      values[2 * places() + place] = c.z;
+    }
+    return values;
   }
 
   void put_all_constants() {
@@ -378,8 +405,8 @@ class DeviceModel {
 
   AllFields fields_{};
   DeviceLists lists_{}, second_lists_{};
-  DeviceArray<std::byte> points_, stresses_;
-  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, pull_;
+  DeviceArray<std::byte> points_, stresses_, closing_stresses_;
+  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, pull_, closing_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;

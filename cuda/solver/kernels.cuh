@@ -8,6 +8,7 @@
 /// the issue of instructions in pass 1.
 #pragma once
 
+#include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/strain.hpp"
@@ -48,8 +49,10 @@ struct Fields {
   const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m: held; 0: nobody.
   const Real* load;               ///< [3, places], or null.
   Real* pull;                     ///< Of hourglass control: [3, places], or null.
-  StateReal* velocity;            ///< [3, places]
-  StateReal* displacement;        ///< [3, places] where StateReal is not Real, or null.
+  const Real* closing;            ///< ĉ of closed gradients [1/m]: [3, places], or null.
+  ClosingStresses<Real> closing_stresses;
+  StateReal* velocity;      ///< [3, places]
+  StateReal* displacement;  ///< [3, places] where StateReal is not Real, or null.
   const TileConstants<Real, StateReal>* tiles;
   Vec3<StateReal> gravity;
   std::size_t places;
@@ -198,6 +201,8 @@ template <class Real>
 constexpr int pass_1_blocks = sizeof(Real) == 4 ? 6 : 3;
 template <class Real>
 constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
+template <class Real>
+constexpr int pass_2_blocks_closed = sizeof(Real) == 4 ? 4 : 2;
 
 /// Where displacement gradients go, those of all tiles or of some: entry e of thread t of block b
 /// to values[e * stride + b * tile_size + t].
@@ -209,9 +214,13 @@ struct Gradients {
   Real* residuals = nullptr;  ///< What the gradients do not follow (`add_residual`); null: unasked.
 };
 
+/// What is done with the part of the neighbours' displacements that a linear fit leaves. Closing
+/// serves bodies with hourglass control, too.
+enum class Beyond { nothing, hourglass, closing };
+
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-template <class Real, class StateReal, Elasticity elasticity, bool volume, bool hourglass,
+template <class Real, class StateReal, Elasticity elasticity, bool volume, Beyond beyond,
           bool only_gradient, class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
@@ -242,13 +251,20 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
     const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
     add_gradient_term(sum, u, w * x);
-    if constexpr (hourglass) add_pull(pull, u, w);
+    if constexpr (beyond != Beyond::nothing) add_pull(pull, u, w);
   });
 
   const Real* c = f.moment_constants + place;
   const Sym3<Real> inverse_moment{
       c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
-  const Mat3<Real> grad_u = displacement_gradient(sum, inverse_moment);
+  const Mat3<Real> fit = displacement_gradient(sum, inverse_moment);
+  Mat3<Real> grad_u = fit;
+  Vec3<Real> moment_offset, closing;
+  if constexpr (beyond == Beyond::closing) {
+    moment_offset = column3(f.force_constants, f.places, place);
+    closing = column3(f.closing, f.places, place);
+    grad_u = closed_gradient(fit, pull, moment_offset, closing);
+  }
   if constexpr (only_gradient) {
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
@@ -259,14 +275,20 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
       const Vec3<Real> x = p.x - own.x;
       const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
       // Nobody is far away: their distance alone would leave the range of float.
-      if (w > Real(0)) add_residual(residual, p.u - own.u, grad_u, x, w);
+      if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
     const auto law = law_of<Real, elasticity, volume>(body);
-    Mat3<Real> q = pair_stress(c[6 * f.places], law.first_piola_stress(grad_u), inverse_moment);
-    if constexpr (hourglass) {
-      q = with_hourglass(q, body.hourglass, grad_u);
+    const Mat3<Real> stress = law.first_piola_stress(grad_u);
+    Mat3<Real> q = pair_stress(c[6 * f.places], stress, inverse_moment);
+    if constexpr (beyond == Beyond::closing) {
+      const Vec3<Real> t = closing_stress(c[6 * f.places], stress, closing);
+      q = closed_pair_stress(q, t, moment_offset, inverse_moment);
+      f.closing_stresses.set(place, t);
+    }
+    if (beyond == Beyond::hourglass || (beyond == Beyond::closing && f.pull)) {
+      q = with_hourglass(q, body.hourglass, fit);
       set_column3(f.pull, f.places, place, pull_force(body.hourglass, pull));
     }
     f.stresses.set(place, {own.x, q});
@@ -276,10 +298,11 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
 /// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of
-/// loads and pulls is added.
+/// loads and pulls is added; with `closed` what closing stresses do.
 template <class Real, class StateReal, bool own_supports, bool damped, bool more, bool only_force,
-          class Others = Alone>
-__global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
+          class Others = Alone, bool closed = false>
+__global__ void __launch_bounds__(tile_size,
+                                  closed ? pass_2_blocks_closed<Real> : pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force,
            const __grid_constant__ Others others) {
@@ -289,8 +312,11 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
   const TileLists::Row row = lists.rows[place / warp_size];
   others.before(tile);
   fetch_tile(f.stresses, lists, tile, image);
-  // A support of each point, after the records.
-  Real* supports = reinterpret_cast<Real*>(image + Stresses<Real>::bytes * lists.slots);
+  // Behind the records: closing stresses, then a support of each point.
+  char* closings = image + Stresses<Real>::bytes * lists.slots;
+  if constexpr (closed) fetch_tile(f.closing_stresses, lists, tile, closings);
+  Real* supports =
+      reinterpret_cast<Real*>(closings + (closed ? ClosingStresses<Real>::bytes : 0) * lists.slots);
   if constexpr (own_supports) {
     supports[threadIdx.x] = f.inverse_h_squared[place];
     if (threadIdx.x < far_slots) supports[tile_size + threadIdx.x] = Real(1);
@@ -311,11 +337,17 @@ __global__ void __launch_bounds__(tile_size, pass_2_blocks<Real>)
     const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
     return weight_shape_anywhere(dot(x, x), inverse_h_squared);
   };
+  Vec3<Real> t_i;
+  if constexpr (closed) t_i = ClosingStresses<Real>::at(closings, lists.slots, 16 * threadIdx.x);
   Vec3<Real> sum;
   walk(lists, row, first, [&](unsigned offset) {
     const auto p = Stresses<Real>::at(image, lists.slots, offset);
     const Vec3<Real> x = p.x - x_i;
-    add_neighbour_force(sum, p.q, x, weight_of(x, offset));
+    const Real w = weight_of(x, offset);
+    add_neighbour_force(sum, p.q, x, w);
+    if constexpr (closed) {
+      add_closing_force(sum, t_i, ClosingStresses<Real>::at(closings, lists.slots, offset), w);
+    }
   });
   const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;
   sum += own_force(q_i, column3(f.force_constants, f.places, place));

@@ -67,10 +67,12 @@ class Passes {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
+    constexpr Elasticity linear = Elasticity::cauchy_hooke;
     launch_pass_1<Alone>(
         fields,
-        {fields.pull ? pass_1<Real, StateReal, Elasticity::cauchy_hooke, false, true, false>
-                     : pass_1<Real, StateReal, Elasticity::cauchy_hooke, false, false, false>,
+        {m_.closed()   ? pass_1<Real, StateReal, linear, false, Beyond::closing, false>
+         : fields.pull ? pass_1<Real, StateReal, linear, false, Beyond::hourglass, false>
+                       : pass_1<Real, StateReal, linear, false, Beyond::nothing, false>,
          0, m_.tiles()},
         {}, {});
     send(Sent::stresses);
@@ -78,9 +80,7 @@ class Passes {
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
   void gather(Real* forces) const {
     receive(Sent::stresses);
-    launch_pass_2<Alone>({m_.own_supports() ? pass_2<Real, StateReal, true, false, false, true>
-                                            : pass_2<Real, StateReal, false, false, false, true>,
-                          0, m_.tiles()},
+    launch_pass_2<Alone>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
                          StateReal(0), forces, {});
   }
   /// Of ghosts: zero.
@@ -104,10 +104,12 @@ class Passes {
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    launch_pass_1<Alone>(
-        m_.fields(),
-        {pass_1<Real, StateReal, Elasticity::green_hooke, false, false, true>, 0, tiles}, gradients,
-        {});
+    constexpr Elasticity any = Elasticity::green_hooke;
+    launch_pass_1<Alone>(m_.fields(),
+                         {m_.closed() ? pass_1<Real, StateReal, any, false, Beyond::closing, true>
+                                      : pass_1<Real, StateReal, any, false, Beyond::nothing, true>,
+                          0, tiles},
+                         gradients, {});
   }
 
  private:
@@ -123,7 +125,7 @@ class Passes {
     Runs(Index begin, Index end, const Passes& passes) : of(passes) {
       for (Index tile = begin; tile < end; ++tile) {
         const Material& material = of.m_.model().parts[of.m_.tiling().part[tile]].material;
-        add(pass_1, pass_1_of<Others1>(material), tile);
+        add(pass_1, of.template pass_1_of<Others1>(material), tile);
         add(pass_2,
             of.m_.own_supports() ? of.template pass_2_of<true, Others2>(material)
                                  : of.template pass_2_of<false, Others2>(material),
@@ -168,29 +170,40 @@ class Passes {
 
   /// Terms chosen at run time become kernels: the one place.
   template <class Others>
-  static Pass1<Others> pass_1_of(const Material& m) {
-    return m.hourglass > 0 ? pass_1_of<true, Others>(m) : pass_1_of<false, Others>(m);
+  Pass1<Others> pass_1_of(const Material& m) const {
+    if constexpr (std::is_same_v<Others, Alone>) {  // shares have no closed gradients
+      if (m_.closed()) return pass_1_of<Beyond::closing, Others>(m);
+    }
+    return m.hourglass > 0 ? pass_1_of<Beyond::hourglass, Others>(m)
+                           : pass_1_of<Beyond::nothing, Others>(m);
   }
-  template <bool hourglass, class Others>
+  template <Beyond beyond, class Others>
   static Pass1<Others> pass_1_of(const Material& m) {
     switch (m.elasticity()) {
       case Elasticity::green_hooke:
-        return pass_1_of<Elasticity::green_hooke, hourglass, Others>(m);
+        return pass_1_of<Elasticity::green_hooke, beyond, Others>(m);
       case Elasticity::cauchy_hooke:
-        return pass_1_of<Elasticity::cauchy_hooke, hourglass, Others>(m);
+        return pass_1_of<Elasticity::cauchy_hooke, beyond, Others>(m);
       case Elasticity::neo_hooke:
         break;
     }
-    return pass_1_of<Elasticity::neo_hooke, hourglass, Others>(m);
+    return pass_1_of<Elasticity::neo_hooke, beyond, Others>(m);
   }
-  template <Elasticity elasticity, bool hourglass, class Others>
+  template <Elasticity elasticity, Beyond beyond, class Others>
   static Pass1<Others> pass_1_of(const Material& m) {
     return m.volume_stiffness > 0
-               ? cuda::pass_1<Real, StateReal, elasticity, true, hourglass, false, Others>
-               : cuda::pass_1<Real, StateReal, elasticity, false, hourglass, false, Others>;
+               ? cuda::pass_1<Real, StateReal, elasticity, true, beyond, false, Others>
+               : cuda::pass_1<Real, StateReal, elasticity, false, beyond, false, Others>;
   }
   template <bool own_supports, class Others>
   Pass2<Others> pass_2_of(const Material& m) const {
+    if constexpr (std::is_same_v<Others, Alone>) {
+      if (m_.closed()) {
+        return m.damping > 0
+                   ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others, true>
+                   : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others, true>;
+      }
+    }
     const bool more = !m_.model().loads.empty() || m_.fields().pull;
     if (m.damping > 0) {
       return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
@@ -198,6 +211,13 @@ class Passes {
     }
     return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
                 : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
+  }
+
+  template <bool closed>
+  Pass2<Alone> gather_of() const {
+    return m_.own_supports()
+               ? cuda::pass_2<Real, StateReal, true, false, false, true, Alone, closed>
+               : cuda::pass_2<Real, StateReal, false, false, false, true, Alone, closed>;
   }
 
   template <class Others>

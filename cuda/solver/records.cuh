@@ -5,6 +5,8 @@
 
 #include <cuda_runtime.h>
 
+#include <type_traits>
+
 #include "phyxel/types.hpp"
 #include "setup/tiling.hpp"
 
@@ -230,6 +232,45 @@ struct Stresses<double> {
   __device__ static Value value(const double2 (&w)[6]) {
     return {{w[0].x, w[0].y, w[1].x},
             {{{w[2].x, w[2].y, w[3].x}, {w[3].y, w[4].x, w[4].y}, {w[5].x, w[5].y, w[1].y}}}};
+  }
+};
+
+/// Closing stress t of each place, where gradients are closed (phyxel/physics/closing.hpp).
+template <class Real>
+struct ClosingStresses {
+  using Word = std::conditional_t<sizeof(Real) == 4, float4, double2>;
+  static constexpr int words = sizeof(Real) == 4 ? 1 : 2, bytes = 16 * words;
+  Word* word[words];
+  static ClosingStresses in(void* memory, std::size_t places) {
+    ClosingStresses s;
+    for (int k = 0; k < words; ++k) s.word[k] = static_cast<Word*>(memory) + k * places;
+    return s;
+  }
+
+  __device__ void set(std::size_t place, Vec3<Real> t) const {
+    if constexpr (words == 1) {
+      word[0][place] = {t.x, t.y, t.z, 0};
+    } else {
+      word[0][place] = {t.x, t.y};
+      word[1][place] = {t.z, 0};
+    }
+  }
+  __device__ void fetch(char* image, int slots, int slot, Index place) const {
+#pragma unroll
+    for (int k = 0; k < words; ++k)
+      copy_async<16>(image + 16 * (k * slots + slot), word[k] + place);
+  }
+  __device__ static void set_far(char* image, int slots, int slot) {
+    for (int k = 0; k < words; ++k) reinterpret_cast<Word*>(image)[k * slots + slot] = {};
+  }
+  __device__ static Vec3<Real> at(const char* image, int slots, unsigned offset) {
+    const auto first = *reinterpret_cast<const Word*>(image + offset);
+    if constexpr (words == 1) {
+      return {first.x, first.y, first.z};
+    } else {
+      const auto second = *reinterpret_cast<const Word*>(image + offset + 16 * slots);
+      return {first.x, first.y, second.x};
+    }
   }
 };
 

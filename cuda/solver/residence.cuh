@@ -15,8 +15,10 @@ class Residence {
   /// Steps that may wait to be launched together.
   static constexpr int most_steps = 256;
 
-  /// Nothing unless each body fits a cluster, or all bodies fit at once.
+  /// Nothing unless each body fits a cluster, or all bodies fit at once; gradients must be as they
+  /// come.
   static std::unique_ptr<Residence> of(const DeviceModel<Real, StateReal>& model) {
+    if (model.closed()) return nullptr;
     std::unique_ptr<Residence> residence(new Residence(model));
     return residence->make() ? std::move(residence) : nullptr;
   }

@@ -39,11 +39,16 @@ void place(Cloud& cloud, const BodyRequest& request) {
 }
 
 void check_terms(const BodyRequest& request) {
-  if (!(request.material.hourglass > 0) || !request.neighbourhood.one_sided()) return;
-  throw InputError(fmt::format(
-      "{}: body \"{}\" has hourglass control ({:g}), which needs one support for the body: allowed "
-      "are neighbours.support = \"uniform\" without max_neighbours, or hourglass = 0",
-      request.where, request.name, request.material.hourglass));
+  if (!request.neighbourhood.one_sided()) return;
+  const auto refuse_if = [&](double value, const char* term, const char* key) {
+    if (!(value > 0)) return;
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has {} ({:g}), which needs one support for the body: allowed are "
+        "neighbours.support = \"uniform\" without max_neighbours, or {} = 0",
+        request.where, request.name, term, value, key));
+  };
+  refuse_if(request.material.hourglass, "hourglass control", "hourglass");
+  refuse_if(request.closure, "closed gradients", "closure");
 }
 
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {

@@ -7,6 +7,7 @@
 
 #include "model/assembly.hpp"
 #include "model/box.hpp"
+#include "model/closure.hpp"
 #include "model/host_memory.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
@@ -100,6 +101,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
                          .material = request.material,
                          .neighbourhood = in_words(request.neighbourhood),
                          .lists = survey.lists,
+                         .closure = request.closure,
                          .kernel_volumes = kernel_volumes,
                          .size = model.size() - shift,
                          .surfels = static_cast<Index>(cloud.surface.position.size())});
@@ -193,6 +195,7 @@ Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
     add_body(model, request, cloud, surveyor);
   }
   find_moments(model);
+  close_gradients(model);
   add_warnings(model, model.surfels.position.size());
   return model;
 }
@@ -209,6 +212,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
     add_body(model, scene.bodies[b], clouds[b], surveyor);
   }
   find_moments(model);
+  close_gradients(model);
   add_warnings(model, model.surfels.position.size());
   return model;
 }

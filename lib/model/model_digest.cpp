@@ -61,7 +61,7 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<Index>{part.size});
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0,
-                                         m.hourglass, static_cast<double>(m.law)});
+                                         m.hourglass, static_cast<double>(m.law), part.closure});
   }
   for (const Motion& motion : model.motions) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;

@@ -210,6 +210,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("velocity", body.velocity);
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
+  table.read("closure", body.closure);
   body.material = read_material(table.table("material"));
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   for (const SceneTable& fixed : table.tables("fixed")) {

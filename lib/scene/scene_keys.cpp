@@ -188,6 +188,11 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Phyxel volumes: \"geometry\" takes those the body carries, \"kernel\" the rule "
            "of Müller et al. 2004 (mass over kernel density, as in Farias et al. 2008); "
            "\"automatic\" is geometry where the body has volumes, else kernel."},
+      {.section = "body", .name = "closure", .fallback = "0", .range = between(0, 1),
+       .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
+           "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
+           "the phyxels are; 1e-3 is plenty. 0: as they come. Needs a closed surface, and one support "
+           "for the body."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
       {.section = "body", .name = "neighbours", .type = KeyType::table,

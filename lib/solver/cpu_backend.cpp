@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/strain.hpp"
@@ -36,7 +37,7 @@ struct PointRecord {
 /// What the second pass reads of a phyxel.
 struct StressRecord {
   static constexpr int size = 16;
-  enum { pair_stress = 0, position = 9, inverse_h_squared = 12 };
+  enum { pair_stress = 0, closing_stress = 9, position = 12, inverse_h_squared = 15 };
 };
 
 template <class Real, class StateReal>
@@ -66,6 +67,7 @@ class CpuBackend final : public Backend {
     velocity_.assign(slots * 3, StateReal(0));
     if (!model.loads.empty()) load_.assign(slots * 3, Real(0));
     if (has_hourglass_control(model)) pull_.assign(slots * 3, Real(0));
+    if (!model.closing.empty()) closing_.assign(slots * 3, Real(0));
     for (std::size_t p = 0; p < model.parts.size(); ++p) pack_part(p);
     model_loads(0);
   }
@@ -114,7 +116,9 @@ class CpuBackend final : public Backend {
     if (!load_.empty()) model_loads(time);
     for (const Run& run : runs_) {
       const bool damped = run.material.damping > 0;
-      if (load_.empty() && pull_.empty()) {
+      if (!closing_.empty()) {
+        damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
+      } else if (load_.empty() && pull_.empty()) {
         damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
       } else {
         damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
@@ -134,7 +138,8 @@ class CpuBackend final : public Backend {
     std::vector<Vec3d> by_slot(static_cast<std::size_t>(layout_.slots()));
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Vec3<P> f = pull_.empty() ? force_of<false>(p) : force_of<true>(p);
+      Vec3<P> f = closing_.empty() ? force_of<false>(p) : force_of<true>(p);
+      if (!pull_.empty()) f += vec3_of<P>(pull_, p);
       for (int l = 0; l < W; ++l) by_slot[p * W + l] = {f.x[l], f.y[l], f.z[l]};
     }
     for (Index i = 0; i < model_.size(); ++i) force[i] = by_slot[layout_.slot(i)];
@@ -144,7 +149,7 @@ class CpuBackend final : public Backend {
     std::vector<Mat3d> by_slot(static_cast<std::size_t>(layout_.slots()));
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Mat3<P> g = displacement_gradient_of<false>(p, nullptr);
+      const Mat3<P> g = whole_gradient_of(p);
       for (int l = 0; l < W; ++l) {
         for (int e = 0; e < 9; ++e) by_slot[p * W + l](e / 3, e % 3) = g(e / 3, e % 3)[l];
       }
@@ -174,7 +179,7 @@ class CpuBackend final : public Backend {
                                      CarrierRecord::size);
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      const Mat3<P> grad_u = displacement_gradient_of<false>(p, nullptr);
+      const Mat3<P> grad_u = whole_gradient_of(p);
       const Vec3<P> x = point_of(p, PointRecord::position);
       const Vec3<S> u = vec3_of<S>(displacement_, p);
       for (int l = 0; l < W; ++l) {
@@ -214,6 +219,7 @@ class CpuBackend final : public Backend {
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
     if (!load_.empty()) list.push_back({"loads", load_.size() * sizeof(Real)});
     if (!pull_.empty()) list.push_back({"hourglass control", pull_.size() * sizeof(Real)});
+    if (!closing_.empty()) list.push_back({"closing vectors", closing_.size() * sizeof(Real)});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -225,7 +231,7 @@ class CpuBackend final : public Backend {
     const std::size_t pass_2 =
         (inverse_.start.empty() ? lists_ : inverse_).bytes() +
         slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
-        (load_.size() + 2 * pull_.size()) * sizeof(Real);
+        (load_.size() + 2 * pull_.size() + closing_.size()) * sizeof(Real);
     return pass_1 + pass_2;
   }
 
@@ -248,19 +254,28 @@ class CpuBackend final : public Backend {
     }
   }
 
-  /// Pass 1: ∇u of the phyxels of pack p and, if they are controlled, how their neighbours pull.
-  template <bool Controlled>
+  /// Pass 1: the linear fit of the phyxels of pack p and, where asked, how their neighbours pull.
+  template <bool Pulled>
   PHYXEL_HD Mat3<P> displacement_gradient_of(Index p, [[maybe_unused]] Vec3<P>* pull) const {
     Mat3<P> sum;
     visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
       add_gradient_term(sum, u_ij, w * x_ij);
-      if constexpr (Controlled) add_pull(*pull, u_ij, w);
+      if constexpr (Pulled) add_pull(*pull, u_ij, w);
     });
     return displacement_gradient(sum, inverse_moment_of(p));
   }
 
-  /// Pass 2: internal forces on the phyxels of pack p.
-  template <bool Controlled>
+  /// ∇u of the phyxels of pack p, as their stresses see it.
+  Mat3<P> whole_gradient_of(Index p) const {
+    if (closing_.empty()) return displacement_gradient_of<false>(p, nullptr);
+    Vec3<P> pull = no_pull();
+    const Mat3<P> fit = displacement_gradient_of<true>(p, &pull);
+    return closed_gradient(fit, pull, vec3_of<P>(moment_offset_, p), vec3_of<P>(closing_, p));
+  }
+  PHYXEL_HD static Vec3<P> no_pull() { return {P(Real(0)), P(Real(0)), P(Real(0))}; }
+
+  /// Pass 2: internal forces on the phyxels of pack p, but for how they are pulled.
+  template <bool Closed>
   PHYXEL_HD Vec3<P> force_of(Index p) const {
     const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
     Index own[W];
@@ -269,14 +284,17 @@ class CpuBackend final : public Backend {
     load_records<StressRecord::size>(stresses_.data(), own, record);
     const Vec3<P> x_i = vec3_at(record, StressRecord::position);
     Vec3<P> force = own_force(mat3_at(record), vec3_of<P>(moment_offset_, p));
+    const Vec3<P> t_i = vec3_at(record, StressRecord::closing_stress);
     const Index* end = lists.indices.data() + lists.start[p + 1];
     for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
       load_records<StressRecord::size>(stresses_.data(), j, record);
       const Vec3<P> x_ij = vec3_at(record, StressRecord::position) - x_i;
       const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
       add_neighbour_force(force, mat3_at(record), x_ij, w_ji);
+      if constexpr (Closed) {
+        add_closing_force(force, t_i, vec3_at(record, StressRecord::closing_stress), w_ji);
+      }
     }
-    if constexpr (Controlled) force += vec3_of<P>(pull_, p);
     return force;
   }
 
@@ -310,7 +328,7 @@ class CpuBackend final : public Backend {
   }
 
   /// Force, gravity and the Verlet step; with `More` what the scene has of loads and pulls.
-  template <bool Damped, bool More>
+  template <bool Damped, bool More, bool Closed = false>
   void advance_run(const Run& run, double dt) {
     const double half_damping = run.material.damping * dt / 2;
     const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
@@ -318,7 +336,7 @@ class CpuBackend final : public Backend {
     const PackRange range = run.range;
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
-      Vec3<P> force = force_of<false>(p);
+      Vec3<P> force = force_of<Closed>(p);
       if constexpr (More) {
         if (!pull_.empty()) force += vec3_of<P>(pull_, p);
         if (!load_.empty()) force += vec3_of<P>(load_, p);
@@ -350,22 +368,37 @@ class CpuBackend final : public Backend {
 
   void find_stresses(const std::vector<Run>& runs) {
     for_each_law(runs, [&](const auto& law, const Run& run) {
-      run.hourglass > 0 ? find_stresses<true>(law, run) : find_stresses<false>(law, run);
+      if (!closing_.empty()) {
+        find_stresses<true, true>(law, run);  // costs what the second alone does
+      } else {
+        run.hourglass > 0 ? find_stresses<true, false>(law, run)
+                          : find_stresses<false, false>(law, run);
+      }
     });
   }
-  template <bool Controlled, class Law>
+  template <bool Controlled, bool Closed, class Law>
   void find_stresses(const Law& law, const Run& run) {
     const PackRange range = run.range;
     const P kappa(static_cast<Real>(run.hourglass));
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
-      Vec3<P> pull{P(Real(0)), P(Real(0)), P(Real(0))};
-      const Mat3<P> grad_u = displacement_gradient_of<Controlled>(p, &pull);
-      Mat3<P> q = pair_stress(load<P>(&volume_[p * W]), law.first_piola_stress(grad_u),
-                              inverse_moment_of(p));
+      Vec3<P> pull = no_pull();
+      const Mat3<P> fit = displacement_gradient_of < Controlled || Closed > (p, &pull);
+      const P volume = load<P>(&volume_[p * W]);
+      Mat3<P> q;
+      if constexpr (Closed) {
+        const Vec3<P> b = vec3_of<P>(moment_offset_, p), closing = vec3_of<P>(closing_, p);
+        const Mat3<P> stress = law.first_piola_stress(closed_gradient(fit, pull, b, closing));
+        const Vec3<P> t = closing_stress(volume, stress, closing);
+        q = closed_pair_stress(pair_stress(volume, stress, inverse_moment_of(p)), t, b,
+                               inverse_moment_of(p));
+        store_closing_stress(p, t);
+      } else {
+        q = pair_stress(volume, law.first_piola_stress(fit), inverse_moment_of(p));
+      }
       if constexpr (Controlled) {
-        q = with_hourglass(q, kappa, grad_u);
-        store3(pull_, p, pull_force(kappa, pull));
+        q = with_hourglass(q, kappa, fit);
+        if (!pull_.empty()) store3(pull_, p, pull_force(kappa, pull));
       }
       store_pair_stress(p, q);
     }
@@ -441,7 +474,8 @@ class CpuBackend final : public Backend {
     return records_of(points_, PointRecord::size, PointRecord::displacement, 3);
   }
   Records stress_records() {
-    return records_of(stresses_, StressRecord::size, StressRecord::pair_stress, 9);
+    const int values = closing_.empty() ? 9 : 12;
+    return records_of(stresses_, StressRecord::size, StressRecord::pair_stress, values);
   }
   template <class T>
   Records records_of(AlignedVector<T>& array, int size, int first, int count) {
@@ -476,6 +510,15 @@ class CpuBackend final : public Backend {
     }
   }
 
+  PHYXEL_HD void store_closing_stress(Index p, const Vec3<P>& t) {
+    for (int l = 0; l < W; ++l) {
+      Real* record = stress_record(p * W + l) + StressRecord::closing_stress;
+      record[0] = t.x[l];
+      record[1] = t.y[l];
+      record[2] = t.z[l];
+    }
+  }
+
   // --- set-up and lists
   // -------------------------------------------------------------------------------
 
@@ -498,6 +541,7 @@ class CpuBackend final : public Backend {
         component(inverse_moment_, slot, e, 6) = static_cast<Real>(entries[e]);
       }
       set3(moment_offset_, slot, model_.moment_offset[i]);
+      if (!closing_.empty()) set3(closing_, slot, model_.closing[i]);
       volume_[slot] = static_cast<Real>(model_.volume[i]);
       inverse_mass_[slot] = static_cast<Real>(1 / model_.mass[i]);
     }
@@ -539,8 +583,9 @@ class CpuBackend final : public Backend {
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
-  AlignedVector<Real> load_;  // empty unless the scene has loads
-  AlignedVector<Real> pull_;  // of hourglass control; empty unless the scene has any
+  AlignedVector<Real> load_;     // empty unless the scene has loads
+  AlignedVector<Real> pull_;     // of hourglass control; empty unless the scene has any
+  AlignedVector<Real> closing_;  // of closed gradients; likewise
   double load_scales_ = -1;
   std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
   SurfelState moved_surfels_;                     // of `update_surfels`

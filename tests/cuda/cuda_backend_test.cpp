@@ -19,6 +19,7 @@ using namespace phyxel::testing;
 struct Case {
   const char* name;
   bool adaptive, capped, everything;
+  bool closed = false;  ///< Gradients of the first body; the second has supports of its own.
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -32,6 +33,10 @@ Scene scene_of(const Case& c) {
   if (c.capped) body.neighbourhood.max_neighbours = 24;
   scene.bodies = {body, body};
   BodyRequest &first = scene.bodies[0], &second = scene.bodies[1];
+  if (c.closed) {
+    first.closure = 0.01;
+    second.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  }
   FixRequest fix;
   fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 3, 3}};
   first.fixed.push_back(fix);
@@ -57,8 +62,16 @@ Scene scene_of(const Case& c) {
   return scene;
 }
 Model model_of_case(const Case& c) {
-  const std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3),
-                                  lattice(9, 14, 8, 0.12, 0.1, 4)};
+  std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3), lattice(9, 14, 8, 0.12, 0.1, 4)};
+  if (c.closed) {
+    clouds[0] = make_shape({.name = "block",
+                            .size = {1.6, 1.2, 1.4},
+                            .spacing = 0.1,
+                            .jitter = 0.2,
+                            .placement = ShapeRequest::Placement::nodes});
+    for (Vec3d& x : clouds[0].position) x += Vec3d{0.8, 0.6, 0.7};
+    for (Vec3d& x : clouds[0].surface.position) x += Vec3d{0.8, 0.6, 0.7};
+  }
   return build_model(scene_of(c), clouds);
 }
 
@@ -322,7 +335,9 @@ INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
                                            Case{"Adaptive", true, false, false},
                                            Case{"Capped", true, true, false},
                                            Case{"UniformEverything", false, false, true},
-                                           Case{"AdaptiveEverything", true, false, true}),
+                                           Case{"AdaptiveEverything", true, false, true},
+                                           Case{"Closed", false, false, false, true},
+                                           Case{"ClosedEverything", false, false, true, true}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(CudaSurfels, EqualTheCpus) {

@@ -17,7 +17,8 @@ struct Body {
   std::vector<double> v, h;
   std::vector<std::vector<int>> neighbours;
   double young = 0, poisson = 0, volume_stiffness = 0;
-  double hourglass = 0;  // κ [N/m]
+  double hourglass = 0;     // κ [N/m]
+  std::vector<V3> closing;  // ĉ [1/m], or none
   bool green = true;
   bool neo_hooke = false;
 };
@@ -122,6 +123,25 @@ inline double shape(const Body& b, int i, int j) {
   return w((b.x[j] - b.x[i]).norm(), b.h[i]) / w(0, b.h[i]);
 }
 
+/// grad u with the residual's share, and its derivative by u_j.
+inline M3 closed_grad_u(const Body& b, const std::vector<V3>& u, int i) {
+  M3 g = grad_u(b, u, i);
+  if (b.closing.empty()) return g;
+  V3 r = V3::Zero();
+  for (const int j : b.neighbours[i]) r += shape(b, i, j) * residual(b, u, g, i, j);
+  return g + r * b.closing[i].transpose();
+}
+inline V3 grad_of(const Body& b, const M3& inverse, int i, int j) {
+  const auto slope = [&](int k) {
+    const V3 x = b.x[k] - b.x[i];
+    return V3(inverse * x * w(x.norm(), b.h[i]));
+  };
+  if (b.closing.empty()) return slope(j);
+  double share = shape(b, i, j);
+  for (const int k : b.neighbours[i]) share -= shape(b, i, k) * slope(j).dot(b.x[k] - b.x[i]);
+  return slope(j) + share * b.closing[i];
+}
+
 inline double hourglass_energy(const Body& b, const std::vector<V3>& u) {
   double total = 0;
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
@@ -136,7 +156,7 @@ inline double hourglass_energy(const Body& b, const std::vector<V3>& u) {
 inline double energy(const Body& b, const std::vector<V3>& u) {
   double total = b.hourglass > 0 ? hourglass_energy(b, u) : 0;
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
-    const M3 g = grad_u(b, u, i), e = strain(b, g);
+    const M3 g = closed_grad_u(b, u, i), e = strain(b, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
     const double elastic = b.neo_hooke ? NeoHooke(b).energy(M3::Identity() + g)
                                        : 0.5 * e.cwiseProduct(stress(b, e)).sum();
@@ -149,15 +169,15 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
 inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
   std::vector<V3> f(b.x.size(), V3::Zero());
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
-    const M3 g = grad_u(b, u, i), j = M3::Identity() + g, a = inverse_moment(b, i);
+    const M3 g = closed_grad_u(b, u, i), j = M3::Identity() + g, a = inverse_moment(b, i);
+    const M3 fit = grad_u(b, u, i);
     M3 p = stress(b, strain(b, g));
     if (b.green) p = j * p;
     if (b.neo_hooke) p = NeoHooke(b).stress(j, cofactor(j));
     if (b.volume_stiffness > 0) p += b.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
-      const V3 xij = b.x[n] - b.x[i];
-      V3 push = -b.v[i] * p * (a * xij * w(xij.norm(), b.h[i]));
-      if (b.hourglass > 0) push -= b.hourglass * shape(b, i, n) * residual(b, u, g, i, n);
+      V3 push = -b.v[i] * p * grad_of(b, a, i, n);
+      if (b.hourglass > 0) push -= b.hourglass * shape(b, i, n) * residual(b, u, fit, i, n);
       f[n] += push;
       f[i] -= push;
     }

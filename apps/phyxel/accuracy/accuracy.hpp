@@ -16,6 +16,7 @@ struct Discretisation {
   double jitter = 0;     ///< In spacings.
   double factor = 1.8;   ///< Of the support.
   double hourglass = 0;  ///< Strength of hourglass control.
+  double closure = 0;    ///< Of gradients.
   int across = 6;        ///< Cells across the thinner sides.
 };
 
@@ -31,6 +32,7 @@ struct Solution {
   double neighbours = 0;         ///< Mean.
   std::int64_t evaluations = 0;  ///< Of all phyxels' forces.
   double seconds = 0;            ///< That they and what belongs to them took.
+  double setup_seconds = 0;      ///< From the scene to the first of them.
   std::vector<Quantity> found;
 };
 

@@ -19,7 +19,7 @@ struct AccuracyOptions {
   std::vector<std::string> cases{"all"};
   std::vector<int> across;  ///< Empty: each case's own.
   std::vector<std::string> lattices{"nodes", "cells"};
-  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1, 0.3};
+  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1}, closures{0, 1e-4};
   std::string csv;
   bool force = false;
 };
@@ -49,11 +49,14 @@ std::vector<Discretisation> discretisations(const AccuracyOptions& options) {
     for (const double jitter : options.jitters) {
       for (const double factor : options.factors) {
         for (const double hourglass : options.hourglass) {
-          list.push_back({.placement = lattice == "nodes" ? ShapeRequest::Placement::nodes
-                                                          : ShapeRequest::Placement::cells,
-                          .jitter = jitter,
-                          .factor = factor,
-                          .hourglass = hourglass});
+          for (const double closure : options.closures) {
+            list.push_back({.placement = lattice == "nodes" ? ShapeRequest::Placement::nodes
+                                                            : ShapeRequest::Placement::cells,
+                            .jitter = jitter,
+                            .factor = factor,
+                            .hourglass = hourglass,
+                            .closure = closure});
+          }
         }
       }
     }
@@ -71,10 +74,10 @@ std::string order_of(double coarse, double fine, int across_coarse, int across_f
 
 void measure(const AccuracyOptions& options) {
   const std::vector<AccuracyCase> cases = chosen_cases(options.cases);
-  PrintedTable table(
-      options.csv, options.force,
-      {"case", "quantity", "lattice", "jitter", "factor", "hourglass", "across", "phyxels",
-       "neighbours", "value", "reference", "error", "order", "evaluations", "seconds"});
+  PrintedTable table(options.csv, options.force,
+                     {"case", "quantity", "lattice", "jitter", "factor", "hourglass", "closure",
+                      "across", "phyxels", "neighbours", "value", "reference", "error", "order",
+                      "evaluations", "seconds", "setup_seconds"});
   for (const AccuracyCase& c : cases) {
     for (Discretisation d : discretisations(options)) {
       std::vector<double> before;
@@ -88,12 +91,13 @@ void measure(const AccuracyOptions& options) {
               {c.name, found.name,
                d.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells",
                fmt::format("{:g}", d.jitter), fmt::format("{:g}", d.factor),
-               fmt::format("{:g}", d.hourglass), std::to_string(across),
-               std::to_string(solution.phyxels), fmt::format("{:.1f}", solution.neighbours),
-               fmt::format("{:.7g}", found.value), fmt::format("{:.7g}", found.reference),
-               fmt::format("{:.3e}", found.error()),
+               fmt::format("{:g}", d.hourglass), fmt::format("{:g}", d.closure),
+               std::to_string(across), std::to_string(solution.phyxels),
+               fmt::format("{:.1f}", solution.neighbours), fmt::format("{:.7g}", found.value),
+               fmt::format("{:.7g}", found.reference), fmt::format("{:.3e}", found.error()),
                before.empty() ? "" : order_of(before[q], found.error(), across_before, across),
-               std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds)});
+               std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds),
+               fmt::format("{:.4g}", solution.setup_seconds)});
         }
         before.clear();
         for (const Quantity& found : solution.found) before.push_back(found.error());
@@ -132,6 +136,10 @@ void add_accuracy(CLI::App& program) {
   command->add_option("--hourglass", options->hourglass, "Strengths of hourglass control")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command->add_option("--csv", options->csv, "Also write the table to this file");
   command->add_flag("--force", options->force, "Replace the CSV file");

@@ -31,6 +31,7 @@ struct Part {
   Material material;
   std::string neighbourhood;    ///< The rule in words, for summaries.
   ListLengths lists;            ///< Of the whole body.
+  double closure = 0;           ///< As `BodyRequest::closure`.
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
   Index size = 0;               ///< Phyxels of the whole body.
   Index surfels = 0;            ///< Surfels of the whole body.
@@ -94,6 +95,7 @@ struct Model {
   std::vector<Sym3d>
       inverse_moment;                ///< Pseudo-inverse of A_i = sum_j w_ij x_ij x_ij^T, shape [n].
   std::vector<Vec3d> moment_offset;  ///< b_i = sum_j w_ij x_ij, shape [n, 3].
+  std::vector<Vec3d> closing;  ///< ĉ of closed gradients [1/m], shape [n]; empty: no body has them.
   Neighbourhood neighbourhood;
   Surfels surfels;
   std::vector<Motion> motions;  ///< Fixed and prescribed phyxels.

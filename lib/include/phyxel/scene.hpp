@@ -90,6 +90,10 @@ struct BodyRequest {
   Material material;
   NeighbourhoodRule neighbourhood;
   VolumeRule volume_rule = VolumeRule::automatic;
+  /// How far gradients are closed (phyxel/physics/closing.hpp): what sums over neighbourhoods may
+  /// miss, as a share of the surface's areas; 0: as they come. Needs a closed surface and one
+  /// support for the body.
+  double closure = 0;
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;

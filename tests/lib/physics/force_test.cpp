@@ -22,6 +22,7 @@ struct Terms {
   std::optional<int> max_neighbours;
   double hourglass = 0;
   Law law = Law::hooke;
+  bool closed = false;
 };
 
 void PrintTo(const Terms& terms, std::ostream* out) { *out << terms.name; }
@@ -43,6 +44,23 @@ const Terms all_terms[] = {
      {},
      0.1,
      Law::neo_hooke},
+    {"Closed", Strain::green, 0, NeighbourhoodRule::Support::uniform, {}, 0, Law::hooke, true},
+    {"ClosedCauchyVolume",
+     Strain::cauchy,
+     2e5,
+     NeighbourhoodRule::Support::uniform,
+     {},
+     0,
+     Law::hooke,
+     true},
+    {"ClosedNeoHookeHourglass",
+     Strain::green,
+     0,
+     NeighbourhoodRule::Support::uniform,
+     {},
+     0.1,
+     Law::neo_hooke,
+     true},
 };
 
 /// An irregular cloud of 5 x 4 x 6 phyxels with the given terms.
@@ -63,6 +81,15 @@ Case make_case(const Terms& terms) {
   rule.max_neighbours = terms.max_neighbours;
   Case c{model_of(one_body(material, rule), lattice(5, 4, 6, 0.1, 0.25)), {}, {}};
   c.u = random_deformation(c.model, 0.01);
+  if (terms.closed) {
+    // Forces follow from the energy for any closing vectors; these make a tenth of the gradient.
+    std::mt19937_64 engine(11);
+    for (Index i = 0; i < c.model.size(); ++i) {
+      const Vec3d closing{uniform(engine, -1, 1), uniform(engine, -1, 1), uniform(engine, -1, 1)};
+      c.model.closing.push_back(closing);
+      c.body.closing.push_back({closing.x, closing.y, closing.z});
+    }
+  }
   for (Index i = 0; i < c.model.size(); ++i) {
     const Vec3d p = c.model.position[i];
     c.body.x.push_back({p.x, p.y, p.z});

@@ -1,0 +1,48 @@
+/// Closed gradients. A moving-least-squares gradient is exact for affine motions, yet what it takes
+/// from a phyxel over all those around it does not cancel inside a body: a uniform stress leaves
+/// forces Σ_i v_i P ∂∇u_i/∂u_j that grow with the irregularity of the cloud. Each gradient gets a
+/// share of what it does not follow (see hourglass.hpp),
+///   ∇u_i = ∇⁰u_i + r_i ĉ_iᵀ,   r_i = Σ_j w_ij (u_j - u_i - ∇⁰u_i x_ij),
+/// with a closing vector ĉ_i [1/m] for each phyxel, found once for the cloud so that
+///   Σ_i v_i ∂∇u_i/∂u_j = S_j,
+/// the outward area of the surface that phyxel j carries (model/closure.hpp). r is zero for affine
+/// motions, so ∇u stays exact; and a uniform stress is now at rest under the tractions on S. The
+/// condition is the integration constraint of Chen, Wu, Yoon and You 2001 (A stabilized conforming
+/// nodal integration), and this form of it is symmetric: forces are still those of an energy.
+/// With b_i = Σ_j w_ij x_ij and T_i = v_i P_i, that energy's derivative is
+///   f_j = Σ_k w_jk ((Q_j + Q_k) x_jk + t_j - t_k),   t = T ĉ,   Q = (T - t bᵀ) A⁻¹.
+#pragma once
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// ∇⁰u + r ĉᵀ. @param pull Σ_j w_ij (u_j - u_i) (`add_pull`)
+template <class Real>
+PHYXEL_HD Mat3<Real> closed_gradient(const Mat3<Real>& grad_u, Vec3<Real> pull,
+                                     Vec3<Real> moment_offset, Vec3<Real> closing) {
+  return fused_outer(pull - grad_u * moment_offset, closing, grad_u);
+}
+
+/// t = v P ĉ [N/m].
+template <class Real>
+PHYXEL_HD Vec3<Real> closing_stress(Real volume, const Mat3<Real>& first_piola_stress,
+                                    Vec3<Real> closing) {
+  return volume * (first_piola_stress * closing);
+}
+
+/// Q = (v P - t bᵀ) A⁻¹. @param pair_stress v P A⁻¹
+template <class Real>
+PHYXEL_HD Mat3<Real> closed_pair_stress(const Mat3<Real>& pair_stress, Vec3<Real> t,
+                                        Vec3<Real> moment_offset,
+                                        const Sym3<Real>& inverse_moment) {
+  return fused_outer(-t, inverse_moment * moment_offset, pair_stress);
+}
+
+/// Adds to the force on phyxel i what closing stresses do between it and neighbour j [N].
+template <class Real>
+PHYXEL_HD void add_closing_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t_j, Real w_ij) {
+  force = fused(w_ij, t_i - t_j, force);
+}
+
+}  // namespace phyxel

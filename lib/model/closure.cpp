@@ -1,0 +1,328 @@
+#include "model/closure.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "exact_sum.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/weight.hpp"
+
+namespace phyxel {
+namespace {
+
+/// How far volumes and areas may follow, beside the closing vectors: a relative change of either
+/// weighs as much as a closing vector 1/0.3 times as large.
+constexpr double ease = 0.3;
+/// After so many the sums are as closed as they get: 1,500 phyxels take 2,600 to 1e-10.
+constexpr int most_iterations = 10'000;
+
+/// A flat piece of the surface. Areas at centroids carry constants and linear functions exactly.
+struct Facet {
+  Vec3d centroid, area;  ///< [m], outward [m²]
+};
+
+std::vector<Facet> facets_of(const Model& model, const Part& part) {
+  std::vector<Facet> facets;
+  const Surfels& surfels = model.surfels;
+  for (const Triangle& t : surfels.triangle) {
+    if (t[0] < part.surfel_begin || t[0] >= part.surfel_end) continue;
+    const Vec3d &a = surfels.position[t[0]], &b = surfels.position[t[1]],
+                &c = surfels.position[t[2]];
+    facets.push_back({(a + b + c) / 3.0, 0.5 * cross(b - a, c - a)});
+  }
+  return facets;
+}
+
+/// Shares facets out to the phyxels near them, so that Σ S = 0 and Σ x Sᵀ = V I hold as they do for
+/// the facets: by weights that reproduce linear functions. Where phyxels in the facet's plane span
+/// it, they are the ones, and none below the surface gets a share.
+std::vector<Vec3d> areas_of_phyxels(const Model& model, const Part& part,
+                                    const std::vector<Facet>& facets) {
+  std::vector<Vec3d> centroids;
+  for (const Facet& f : facets) centroids.push_back(f.centroid);
+  const auto begin = static_cast<std::size_t>(part.begin),
+             count = static_cast<std::size_t>(part.end - part.begin);
+  const std::span<const Vec3d> position = std::span(model.position).subspan(begin, count);
+  const std::span<const double> support =
+      std::span(model.neighbourhood.support).subspan(begin, count);
+  const Csr near = phyxels_near(centroids, position, support);
+  std::vector<double> share(near.indices.size());
+#pragma omp parallel for schedule(static)
+  for (Index f = 0; f < near.rows(); ++f) {
+    const Facet& facet = facets[f];
+    const double area = norm(facet.area);
+    const Vec3d normal = area > 0 ? facet.area / area : Vec3d{};
+    const auto x_of = [&](Index i) { return position[i] - facet.centroid; };
+    const auto weigh = [&](bool in_plane) {
+      // Moments about the weighted mean: 1 and x - mean are then orthogonal.
+      double sum = 0;
+      Vec3d first;
+      const auto weight_of = [&](Index i) {
+        const Vec3d x = x_of(i);
+        const double h = support[i];
+        // Whole units of rounding: a lattice's nodes are put on its faces by arithmetic.
+        if (in_plane && std::abs(dot(x, normal)) > 1e-6 * h) return 0.0;
+        return weight_shape(dot(x, x), 1 / (h * h));
+      };
+      for (const Index i : near.row(f)) {
+        sum += weight_of(i);
+        first += weight_of(i) * x_of(i);
+      }
+      if (!(sum > 0)) return -1;
+      const Vec3d mean = first / sum;
+      Sym3d moment;
+      for (const Index i : near.row(f)) moment += moment_term(x_of(i) - mean, weight_of(i));
+      const PseudoInverse<double> inverse = pseudo_inverse(moment);
+      const Vec3d slope = inverse.matrix * mean;
+      for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+        const Index i = near.indices[k];
+        share[k] = weight_of(i) * (1 / sum - dot(slope, x_of(i) - mean));
+      }
+      return inverse.rank;
+    };
+    if (weigh(true) == 2) continue;
+    if (weigh(false) < 0) {  // only the nearest, beyond its support
+      for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+        share[k] = 1.0 / near.length(f);
+      }
+    }
+  }
+  std::vector<Vec3d> areas(count);
+  for (Index f = 0; f < near.rows(); ++f) {
+    for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+      areas[near.indices[k]] += share[k] * facets[f].area;
+    }
+  }
+  return areas;
+}
+
+/// What is sought, of each phyxel: the closing vector times v / s², and the relative changes of its
+/// area and of its volume, both over `ease`.
+struct Unknown {
+  Vec3d closing;
+  double area = 0, volume = 0;
+};
+double dot(const Unknown& a, const Unknown& b) {
+  return dot(a.closing, b.closing) + a.area * b.area + a.volume * b.volume;
+}
+void add(Unknown& to, double s, const Unknown& x) {
+  to.closing += s * x.closing;
+  to.area += s * x.area;
+  to.volume += s * x.volume;
+}
+
+template <class Term>
+double exact_sum(Index n, Term&& term) {
+  ExactSum all;
+#pragma omp parallel
+  {
+    ExactSum own;
+#pragma omp for schedule(static) nowait
+    for (Index i = 0; i < n; ++i) own.add(term(i));
+#pragma omp critical
+    all.add(own);
+  }
+  return all.value();
+}
+
+/// The sums of one body, per s², as a linear function of the unknowns:
+///   R_j = Σ_k w_jk (c_k (1 + a_k x_jk) - M_k x_jk (1 + σ_k)) - c_j Σ_k w_jk (1 - a_j x_jk)
+///         - M_j b_j (1 + σ_j) - S_j (1 + y_j),   M = v A⁻¹, a = A⁻¹ b.
+/// Of the changes σ only what leaves the whole volume as it is counts: by Σ x Sᵀ = V I, areas of
+/// whole faces stay, too.
+class Sums {
+ public:
+  Sums(const Model& model, const Part& part, std::vector<Vec3d> areas)
+      : model_(model), begin_(part.begin), size_(part.end - part.begin), areas_(std::move(areas)) {
+    const double spacing = std::cbrt(part.volume / part.size);
+    unit_ = spacing * spacing;
+    whole_ = exact_sum(size_, [&](Index i) { return model_.volume[begin_ + i]; });
+    for (Vec3d& s : areas_) s = s / unit_;
+    tilt_.resize(areas_.size());
+    weight_.resize(areas_.size());
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < size_; ++i) {
+      tilt_[i] = model_.inverse_moment[begin_ + i] * model_.moment_offset[begin_ + i];
+      double sum = 0;
+      visit(i, [&](Index, Vec3d, double w) { sum += w; });
+      weight_[i] = sum - dot(tilt_[i], model_.moment_offset[begin_ + i]);
+    }
+  }
+  double unit() const { return unit_; }
+  const std::vector<Vec3d>& areas() const { return areas_; }
+  Index size() const { return size_; }
+
+  /// The sums without closing, as they are to be 0.
+  std::vector<Vec3d> open() const {
+    std::vector<Vec3d> sums(areas_.size());
+    std::vector<Unknown> ones(areas_.size());
+    for (Unknown& x : ones) x.area = x.volume = 1 / ease;
+    apply(ones, 0, sums);
+    return sums;
+  }
+  void apply(const std::vector<Unknown>& x, std::vector<Vec3d>& sums) const {
+    apply(x, mean_volume(x), sums);
+  }
+  /// The change of all volumes that takes no part [over `ease`].
+  double mean_volume(const std::vector<Unknown>& x) const {
+    return exact_sum(size_, [&](Index i) { return model_.volume[begin_ + i] * x[i].volume; }) /
+           whole_;
+  }
+  void apply_transpose(const std::vector<Vec3d>& sums, std::vector<Unknown>& x) const {
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < size_; ++i) {
+      Unknown out;
+      visit(i, [&](Index k, Vec3d x_ik, double w) {
+        const Vec3d difference = sums[k] - sums[i];
+        out.closing += (w * (1 - dot(tilt_[i], x_ik))) * difference;
+        out.volume += w * dot(own_share(i, x_ik), difference);
+      });
+      out.volume *= ease;
+      out.area = -ease * dot(areas_[i], sums[i]);
+      x[i] = out;
+    }
+    const double all = exact_sum(size_, [&](Index i) { return x[i].volume; });
+    for (Index i = 0; i < size_; ++i) x[i].volume -= model_.volume[begin_ + i] / whole_ * all;
+  }
+
+ private:
+  void apply(const std::vector<Unknown>& x, double mean, std::vector<Vec3d>& sums) const {
+#pragma omp parallel for schedule(static)
+    for (Index j = 0; j < size_; ++j) {
+      Vec3d sum = -weight_[j] * x[j].closing - ease * x[j].area * areas_[j] -
+                  ease * (x[j].volume - mean) * own_share(j, model_.moment_offset[begin_ + j]);
+      visit(j, [&](Index k, Vec3d x_jk, double w) {
+        sum += w * ((1 + dot(tilt_[k], x_jk)) * x[k].closing -
+                    (ease * (x[k].volume - mean)) * own_share(k, x_jk));
+      });
+      sums[j] = sum;
+    }
+  }
+  template <class Visit>
+  void visit(Index i, Visit&& visit) const {
+    const double h = model_.neighbourhood.support[begin_ + i];
+    for (const Index k : model_.neighbourhood.neighbours.row(begin_ + i)) {
+      const Vec3d x = model_.position[k] - model_.position[begin_ + i];
+      visit(k - begin_, x, weight_shape(dot(x, x), 1 / (h * h)));
+    }
+  }
+  /// M_i x per s².
+  Vec3d own_share(Index i, Vec3d x) const {
+    return (model_.volume[begin_ + i] / unit_) * (model_.inverse_moment[begin_ + i] * x);
+  }
+
+  const Model& model_;
+  Index begin_, size_;
+  std::vector<Vec3d> areas_;     ///< S / s²
+  std::vector<Vec3d> tilt_;      ///< a
+  std::vector<double> weight_;   ///< Σ_k w_jk (1 - a_j x_jk)
+  double unit_ = 1, whole_ = 1;  ///< s² [m²], all volumes [m³]
+};
+
+/// The smallest unknowns that close the sums: conjugate gradients for least squares (Björck 1996,
+/// algorithm 7.4.1). Smooth unknowns, which take the most of them, matter the least: a few
+/// iterations do most of what can be done.
+/// @param tolerance share of the areas
+struct Solution {
+  std::vector<Unknown> x;
+  int iterations = 0;
+  double left = 0;  ///< Root mean square of the sums over that of the areas, summed anew.
+};
+Solution close(const Sums& sums, double tolerance) {
+  const Index n = sums.size();
+  const auto count = static_cast<std::size_t>(n);
+  Solution solution{std::vector<Unknown>(count)};
+  const double areas = exact_sum(n, [&](Index i) { return dot(sums.areas()[i], sums.areas()[i]); });
+  const std::vector<Vec3d> open = sums.open();
+  std::vector<Vec3d> residual(count), image(count);
+  for (std::size_t i = 0; i < count; ++i) residual[i] = -open[i];
+  const auto left_by = [&](auto&& sum) {
+    return std::sqrt(exact_sum(n, [&](Index i) { return dot(sum(i), sum(i)); }) / areas);
+  };
+  std::vector<Unknown> slope(count), direction;
+  sums.apply_transpose(residual, slope);
+  direction = slope;
+  double steepness = exact_sum(n, [&](Index i) { return dot(slope[i], slope[i]); });
+  for (;; ++solution.iterations) {
+    const double left = left_by([&](Index i) { return residual[i]; });
+    if (!(left > tolerance) || solution.iterations == most_iterations || !(steepness > 0)) break;
+    sums.apply(direction, image);
+    const double length = exact_sum(n, [&](Index i) { return dot(image[i], image[i]); });
+    const double step = steepness / length;
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) {
+      add(solution.x[i], step, direction[i]);
+      residual[i] -= step * image[i];
+    }
+    sums.apply_transpose(residual, slope);
+    const double next = exact_sum(n, [&](Index i) { return dot(slope[i], slope[i]); });
+    const double keep = next / steepness;
+#pragma omp parallel for schedule(static)
+    for (Index i = 0; i < n; ++i) {
+      Unknown turned = slope[i];
+      add(turned, keep, direction[i]);
+      direction[i] = turned;
+    }
+    steepness = next;
+  }
+  sums.apply(solution.x, image);
+  solution.left = left_by([&](Index i) { return open[i] + image[i]; });
+  return solution;
+}
+
+/// The volume inside, and whether facets enclose it.
+double enclosed_volume(const std::vector<Facet>& facets, const Part& part) {
+  Vec3d area;
+  double whole = 0, volume = 0;
+  for (const Facet& f : facets) {
+    area += f.area;
+    whole += norm(f.area);
+    volume += dot(f.area, f.centroid - part.origin) / 3;
+  }
+  // Coordinates of a file may be floats.
+  constexpr double rounding = 1e-5;
+  return norm(area) <= rounding * whole ? volume : 0;
+}
+
+void close_part(Model& model, const Part& part) {
+  const std::vector<Facet> facets = facets_of(model, part);
+  const double volume = enclosed_volume(facets, part);
+  if (!(volume > 0)) {
+    throw InputError(fmt::format(
+        "body \"{}\" asks for closure ({:g}), which needs its surface, closed and with triangles "
+        "that face outward; found {}. Allowed: a mesh, a shape with surfels, a file with such a "
+        "surface, or closure = 0",
+        part.name, part.closure, facets.empty() ? "none" : "one that encloses no volume"));
+  }
+  const double scale = volume / part.volume;
+  for (Index i = part.begin; i < part.end; ++i) model.volume[i] *= scale;
+  const Sums sums(model, part, areas_of_phyxels(model, part, facets));
+  const Solution solution = close(sums, part.closure);
+  const double mean = sums.mean_volume(solution.x);
+  for (Index i = 0; i < sums.size(); ++i) {
+    double& v = model.volume[part.begin + i];
+    v *= 1 + ease * (solution.x[i].volume - mean);
+    model.closing[part.begin + i] = (sums.unit() / v) * solution.x[i].closing;
+  }
+  if (solution.left > part.closure) {
+    model.warnings.push_back(fmt::format(
+        "body \"{}\": sums over neighbourhoods are closed to {:.2g} after {} iterations, asked was "
+        "{:g}; more phyxels across its thinnest places help",
+        part.name, solution.left, solution.iterations, part.closure));
+  }
+}
+
+}  // namespace
+
+void close_gradients(Model& model) {
+  for (const Part& part : model.parts) {
+    if (!(part.closure > 0) || part.begin == part.end) continue;
+    model.closing.resize(static_cast<std::size_t>(model.size()));
+    close_part(model, part);
+  }
+}
+
+}  // namespace phyxel

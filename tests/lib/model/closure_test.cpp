@@ -1,0 +1,215 @@
+/// Closed gradients: what they are found from, and what they are for.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/shapes.hpp"
+#include "support/backend.hpp"
+#include "support/clouds.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+using ::testing::HasSubstr;
+
+/// A block with a phyxel on each node, inner ones moved by up to 0.3 spacings, as are those on
+/// faces within them.
+ShapeRequest block() {
+  return {.name = "block",
+          .size = {0.8, 0.6, 1.0},
+          .spacing = 0.1,
+          .jitter = 0.3,
+          .placement = ShapeRequest::Placement::nodes};
+}
+Scene scene_of(double closure, Material material = rubber()) {
+  Scene scene = one_body(material);
+  scene.bodies[0].closure = closure;
+  return scene;
+}
+Model model_of_cloud(const Cloud& cloud, double closure, Material material = rubber()) {
+  const Scene scene = scene_of(closure, material);
+  return build_model(scene, std::span(&cloud, 1));
+}
+
+/// Forces under ∇u = g everywhere, by Cauchy's strain, and the stress.
+struct Uniform {
+  std::vector<Vec3d> force;
+  Mat3d stress;
+};
+Uniform under(const Model& model, const Mat3d& g) {
+  std::vector<Vec3d> u;
+  for (const Vec3d& x : model.position) u.push_back(g * x);
+  const auto backend = make_test_backend(model, Precision::double_);
+  backend->upload(state_of(u));
+  Uniform found;
+  backend->internal_forces(found.force);
+  const Material& m = model.parts[0].material;
+  const double trace = g(0, 0) + g(1, 1) + g(2, 2);
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      found.stress(a, b) =
+          m.lame_mu() * (g(a, b) + g(b, a)) + (a == b ? m.lame_lambda() * trace : 0);
+    }
+  }
+  return found;
+}
+Mat3d some_gradient() {
+  Mat3d g;
+  std::mt19937_64 engine(2);
+  for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = uniform(engine, -1e-3, 1e-3);
+  return g;
+}
+Material linear_rubber() {
+  Material material = rubber();
+  material.strain = Strain::cauchy;
+  return material;
+}
+
+/// Inside an irregular body a uniform stress leaves no force, and on each face as much as is needed
+/// to hold it: -P n times its area.
+TEST(Closure, AUniformStressIsAtRestUnderItsTractions) {
+  const Cloud cloud = make_shape(block());
+  const Material material = linear_rubber();
+  const Mat3d g = some_gradient();
+  double largest_inside[2] = {};
+  for (const double closure : {0.0, 1e-11}) {
+    const Model model = model_of_cloud(cloud, closure, material);
+    EXPECT_TRUE(model.warnings.empty());
+    const Uniform found = under(model, g);
+    const double face = norm(found.stress * Vec3d{1, 0, 0}) * 0.1 * 0.1;  // of a phyxel
+    for (Index i = 0; i < model.size(); ++i) {
+      const Vec3d x = model.position[i];
+      const bool inside = std::abs(x.x) < 0.39 && std::abs(x.y) < 0.29 && std::abs(x.z) < 0.49;
+      double& largest = largest_inside[closure > 0];
+      if (inside) largest = std::max(largest, norm(found.force[i]) / face);
+    }
+    if (closure == 0) continue;
+    // Phyxels of edges are on two faces: a stress that pulls at one of them.
+    Mat3d along{};
+    along(2, 2) = 1e-3;
+    along(0, 0) = along(1, 1) = -1e-3 * material.poisson;
+    const Uniform pulled = under(model, along);
+    EXPECT_NEAR(pulled.stress(2, 2), material.young * 1e-3, 1e-9 * material.young);
+    Vec3d top;
+    for (const Index i : cloud.regions.at("z+")) top += pulled.force[i];
+    const double expected = -pulled.stress(2, 2) * 0.8 * 0.6;
+    EXPECT_NEAR(top.z, expected, 1e-9 * std::abs(expected));
+    EXPECT_LT(std::hypot(top.x, top.y), 1e-9 * std::abs(expected));
+  }
+  EXPECT_GT(largest_inside[0], 0.05);  // so much for a cloud of this irregularity
+  EXPECT_LT(largest_inside[1], 1e-8);  // the closure, over the share of one phyxel
+}
+
+/// On any cloud with a surface: phyxels on cells lie inside the surface, and share its area.
+TEST(Closure, HoldsForPhyxelsBelowTheSurface) {
+  ShapeRequest request = block();
+  request.placement = ShapeRequest::Placement::cells;
+  request.size = {1, 0.9, 1.2};
+  const ShapeRequest ball{.name = "sphere", .radius = 0.6, .spacing = 0.1, .jitter = 0.2};
+  for (const ShapeRequest& shape : {request, ball}) {
+    const Cloud cloud = make_shape(shape);
+    const Model model = model_of_cloud(cloud, 1e-10, linear_rubber());
+    EXPECT_TRUE(model.warnings.empty()) << shape.name << ": " << model.warnings.at(0);
+    const Uniform found = under(model, some_gradient());
+    const double h = model.neighbourhood.support[0];
+    double largest = 0;
+    Index inside = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      double nearest = 1;
+      for (const Vec3d& s : cloud.surface.position) {
+        nearest = std::min(nearest, norm(s - model.position[i]));
+      }
+      if (nearest < 1.3 * h) continue;  // facets are smaller than 0.3 h
+      ++inside;
+      largest = std::max(largest, norm(found.force[i]));
+    }
+    EXPECT_GT(inside, 50);
+    EXPECT_LT(largest, 1e-8 * model.parts[0].material.young * 1e-3 * 0.1 * 0.1) << shape.name;
+  }
+}
+
+/// Whatever the cloud, masses are the bodies'; and both momenta are kept in large motions.
+TEST(Closure, KeepsMassAndMomenta) {
+  const Cloud cloud = make_shape(block());
+  const Model plain = model_of_cloud(cloud, 0), closed = model_of_cloud(cloud, 1e-3);
+  EXPECT_EQ(plain.mass, closed.mass);
+  EXPECT_TRUE(plain.closing.empty());
+  ASSERT_EQ(closed.closing.size(), closed.position.size());
+  const auto backend = make_test_backend(closed, Precision::double_);
+  backend->upload(state_of(random_deformation(closed, 0.02)));
+  const Diagnostics d = diagnose(closed, *backend, 0, 1e-3);
+  EXPECT_GT(d.strain_energy, 1);
+  EXPECT_LT(norm(d.internal_force), 1e-14 * d.force_scale);
+  EXPECT_LT(norm(d.internal_torque), 1e-13 * d.torque_scale);
+}
+
+/// Threads change nothing, nor does another body in front.
+TEST(Closure, IsTheSameForEachBody) {
+  const Cloud cloud = make_shape(block());
+  Scene scene = scene_of(1e-3);
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[0].closure = 0;
+  const std::vector<Cloud> clouds{cloud, cloud};
+  const Model two = build_model(scene, clouds), one = model_of_cloud(cloud, 1e-3);
+  ASSERT_EQ(two.size(), 2 * one.size());
+  for (Index i = 0; i < one.size(); ++i) {
+    EXPECT_EQ(two.closing[i], Vec3d{});
+    EXPECT_EQ(two.closing[one.size() + i], one.closing[i]);
+    EXPECT_EQ(two.volume[one.size() + i], one.volume[i]);
+  }
+}
+
+std::string refusal(const Cloud& cloud, const NeighbourhoodRule& rule = {}) {
+  Scene scene = one_body(rubber(), rule);
+  scene.bodies[0].closure = 1e-3;
+  try {
+    build_model(scene, std::span(&cloud, 1));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Closure, NeedsAClosedSurfaceAndOneSupport) {
+  const Cloud whole = make_shape(block());
+  EXPECT_EQ(refusal(whole), "");
+  Cloud bare = whole;
+  bare.surface = {};
+  EXPECT_THAT(refusal(bare),
+              HasSubstr("asks for closure (0.001), which needs its surface, closed"));
+  Cloud open = whole;
+  open.surface.triangle.pop_back();
+  EXPECT_THAT(refusal(open), HasSubstr("found one that encloses no volume"));
+  Cloud inside_out = whole;
+  for (Triangle& t : inside_out.surface.triangle) std::swap(t[0], t[1]);
+  EXPECT_THAT(refusal(inside_out), HasSubstr("encloses no volume"));
+  NeighbourhoodRule adaptive;
+  adaptive.support = NeighbourhoodRule::Support::adaptive;
+  EXPECT_THAT(refusal(whole, adaptive), HasSubstr("has closed gradients (0.001), which needs one "
+                                                  "support for the body"));
+}
+
+/// A sheet of one layer has no moments across it, nor area to hold there.
+TEST(Closure, ClosesASheetOfOneLayer) {
+  ShapeRequest sheet = block();
+  sheet.placement = ShapeRequest::Placement::cells;
+  sheet.size = {1, 1, 0.1};
+  const Model model = model_of_cloud(make_shape(sheet), 1e-6);
+  for (const std::string& warning : model.warnings) EXPECT_THAT(warning, HasSubstr("degenerate"));
+}
+
+/// Less than rounding cannot be: said, not hidden.
+TEST(Closure, SaysWhereSumsStayOpen) {
+  ShapeRequest small = block();
+  small.size = {0.2, 0.2, 0.3};
+  const Model model = model_of_cloud(make_shape(small), 1e-18);
+  ASSERT_FALSE(model.warnings.empty());
+  EXPECT_THAT(model.warnings, ::testing::Contains(HasSubstr("are closed to")));
+}
+
+}  // namespace
+}  // namespace phyxel
