@@ -136,7 +136,7 @@ class Builder {
     ranks_.together([&] {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
         check_terms(scene_.bodies[b]);
-        if (scene_.bodies[b].closure > 0 && ranks_.size() > 1) {
+        if (scene_.bodies[b].closure > 0) {
           throw InputError(fmt::format(
               "{}: body \"{}\" has closed gradients (closure = {:g}), which one rank has to find: "
               "allowed are one rank, or closure = 0",

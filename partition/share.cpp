@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "phyxel/error.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -149,6 +150,10 @@ class Maker {
 }  // namespace
 
 ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of) {
+  if (!whole.closing.empty()) {
+    throw InputError(
+        "shares of a model with closed gradients are not made: allowed is closure = 0");
+  }
   return Maker(whole, plan, part_of).make();
 }
 

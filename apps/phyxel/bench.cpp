@@ -99,6 +99,7 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   body.name = "cube";
   body.material = {.young = 1e6, .poisson = 0.3, .density = 1000, .strain = Strain::green};
   if (terms == "neo-hookean") body.material.law = Law::neo_hooke;
+  if (terms == "corotated") body.material.law = Law::corotated;
   if (terms == "cauchy") body.material.strain = Strain::cauchy;
   if (terms == "volume") body.material.volume_stiffness = 1e6;
   if (terms == "hourglass") body.material.hourglass = 0.1;
@@ -111,9 +112,9 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   return scene;
 }
 /// "surfels": moved after every step.
-const std::vector<std::string> all_terms = {"green",     "cauchy",  "neo-hookean", "volume",
-                                            "hourglass", "closure", "damping",     "load",
-                                            "adaptive",  "surfels"};
+const std::vector<std::string> all_terms = {"green",  "cauchy",    "neo-hookean", "corotated",
+                                            "volume", "hourglass", "closure",     "damping",
+                                            "load",   "adaptive",  "surfels"};
 
 /// A deformation of 10%.
 State deformed(const Model& model) {
@@ -430,10 +431,10 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   if (std::string(name) != "neighbours") add_device_options(*command, *options);
   if (std::string(name) == "step") {
     command
-        ->add_option(
-            "--terms", options->terms,
-            "Term sets: green, cauchy, neo-hookean, volume, hourglass, closure, damping, load, "
-            "adaptive, surfels")
+        ->add_option("--terms", options->terms,
+                     "Term sets: green, cauchy, neo-hookean, corotated, volume, hourglass, "
+                     "closure, damping, load, "
+                     "adaptive, surfels")
         ->delimiter(',');
     command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
         ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));

@@ -14,6 +14,7 @@ namespace {
 std::string terms_of(const Part& part) {
   const Material& m = part.material;
   std::string terms = m.law == Law::neo_hooke     ? "neo-Hookean law"
+                      : m.law == Law::corotated   ? "corotated law"
                       : m.strain == Strain::green ? "Green strain"
                                                   : "Cauchy strain";
   if (m.volume_stiffness > 0)

@@ -121,7 +121,10 @@ void check_paper_model(const Model& model) {
                     part.name));
   }
   if (part.material.law != Law::hooke) {
-    refuse(fmt::format("body \"{}\" is neo-Hookean; allowed: law = \"hooke\"", part.name));
+    refuse(fmt::format("body \"{}\" has another law; allowed: law = \"hooke\"", part.name));
+  }
+  if (part.closure > 0) {
+    refuse(fmt::format("body \"{}\" has closed gradients; allowed: closure = 0", part.name));
   }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {

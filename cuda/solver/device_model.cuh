@@ -283,7 +283,8 @@ class DeviceModel {
                      " neighbours take " + std::to_string(bytes) +
                      " bytes of shared memory, of which a block may have " +
                      std::to_string(most_shared_memory_) +
-                     ": allowed are a smaller support, precision \"float\" or the CPU");
+                     ": allowed are a smaller support, precision \"float\"" +
+                     (closed() ? ", closure = 0" : "") + " or the CPU");
   }
 
   void make_fields() {

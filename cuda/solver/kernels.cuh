@@ -81,6 +81,9 @@ __device__ Mat3<Real> first_piola_stress_of(const Constants& body, const Mat3<Re
     if (body.elasticity == Elasticity::neo_hooke) {
       return stress.template operator()<Elasticity::neo_hooke>();
     }
+    if (body.elasticity == Elasticity::corotated) {
+      return stress.template operator()<Elasticity::corotated>();
+    }
   }
   if (body.elasticity == Elasticity::green_hooke) {
     return stress.template operator()<Elasticity::green_hooke>();

@@ -184,6 +184,8 @@ class Passes {
         return pass_1_of<Elasticity::green_hooke, beyond, Others>(m);
       case Elasticity::cauchy_hooke:
         return pass_1_of<Elasticity::cauchy_hooke, beyond, Others>(m);
+      case Elasticity::corotated:
+        return pass_1_of<Elasticity::corotated, beyond, Others>(m);
       case Elasticity::neo_hooke:
         break;
     }

@@ -4,41 +4,74 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include "exact_sum.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
 
-/// How far volumes and areas may follow, beside the closing vectors: a relative change of either
-/// weighs as much as a closing vector 1/0.3 times as large.
-constexpr double ease = 0.3;
+/// How far areas and volumes may follow, beside the closing vectors: a relative change weighs as
+/// much as a closing vector 1/ease times as large.
+constexpr double ease_area = 0.3, ease_volume = 0.1;
 /// After so many the sums are as closed as they get: 1,500 phyxels take 2,600 to 1e-10.
 constexpr int most_iterations = 10'000;
+/// Iterations that have to take a tenth of what is left.
+constexpr int patience = 500;
 
-/// A flat piece of the surface. Areas at centroids carry constants and linear functions exactly.
+/// A flat piece of the surface. Areas at centroids carry constants and linear functions exactly,
+/// however triangles are split.
 struct Facet {
   Vec3d centroid, area;  ///< [m], outward [m²]
 };
 
-std::vector<Facet> facets_of(const Model& model, const Part& part) {
-  std::vector<Facet> facets;
-  const Surfels& surfels = model.surfels;
-  for (const Triangle& t : surfels.triangle) {
-    if (t[0] < part.surfel_begin || t[0] >= part.surfel_end) continue;
-    const Vec3d &a = surfels.position[t[0]], &b = surfels.position[t[1]],
-                &c = surfels.position[t[2]];
+void add_facets(std::vector<Facet>& facets, Vec3d a, Vec3d b, Vec3d c, double longest) {
+  const double ab = norm(b - a), bc = norm(c - b), ca = norm(a - c);
+  if (std::max({ab, bc, ca}) <= longest) {
     facets.push_back({(a + b + c) / 3.0, 0.5 * cross(b - a, c - a)});
+  } else if (ab >= bc && ab >= ca) {
+    const Vec3d middle = 0.5 * (a + b);
+    add_facets(facets, a, middle, c, longest);
+    add_facets(facets, middle, b, c, longest);
+  } else {
+    add_facets(facets, b, c, a, longest);  // the longest comes first within two turns
+  }
+}
+/// @param first the number of the surface's first vertex in `triangles`
+/// @param longest edges [m]
+std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Triangle> triangles,
+                             Index first, double longest) {
+  std::vector<Facet> facets;
+  for (const Triangle& t : triangles) {
+    add_facets(facets, position[t[0] - first], position[t[1] - first], position[t[2] - first],
+               longest);
   }
   return facets;
 }
+/// A body's own surface. Triangles stand part by part.
+std::vector<Facet> facets_of(const Model& model, const Part& part) {
+  const std::vector<Triangle>& all = model.surfels.triangle;
+  const auto before = [&](Index surfel) {
+    return std::lower_bound(all.begin(), all.end(), surfel,
+                            [](const Triangle& t, Index s) { return t[0] < s; });
+  };
+  const std::span<const Vec3d> position =
+      std::span(model.surfels.position)
+          .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin);
+  // Small against a support, so that each goes to the phyxels beside it.
+  const double longest = 0.5 * model.neighbourhood.support[part.begin];
+  return facets_of(position, {before(part.surfel_begin), before(part.surfel_end)},
+                   part.surfel_begin, longest);
+}
 
 /// Shares facets out to the phyxels near them, so that Σ S = 0 and Σ x Sᵀ = V I hold as they do for
-/// the facets: by weights that reproduce linear functions. Where phyxels in the facet's plane span
-/// it, they are the ones, and none below the surface gets a share.
+/// the facets: by weights that reproduce linear functions, where phyxels span space. Where phyxels
+/// in the facet's plane span it, they are the ones, and none below the surface gets a share.
 std::vector<Vec3d> areas_of_phyxels(const Model& model, const Part& part,
                                     const std::vector<Facet>& facets) {
   std::vector<Vec3d> centroids;
@@ -100,7 +133,8 @@ std::vector<Vec3d> areas_of_phyxels(const Model& model, const Part& part,
 }
 
 /// What is sought, of each phyxel: the closing vector times v / s², and the relative changes of its
-/// area and of its volume, both over `ease`.
+/// area and of its volume, over `ease_area` and
+/// `ease_volume`.
 struct Unknown {
   Vec3d closing;
   double area = 0, volume = 0;
@@ -159,14 +193,15 @@ class Sums {
   std::vector<Vec3d> open() const {
     std::vector<Vec3d> sums(areas_.size());
     std::vector<Unknown> ones(areas_.size());
-    for (Unknown& x : ones) x.area = x.volume = 1 / ease;
+    for (Unknown& x : ones) x.area = 1 / ease_area;
+    for (Unknown& x : ones) x.volume = 1 / ease_volume;
     apply(ones, 0, sums);
     return sums;
   }
   void apply(const std::vector<Unknown>& x, std::vector<Vec3d>& sums) const {
     apply(x, mean_volume(x), sums);
   }
-  /// The change of all volumes that takes no part [over `ease`].
+  /// The change of all volumes that takes no part [over `ease_volume`].
   double mean_volume(const std::vector<Unknown>& x) const {
     return exact_sum(size_, [&](Index i) { return model_.volume[begin_ + i] * x[i].volume; }) /
            whole_;
@@ -180,8 +215,8 @@ class Sums {
         out.closing += (w * (1 - dot(tilt_[i], x_ik))) * difference;
         out.volume += w * dot(own_share(i, x_ik), difference);
       });
-      out.volume *= ease;
-      out.area = -ease * dot(areas_[i], sums[i]);
+      out.volume *= ease_volume;
+      out.area = -ease_area * dot(areas_[i], sums[i]);
       x[i] = out;
     }
     const double all = exact_sum(size_, [&](Index i) { return x[i].volume; });
@@ -192,11 +227,12 @@ class Sums {
   void apply(const std::vector<Unknown>& x, double mean, std::vector<Vec3d>& sums) const {
 #pragma omp parallel for schedule(static)
     for (Index j = 0; j < size_; ++j) {
-      Vec3d sum = -weight_[j] * x[j].closing - ease * x[j].area * areas_[j] -
-                  ease * (x[j].volume - mean) * own_share(j, model_.moment_offset[begin_ + j]);
+      Vec3d sum =
+          -weight_[j] * x[j].closing - ease_area * x[j].area * areas_[j] -
+          ease_volume * (x[j].volume - mean) * own_share(j, model_.moment_offset[begin_ + j]);
       visit(j, [&](Index k, Vec3d x_jk, double w) {
         sum += w * ((1 + dot(tilt_[k], x_jk)) * x[k].closing -
-                    (ease * (x[k].volume - mean)) * own_share(k, x_jk));
+                    (ease_volume * (x[k].volume - mean)) * own_share(k, x_jk));
       });
       sums[j] = sum;
     }
@@ -245,12 +281,18 @@ Solution close(const Sums& sums, double tolerance) {
   std::vector<Unknown> slope(count), direction;
   sums.apply_transpose(residual, slope);
   direction = slope;
+  double left_before = HUGE_VAL;
   double steepness = exact_sum(n, [&](Index i) { return dot(slope[i], slope[i]); });
   for (;; ++solution.iterations) {
     const double left = left_by([&](Index i) { return residual[i]; });
-    if (!(left > tolerance) || solution.iterations == most_iterations || !(steepness > 0)) break;
+    if (!(left > tolerance) || !(steepness > 0) || solution.iterations == most_iterations) break;
+    if (solution.iterations % patience == 0) {
+      if (!(left < 0.9 * left_before)) break;
+      left_before = left;
+    }
     sums.apply(direction, image);
     const double length = exact_sum(n, [&](Index i) { return dot(image[i], image[i]); });
+    if (!(length > 0)) break;
     const double step = steepness / length;
 #pragma omp parallel for schedule(static)
     for (Index i = 0; i < n; ++i) {
@@ -273,41 +315,67 @@ Solution close(const Sums& sums, double tolerance) {
   return solution;
 }
 
-/// The volume inside, and whether facets enclose it.
-double enclosed_volume(const std::vector<Facet>& facets, const Part& part) {
-  Vec3d area;
-  double whole = 0, volume = 0;
+/// What facets say of the space inside.
+struct Enclosed {
+  double volume = 0;  ///< [m³]
+  double open = 0;    ///< How far Σ x Sᵀ is from V I, and Σ S from 0, as shares.
+};
+Enclosed enclosed_by(const std::vector<Facet>& facets) {
+  Enclosed found;
+  if (facets.empty()) return found;
+  Vec3d sum;
+  Mat3d moment{};
+  double area = 0;
   for (const Facet& f : facets) {
-    area += f.area;
-    whole += norm(f.area);
-    volume += dot(f.area, f.centroid - part.origin) / 3;
+    sum += f.area;
+    area += norm(f.area);
+    moment = fused_outer(f.centroid - facets[0].centroid, f.area, moment);
   }
-  // Coordinates of a file may be floats.
-  constexpr double rounding = 1e-5;
-  return norm(area) <= rounding * whole ? volume : 0;
+  found.volume = (moment(0, 0) + moment(1, 1) + moment(2, 2)) / 3;
+  found.open = area > 0 ? norm(sum) / area : 1;
+  for (int e = 0; e < 9; ++e) {
+    const double off = moment(e / 3, e % 3) - (e % 4 == 0 ? found.volume : 0);
+    found.open = std::max(found.open, std::abs(off / found.volume));
+  }
+  return found;
 }
 
-void close_part(Model& model, const Part& part) {
+void close_part(Model& model, Part& part) {
+  const Phase phase("closing gradients");
   const std::vector<Facet> facets = facets_of(model, part);
-  const double volume = enclosed_volume(facets, part);
-  if (!(volume > 0)) {
-    throw InputError(fmt::format(
-        "body \"{}\" asks for closure ({:g}), which needs its surface, closed and with triangles "
-        "that face outward; found {}. Allowed: a mesh, a shape with surfels, a file with such a "
-        "surface, or closure = 0",
-        part.name, part.closure, facets.empty() ? "none" : "one that encloses no volume"));
-  }
-  const double scale = volume / part.volume;
-  for (Index i = part.begin; i < part.end; ++i) model.volume[i] *= scale;
+  const auto begin = static_cast<std::size_t>(part.begin), end = static_cast<std::size_t>(part.end);
+  const std::vector<double> before(model.volume.begin() + part.begin,
+                                   model.volume.begin() + part.end);
+  const double scale = enclosed_by(facets).volume / part.volume;
+  for (std::size_t i = begin; i < end; ++i) model.volume[i] *= scale;
   const Sums sums(model, part, areas_of_phyxels(model, part, facets));
   const Solution solution = close(sums, part.closure);
   const double mean = sums.mean_volume(solution.x);
-  for (Index i = 0; i < sums.size(); ++i) {
-    double& v = model.volume[part.begin + i];
-    v *= 1 + ease * (solution.x[i].volume - mean);
-    model.closing[part.begin + i] = (sums.unit() / v) * solution.x[i].closing;
+  for (std::size_t i = begin; i < end; ++i) {
+    const Unknown& x = solution.x[i - begin];
+    const double change = ease_volume * (x.volume - mean);
+    // Half is far beyond what closes clouds that are any good; NaN is none of these.
+    if (!(std::abs(change) < 0.5)) {
+      throw InputError(fmt::format(
+          "body \"{}\": gradients cannot be closed (closure = {:g}): phyxel {} would have to "
+          "change "
+          "its volume by {:.0f}%; allowed are more phyxels where the body is thin, or closure = 0",
+          part.name, part.closure, i - begin, 100 * change));
+    }
+    model.volume[i] *= 1 + change;
+    model.closing[i] = (sums.unit() / model.volume[i]) * x.closing;
   }
-  if (solution.left > part.closure) {
+  ExactSum whole;
+  for (std::size_t i = begin; i < end; ++i) whole.add(model.volume[i]);
+  part.volume = whole.value();
+  for (Load& load : model.loads) {
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      const Index i = load.phyxels[k];
+      if (i < part.begin || i >= part.end) continue;
+      load.force[k] += (model.volume[i] - before[i - part.begin]) * load.density;
+    }
+  }
+  if (!(solution.left <= part.closure)) {
     model.warnings.push_back(fmt::format(
         "body \"{}\": sums over neighbourhoods are closed to {:.2g} after {} iterations, asked was "
         "{:g}; more phyxels across its thinnest places help",
@@ -317,10 +385,31 @@ void close_part(Model& model, const Part& part) {
 
 }  // namespace
 
+void check_closure(const BodyRequest& request, const Surface& surface,
+                   std::optional<double> volume) {
+  if (!(request.closure > 0)) return;
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
+        "{}; "
+        "allowed are a mesh, a shape with surfels, a file with such a surface, or closure = 0",
+        request.where, request.name, request.closure, why));
+  };
+  if (surface.triangle.empty()) refuse("it has no triangles");
+  const Enclosed found = enclosed_by(facets_of(surface.position, surface.triangle, 0, HUGE_VAL));
+  // Coordinates of a file may be floats.
+  if (!(found.open <= 1e-5)) refuse("its triangles do not enclose a volume");
+  if (!(found.volume > 0)) refuse("its triangles face inward");
+  if (volume && !(std::abs(found.volume / *volume - 1) < 0.3)) {
+    refuse(fmt::format("that encloses {:.4g} m^3, and its phyxels have {:.4g}", found.volume,
+                       *volume));
+  }
+}
+
 void close_gradients(Model& model) {
-  for (const Part& part : model.parts) {
+  for (Part& part : model.parts) {
     if (!(part.closure > 0) || part.begin == part.end) continue;
-    model.closing.resize(static_cast<std::size_t>(model.size()));
+    model.closing.resize(static_cast<std::size_t>(model.with_lists().size()));
     close_part(model, part);
   }
 }

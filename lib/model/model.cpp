@@ -55,6 +55,12 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   check_terms(request);
+  if (surveyor && request.closure > 0) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has closed gradients (closure = {:g}), which are found from lists of "
+        "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
+        request.where, request.name, request.closure));
+  }
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
   Survey survey;
@@ -110,6 +116,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
   BodySums sums;
   sums.add(model, part.begin, part.end);
   sums.tell(part);
+  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(part.volume));
 
   const BoundaryChoice choice =
       choose_boundary(request, cloud, {}, static_cast<Index>(cloud.position.size()));

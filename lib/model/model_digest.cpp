@@ -14,6 +14,16 @@ void add(XXH3_state_t* state, const std::vector<T>& values) {
   XXH3_64bits_update(state, values.data(), values.size() * sizeof(T));
 }
 
+/// What closing vectors follow from beside the phyxels.
+void add_surface(XXH3_state_t* state, const Surfels& surfels, const Part& part) {
+  for (const Triangle& t : surfels.triangle) {
+    if (t[0] < part.surfel_begin || t[0] >= part.surfel_end) continue;
+    for (const Index s : t) {
+      XXH3_64bits_update(state, &surfels.position[s], sizeof(Vec3d));
+    }
+  }
+}
+
 /// A sum over phyxels, so that ranks may each add theirs.
 std::uint64_t digest_of_phyxels(const Model& model) {
   std::uint64_t sum = 0;
@@ -62,6 +72,7 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0,
                                          m.hourglass, static_cast<double>(m.law), part.closure});
+    if (part.closure > 0) add_surface(state.get(), model.surfels, part);
   }
   for (const Motion& motion : model.motions) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;

@@ -192,7 +192,7 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
            "the phyxels are; 1e-3 is plenty. 0: as they come. Needs a closed surface, and one support "
-           "for the body."},
+           "for the body; one rank only."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
       {.section = "body", .name = "neighbours", .type = KeyType::table,
@@ -214,9 +214,10 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
        .range = above(0), .meaning = "Mass density at rest: water 1000."},
       {.section = "body.material", .name = "law", .type = KeyType::choice,
-       .fallback = "\"hooke\"", .words = {"hooke", "neo-hookean"},
+       .fallback = "\"hooke\"", .words = {"hooke", "neo-hookean", "corotated"},
        .meaning = "\"hooke\": stress in proportion to `strain`, which gives way under strong "
-           "compression; \"neo-hookean\" (Smith et al. 2018) does not, not even turned inside out."},
+           "compression; \"neo-hookean\" (Smith et al. 2018) does not, not even turned inside out; "
+           "nor does \"corotated\", whose stress is in proportion to stretch however large."},
       {.section = "body.material", .name = "strain", .type = KeyType::choice,
        .fallback = "\"green\"", .words = {"green", "cauchy"},
        .meaning = "\"green\" is right under any rotation; \"cauchy\" is cheaper, and only right "

@@ -226,12 +226,13 @@ class CpuBackend final : public Backend {
 
   std::size_t step_traffic() const override {
     const auto slots = static_cast<std::size_t>(layout_.slots());
-    const std::size_t pass_1 =
-        lists_.bytes() + slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real);
+    const std::size_t pass_1 = lists_.bytes() +
+                               slots * (PointRecord::size + 6 + 1 + 9) * sizeof(Real) +
+                               3 * closing_.size() * sizeof(Real);  // b and ĉ read, t written
     const std::size_t pass_2 =
         (inverse_.start.empty() ? lists_ : inverse_).bytes() +
         slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
-        (load_.size() + 2 * pull_.size() + closing_.size()) * sizeof(Real);
+        (load_.size() + 2 * pull_.size()) * sizeof(Real);
     return pass_1 + pass_2;
   }
 
@@ -474,8 +475,7 @@ class CpuBackend final : public Backend {
     return records_of(points_, PointRecord::size, PointRecord::displacement, 3);
   }
   Records stress_records() {
-    const int values = closing_.empty() ? 9 : 12;
-    return records_of(stresses_, StressRecord::size, StressRecord::pair_stress, values);
+    return records_of(stresses_, StressRecord::size, StressRecord::pair_stress, 9);
   }
   template <class T>
   Records records_of(AlignedVector<T>& array, int size, int first, int count) {

@@ -2,6 +2,7 @@
 /// order of every sum stays that of the neighbour list, whatever the width.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -33,6 +34,13 @@ struct Pack {
   PHYXEL_HD friend Pack operator*(Pack a, Pack b) { return Pack(a.lanes * b.lanes); }
   PHYXEL_HD friend Pack operator/(Pack a, Pack b) { return Pack(a.lanes / b.lanes); }
   PHYXEL_HD friend Pack operator-(Pack a) { return Pack(-a.lanes); }
+  PHYXEL_HD friend Pack where_larger(Pack a, Pack b, Pack yes, Pack no) {
+    return Pack(a.lanes > b.lanes ? yes.lanes : no.lanes);
+  }
+  PHYXEL_HD friend Pack sqrt(Pack a) {
+    for (int l = 0; l < W; ++l) a.lanes[l] = std::sqrt(a.lanes[l]);
+    return a;
+  }
 };
 
 /// W consecutive values (aligned to the pack).

@@ -58,6 +58,21 @@ TEST(Accuracy, NodesBendAsFiniteElementsDo) {
   }
 }
 
+/// On 1,519 jittered phyxels: 13% too soft without, 1.9% with closed gradients; and the patch,
+/// whose outer phyxels alone are told where to go, is exact to what Newton's method is.
+TEST(Accuracy, ClosedGradientsServeIrregularClouds) {
+  const Discretisation plain{.jitter = 0.2, .hourglass = 0.1, .across = 6};
+  Discretisation closed = plain;
+  closed.closure = 1e-3;
+  EXPECT_GT(named("gravity").solve(plain).found.at(0).error(), 0.1);
+  EXPECT_LT(std::abs(named("gravity").solve(closed).found.at(0).error()), 0.03);
+  EXPECT_GT(std::abs(named("tension").solve(plain).found.at(0).error()), 0.1);
+  EXPECT_LT(std::abs(named("tension").solve(closed).found.at(0).error()), 0.01);
+  closed.closure = 1e-11;
+  EXPECT_GT(named("patch").solve(plain).found.at(0).value, 0.1);
+  EXPECT_LT(named("patch").solve(closed).found.at(0).value, 1e-8);
+}
+
 class AccuracyCommand : public test::Program {};
 
 TEST_F(AccuracyCommand, PrintsATableAndWritesIt) {
@@ -72,7 +87,7 @@ TEST_F(AccuracyCommand, PrintsATableAndWritesIt) {
 
 TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
   EXPECT_EQ(run({"accuracy", "gravity", "--across", "2,3", "--lattice", "nodes", "--jitter", "0",
-                 "--hourglass", "0.3", "--csv", "accuracy.csv"})
+                 "--hourglass", "0.3", "--closure", "0,1e-3", "--csv", "accuracy.csv"})
                 .code,
             0);
   const auto page = run({"accuracy", "page", "--results", ".", "--out", "page.md"});
@@ -80,6 +95,7 @@ TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
   const std::string text = test::text_of(folder_ / "page.md");
   EXPECT_THAT(text, HasSubstr("## gravity: deflection"));
   EXPECT_THAT(text, HasSubstr("**nodes, α = 0.3** | 3 | 256 |"));  // finer is better, and slower
+  EXPECT_THAT(text, HasSubstr("nodes, α = 0.3, closed"));
   EXPECT_EQ(run({"accuracy", "page", "--results", "nowhere"}).code, 2);
 }
 

@@ -19,7 +19,8 @@ using namespace phyxel::testing;
 struct Case {
   const char* name;
   bool adaptive, capped, everything;
-  bool closed = false;  ///< Gradients of the first body; the second has supports of its own.
+  bool closed = false;    ///< Gradients of the first body,
+  bool one_each = false;  ///< whose neighbour has supports of its own.
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -35,7 +36,7 @@ Scene scene_of(const Case& c) {
   BodyRequest &first = scene.bodies[0], &second = scene.bodies[1];
   if (c.closed) {
     first.closure = 0.01;
-    second.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+    if (c.one_each) second.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
   }
   FixRequest fix;
   fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 3, 3}};
@@ -47,6 +48,7 @@ Scene scene_of(const Case& c) {
     if (!c.adaptive) first.material.hourglass = 0.2;  // and the second has none
     if (c.adaptive) first.material.law = Law::neo_hooke;
     second.material.strain = Strain::cauchy;
+    if (c.adaptive) second.material.law = Law::corotated;
     LoadRequest load;
     load.select.box = Selection::Box{{1.2, -1, -1}, {3, 3, 3}};
     load.force = {0, 30, 0};
@@ -330,15 +332,16 @@ TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
   EXPECT_LT(norm(model.position[bad.bad_phyxel] - model.position[1234]), 1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Terms, CudaBackend,
-                         ::testing::Values(Case{"Uniform", false, false, false},
-                                           Case{"Adaptive", true, false, false},
-                                           Case{"Capped", true, true, false},
-                                           Case{"UniformEverything", false, false, true},
-                                           Case{"AdaptiveEverything", true, false, true},
-                                           Case{"Closed", false, false, false, true},
-                                           Case{"ClosedEverything", false, false, true, true}),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Terms, CudaBackend,
+    ::testing::Values(Case{"Uniform", false, false, false}, Case{"Adaptive", true, false, false},
+                      Case{"Capped", true, true, false},
+                      Case{"UniformEverything", false, false, true},
+                      Case{"AdaptiveEverything", true, false, true},
+                      Case{"Closed", false, false, false, true},
+                      Case{"ClosedEverything", false, false, true, true},
+                      Case{"ClosedBesideAdaptive", false, false, true, true, true}),
+    [](const auto& test) { return std::string(test.param.name); });
 
 TEST(CudaSurfels, EqualTheCpus) {
   const Model model = built_in_bodies("dino", "alien_head");

@@ -340,6 +340,21 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 /// What is refused is refused by all ranks, in the words of one rank.
+TEST(BuiltShare, RefusesClosedGradients) {
+  Scene scene = testing::one_body();
+  scene.bodies[0].where = "scene.toml:3:1";
+  scene.bodies[0].closure = 1e-3;
+  const std::vector<Cloud> clouds{make_shape({.name = "block", .size = {1, 1, 1}, .spacing = 0.2})};
+  try {
+    build_share(world(), scene, clouds, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("scene.toml:3:1: body \"body\" has closed gradients"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(BuiltShare, RefusesWhatOneRankWould) {
   const auto words_of = [](const auto& make) -> std::string {
     try {

@@ -20,7 +20,7 @@ struct Body {
   double hourglass = 0;     // κ [N/m]
   std::vector<V3> closing;  // ĉ [1/m], or none
   bool green = true;
-  bool neo_hooke = false;
+  bool neo_hooke = false, corotated = false;
 };
 
 inline double w(double r, double h) {
@@ -114,6 +114,28 @@ inline M3 cofactor(const M3& j) {
   return cof;
 }
 
+/// ψ = μ |F - R|² + λ/2 (tr S - 3)² with R by singular values, of determinant 1.
+struct Corotated {
+  double mu, lambda;
+  explicit Corotated(const Body& b)
+      : mu(b.young / (2 * (1 + b.poisson))),
+        lambda(b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson))) {}
+  static M3 rotation(const M3& j) {
+    const Eigen::JacobiSVD<M3> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    V3 sides = V3::Ones();
+    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sides[2] = -1;
+    return svd.matrixU() * sides.asDiagonal() * svd.matrixV().transpose();
+  }
+  double energy(const M3& j) const {
+    const M3 r = rotation(j);
+    return mu * (j - r).squaredNorm() + lambda / 2 * std::pow((r.transpose() * j).trace() - 3, 2);
+  }
+  M3 stress(const M3& j) const {
+    const M3 r = rotation(j);
+    return 2 * mu * (j - r) + lambda * ((r.transpose() * j).trace() - 3) * r;
+  }
+};
+
 /// What the linear fit at i leaves of the motion of j.
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
@@ -158,8 +180,9 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const M3 g = closed_grad_u(b, u, i), e = strain(b, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    const double elastic = b.neo_hooke ? NeoHooke(b).energy(M3::Identity() + g)
-                                       : 0.5 * e.cwiseProduct(stress(b, e)).sum();
+    const double elastic = b.corotated   ? Corotated(b).energy(M3::Identity() + g)
+                           : b.neo_hooke ? NeoHooke(b).energy(M3::Identity() + g)
+                                         : 0.5 * e.cwiseProduct(stress(b, e)).sum();
     total += b.v[i] * (elastic + 0.5 * b.volume_stiffness * dj * dj);
   }
   return total;
@@ -174,6 +197,7 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     M3 p = stress(b, strain(b, g));
     if (b.green) p = j * p;
     if (b.neo_hooke) p = NeoHooke(b).stress(j, cofactor(j));
+    if (b.corotated) p = Corotated(b).stress(j);
     if (b.volume_stiffness > 0) p += b.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
       V3 push = -b.v[i] * p * grad_of(b, a, i, n);

@@ -110,7 +110,7 @@ Solution patch(const Discretisation& d) {
   double largest = 0;
   Rest rest = rest_of(scene, [&](Model& model) {
     const double layer =
-        d.placement == ShapeRequest::Placement::nodes ? 0.1 / d.across : 2.0 / d.across;
+        d.placement == ShapeRequest::Placement::nodes ? 0.1 / d.across : 1.5 / d.across;
     Vec3d low = model.position[0], high = low;
     for (const Vec3d& x : model.position) {
       low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};

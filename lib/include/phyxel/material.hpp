@@ -11,11 +11,13 @@ enum class Strain { green, cauchy };
 
 /// How stress follows from strain. `hooke`: in proportion, which softens where a body is pressed to
 /// half its size and no longer resists beyond. `neo_hooke` (Smith, de Goes and Kim 2018) resists
-/// until it is turned inside out, and still then; the same at small strains.
-enum class Law { hooke, neo_hooke };
+/// until it is turned inside out, and still then. `corotated` measures strain after taking the
+/// nearest rotation away: in proportion to stretch, however large, and inside out, too. All are the
+/// same at small strains.
+enum class Law { hooke, neo_hooke, corotated };
 
 /// Strain and law in one.
-enum class Elasticity { green_hooke, cauchy_hooke, neo_hooke };
+enum class Elasticity { green_hooke, cauchy_hooke, neo_hooke, corotated };
 
 /// Isotropic elastic material, one per body.
 struct Material {
@@ -32,6 +34,7 @@ struct Material {
 
   Elasticity elasticity() const {
     if (law == Law::neo_hooke) return Elasticity::neo_hooke;
+    if (law == Law::corotated) return Elasticity::corotated;
     return strain == Strain::green ? Elasticity::green_hooke : Elasticity::cauchy_hooke;
   }
   /// Lamé's first parameter [Pa].

@@ -124,9 +124,9 @@ struct Model {
 std::vector<char> held_phyxels(const Model& model);
 
 /// A number that tells two models apart: rest positions, supports, geometric volumes, materials,
-/// motions and loads, from which all else follows; so it is the same whatever device built them. A
-/// checkpoint carries it, so that a state never continues on another body. Of a share it is that of
-/// the whole, and collective.
+/// motions and loads, and the surfaces of bodies with closed gradients, from which all else
+/// follows; so it is the same whatever device built them. A checkpoint carries it, so that a state
+/// never continues on another body. Of a share it is that of the whole, and collective.
 std::uint64_t model_digest(const Model& model);
 
 /// The rest cloud of one body of a scene: shape, mesh or file; scaled, rotated, moved into place.

@@ -56,6 +56,12 @@ using Sym3d = Sym3<double>;
 using Index = std::int32_t;   ///< index of a phyxel, surfel or triangle on one rank
 using Offset = std::int64_t;  ///< offset into a list of pairs; never 32-bit
 
+/// a > b ? yes : no; lane by lane for packs.
+template <class R>
+PHYXEL_HD R where_larger(R a, R b, R yes, R no) {
+  return a > b ? yes : no;
+}
+
 /// a b + c. On a GPU rounded once, always: left to the compiler, it would depend on what surrounds
 /// the expression, and two kernels would not agree to the last bit. With PHYXEL_UNFUSED rounded
 /// twice, as a CPU without such an instruction does.

@@ -9,6 +9,7 @@
 #include "phyxel/shapes.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
+#include "support/surfaces.hpp"
 
 namespace phyxel {
 namespace {
@@ -132,6 +133,64 @@ TEST(Closure, HoldsForPhyxelsBelowTheSurface) {
   }
 }
 
+/// Twelve triangles around a thousand phyxels: however large they are, all phyxels near get their
+/// share.
+TEST(Closure, TrianglesMayBeLarge) {
+  Cloud cloud = make_shape({.name = "block",
+                            .size = {1, 1, 1},
+                            .spacing = 0.1,
+                            .jitter = 0.2,
+                            .placement = ShapeRequest::Placement::nodes});
+  cloud.surface = test::box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+  const Material material = linear_rubber();
+  const Model model = model_of_cloud(cloud, 1e-10, material);
+  EXPECT_TRUE(model.warnings.empty());
+  Mat3d along{};
+  along(2, 2) = 1e-3;
+  along(0, 0) = along(1, 1) = -1e-3 * material.poisson;
+  const Uniform pulled = under(model, along);
+  double largest = 0, least = 1;
+  for (const Index i : cloud.regions.at("z+")) {
+    const Vec3d x = model.position[i];
+    if (std::max(std::abs(x.x), std::abs(x.y)) > 0.39) continue;
+    const double share = -pulled.force[i].z / (pulled.stress(2, 2) * 0.1 * 0.1);
+    largest = std::max(largest, share);
+    least = std::min(least, share);
+  }
+  EXPECT_LT(largest, 1.5);  // jitter 0.2: areas of Voronoi's cells are between 0.6 and 1.4
+  EXPECT_GT(least, 0.5);
+}
+
+/// Loads by volume and the body's volume are those of the volumes that forces come from.
+TEST(Closure, LoadsByVolumeFollow) {
+  const Cloud cloud = make_shape(block());
+  Scene scene = scene_of(1e-3);
+  scene.bodies[0].volume_rule = VolumeRule::kernel;
+  scene.bodies[0].loads.push_back({.select = {.all = true}, .force_density = {0, 0, -100}});
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  double volume = 0, force = 0;
+  for (const double v : model.volume) volume += v;
+  for (const Vec3d& f : model.loads.at(0).force) force += f.z;
+  EXPECT_NEAR(volume, 0.48, 1e-12);
+  EXPECT_NEAR(model.parts[0].volume, 0.48, 1e-12);
+  EXPECT_NEAR(force, -48, 1e-10);
+}
+
+/// A checkpoint of one is not taken for the other.
+TEST(Closure, DigestsTellSurfacesApart) {
+  Cloud cloud = make_shape(block());
+  Scene scene = scene_of(1e-3);
+  scene.bodies[0].volume_rule = VolumeRule::kernel;  // which the digest leaves out
+  const auto digest = [&] { return model_digest(build_model(scene, std::span(&cloud, 1))); };
+  const std::uint64_t one = digest();
+  EXPECT_EQ(digest(), one);
+  scene.bodies[0].closure = 2e-3;
+  EXPECT_NE(digest(), one);
+  scene.bodies[0].closure = 1e-3;
+  for (Vec3d& x : cloud.surface.position) x.z *= 1.01;
+  EXPECT_NE(digest(), one);
+}
+
 /// Whatever the cloud, masses are the bodies'; and both momenta are kept in large motions.
 TEST(Closure, KeepsMassAndMomenta) {
   const Cloud cloud = make_shape(block());
@@ -147,7 +206,7 @@ TEST(Closure, KeepsMassAndMomenta) {
   EXPECT_LT(norm(d.internal_torque), 1e-13 * d.torque_scale);
 }
 
-/// Threads change nothing, nor does another body in front.
+/// Another body in front changes nothing.
 TEST(Closure, IsTheSameForEachBody) {
   const Cloud cloud = make_shape(block());
   Scene scene = scene_of(1e-3);
@@ -180,13 +239,28 @@ TEST(Closure, NeedsAClosedSurfaceAndOneSupport) {
   Cloud bare = whole;
   bare.surface = {};
   EXPECT_THAT(refusal(bare),
-              HasSubstr("asks for closure (0.001), which needs its surface, closed"));
+              HasSubstr("has closed gradients (closure = 0.001), which need its whole "
+                        "surface, but it has no triangles"));
   Cloud open = whole;
   open.surface.triangle.pop_back();
-  EXPECT_THAT(refusal(open), HasSubstr("found one that encloses no volume"));
+  EXPECT_THAT(refusal(open), HasSubstr("but its triangles do not enclose a volume"));
+  // A tube without its ends: areas add up to nothing, all the same.
+  Cloud tube = whole;
+  std::erase_if(tube.surface.triangle, [&](const Triangle& t) {
+    const auto& x = tube.surface.position;
+    const auto on = [&](double z) {
+      return std::abs(x[t[0]].z - z) + std::abs(x[t[1]].z - z) + std::abs(x[t[2]].z - z) < 1e-9;
+    };
+    return on(0.5) || on(-0.5);
+  });
+  EXPECT_LT(tube.surface.triangle.size(), whole.surface.triangle.size());
+  EXPECT_THAT(refusal(tube), HasSubstr("do not enclose a volume"));
+  Cloud larger = whole;
+  for (Vec3d& x : larger.surface.position) x = 1.2 * x;
+  EXPECT_THAT(refusal(larger), HasSubstr("that encloses 0.8294 m^3, and its phyxels have 0.48"));
   Cloud inside_out = whole;
   for (Triangle& t : inside_out.surface.triangle) std::swap(t[0], t[1]);
-  EXPECT_THAT(refusal(inside_out), HasSubstr("encloses no volume"));
+  EXPECT_THAT(refusal(inside_out), HasSubstr("face inward"));
   NeighbourhoodRule adaptive;
   adaptive.support = NeighbourhoodRule::Support::adaptive;
   EXPECT_THAT(refusal(whole, adaptive), HasSubstr("has closed gradients (0.001), which needs one "

@@ -44,6 +44,14 @@ const Terms all_terms[] = {
      {},
      0.1,
      Law::neo_hooke},
+    {"Corotated", Strain::green, 0, NeighbourhoodRule::Support::adaptive, {}, 0, Law::corotated},
+    {"CorotatedVolumeHourglass",
+     Strain::green,
+     2e5,
+     NeighbourhoodRule::Support::uniform,
+     {},
+     0.1,
+     Law::corotated},
     {"Closed", Strain::green, 0, NeighbourhoodRule::Support::uniform, {}, 0, Law::hooke, true},
     {"ClosedCauchyVolume",
      Strain::cauchy,
@@ -102,6 +110,7 @@ Case make_case(const Terms& terms) {
   c.body.poisson = material.poisson;
   c.body.green = terms.strain == Strain::green;
   c.body.neo_hooke = terms.law == Law::neo_hooke;
+  c.body.corotated = terms.law == Law::corotated;
   c.body.volume_stiffness = terms.volume_stiffness;
   // κ = α E v / tr A, where tr A sums w r² over a continuum of density 1 / v: by many shells.
   const double h = c.body.h[0], v = c.model.parts[0].volume / c.model.size();
@@ -278,9 +287,9 @@ TEST(Force, HourglassModesAreSeenByTheResidualAlone) {
 }
 
 /// Pressed flat along x, and turned inside out: Hooke's law in Green's strain gives way where the
-/// body is pressed below 1/√3 of its length; the neo-Hookean one pushes harder the further.
-TEST(Force, NeoHookeResistsUntilTheBodyIsInsideOut) {
-  for (const Law law : {Law::hooke, Law::neo_hooke}) {
+/// body is pressed below 1/√3 of its length; the other two push harder the further.
+TEST(Force, LawsButHookesResistUntilTheBodyIsInsideOut) {
+  for (const Law law : {Law::hooke, Law::neo_hooke, Law::corotated}) {
     double before = 0;
     bool resists = true;
     for (const double stretch : {0.9, 0.7, 0.5, 0.3, 0.1, 0.0, -0.2, -0.5}) {
@@ -288,26 +297,76 @@ TEST(Force, NeoHookeResistsUntilTheBodyIsInsideOut) {
       g(0, 0) = stretch - 1;
       const Hooke<double> hooke{1e5, 8e4};
       const double push = law == Law::hooke ? GreenHooke<double>{hooke}.first_piola_stress(g)(0, 0)
-                                            : NeoHooke<double>{hooke}.first_piola_stress(g)(0, 0);
+                          : law == Law::neo_hooke
+                              ? NeoHooke<double>{hooke}.first_piola_stress(g)(0, 0)
+                              : CorotatedHooke<double>{hooke}.first_piola_stress(g)(0, 0);
       resists = resists && push < before;
       before = push;
     }
-    EXPECT_EQ(resists, law == Law::neo_hooke);
+    EXPECT_EQ(resists, law != Law::hooke);
   }
 }
 
-TEST(Force, NeoHookeIsHookeAtSmallStrains) {
+TEST(Force, LawsAreHookesAtSmallStrains) {
   std::mt19937_64 engine(5);
   for (int trial = 0; trial < 20; ++trial) {
     Mat3d g;
     for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = uniform(engine, -1e-6, 1e-6);
     const Hooke<double> hooke{3e5, 8e4};
     const Mat3d p = NeoHooke<double>{hooke}.first_piola_stress(g),
+                turned = CorotatedHooke<double>{hooke}.first_piola_stress(g),
                 s = full(hooke.stress(cauchy_strain(g)));
     // What is of second order is 1e-6 of it; and no digits are lost by what cancels at rest.
-    for (int e = 0; e < 9; ++e) EXPECT_NEAR(p(e / 3, e % 3), s(e / 3, e % 3), 1e-5);
+    for (int e = 0; e < 9; ++e) {
+      EXPECT_NEAR(p(e / 3, e % 3), s(e / 3, e % 3), 1e-5);
+      EXPECT_NEAR(turned(e / 3, e % 3), s(e / 3, e % 3), 1e-5);
+    }
     EXPECT_NEAR(NeoHooke<double>{hooke}.energy(g), hooke.energy(cauchy_strain(g)), 1e-11);
+    EXPECT_NEAR(CorotatedHooke<double>{hooke}.energy(g), hooke.energy(cauchy_strain(g)), 1e-11);
   }
+}
+
+/// Held against singular values: at rest, strained and turned by any angle, flattened, inside out.
+TEST(Force, TheNearestRotationIsThatOfSingularValues) {
+  std::mt19937_64 engine(8);
+  std::normal_distribution<double> normal;
+  for (const double size : {1e-6, 1e-2, 0.3, 1.0, 10.0}) {
+    for (int trial = 0; trial < 200; ++trial) {
+      oracle::M3 change;
+      for (int e = 0; e < 9; ++e) change(e / 3, e % 3) = size * normal(engine);
+      oracle::M3 f = oracle::M3::Identity() + change;
+      if (trial % 2) {
+        const Eigen::Quaterniond turn(normal(engine), normal(engine), normal(engine),
+                                      normal(engine));
+        f = turn.normalized().toRotationMatrix() * f;
+      }
+      const Eigen::JacobiSVD<oracle::M3> svd(f);
+      const oracle::V3 s = svd.singularValues();
+      const double gap = s[1] + (f.determinant() < 0 ? -1 : 1) * s[2];
+      Mat3d g;
+      for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = f(e / 3, e % 3) - (e % 4 == 0);
+      const oracle::M3 expected = oracle::Corotated::rotation(f);
+      const NearestRotation<double> r = nearest_rotation(g);
+      const NearestRotation<float> rough = nearest_rotation(to<float>(g));
+      // Rounding of K's entries, through how far its largest eigenvalues are apart.
+      const double tolerance = std::max(1.0, s[0]) / std::min(1.0, gap);
+      for (int e = 0; e < 9; ++e) {
+        const double exact = expected(e / 3, e % 3) - (e % 4 == 0);
+        EXPECT_NEAR(r.change(e / 3, e % 3), exact, 1e-13 * tolerance * tolerance) << size;
+        EXPECT_NEAR(rough.change(e / 3, e % 3), exact, 3e-6 * tolerance * tolerance) << size;
+      }
+      EXPECT_NEAR(r.stretch, (expected.transpose() * f).trace() - 3, 1e-13 * std::max(1.0, s[0]));
+    }
+  }
+  // Digits of small turns and strains are kept in float.
+  Mat3<float> small{};
+  small(0, 1) = -3e-6F, small(1, 0) = 5e-6F, small(2, 2) = 7e-6F;
+  const NearestRotation<float> r = nearest_rotation(small);
+  EXPECT_NEAR(r.change(1, 0), 4e-6F, 1e-11F);  // half of what is skew; squares are 1e-11
+  EXPECT_NEAR(r.stretch, 7e-6F, 1e-10F);
+  // Nothing is nearest to F = 0: whatever it is, it is finite.
+  const NearestRotation<double> any = nearest_rotation(-1.0 * identity<double>());
+  for (int e = 0; e < 9; ++e) EXPECT_TRUE(std::isfinite(any.change(e / 3, e % 3)));
 }
 
 TEST(Force, HourglassControlNeedsOneSupport) {

@@ -55,6 +55,7 @@ translation = [1, 2, 3]
 velocity = [4, 5, 6]
 spin = [7, 8, 9]
 volumes = "kernel"
+closure = 0.25
 [body.material]
 young = 2e5
 poisson = -0.25
@@ -136,6 +137,7 @@ TEST(Scene, BodyKeysAreReadExactly) {
   expect_vector(body.velocity, {4, 5, 6});
   expect_vector(body.spin, {7, 8, 9});
   EXPECT_EQ(body.volume_rule, VolumeRule::kernel);
+  EXPECT_EQ(body.closure, 0.25);
   EXPECT_EQ(body.material.young, 2e5);
   EXPECT_EQ(body.material.poisson, -0.25);
   EXPECT_EQ(body.material.density, 1234);
@@ -154,7 +156,7 @@ TEST(Scene, BoundaryKeysAreReadExactly) {
   const BodyRequest body = parse_scene(full_scene, "all.toml").bodies.at(0);
   ASSERT_EQ(body.fixed.size(), 2u);
   EXPECT_EQ(body.fixed[0].select.region, "x-");
-  EXPECT_EQ(body.fixed[0].select.where, "all.toml:53:10");
+  EXPECT_EQ(body.fixed[0].select.where, "all.toml:54:10");
   EXPECT_EQ(body.fixed[1].select.indices, (std::vector<Index>{5, 3}));
   ASSERT_EQ(body.motions.size(), 1u);
   const MotionRequest& motion = body.motions[0];

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "phyxel/material.hpp"
+#include "phyxel/physics/rotation.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/types.hpp"
 
@@ -122,6 +123,28 @@ struct NeoHooke {
   }
 };
 
+/// Hooke's law in the stretch that is left when the nearest rotation R is taken away:
+///   ψ = μ |F - R|² + ½ λ (R : F - 3)²
+/// (as in Müller, Dorsey, McMillan, Jagnow and Cutler 2002, for each phyxel). Stress grows in
+/// proportion to stretch; a body turned inside out is pushed back the way that is shortest.
+template <class Real>
+struct CorotatedHooke {
+  Hooke<Real> hooke;
+
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    const NearestRotation<Real> r = nearest_rotation(grad_u);
+    return hooke.mu * detail::squares(grad_u - r.change) +
+           Real(0.5) * hooke.lambda * r.stretch * r.stretch;
+  }
+  /// 2 μ (F - R) + λ (R : F - 3) R [Pa]: R is at a maximum of R : F, so its own change costs
+  /// nothing.
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    const NearestRotation<Real> r = nearest_rotation(grad_u);
+    const Mat3<Real> sides = Real(2) * hooke.mu * (grad_u - r.change);
+    return fused(hooke.lambda * r.stretch, identity<Real>() + r.change, sides);
+  }
+};
+
 namespace detail {
 template <Elasticity, class Real>
 struct ElasticLawOf {
@@ -135,6 +158,10 @@ template <class Real>
 struct ElasticLawOf<Elasticity::neo_hooke, Real> {
   using type = NeoHooke<Real>;
 };
+template <class Real>
+struct ElasticLawOf<Elasticity::corotated, Real> {
+  using type = CorotatedHooke<Real>;
+};
 }  // namespace detail
 
 /// Each law as a type: all are made of Hooke's parameters.
@@ -146,6 +173,7 @@ template <class Real, class Apply>
 PHYXEL_HD auto with_law(Elasticity elasticity, const Hooke<Real>& hooke, Apply&& apply) {
   if (elasticity == Elasticity::green_hooke) return apply(GreenHooke<Real>{hooke});
   if (elasticity == Elasticity::cauchy_hooke) return apply(CauchyHooke<Real>{hooke});
+  if (elasticity == Elasticity::corotated) return apply(CorotatedHooke<Real>{hooke});
   return apply(NeoHooke<Real>{hooke});
 }
 
