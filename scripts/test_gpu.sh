@@ -81,7 +81,7 @@ check() {
 run_sanitizers() {
   rm -f "$logs"/*.passed "$logs"/*.line
   check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
-  check cuda_backend_test '*Forces*/AdaptiveEverything:*Energies*/UniformEverything:*Surf*'
+  check cuda_backend_test '*Forces*/AdaptiveEverything:*Forces*/ClosedBesideAdaptive:*Energies*/UniformEverything:*Surf*'
   # Blocks that wait for each other's mail take hours where every access is recorded for races.
   check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
   check setup_test '*Overlapping*'
