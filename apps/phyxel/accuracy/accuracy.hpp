@@ -30,7 +30,7 @@ struct Quantity {
 struct Solution {
   Index phyxels = 0;
   double neighbours = 0;         ///< Mean.
-  std::int64_t evaluations = 0;  ///< Of all phyxels' forces.
+  std::int64_t evaluations = 0;  ///< Of all phyxels' forces: steps, of bodies that move.
   double seconds = 0;            ///< That they and what belongs to them took.
   double setup_seconds = 0;      ///< From the scene to the first of them.
   std::vector<Quantity> found;
@@ -43,7 +43,9 @@ struct AccuracyCase {
   Solution (*solve)(const Discretisation&);
 };
 
-/// Those at rest.
+/// Bodies at rest, and bodies that move.
 std::vector<AccuracyCase> static_cases();
+std::vector<AccuracyCase> dynamic_cases();
+std::vector<AccuracyCase> accuracy_cases();  ///< All of them.
 
 }  // namespace phyxel::app

@@ -25,7 +25,7 @@ struct AccuracyOptions {
 };
 
 std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
-  const std::vector<AccuracyCase> all = static_cases();
+  const std::vector<AccuracyCase> all = accuracy_cases();
   std::vector<AccuracyCase> chosen;
   std::vector<std::string> known{"all"};
   for (const AccuracyCase& c : all) known.push_back(c.name);
@@ -114,7 +114,7 @@ void add_accuracy(CLI::App& program) {
       "accuracy", "Problems with known answers: errors beside time, on the CPU in double");
   auto options = std::make_shared<AccuracyOptions>();
   std::string known = "Which, of:";
-  for (const AccuracyCase& c : static_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
+  for (const AccuracyCase& c : accuracy_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
   command->add_option("cases", options->cases, known)->capture_default_str();
   command->add_option("--across", options->across, "Cells across the thinner sides")
       ->delimiter(',')

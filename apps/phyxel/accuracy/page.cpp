@@ -60,7 +60,8 @@ class AccuracyPage {
   std::string text() {
     text_ = fmt::format(
         "# Accuracy\n\nWritten by `phyxel accuracy page` from the table of `phyxel accuracy` in "
-        "`docs/results/`: problems with known answers, solved on the CPU in double. *Cells*: a "
+        "`docs/results/`: problems with known answers, solved on the CPU in double (*inf*: it flew "
+        "apart). *Cells*: a "
         "phyxel in the middle of each cell of a lattice; *nodes*: one at each corner, so on faces, "
         "edges and corners of the body, too. *Jitter*: phyxels moved at random by up to so many "
         "spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: "
@@ -74,7 +75,7 @@ class AccuracyPage {
         "what the quantity says.\n\nMeasured by {} on {}; {}; {}.\n\n",
         table_.fact("program"), table_.fact("hardware"), table_.fact("compiler"),
         table_.fact("date"));
-    for (const AccuracyCase& c : static_cases()) {
+    for (const AccuracyCase& c : accuracy_cases()) {
       for (const std::string& quantity : table_.values("quantity", {{"case", c.name}})) {
         section(c, quantity);
       }
@@ -117,7 +118,8 @@ class AccuracyPage {
                     .curves = {}};
     std::vector<std::size_t> shown;
     for (const std::size_t r : rows) {
-      if (table_.number(r, "jitter") > 0 || !(error_of(table_, r) > 0)) continue;
+      const double error = error_of(table_, r);
+      if (table_.number(r, "jitter") > 0 || !(error > 0) || !std::isfinite(error)) continue;
       shown.push_back(r);
       const std::string way = way_of(table_, r);
       auto curve = std::find_if(chart.curves.begin(), chart.curves.end(),
@@ -129,7 +131,8 @@ class AccuracyPage {
       curve->x.push_back(time_of(table_, r));
       curve->y.push_back(error_of(table_, r));
     }
-    if (shown.size() < 2 || c.name == "rotation") return;  // rounding has no order
+    // Rounding has no order, and one resolution no curve.
+    if (shown.size() < 2 || c.name == "rotation" || c.across.size() < 2) return;
     Curve front{"Pareto front", {}, {}, 0, true};
     for (const std::size_t r : front_of(table_, shown)) {
       front.x.push_back(time_of(table_, r));
