@@ -90,7 +90,7 @@ class AccuracyPage {
     for (std::size_t r = 0; r < table_.rows.size(); ++r) {
       if (table_.matches(r, {{"case", c.name}, {"quantity", quantity}})) rows.push_back(r);
     }
-    chart(c, quantity, rows);
+    for (const bool irregular : {false, true}) chart(c, quantity, rows, irregular);
     const std::vector<std::size_t> front = front_of(table_, rows);
     std::vector<std::vector<std::string>> cells;
     for (const std::size_t r : rows) {
@@ -107,10 +107,12 @@ class AccuracyPage {
                         cells);
   }
 
-  /// Error against time, a curve for each way on regular lattices, and the front.
+  /// Error against time, a curve for each way on regular lattices or on irregular ones, and the
+  /// front.
   void chart(const AccuracyCase& c, const std::string& quantity,
-             const std::vector<std::size_t>& rows) {
-    LineChart chart{.title = fmt::format("{}: {}", c.name, quantity),
+             const std::vector<std::size_t>& rows, bool irregular) {
+    LineChart chart{.title = fmt::format("{}: {}, {} lattices", c.name, quantity,
+                                         irregular ? "irregular" : "regular"),
                     .x_label = "time from the scene to the answer [s]",
                     .y_label = "error",
                     .log_x = true,
@@ -119,7 +121,8 @@ class AccuracyPage {
     std::vector<std::size_t> shown;
     for (const std::size_t r : rows) {
       const double error = error_of(table_, r);
-      if (table_.number(r, "jitter") > 0 || !(error > 0) || !std::isfinite(error)) continue;
+      if ((table_.number(r, "jitter") > 0) != irregular || !(error > 0) || !std::isfinite(error))
+        continue;
       shown.push_back(r);
       const std::string way = way_of(table_, r);
       auto curve = std::find_if(chart.curves.begin(), chart.curves.end(),
