@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Configures, builds and tests.
 #
-#   scripts/test.sh                   cpu, asan, tsan, cuda (where nvcc is) and fuzz
+#   scripts/test.sh                   cpu, asan, fuzz, tsan and cuda (where nvcc is)
 #   scripts/test.sh cpu asan          only these
 #
+# cpu runs every test; asan every one again under the sanitizers, with clang, of whose build fuzz
+# takes the fuzzers; tsan those that have threads; cuda those that CUDA changes.
 # Every stage runs even if an earlier one failed; a summary comes last, and exit code 1 if any failed.
 # FUZZ_SECONDS (30) is the time for each fuzzer.
 set -uo pipefail
@@ -11,7 +13,7 @@ cd "$(dirname "$0")/.." || exit 1
 
 stages=("$@")
 if [[ ${#stages[@]} -eq 0 ]]; then
-  stages=(cpu asan tsan cuda fuzz)
+  stages=(cpu asan fuzz tsan cuda)
 fi
 for stage in "${stages[@]}"; do
   case $stage in cpu | asan | tsan | cuda | fuzz) ;; *)
@@ -26,16 +28,20 @@ jobs=$(nproc)
 generator=()
 command -v ninja >/dev/null || generator=(-G "Unix Makefiles")
 
+have_clang() { command -v clang++ >/dev/null; }
+
+# build <configure preset> <build preset>
 build() {
-  cmake --preset "$1" "${generator[@]}" "${@:2}" && cmake --build --preset "$1" --parallel "$jobs"
+  cmake --preset "$1" "${generator[@]}" -DPHYXEL_TESTS=ON && cmake --build --preset "$2" --parallel "$jobs"
 }
 
 # ctest keeps the names of what failed in a file, which the summary repeats: the list of a stage is
 # far above when the last stage ends.
+# tested <configure preset> [<build and test preset>]
 tested() {
   local failed=build/$1/Testing/Temporary/LastTestsFailed.log
   rm -f "$failed"
-  build "$1" -DPHYXEL_TESTS=ON && ctest --preset "$1" --parallel "$jobs"
+  build "$1" "${2-$1}" && ctest --preset "${2-$1}" --parallel "$jobs"
 }
 
 failed_tests() {
@@ -58,22 +64,22 @@ tested_with_tsan() {
 }
 
 fuzzed() {
-  build fuzz || return 1
+  build asan fuzz || return 1
   local failed=0 fuzzer name corpus seeds
-  for fuzzer in build/fuzz/bin/fuzz_*; do
+  for fuzzer in build/asan/bin/fuzz_*; do
     name=$(basename "$fuzzer")
-    corpus=build/fuzz/corpus/$name
+    corpus=build/asan/fuzz/corpus/$name
     seeds=fuzz/corpus/${name#fuzz_}
-    mkdir -p "$corpus" build/fuzz/found
+    mkdir -p "$corpus" build/asan/fuzz/found
     [[ -d $seeds ]] || seeds=
     echo "--- $name"
-    # Crashing inputs are kept under build/fuzz/found, the whole log beside it.
+    # Crashing inputs are kept under build/asan/fuzz/found, the whole log beside it.
     if ! "$fuzzer" -max_total_time="${FUZZ_SECONDS:-30}" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
-      -artifact_prefix=build/fuzz/found/"$name"- "$corpus" ${seeds:+"$seeds"} >build/fuzz/"$name".log 2>&1; then
+      -artifact_prefix=build/asan/fuzz/found/"$name"- "$corpus" ${seeds:+"$seeds"} >build/asan/fuzz/"$name".log 2>&1; then
       failed=1
-      grep -vE '^(#[0-9]+[[:space:]]|[[:space:]]*NEW_FUNC)' build/fuzz/"$name".log | tail -n 40
+      grep -vE '^(#[0-9]+[[:space:]]|[[:space:]]*NEW_FUNC)' build/asan/fuzz/"$name".log | tail -n 40
     fi
-    grep -E 'number_of_executed_units|average_exec_per_sec' build/fuzz/"$name".log
+    grep -E 'number_of_executed_units|average_exec_per_sec' build/asan/fuzz/"$name".log
   done
   return $failed
 }
@@ -89,10 +95,11 @@ for stage in "${stages[@]}"; do
   echo "=== $stage"
   start=$SECONDS
   case $stage in
-    cpu | asan) (tested "$stage") ;;
-    tsan) if command -v clang++ >/dev/null; then (tested_with_tsan); else (exit 77); fi ;;
-    cuda) if have_nvcc; then (tested cuda); else (exit 77); fi ;;
-    fuzz) if command -v clang++ >/dev/null; then (fuzzed); else (exit 77); fi ;;
+    cpu) (tested cpu) ;;
+    asan) if have_clang; then (tested asan); else (exit 77); fi ;;
+    fuzz) if have_clang; then (fuzzed); else (exit 77); fi ;;
+    tsan) if have_clang; then (tested_with_tsan); else (exit 77); fi ;;
+    cuda) if have_nvcc; then (tested cuda cuda-tests); else (exit 77); fi ;;
   esac
   code=$?
   result=passed

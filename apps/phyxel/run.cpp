@@ -79,9 +79,9 @@ class Run {
           const Phase phase("time step");
           return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
         })),
-        solver_(*backend_, first_state()),
+        solver_(model(), *backend_, first_state(), scene_.solver.method),
         first_step_(solver_.steps()),
-        start_diagnostics_(diagnose(model(), *backend_, solver_.steps(), solver_.dt())) {
+        start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
     // Last, because it replaces what an earlier run has left: all that could be refused, or find no
     // memory, has been tried by now.
     ranks().together([&] {
@@ -115,8 +115,7 @@ class Run {
 
     StopSignal signals;
     const Watchdog watchdog(ranks(), watchdog_seconds());
-    Progress progress(scene_.time.end,
-                      options_.quiet || options_.json || !leads() ? nullptr : stderr,
+    Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
                       {.phyxels = model().whole_size()});
     loop_start_ = Clock::now();
     auto last_checkpoint = Clock::now();
@@ -144,8 +143,7 @@ class Run {
         step_seconds_ += seconds_since(stepping_since);
         if (frame) writer_.wait_for_room();
         const auto look_start = Clock::now();
-        now = in_phase("energies",
-                       [&] { return diagnose(model(), backend, solver.steps(), solver.dt()); });
+        now = in_phase("energies", [&] { return diagnose(model(), backend, solver.now()); });
         watch.check(now);
         peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
         auto good = good_state(now);
@@ -199,6 +197,8 @@ class Run {
   static constexpr double watch_share = 50;
 
   const Model& model() const { return shared_.here(); }
+  bool steps_explicitly() const { return scene_.solver.method == Method::verlet; }
+  double end_time() const { return static_cast<double>(plan_.steps) * plan_.dt; }
   /// Whether this rank speaks and writes.
   static bool leads() { return ranks().rank() == 0; }
   /// Ranks ask each other now and then, and one alone itself after every step.
@@ -250,6 +250,13 @@ class Run {
           fmt::format("{}: written by a run in {}, this one is in {}: allowed --precision {}",
                       file.string(), precision_name(precision),
                       precision_name(scene_.solver.precision), precision_name(precision)));
+    }
+    const Method method = checkpoint.info().method;
+    if (method != scene_.solver.method) {
+      throw InputError(
+          fmt::format("{}: written by the method \"{}\", this run's is \"{}\": allowed --method {}",
+                      file.string(), method_name(method), method_name(scene_.solver.method),
+                      method_name(method)));
     }
     return checkpoint;
   }
@@ -379,6 +386,7 @@ class Run {
       CheckpointInfo info;
       info.program = program_version();
       info.precision = scene_.solver.precision;
+      info.method = scene_.solver.method;
       info.scene_text = scene_.text;
       info.model_digest = shared_.digest();
       info.total_energy = good->diagnostics.total_energy();
@@ -408,7 +416,7 @@ class Run {
     fmt::print("  time step   {}\n", plan_.why);
     fmt::print(
         "  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
-        plan_.steps, scene_.time.end, plan_.steps_per_frame, setup_seconds_);
+        plan_.steps, end_time(), plan_.steps_per_frame, setup_seconds_);
     if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_.time(), first_step_);
     std::fflush(stdout);
   }
@@ -418,7 +426,7 @@ class Run {
     if (!leads()) return;
     const std::string message = fmt::format(
         "the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
-        solver_.time(), scene_.time.end);
+        solver_.time(), end_time());
     if (options_.json) {
       fmt::print(
           "{}\n",
@@ -448,8 +456,12 @@ class Run {
           {"time_s", now.time},
           {"steps", solver_.steps()},
           {"time_step_s", plan_.dt},
+          {"method", method_name(scene_.solver.method)},
           {"largest_stable_step_s", plan_.limit.largest_step},
           {"omega_max_rad_s", plan_.limit.omega_max},
+          {"force_evaluations", solver_.work().evaluations},
+          {"newton_steps", solver_.work().newton_steps},
+          {"newton_residual", solver_.work().residual},
           {"setup_seconds", setup_seconds_},
           {"loop_seconds", loop_seconds_},
           {"step_seconds", step_seconds_},
@@ -487,7 +499,18 @@ class Run {
           1e-3 * static_cast<double>(traffic.bytes_sent) / steps,
           100 * traffic.seconds / loop_seconds_);
     }
-    if (is_conservative(model())) {
+    if (!steps_explicitly()) {
+      const SolverWork work = solver_.work();
+      fmt::print(
+          "  newton      {} steps of Newton's method, {} evaluations of the forces; residual "
+          "{:.1e} "
+          "of what acts\n",
+          work.newton_steps, work.evaluations, work.residual);
+    }
+    if (scene_.solver.method == Method::equilibrium) {
+      fmt::print("  energy      {:.6g} J at rest, {:.4g} J of it elastic\n", now.total_energy(),
+                 now.elastic_energy());
+    } else if (is_conservative(model())) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
                  energy_drift, peak_energy_);
     } else {
@@ -571,8 +594,9 @@ void check(const Overrides& overrides) {
                static_cast<double>(array.bytes) / std::max(1, model.size()), array.name);
   }
   // A few steps tell how long the run will take.
-  Solver solver(*backend, initial_state(model, scene, plan.dt));
   diagnose(model, *backend, 0, plan.dt);  // has memory of its own, which must be there too
+  if (scene.solver.method == Method::equilibrium) return;
+  Solver solver(model, *backend, initial_state(model, scene, plan.dt), scene.solver.method);
   const auto start = Clock::now();
   int steps = 0;
   for (; steps < 2 || (seconds_since(start) < 0.2 && steps < 1000); ++steps) solver.step();

@@ -50,6 +50,9 @@ void add_overrides(CLI::App& command, Overrides& o) {
   command.add_option("--out", o.out, "Output folder, instead of the scene's");
   command.add_option("--device", o.device, device_help);
   command.add_option("--precision", o.precision, "float, double or mixed");
+  command.add_option("--method", o.method,
+                     "verlet, implicit (needs --step or the scene's time.step) or equilibrium, "
+                     "which finds where the scene comes to rest; the last two in double");
   command.add_option("--threads", o.threads, "CPU threads (default: all)");
   command.add_option("--until", o.until, "Simulated time to stop at [s]");
   command.add_option("--step", o.step, "Time step [s], instead of the scene's");
@@ -61,7 +64,27 @@ Scene scene_with(const Overrides& o) {
   if (!o.out.empty()) scene.output.directory = o.out;
   if (!o.device.empty()) scene.solver.device = o.device;
   if (!o.device.empty()) check_device_name(o.device, "--device");
+  if (!o.method.empty()) {
+    const auto method = method_named(o.method);
+    if (!method) {
+      throw InputError(fmt::format("--method {}: unknown{}; allowed: verlet, implicit, equilibrium",
+                                   o.method,
+                                   did_you_mean(o.method, {"verlet", "implicit", "equilibrium"})));
+    }
+    scene.solver.method = *method;
+    if (*method != Method::verlet) scene.solver.precision = Precision::double_;
+  }
   if (!o.precision.empty()) scene.solver.precision = precision_option(o.precision);
+  if (scene.solver.method != Method::verlet && scene.solver.precision != Precision::double_) {
+    throw InputError(
+        fmt::format("--precision {}: the method \"{}\" computes in double: allowed: "
+                    "double",
+                    o.precision, method_name(scene.solver.method)));
+  }
+  if (scene.solver.method != Method::equilibrium && !o.until && !(scene.time.end > 0)) {
+    throw InputError(fmt::format("{}: section [time] is missing; needed with method = \"{}\"",
+                                 scene.file.string(), method_name(scene.solver.method)));
+  }
   if (o.threads) {
     if (*o.threads < 1 || *o.threads > 4096) {
       throw InputError(fmt::format("--threads {}: out of range: allowed 1 to 4096", *o.threads));
@@ -83,7 +106,22 @@ Scene scene_with(const Overrides& o) {
   return scene;
 }
 
-StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
+namespace {
+
+/// Steps of about `wanted` [s] that frames and the end fall on.
+void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
+  const double interval = scene.output.frames_per_second > 0
+                              ? std::min(1 / scene.output.frames_per_second, scene.time.end)
+                              : scene.time.end;
+  // The 1e-9 keeps a step that divides the interval from being split for a rounding error.
+  plan.steps_per_frame =
+      std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(interval / wanted - 1e-9)));
+  plan.dt = interval / static_cast<double>(plan.steps_per_frame);
+  plan.steps = static_cast<std::int64_t>(std::ceil(scene.time.end / plan.dt - 1e-9));
+}
+
+StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& backend,
+                           bool unsafe_step) {
   StepPlan plan;
   plan.limit = step_limit(model, backend);
   const double largest = plan.limit.largest_step;
@@ -94,22 +132,38 @@ StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bo
         "all the same",
         *scene.time.step, largest, plan.limit.omega_max));
   }
-  const double wanted =
-      scene.time.step ? *scene.time.step : three_digits_below(scene.time.safety * largest);
-  const double interval = scene.output.frames_per_second > 0
-                              ? std::min(1 / scene.output.frames_per_second, scene.time.end)
-                              : scene.time.end;
-  // The 1e-9 keeps a step that divides the interval from being split for a rounding error.
-  plan.steps_per_frame =
-      std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(interval / wanted - 1e-9)));
-  plan.dt = interval / static_cast<double>(plan.steps_per_frame);
-  plan.steps = static_cast<std::int64_t>(std::ceil(scene.time.end / plan.dt - 1e-9));
+  divide_time(scene,
+              scene.time.step ? *scene.time.step : three_digits_below(scene.time.safety * largest),
+              plan);
   const std::string limit_words = fmt::format(
       "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations",
       largest, plan.limit.omega_max, plan.limit.iterations);
   plan.why = scene.time.step ? fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words)
                              : fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest,
                                            limit_words);
+  return plan;
+}
+
+}  // namespace
+
+StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
+  if (scene.solver.method == Method::verlet) {
+    return plan_verlet_steps(scene, model, backend, unsafe_step);
+  }
+  StepPlan plan;
+  if (scene.solver.method == Method::equilibrium) {
+    plan.dt = 1;
+    plan.steps = plan.steps_per_frame = 1;
+    plan.why = "none: Newton's method finds where the scene comes to rest";
+    return plan;
+  }
+  if (!scene.time.step) {
+    throw InputError(
+        "time.step = \"auto\": implicit steps are stable at any size: needed is one [s], short "
+        "against the motions to be seen");
+  }
+  divide_time(scene, *scene.time.step, plan);
+  plan.why = fmt::format("{:.6g} s, implicit", plan.dt);
   return plan;
 }
 

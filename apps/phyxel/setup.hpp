@@ -14,7 +14,7 @@ namespace phyxel::app {
 /// Options that replace what the scene says.
 struct Overrides {
   std::string scene;
-  std::string out, device, precision;
+  std::string out, device, precision, method;
   std::optional<int> threads;
   std::optional<double> until, step;
   bool unsafe_step = false;
@@ -26,7 +26,7 @@ Scene scene_with(const Overrides& overrides);
 
 /// The step a run takes and why.
 struct StepPlan {
-  StepLimit limit;
+  StepLimit limit;                   ///< Of Verlet's steps.
   double dt = 0;                     ///< [s]
   std::int64_t steps = 0;            ///< To the end of the run.
   std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it; 0: only the last.
@@ -34,9 +34,10 @@ struct StepPlan {
 };
 
 /// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
-/// digits are kept; slightly shortened so that frames and the end fall on whole steps. Uses the
-/// arrays of the backend.
-/// @throws InputError for a step above the largest stable one unless `unsafe_step`.
+/// digits are kept; slightly shortened so that frames and the end fall on whole steps. A search for
+/// equilibrium is one step. Uses the arrays of the backend.
+/// @throws InputError for a step above the largest stable one unless `unsafe_step`, and for
+///   implicit steps of no given size.
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step);
 
 /// Phyxels that follow a path, and that loads pull.

@@ -129,6 +129,9 @@ void check_paper_model(const Model& model) {
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) refuse("phyxels that are moved; allowed: phyxels that are held");
+    if (!motion.axes.all()) {
+      refuse("phyxels that are held along some axes; allowed: phyxels that are held along all");
+    }
   }
 }
 

@@ -5,18 +5,30 @@
 
 namespace phyxel::cuda {
 
-/// Phyxels that are set after each step.
+/// Phyxels that are set along some axes after each step.
 template <class Real, class StateReal>
-__global__ void follow(Fields<Real, StateReal> f, const Index* place, int count,
+__global__ void follow(Fields<Real, StateReal> f, const Index* place, int count, Axes axes,
                        Vec3<StateReal> displacement, Vec3<StateReal> velocity) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   const Index at = place[k];
+  auto point = f.points.get(at);
+  if (!axes.x || !axes.y || !axes.z) {
+    const auto along_axes = [axes](Vec3<StateReal> path, Vec3<StateReal> free) {
+      return Vec3<StateReal>{axes.x ? path.x : free.x, axes.y ? path.y : free.y,
+                             axes.z ? path.z : free.z};
+    };
+    velocity = along_axes(velocity, column3(f.velocity, f.places, at));
+    if constexpr (std::is_same_v<Real, StateReal>) {
+      displacement = along_axes(displacement, point.u);
+    } else {
+      displacement = along_axes(displacement, column3(f.displacement, f.places, at));
+    }
+  }
   set_column3(f.velocity, f.places, at, velocity);
   if constexpr (!std::is_same_v<Real, StateReal>) {
     set_column3(f.displacement, f.places, at, displacement);
   }
-  auto point = f.points.get(at);
   point.u = to<Real>(displacement);
   f.points.set(at, point);
 }
@@ -62,14 +74,14 @@ class Boundary {
   void follow_paths(double time, double dt) const {
     for (const Path& path : paths_) {
       const Vec3d after = path.of->displacement_at(time + dt);
-      set(path.places, after, (after - path.of->displacement_at(time)) / dt);
+      set(path.places, path.of->axes, after, (after - path.of->displacement_at(time)) / dt);
     }
   }
   /// Held phyxels stay where their motion says, at rest, wherever a state has put them.
   void put_held_at_rest() const {
-    if (held_.size() > 0) set(held_, {}, {});
+    if (held_.size() > 0) set(held_, {}, {}, {});
   }
-  /// [places], null where no phyxel follows a path.
+  /// Along which axes phyxels follow a path (`Axes::bits`), shape [places]; null where none does.
   const char* moved() const { return moved_.data(); }
 
  private:
@@ -93,13 +105,13 @@ class Boundary {
     std::vector<Index> held;
     for (const Motion& motion : m_.model().motions) {
       const std::vector<Index> at = places_of(motion.phyxels);
-      if (motion.stands_still()) {
+      if (motion.stands_still() && motion.axes.all()) {
         held.insert(held.end(), at.begin(), at.end());
         continue;
       }
       paths_.push_back({&motion, sent(at, "moved phyxels")});
       moved.resize(m_.places(), 0);
-      for (const Index place : at) moved[place] = 1;
+      for (const Index place : at) moved[place] |= motion.axes.bits();
     }
     held_ = sent(held, "held phyxels");
     moved_ = sent(moved, "moved phyxels");
@@ -114,9 +126,9 @@ class Boundary {
           {&load, sent(places_of(load.phyxels), "loaded phyxels"), sent(force, "loads")});
     }
   }
-  void set(const DeviceArray<Index>& at, Vec3d displacement, Vec3d velocity) const {
+  void set(const DeviceArray<Index>& at, Axes axes, Vec3d displacement, Vec3d velocity) const {
     const auto count = static_cast<int>(at.size());
-    m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), count,
+    m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), count, axes,
                    to<StateReal>(displacement), to<StateReal>(velocity));
   }
 

@@ -104,9 +104,9 @@ class CudaBackend final : public Backend {
     m_.wait();
   }
 
-  std::optional<Diagnostics> diagnostics(double time, double dt) override {
+  std::optional<Diagnostics> diagnostics(const Instant& now) override {
     settle();
-    boundary_.sum_loads(time);
+    boundary_.sum_loads(now.time);
     const DeviceArray<Real> forces = passes_.forces(),
                             gradients = m_.fields().pull ? passes_.gradients_and_residuals()
                                                          : passes_.gradients();
@@ -118,7 +118,7 @@ class CudaBackend final : public Backend {
     if (tiles > 0) {
       diagnose_tiles<<<tiles, diagnose_threads, 0, m_.stream()>>>(
           m_.fields(), m_.materials(), boundary_.moved(), forces.data(), gradients.data(),
-          m_.number_at(), dt, each.data());
+          m_.number_at(), now.lag, each.data());
       m_.launched("diagnose_tiles", static_cast<unsigned>(tiles), diagnose_threads);
       m_.launch_each("add_tiles", add_tiles, tiles, each.data(), tiles, all.data());
       m_.launch_each("find_fastest", find_fastest, tiles, each.data(), tiles, all.data());

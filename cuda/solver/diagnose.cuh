@@ -91,12 +91,12 @@ inline constexpr int diagnose_threads = 128;
 
 /// @param force,gradient of the present displacements; with hourglass control, row 9 of `gradient`
 ///   has the residuals
-/// @param moved phyxels on a path, or null
+/// @param moved along which axes phyxels follow a path (`Axes::bits`), or null
 /// @param number_at of each place: its phyxel's number
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
                                const TileMaterial* materials, const char* moved, const Real* force,
-                               const Real* gradient, const Index* number_at, double dt,
+                               const Real* gradient, const Index* number_at, double lag,
                                TileTotals* totals) {
   __shared__ TileTotals shared[diagnose_threads];
   TileTotals both{};
@@ -132,9 +132,11 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
 
       const Vec3<double> acceleration =
           (1 / mass) * (internal + load) + gravity - m.damping * half_step_velocity;
-      const bool on_a_path = held || (moved && moved[place]);
-      const Vec3<double> v =
-          on_a_path ? half_step_velocity : half_step_velocity + (dt / 2) * acceleration;
+      const int moves = held ? 7 : moved ? moved[place] : 0;
+      Vec3<double> v = half_step_velocity;
+      if (!(moves & 1)) v.x += lag * acceleration.x;
+      if (!(moves & 2)) v.y += lag * acceleration.y;
+      if (!(moves & 4)) v.z += lag * acceleration.z;
       const Vec3<double> p = mass * v;
       t.sum[kinetic_energy] = 0.5 * dot(p, v);
       put3(t.sum + momentum, p);

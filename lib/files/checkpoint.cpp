@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t version = 1;
+constexpr std::int64_t version = 2;
 constexpr std::size_t kept = 2;
 
 constexpr const char* prefix = "checkpoint_";
@@ -76,6 +76,7 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   out.attribute("/phyxel", "version", version);
   out.attribute("/phyxel", "program", info.program);
   out.attribute("/phyxel", "precision", std::string(precision_name(info.precision)));
+  out.attribute("/phyxel", "method", std::string(method_name(info.method)));
   out.attribute("/phyxel", "model_digest", fmt::format("{:016x}", info.model_digest));
   out.attribute("/phyxel", "total_energy", info.total_energy);
   out.attribute("/phyxel", "initial_energy", info.initial_energy);
@@ -116,6 +117,10 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
   const auto known = precision_named(precision);
   if (!known) in.refuse(fmt::format("unknown precision \"{}\"", precision));
   info_.precision = *known;
+  const std::string method = in.text_attribute("/phyxel", "method");
+  const auto known_method = method_named(method);
+  if (!known_method) in.refuse(fmt::format("unknown method \"{}\"", method));
+  info_.method = *known_method;
   const std::string digest = in.text_attribute("/phyxel", "model_digest");
   const auto [end, error] =
       std::from_chars(digest.data(), digest.data() + digest.size(), info_.model_digest, 16);

@@ -213,19 +213,25 @@ std::vector<const Selection*> selections_of(const BodyRequest& request) {
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
   BoundaryChoice choice;
-  std::vector<char> moved(cloud.position.size(), 0);
+  std::vector<char> moved(cloud.position.size(), 0);  // a bit for each axis
+  std::vector<Axes> axes;
+  for (const FixRequest& fix : request.fixed) axes.push_back(fix.axes);
+  for (const MotionRequest& motion : request.motions) axes.push_back(motion.axes);
   const SomePhyxels here{cloud, number, size};
   choice.first_load = request.fixed.size() + request.motions.size();
   for (const Selection* selection : selections_of(request)) {
-    const bool moves = choice.chosen.size() < choice.first_load;
+    const std::size_t entry = choice.chosen.size();
+    const int bits = entry < choice.first_load ? axes[entry].bits() : 0;
     const std::vector<Index>& chosen =
         choice.chosen.emplace_back(select(*selection, here, request.name));
     for (const Index i : chosen) {
-      if (moves && moved[i]++) {
+      if (moved[i] & bits) {
         throw InputError(fmt::format(
-            "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry",
+            "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry; allowed: "
+            "one entry for each of its axes",
             selection->where, here.number_of(i), request.name));
       }
+      moved[i] = static_cast<char>(moved[i] | bits);
     }
   }
   return choice;
@@ -264,8 +270,8 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
     for (Index& i : phyxels) i += shift;
     return phyxels;
   };
-  for (std::size_t f = 0; f < request.fixed.size(); ++f) {
-    model.motions.push_back({.phyxels = next()});
+  for (const FixRequest& fix : request.fixed) {
+    model.motions.push_back({.phyxels = next(), .axes = fix.axes});
   }
   for (const MotionRequest& m : request.motions) {
     model.motions.push_back({.phyxels = next(),
@@ -273,7 +279,8 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                              .duration = m.duration,
                              .velocity = m.velocity,
                              .amplitude = m.amplitude,
-                             .frequency = m.frequency});
+                             .frequency = m.frequency,
+                             .axes = m.axes});
   }
   for (std::size_t l = 0; l < request.loads.size(); ++l) {
     const LoadRequest& asked = request.loads[l];

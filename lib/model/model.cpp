@@ -262,7 +262,7 @@ Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surve
 std::vector<char> held_phyxels(const Model& model) {
   std::vector<char> held(static_cast<std::size_t>(model.size()), 0);
   for (const Motion& motion : model.motions) {
-    if (!motion.stands_still()) continue;
+    if (!motion.stands_still() || !motion.axes.all()) continue;
     for (const Index i : motion.phyxels) held[i] = 1;
   }
   return held;

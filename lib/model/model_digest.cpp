@@ -78,6 +78,9 @@ std::uint64_t model_digest(const Model& model) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
     add(state.get(), std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z,
                                          motion.duration, motion.frequency});
+    if (!motion.axes.all()) {
+      add(state.get(), std::vector<char>{motion.axes.x, motion.axes.y, motion.axes.z});
+    }
   }
   for (const Load& load : model.loads) {
     add(state.get(), std::vector<Vec3d>{load.total, load.density});

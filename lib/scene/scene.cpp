@@ -28,8 +28,15 @@ TimeRequest read_time(const SceneTable& table) {
 
 SolverRequest read_solver(const SceneTable& table) {
   SolverRequest solver;
+  table.read_choice("method", solver.method);
+  if (solver.method != Method::verlet) solver.precision = Precision::double_;
   table.read("device", solver.device);
   table.read_choice("precision", solver.precision);
+  if (solver.method != Method::verlet && solver.precision != Precision::double_) {
+    table.refuse("precision",
+                 fmt::format("\"{}\" found; allowed with method = \"{}\": \"double\"",
+                             precision_name(solver.precision), method_name(solver.method)));
+  }
   table.read("threads", solver.threads);
   return solver;
 }
@@ -133,8 +140,12 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   scene.text = text;
   root.read("title", scene.title);
   root.read("gravity", scene.gravity);
-  scene.time = read_time(root.table("time"));
   if (root.has("solver")) scene.solver = read_solver(root.table("solver"));
+  if (root.has("time")) {
+    scene.time = read_time(root.table("time"));
+  } else if (scene.solver.method != Method::equilibrium) {
+    root.refuse("time", "missing; needed: [time]");
+  }
   if (root.has("output")) scene.output = read_output(root.table("output"));
   if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
   if (root.has("render")) scene.render = read_render(root.table("render"));
@@ -154,6 +165,25 @@ const char* precision_name(Precision precision) {
       break;
   }
   return "mixed";
+}
+
+const char* method_name(Method method) {
+  switch (method) {
+    case Method::verlet:
+      return "verlet";
+    case Method::implicit:
+      return "implicit";
+    case Method::equilibrium:
+      break;
+  }
+  return "equilibrium";
+}
+
+std::optional<Method> method_named(std::string_view name) {
+  for (const Method m : {Method::verlet, Method::implicit, Method::equilibrium}) {
+    if (name == method_name(m)) return m;
+  }
+  return std::nullopt;
 }
 
 std::optional<Precision> precision_named(std::string_view name) {

@@ -164,9 +164,17 @@ Selection read_selection(const SceneTable& table) {
   return select;
 }
 
+Axes read_axes(const SceneTable& table) {
+  std::string axes = "xyz";
+  table.read("axes", axes);
+  const auto has = [&](char axis) { return axes.find(axis) != std::string::npos; };
+  return {has('x'), has('y'), has('z')};
+}
+
 MotionRequest read_motion(const SceneTable& table) {
   MotionRequest motion;
   motion.select = read_selection(table);
+  motion.axes = read_axes(table);
   table.expect_together("displacement", "duration");
   table.expect_together("amplitude", "frequency");
   if (!table.has("displacement") && !table.has("velocity") && !table.has("amplitude")) {
@@ -214,7 +222,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   body.material = read_material(table.table("material"));
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   for (const SceneTable& fixed : table.tables("fixed")) {
-    body.fixed.push_back({read_selection(fixed)});
+    body.fixed.push_back({read_selection(fixed), read_axes(fixed)});
   }
   for (const SceneTable& motion : table.tables("motion")) {
     body.motions.push_back(read_motion(motion));

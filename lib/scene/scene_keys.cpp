@@ -46,7 +46,8 @@ std::vector<SceneSection> make_sections() {
        "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
        "Box and ball selections move along with each copy."},
       {"body.fixed", "[[body.fixed]]", "selection",
-       "Phyxels held where they are, with one of the selection keys below and nothing else."},
+       "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
+       "some: `axes = \"z\"` of all phyxels is plane strain."},
       {"body.motion", "[[body.motion]]", "selection",
        "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
        "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
@@ -67,7 +68,8 @@ std::vector<SceneKey> top_keys() {
        .meaning = "Shown in summaries and kept in the output."},
       {.name = "gravity", .type = KeyType::vector, .unit = "m/s^2", .fallback = "[0, 0, 0]",
        .meaning = "Acceleration of every free phyxel. The Earth's is [0, 0, -9.81]."},
-      {.name = "time", .type = KeyType::table, .required = true, .meaning = "Duration and steps."},
+      {.name = "time", .type = KeyType::table, .otherwise = "see meaning",
+       .meaning = "Duration and steps. Required, but for the method \"equilibrium\"."},
       {.name = "solver", .type = KeyType::table, .otherwise = "its defaults",
        .meaning = "Device and precision."},
       {.name = "output", .type = KeyType::table, .otherwise = "its defaults",
@@ -87,16 +89,23 @@ std::vector<SceneKey> run_keys() {
        .fallback = "\"auto\"", .range = above(0),
        .meaning = "Time step. \"auto\": `safety` times the largest stable step, which is found "
            "from the stiffness of the bodies; three digits of it. A given step above the largest "
-           "is refused."},
+           "is refused. The method \"implicit\" needs one, of any size."},
       {.section = "time", .name = "safety", .fallback = "0.8", .range = strictly_between(0, 1),
        .meaning = "Fraction of the largest stable step; not with a given `step`."},
 
+      {.section = "solver", .name = "method", .type = KeyType::choice, .fallback = "\"verlet\"",
+       .words = {"verlet", "implicit", "equilibrium"},
+       .meaning = "\"verlet\": explicit steps. \"implicit\": steps of `time.step`, however stiff "
+           "the bodies are; what is faster than a step is damped away. \"equilibrium\": where the "
+           "scene comes to rest under its whole loads, without steps; `[time]`, velocities and "
+           "damping play no part, frame 0 is the start and frame 1 rest."},
       {.section = "solver", .name = "device", .type = KeyType::choice, .fallback = "\"auto\"",
        .words = {"auto", "cpu", "cuda"},
        .meaning = "\"auto\": a GPU if there is one and phyxel was built for it, else the CPU."},
       {.section = "solver", .name = "precision", .type = KeyType::choice, .fallback = "\"float\"",
        .words = {"float", "double", "mixed"},
-       .meaning = "\"mixed\": positions in double, forces in float."},
+       .meaning = "\"mixed\": positions in double, forces in float. The methods \"implicit\" and "
+           "\"equilibrium\" compute in double, which is then the default."},
       {.section = "solver", .name = "threads", .type = KeyType::integer, .fallback = "0",
        .range = between(0, 4096),
        .meaning = "CPU threads; 0: all. The results are the same on any number."},
@@ -259,7 +268,12 @@ std::vector<SceneKey> body_keys() {
 }
 
 std::vector<SceneKey> boundary_keys() {
+  const std::vector<std::string> axes = {"x", "y", "z", "xy", "xz", "yz", "xyz"};
   return {
+      {.section = "body.fixed", .name = "axes", .type = KeyType::choice, .fallback = "\"xyz\"",
+       .words = axes,
+       .meaning = "Along which axes they are held; along the others they are free, as on rollers."},
+
       {.section = "body.motion", .name = "displacement", .type = KeyType::vector, .unit = "m",
        .fallback = "[0, 0, 0]", .meaning = "Reached after `duration`, then kept."},
       {.section = "body.motion", .name = "duration", .unit = "s", .otherwise = "none",
@@ -270,6 +284,9 @@ std::vector<SceneKey> boundary_keys() {
        .fallback = "[0, 0, 0]", .meaning = "Of an oscillation."},
       {.section = "body.motion", .name = "frequency", .unit = "Hz", .otherwise = "none",
        .range = above(0), .meaning = "Of the oscillation."},
+      {.section = "body.motion", .name = "axes", .type = KeyType::choice, .fallback = "\"xyz\"",
+       .words = axes,
+       .meaning = "Along which axes they are moved; along the others they are free."},
 
       {.section = "body.load", .name = "force", .type = KeyType::vector, .unit = "N",
        .fallback = "[0, 0, 0]", .meaning = "Total, shared among the phyxels by mass."},

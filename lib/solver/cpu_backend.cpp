@@ -127,7 +127,11 @@ class CpuBackend final : public Backend {
     for (const Motion& motion : model_.motions) {
       const Vec3d after = motion.displacement_at(time + dt);
       const Vec3d velocity = (after - motion.displacement_at(time)) / dt;
-      for (const Index i : motion.phyxels) set_state(i, after, velocity);
+      for (const Index i : motion.phyxels) {
+        const Index slot = layout_.slot(i);
+        set_state(i, motion.along_axes(after, get3(displacement_, slot)),
+                  motion.along_axes(velocity, get3(velocity_, slot)));
+      }
     }
     if (model_.share) refresh(displacement_records());
   }

@@ -48,11 +48,10 @@ double pressure_wave_speed(const Material& m) {
   return std::sqrt((m.lame_lambda() + 2 * m.lame_mu() + m.volume_stiffness) / m.density);
 }
 
-Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
-  const double time = static_cast<double>(step) * dt;
-  if (auto summed = backend.diagnostics(time, dt)) {
-    summed->step = step;
-    summed->time = time;
+Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
+  if (auto summed = backend.diagnostics(now)) {
+    summed->step = now.step;
+    summed->time = now.time;
     return *summed;
   }
   State state;
@@ -68,16 +67,16 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
   Totals all;
   std::vector<Vec3d> applied(model.loads.empty() ? 0 : force.size());
   for (const Load& load : model.loads) {
-    const double scale = load.scale_at(time);
+    const double scale = load.scale_at(now.time);
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
       const Index i = load.phyxels[k];
       applied[i] += scale * load.force[k];
       if (model.owns(i)) all.load_energy.add(-scale * dot(load.force[k], state.displacement[i]));
     }
   }
-  std::vector<char> moved(force.size(), 0);
+  std::vector<Vec3d> free(model.motions.empty() ? 0 : force.size(), {1, 1, 1});
   for (const Motion& motion : model.motions) {
-    for (const Index i : motion.phyxels) moved[i] = 1;
+    for (const Index i : motion.phyxels) free[i] = motion.along_axes({}, free[i]);
   }
 
 #pragma omp parallel num_threads(std::max(1, backend.threads()))
@@ -98,7 +97,8 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
         Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
         if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
         acceleration -= m.damping * state.velocity[i];
-        const Vec3d v = moved[i] ? state.velocity[i] : state.velocity[i] + (dt / 2) * acceleration;
+        if (!free.empty()) acceleration = by_components(free[i], acceleration);
+        const Vec3d v = state.velocity[i] + now.lag * acceleration;
         const Vec3d p = model.mass[i] * v;
         own.kinetic_energy.add(0.5 * dot(p, v));
         own.momentum.add(p);
@@ -125,8 +125,8 @@ Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, do
   }
   if (model.share) all.add_others(*model.share->others);
   Diagnostics d = all.values();
-  d.step = step;
-  d.time = time;
+  d.step = now.step;
+  d.time = now.time;
   return d;
 }
 

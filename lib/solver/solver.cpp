@@ -1,47 +1,79 @@
 #include "phyxel/solver.hpp"
 
+#include "phyxel/equilibrium.hpp"
+#include "phyxel/error.hpp"
+#include "solver/implicit_step.hpp"
+
 namespace phyxel {
+
 State initial_state(const Model& model, const Scene& scene, double dt) {
+  // Verlet's velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest there
+  // are no internal forces.
+  const double lag = scene.solver.method == Method::verlet ? dt / 2 : 0;
   State state;
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     const Part& part = model.parts[p];
-    // The stored velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest
-    // there are no internal forces.
 #pragma omp parallel for schedule(static)
     for (Index i = part.begin; i < part.end; ++i) {
       state.velocity[i] =
           scene.bodies[p].velocity + cross(scene.bodies[p].spin, model.position[i] - part.centre);
-      state.velocity[i] -= (dt / 2) * model.gravity;
+      state.velocity[i] -= lag * model.gravity;
     }
   }
   for (const Load& load : model.loads) {
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
       const Index i = load.phyxels[k];
-      state.velocity[i] -= (dt / 2 * load.scale_at(0) / model.mass[i]) * load.force[k];
+      state.velocity[i] -= (lag * load.scale_at(0) / model.mass[i]) * load.force[k];
     }
   }
   for (const Motion& motion : model.motions) {
     for (const Index i : motion.phyxels) {
-      state.displacement[i] = motion.displacement_at(0);
-      state.velocity[i] = {};
+      state.displacement[i] = motion.along_axes(motion.displacement_at(0), {});
+      state.velocity[i] = motion.along_axes({}, state.velocity[i]);
     }
   }
   return state;
 }
 
 Solver::Solver(Backend& backend, const State& start)
-    : backend_(backend), steps_(start.step), dt_(start.dt) {
+    : backend_(backend), steps_(start.step), first_step_(start.step), dt_(start.dt) {
   backend_.upload(start);
 }
 
+Solver::Solver(const Model& model, Backend& backend, const State& start, Method method)
+    : Solver(backend, start) {
+  model_ = &model;
+  method_ = method;
+  if (method != Method::implicit) return;
+  implicit_ = std::make_unique<ImplicitStep>(model, backend);
+  implicit_state_ = start;
+}
+
+Solver::~Solver() = default;
+
 void Solver::step() {
-  backend_.stress();              // u -> ∇u -> ε -> σ -> Q
-  backend_.advance(time(), dt_);  // gather of Q -> f -> loads -> Verlet -> u⁺
+  switch (method_) {
+    case Method::verlet:
+      backend_.stress();              // u -> ∇u -> ε -> σ -> Q
+      backend_.advance(time(), dt_);  // gather of Q -> f -> loads -> Verlet -> u⁺
+      break;
+    case Method::implicit:
+      implicit_->take(implicit_state_);
+      backend_.upload(implicit_state_);
+      break;
+    case Method::equilibrium: {
+      const Equilibrium found = find_equilibrium(*model_, backend_);
+      rest_ = {found.evaluations, found.steps, found.residual};
+      break;
+    }
+  }
   ++steps_;
 }
+
+Instant Solver::now() const { return {steps_, time(), method_ == Method::verlet ? dt_ / 2 : 0}; }
 
 State Solver::state() const {
   State state;
@@ -50,6 +82,13 @@ State Solver::state() const {
   state.dt = dt_;
   state.time = time();
   return state;
+}
+
+SolverWork Solver::work() const {
+  if (method_ == Method::verlet) return {.evaluations = steps_ - first_step_};
+  if (!implicit_) return rest_;
+  const NewtonReport& work = implicit_->work();
+  return {work.evaluations, work.steps, work.residual};
 }
 
 }  // namespace phyxel

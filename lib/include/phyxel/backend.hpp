@@ -70,10 +70,9 @@ class Backend {
   /// control holds small.
   /// @throws InputError if this backend has no such control.
   virtual void fit_residuals(std::vector<double>& residual);
-  /// Energies, momenta and the rest of the present state, at `time`, where the device sums them
-  /// itself; nothing where that is left to the host (see `diagnose`).
-  virtual std::optional<Diagnostics> diagnostics([[maybe_unused]] double time,
-                                                 [[maybe_unused]] double dt) {
+  /// Energies, momenta and the rest of the present state where the device sums them itself; nothing
+  /// where that is left to the host (see `diagnose`).
+  virtual std::optional<Diagnostics> diagnostics([[maybe_unused]] const Instant& now) {
     return std::nullopt;
   }
   /// Passive surfel advection, equation (6): brings the surfels to the present displacements. They

@@ -17,6 +17,7 @@ struct CheckpointInfo {
   int version = 0;      ///< Of the format.
   std::string program;  ///< "phyxel 0.1.0 (commit)".
   Precision precision = Precision::single;
+  Method method = Method::verlet;  ///< Which tells when velocities are.
   std::string scene_text;
   std::uint64_t model_digest = 0;   ///< Of rest positions, masses and neighbour lists.
   double total_energy = 0;          ///< [J], for the drift of the continued run.

@@ -7,11 +7,14 @@
 
 namespace phyxel {
 
-/// Energies, conserved quantities and a finiteness check of a backend's present state, which is at
-/// `time` = `step` × `dt`. Sums run in double and exactly, so they do not depend on the number of
-/// threads or ranks; a device that sums itself has its own. Of a share, those of the whole model:
-/// collective.
-Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt);
+/// Energies, conserved quantities and a finiteness check of a backend's present state. Sums run in
+/// double and exactly, so they do not depend on the number of threads or ranks; a device that sums
+/// itself has its own. Of a share, those of the whole model: collective.
+Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now);
+/// The same after so many of Verlet's steps.
+inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
+  return diagnose(model, backend, {step, static_cast<double>(step) * dt, dt / 2});
+}
 
 /// Von Mises equivalent of the Cauchy stress [Pa] and det F of every phyxel, shape [n]; either
 /// pointer may be null.

@@ -52,7 +52,7 @@ struct Degenerate {
   std::string describe() const;  ///< Counts and the first few indices of each kind.
 };
 
-/// Phyxels that follow a path. Fixed phyxels are a motion with every term zero.
+/// Phyxels that follow a path along some axes. Fixed phyxels are a motion with every term zero.
 struct Motion {
   std::vector<Index> phyxels;
   Vec3d displacement{};
@@ -60,9 +60,14 @@ struct Motion {
   Vec3d velocity{};
   Vec3d amplitude{};
   double frequency = 0;
+  Axes axes{};
   Vec3d displacement_at(double time) const;  ///< [m]
   bool stands_still() const {
     return displacement == Vec3d{} && velocity == Vec3d{} && amplitude == Vec3d{};
+  }
+  /// Of a phyxel that was at `free` if nothing moved it: `path` along the axes of this motion.
+  Vec3d along_axes(Vec3d path, Vec3d free) const {
+    return {axes.x ? path.x : free.x, axes.y ? path.y : free.y, axes.z ? path.z : free.z};
   }
 };
 
@@ -120,7 +125,7 @@ struct Model {
   Offset pairs() const;
 };
 
-/// Whether each phyxel is held in place by a motion that stands still, shape [n].
+/// Whether each phyxel is held in place along all axes by a motion that stands still, shape [n].
 std::vector<char> held_phyxels(const Model& model);
 
 /// A number that tells two models apart: rest positions, supports, geometric volumes, materials,

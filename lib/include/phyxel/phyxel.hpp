@@ -8,6 +8,7 @@
 #include "phyxel/cloud.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"

@@ -18,11 +18,21 @@ namespace phyxel {
 /// Arithmetic of a run. `mixed`: state in double, forces in float.
 enum class Precision { single, double_, mixed };
 
+/// How a scene gets to its end. `verlet`: explicit steps below the largest stable one. `implicit`:
+/// steps of any size, each a balance of forces. `equilibrium`: where it comes to rest, at once.
+enum class Method { verlet, implicit, equilibrium };
+
 /// "float", "double" or "mixed".
 const char* precision_name(Precision precision);
 
 /// The precision of that name; nothing for another word.
 std::optional<Precision> precision_named(std::string_view name);
+
+/// "verlet", "implicit" or "equilibrium".
+const char* method_name(Method method);
+
+/// The method of that name; nothing for another word.
+std::optional<Method> method_named(std::string_view name);
 
 /// A choice of phyxels, in rest coordinates after placement. Exactly one member is set.
 struct Selection {
@@ -41,9 +51,18 @@ struct Selection {
   std::string where;  ///< "scene.toml:12:3", for errors.
 };
 
+/// Along which axes a phyxel is held or moved; along the others it is free, as on rollers.
+struct Axes {
+  bool x = true, y = true, z = true;
+  bool all() const { return x && y && z; }
+  char bits() const { return static_cast<char>(x | y << 1 | z << 2); }  ///< One for each.
+  bool operator==(const Axes&) const = default;
+};
+
 /// Phyxels held where they are.
 struct FixRequest {
   Selection select;
+  Axes axes{};
 };
 
 /// Phyxels moved along a given path:
@@ -56,6 +75,7 @@ struct MotionRequest {
   Vec3d velocity;        ///< [m/s]
   Vec3d amplitude;       ///< [m]
   double frequency = 0;  ///< [Hz]
+  Axes axes{};
 };
 
 /// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density`
@@ -107,6 +127,7 @@ struct TimeRequest {
 };
 
 struct SolverRequest {
+  Method method = Method::verlet;
   std::string device = "auto";  ///< "auto", "cpu" or "cuda".
   Precision precision = Precision::single;
   int threads = 0;  ///< 0: OpenMP's choice.

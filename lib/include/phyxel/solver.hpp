@@ -1,6 +1,8 @@
 /// The time loop and the step limit.
 #pragma once
 
+#include <memory>
+
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
@@ -25,26 +27,49 @@ StepLimit step_limit(const Model& model, int threads = 0);
 /// to rounding. It uses the backend's arrays: a state is to be uploaded after.
 StepLimit step_limit(const Model& model, Backend& backend);
 
-/// The state at t = 0: initial velocities of the bodies, motions at their start.
+/// The state at t = 0: initial velocities of the bodies, motions at their start, velocities as the
+/// scene's method has them.
 State initial_state(const Model& model, const Scene& scene, double dt);
+
+/// What a solver has done so far.
+struct SolverWork {
+  std::int64_t evaluations = 0;  ///< Of the forces of all phyxels.
+  std::int64_t newton_steps = 0;
+  double residual = 0;  ///< Largest force that Newton's method has left, of what acts.
+};
+
+class ImplicitStep;
 
 /// Advances a state through a backend by steps of fixed size. Time is always step × dt, so that a
 /// restarted run sees the same times to the bit.
 class Solver {
  public:
-  /// Uploads `start`, whose `dt` is the step size.
+  /// By Verlet's steps. Uploads `start`, whose `dt` is the step size.
   Solver(Backend& backend, const State& start);
+  /// By the method asked for. One step of the method `equilibrium` finds where the model comes to
+  /// rest.
+  /// @param backend in double, for another method than Verlet's
+  Solver(const Model& model, Backend& backend, const State& start, Method method);
+  ~Solver();
 
+  /// @throws DivergedError if Newton's method finds no balance
   void step();
   double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
   std::int64_t steps() const { return steps_; }
   double dt() const { return dt_; }  ///< [s]
-  State state() const;               ///< Downloaded copy.
+  Instant now() const;
+  State state() const;  ///< Downloaded copy.
+  SolverWork work() const;
 
  private:
+  const Model* model_ = nullptr;  ///< Of a method that needs it.
   Backend& backend_;
-  std::int64_t steps_;
+  Method method_ = Method::verlet;
+  std::int64_t steps_, first_step_;
   double dt_;
+  std::unique_ptr<ImplicitStep> implicit_;
+  State implicit_state_;
+  SolverWork rest_;  ///< Of the search for rest.
 };
 
 }  // namespace phyxel

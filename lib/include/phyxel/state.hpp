@@ -10,10 +10,18 @@ namespace phyxel {
 /// State of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.
-  std::vector<Vec3d> velocity;      ///< v(t - dt/2) [m/s], shape [n, 3]: (u(t) - u(t - dt)) / dt.
-  double time = 0;                  ///< t [s] = step * dt.
+  /// v(t - dt/2) [m/s], shape [n, 3]: (u(t) - u(t - dt)) / dt; of implicit steps v(t).
+  std::vector<Vec3d> velocity;
+  double time = 0;  ///< t [s] = step * dt.
   std::int64_t step = 0;
   double dt = 0;  ///< [s]
+};
+
+/// When a backend's present state is.
+struct Instant {
+  std::int64_t step = 0;
+  double time = 0;  ///< [s]
+  double lag = 0;   ///< Its velocities are those of so much earlier [s].
 };
 
 /// Deformed surfels.

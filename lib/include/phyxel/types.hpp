@@ -124,6 +124,8 @@ template <class R>
 PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+/// Component by component.
+inline Vec3d by_components(Vec3d a, Vec3d b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 inline double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 /// Unit vector along `a`; the zero vector stays zero.
 inline Vec3d normalised(Vec3d a) {

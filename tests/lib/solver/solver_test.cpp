@@ -211,6 +211,30 @@ TEST(Motion, FollowsItsPath) {
   }
 }
 
+/// Held along z, a body falls freely along x: in steps of every precision.
+TEST(Motion, RollersHoldAlongTheirAxesOnly) {
+  Scene scene = one_body();
+  scene.gravity = {1, 0, -9.81};
+  scene.bodies[0].fixed.push_back(
+      {.select = {.all = true}, .axes = {.x = false, .y = false, .z = true}});
+  const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
+  for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
+    const auto backend = make_test_backend(model, precision);
+    const double dt = 1e-3;
+    Solver solver(*backend, initial_state(model, scene, dt));
+    for (int s = 0; s < 500; ++s) solver.step();
+    const State end = solver.state();
+    // As in Verlet.FallsFreelyAsGravitySays.
+    const double tolerance = precision == Precision::single ? 1e-5 : 1e-13;
+    for (const Vec3d& u : end.displacement) {
+      EXPECT_EQ(u.z, 0);
+      EXPECT_NEAR(u.x, 0.125, tolerance);
+    }
+    const Diagnostics d = diagnose(model, *backend, solver.now());
+    EXPECT_NEAR(d.kinetic_energy, 0.5 * model.parts[0].mass * 0.25, 10 * tolerance);
+  }
+}
+
 /// Pulls a bar by body forces and a clamp-free mirror load until it rests; returns (E, ν).
 std::pair<double, double> measured_constants(Strain strain) {
   Material material = rubber();

@@ -1,0 +1,124 @@
+#include "solver/implicit_step.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+// Of the forces. What is left of them is an error of the velocities, and far below the step's own.
+constexpr double tolerance = 1e-8;
+constexpr int most_newton_steps = 100;
+const double share_of_step = 1 - std::sqrt(0.5);  // γ
+
+}  // namespace
+
+ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
+    : model_(model), newton_(model, backend, tolerance, most_newton_steps) {
+  const OwnedVectors& vectors = newton_.vectors();
+  balance_.target = vectors.make();
+  balance_.centre = vectors.make();
+  balance_.applied = vectors.make();
+  balance_.weight.resize(balance_.target.size());
+  balance_.free.assign(balance_.target.size(), {1, 1, 1});
+  for (const Motion& motion : model.motions) {
+    for (const Index i : motion.phyxels) {
+      balance_.free[i] = motion.along_axes({}, balance_.free[i]);
+    }
+  }
+  for (const Part& part : model.parts) {
+    if (part.material.damping > 0) damping_.resize(balance_.target.size(), 0);
+  }
+  for (const Part& part : model.parts) {
+    if (damping_.empty()) break;
+    for (Index i = part.begin; i < part.end; ++i) damping_[i] = part.material.damping;
+  }
+}
+
+void ImplicitStep::find_applied(double time) {
+  newton_.vectors().for_each(
+      [&](Index i) { balance_.applied[i] = model_.mass[i] * model_.gravity; });
+  for (const Load& load : model_.loads) {
+    const double scale = load.scale_at(time);
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      balance_.applied[load.phyxels[k]] += scale * load.force[k];
+    }
+  }
+}
+
+void ImplicitStep::find_targets(double time, Vector& target) const {
+  for (const Motion& motion : model_.motions) {
+    const Vec3d path = motion.displacement_at(time);
+    for (const Index i : motion.phyxels) target[i] = motion.along_axes(path, target[i]);
+  }
+}
+
+/// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): v' is put into the first, which leaves a
+/// balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
+void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u, Vector& v) {
+  const OwnedVectors& vectors = newton_.vectors();
+  find_applied(time);
+  find_targets(time, balance_.target);
+  const auto slowed = [&](Index i) { return damping_.empty() ? 1.0 : 1 + damping_[i] * s; };
+  vectors.for_each([&](Index i) {
+    balance_.weight[i] = model_.mass[i] * slowed(i) / (s * s);
+    balance_.centre[i] = from[i] + (s / slowed(i)) * v[i];
+  });
+  const Vector inner = newton_.inner_forces(u);
+  balance_.scale = std::sqrt(vectors.product(inner, inner)) + std::sqrt(vectors.sum([&](Index i) {
+                     const Vec3d force =
+                         (model_.mass[i] / s) * by_components(balance_.free[i], v[i]);
+                     return dot(force, force);
+                   }));
+  const NewtonReport report = newton_.solve(balance_, u);
+  work_.steps += report.steps;
+  work_.evaluations += report.evaluations + 2;
+  work_.residual = std::max(work_.residual, report.residual);
+  if (!report.found) {
+    const std::string why = fmt::format(
+        "the implicit step to t = {:g} s failed: after {} steps of Newton's method the residual "
+        "force is {:.2g} of what acts, {:.2g} is asked; allowed is a smaller time.step",
+        time, report.steps, report.residual, tolerance);
+    if (model_.share) throw AgreedError(ExitCode::diverged, why);
+    throw DivergedError(why);
+  }
+  // By forces rather than by displacements: sums of them are zero, so momentum is kept.
+  const Vector force = newton_.inner_forces(u);
+  vectors.for_each([&](Index i) {
+    const Vec3d acceleration = (1 / model_.mass[i]) * (force[i] + balance_.applied[i]);
+    v[i] = by_components(balance_.free[i], (1 / slowed(i)) * (v[i] + s * acceleration));
+  });
+}
+
+void ImplicitStep::take(State& state) {
+  const OwnedVectors& vectors = newton_.vectors();
+  const double dt = state.dt, s = share_of_step * dt, rest = dt - s;
+  const double begin = static_cast<double>(state.step) * dt;
+  const double end = static_cast<double>(state.step + 1) * dt;
+  const Vector u = state.displacement, v = state.velocity;
+  Vector& u2 = state.displacement;
+  Vector& v2 = state.velocity;
+  take_stage(begin + s, s, u, u2, v2);
+  // From the first stage's speed and acceleration over the rest of the step.
+  Vector from = vectors.make();
+  vectors.for_each([&](Index i) {
+    const Vec3d acceleration = (1 / s) * (v2[i] - v[i]);
+    from[i] = u[i] + rest * v2[i];
+    v2[i] = v[i] + rest * acceleration;
+  });
+  take_stage(end, s, from, u2, v2);
+  Vector before = vectors.make(), after = vectors.make();
+  find_targets(begin, before);
+  find_targets(end, after);
+  vectors.for_each([&](Index i) {
+    const Vec3d along_path = (1 / dt) * (after[i] - before[i]);
+    v2[i] = by_components(balance_.free[i], v2[i]) + along_path;
+  });
+  ++state.step;
+  state.time = end;
+}
+
+}  // namespace phyxel

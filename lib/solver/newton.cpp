@@ -1,0 +1,185 @@
+#include "solver/newton.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "phyxel/diagnostics.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr double largest_strain = 0.3;  // of one step
+constexpr int most_cuts = 8;
+constexpr double inner_tolerance = 1e-3;
+constexpr int most_inner = 50'000;
+
+Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
+  return v - by_components(balance.free[i], v);
+}
+
+}  // namespace
+
+Newton::Newton(const Model& model, Backend& backend, double tolerance, int most_steps)
+    : model_(model),
+      backend_(backend),
+      tolerance_(tolerance),
+      most_steps_(most_steps),
+      vectors_(model, std::max(1, backend.threads())),
+      difference_(1e-7 * vectors_.smallest_support()) {}
+
+NewtonReport Newton::solve(const Balance& balance, Vector& u) {
+  NewtonReport report;
+  evaluations_ = 0;
+  Vector force = forces(balance, u), step = vectors_.make(), next = vectors_.make();
+  double energy = potential(balance, u);
+  for (;;) {
+    report.residual = residual(balance, force);
+    report.evaluations = evaluations_;
+    const double to_move = vectors_.largest(
+        [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
+    report.found = report.residual <= tolerance_ && to_move == 0;
+    if (report.found || report.steps == most_steps_ || !std::isfinite(report.residual)) {
+      return report;
+    }
+    ++report.steps;
+
+    find_step(balance, u, force, step);
+    double length = std::min(1.0, largest_strain / steepest(step));
+    for (int attempt = 0;; ++attempt, length *= 0.5) {
+      vectors_.for_each([&](Index i) {
+        next[i] = u[i] + length * step[i];
+        // To the last bit at the end of the way.
+        if (length == 1) {
+          next[i] =
+              by_components(balance.free[i], next[i]) + held_part(balance, i, balance.target[i]);
+        }
+      });
+      force = forces(balance, next);
+      const double now = potential(balance, next);
+      // Of what is moved along, energy rises; and rounding is no rise.
+      const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
+      if (std::isfinite(now) && (to_move > 0 || rise <= rounding || attempt == most_cuts)) {
+        energy = now;
+        break;
+      }
+      if (attempt > 2 * most_cuts) return report;
+    }
+    u.swap(next);
+  }
+}
+
+Newton::Vector Newton::inner_forces(const Vector& u) {
+  put(u);
+  Vector force;
+  backend_.internal_forces(force);
+  ++evaluations_;
+  return force;
+}
+
+/// Inner, applied and inertia's [N].
+Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
+  Vector force = inner_forces(u);
+  vectors_.for_each([&](Index i) { force[i] += balance.applied[i]; });
+  if (!balance.weight.empty()) {
+    vectors_.for_each([&](Index i) {
+      force[i] -= balance.weight[i] * by_components(balance.free[i], u[i] - balance.centre[i]);
+    });
+  }
+  return force;
+}
+
+void Newton::put(const Vector& u) {
+  placed_.displacement = u;
+  placed_.velocity.resize(u.size());
+  vectors_.refresh_ghosts(placed_.displacement);
+  backend_.upload(placed_);
+}
+
+/// Right after `forces` at u [J].
+double Newton::potential(const Balance& balance, const Vector& u) {
+  const double elastic = diagnose(model_, backend_, 0, 1).elastic_energy();
+  ++evaluations_;
+  double inert = 0;
+  if (!balance.weight.empty()) {
+    inert = vectors_.sum([&](Index i) {
+      const Vec3d way = by_components(balance.free[i], u[i] - balance.centre[i]);
+      return 0.5 * balance.weight[i] * dot(way, way);
+    });
+  }
+  return elastic - vectors_.product(balance.applied, u) + inert;
+}
+
+double Newton::residual(const Balance& balance, const Vector& force) const {
+  const double free = vectors_.sum(
+      [&](Index i) { return dot(by_components(balance.free[i], force[i]), force[i]); });
+  const double reactions =
+      vectors_.sum([&](Index i) { return dot(held_part(balance, i, force[i]), force[i]); });
+  const double scale = std::sqrt(vectors_.product(balance.applied, balance.applied)) +
+                       std::sqrt(reactions) + balance.scale;
+  return scale > 0 ? std::sqrt(free) / scale : std::sqrt(free) > 0 ? 1 : 0;
+}
+
+/// The largest entry of the gradient of a displacement.
+double Newton::steepest(const Vector& step) {
+  put(step);
+  std::vector<Mat3d> gradient;
+  backend_.displacement_gradients(gradient);
+  ++evaluations_;
+  const double most = vectors_.largest([&](Index i) {
+    double entry = 0;
+    for (int e = 0; e < 9; ++e) entry = std::max(entry, std::abs(gradient[i](e / 3, e % 3)));
+    return entry;
+  });
+  return std::max(most, 1e-300);
+}
+
+/// out = (K + weight) v on what is free, K by a difference of forces. @param force at u
+void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
+                             const Vector& v, Vector& out) {
+  const double size = vectors_.largest([&](Index i) { return norm(v[i]); });
+  const double scale = size > 0 ? difference_ / size : 1;
+  Vector there(u.size());
+  vectors_.for_each([&](Index i) { there[i] = u[i] + scale * v[i]; });
+  const Vector changed = forces(balance, there);
+  vectors_.for_each([&](Index i) {
+    out[i] = by_components(balance.free[i], (1 / scale) * (force[i] - changed[i]));
+  });
+}
+
+/// The step of Newton's method, held phyxels all the way to their targets: conjugate gradients, by
+/// masses. Where the stiffness has no definite sign, as far as it has.
+void Newton::find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step) {
+  Vector rest = vectors_.make(), image = vectors_.make();
+  vectors_.for_each([&](Index i) { step[i] = held_part(balance, i, balance.target[i] - u[i]); });
+  const bool moves = vectors_.largest([&](Index i) { return norm(step[i]); }) > 0;
+  if (moves) stiffness_times(balance, u, force, step, image);
+  vectors_.for_each([&](Index i) {
+    rest[i] = by_components(balance.free[i], force[i]);
+    if (moves) rest[i] -= image[i];
+  });
+
+  Vector way(u.size());
+  const auto preconditioned = [&](Index i) { return (1 / model_.mass[i]) * rest[i]; };
+  vectors_.for_each([&](Index i) { way[i] = preconditioned(i); });
+  double product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
+  const double start = product;
+  for (int k = 0; k < most_inner && product > inner_tolerance * inner_tolerance * start; ++k) {
+    stiffness_times(balance, u, force, way, image);
+    const double curvature = vectors_.product(way, image);
+    if (!(curvature > 0)) {
+      if (k == 0) vectors_.for_each([&](Index i) { step[i] += way[i]; });
+      break;
+    }
+    const double length = product / curvature;
+    vectors_.for_each([&](Index i) {
+      step[i] += length * way[i];
+      rest[i] -= length * image[i];
+    });
+    const double before = product;
+    product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
+    const double share = product / before;
+    vectors_.for_each([&](Index i) { way[i] = preconditioned(i) + share * way[i]; });
+  }
+}
+
+}  // namespace phyxel
