@@ -8,11 +8,9 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)
-if(NOT PHYXEL_FUZZ)  # the program and its tests
-  find_package(CLI11 REQUIRED)
-  find_package(PNG REQUIRED)
-  find_package(METIS REQUIRED)
-endif()
+find_package(CLI11 REQUIRED)
+find_package(PNG REQUIRED)
+find_package(METIS REQUIRED)
 
 # phyxel_header_library(NAME header debian-package [definition...]): a library that is one header.
 function(phyxel_header_library name header package)
