@@ -142,6 +142,11 @@ class Builder {
               "allowed are one rank, or closure = 0",
               scene_.bodies[b].where, scene_.bodies[b].name, scene_.bodies[b].closure));
         }
+        if (!scene_.bodies[b].inclusions.empty()) {
+          throw InputError(fmt::format(
+              "{}: body \"{}\" has inclusions, which ranks cannot share: allowed is one rank",
+              scene_.bodies[b].inclusions[0].select.where, scene_.bodies[b].name));
+        }
         bodies_[b].kernel_volumes = wants_kernel_volumes(scene_.bodies[b], with_volumes[b] > 0,
                                                          static_cast<std::size_t>(bodies_[b].size));
       }
@@ -345,6 +350,7 @@ class Builder {
       m.neighbourhood.support =
           tabulated(local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].support; });
       m.parts.resize(bodies_.size());
+      for (std::size_t b = 0; b < bodies_.size(); ++b) m.parts[b].body = static_cast<Index>(b);
       for (const auto& [first, last] : stretches_of_bodies(local.phyxels)) {
         Part& part = m.parts[static_cast<std::size_t>(local.phyxels[first].body)];
         part.begin = static_cast<Index>(first);

@@ -154,6 +154,9 @@ ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<
     throw InputError(
         "shares of a model with closed gradients are not made: allowed is closure = 0");
   }
+  if (whole.has_inclusions()) {
+    throw InputError("shares of bodies of several materials are not made: allowed is one material");
+  }
   return Maker(whole, plan, part_of).make();
 }
 

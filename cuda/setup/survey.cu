@@ -315,8 +315,8 @@ Surveyor cuda_surveyor(int device) {
 
 bool can_survey_on_cuda(const Scene& scene) {
   return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
-    // Closing vectors are found on the host, from its lists.
-    return body.closure > 0 || body.neighbourhood.max_neighbours ||
+    // The host finds closing vectors, from its lists, and sorts by material.
+    return body.closure > 0 || !body.inclusions.empty() || body.neighbourhood.max_neighbours ||
            body.neighbourhood.nearest > most_nearest;
   });
 }

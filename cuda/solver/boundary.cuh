@@ -5,14 +5,24 @@
 
 namespace phyxel::cuda {
 
+/// offset + slope x, of a place x that is counted from its body's origin.
+template <class T>
+struct AffineField {
+  Vec3<T> offset;
+  Mat3<T> slope;
+  __device__ Vec3<T> at(Vec3<T> x) const { return offset + slope * x; }
+};
+
 /// Phyxels that are set along some axes after each step.
 template <class Real, class StateReal>
 __global__ void follow(Fields<Real, StateReal> f, const Index* place, int count, Axes axes,
-                       Vec3<StateReal> displacement, Vec3<StateReal> velocity) {
+                       AffineField<StateReal> displacements, AffineField<StateReal> velocities) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   const Index at = place[k];
   auto point = f.points.get(at);
+  const Vec3<StateReal> x = to<StateReal>(point.x);
+  Vec3<StateReal> displacement = displacements.at(x), velocity = velocities.at(x);
   if (!axes.x || !axes.y || !axes.z) {
     const auto along_axes = [axes](Vec3<StateReal> path, Vec3<StateReal> free) {
       return Vec3<StateReal>{axes.x ? path.x : free.x, axes.y ? path.y : free.y,
@@ -72,9 +82,12 @@ class Boundary {
   }
   /// Moves phyxels to where their paths are after a step from `time` [s].
   void follow_paths(double time, double dt) const {
-    for (const Path& path : paths_) {
-      const Vec3d after = path.of->displacement_at(time + dt);
-      set(path.places, path.of->axes, after, (after - path.of->displacement_at(time)) / dt);
+    for (const Moved& path : paths_) {
+      const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
+      const Vec3d x = path.origin, there = after.at(x);
+      set(path.places, path.of->axes, {to<StateReal>(there), to_real(after.turn)},
+          {to<StateReal>((there - before.at(x)) / dt),
+           to_real((1 / dt) * (after.turn - before.turn))});
     }
   }
   /// Held phyxels stay where their motion says, at rest, wherever a state has put them.
@@ -85,8 +98,9 @@ class Boundary {
   const char* moved() const { return moved_.data(); }
 
  private:
-  struct Path {
+  struct Moved {
     const Motion* of;
+    Vec3d origin;  ///< Of their body.
     DeviceArray<Index> places;
   };
   struct Loading {
@@ -109,12 +123,25 @@ class Boundary {
         held.insert(held.end(), at.begin(), at.end());
         continue;
       }
-      paths_.push_back({&motion, sent(at, "moved phyxels")});
+      paths_.push_back({&motion, origin_of(motion), sent(at, "moved phyxels")});
       moved.resize(m_.places(), 0);
       for (const Index place : at) moved[place] |= motion.axes.bits();
     }
     held_ = sent(held, "held phyxels");
     moved_ = sent(moved, "moved phyxels");
+  }
+  Vec3d origin_of(const Motion& motion) const {
+    for (const Part& part : m_.model().parts) {
+      const bool here = !motion.phyxels.empty() && motion.phyxels[0] >= part.begin &&
+                        motion.phyxels[0] < part.end;
+      if (here) return part.origin;
+    }
+    return {};
+  }
+  static Mat3<StateReal> to_real(const Mat3d& m) {
+    Mat3<StateReal> out;
+    for (int e = 0; e < 9; ++e) out(e / 3, e % 3) = static_cast<StateReal>(m(e / 3, e % 3));
+    return out;
   }
   void make_loads() {
     if (m_.model().loads.empty()) return;
@@ -126,14 +153,15 @@ class Boundary {
           {&load, sent(places_of(load.phyxels), "loaded phyxels"), sent(force, "loads")});
     }
   }
-  void set(const DeviceArray<Index>& at, Axes axes, Vec3d displacement, Vec3d velocity) const {
+  void set(const DeviceArray<Index>& at, Axes axes, const AffineField<StateReal>& displacement,
+           const AffineField<StateReal>& velocity) const {
     const auto count = static_cast<int>(at.size());
     m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), count, axes,
-                   to<StateReal>(displacement), to<StateReal>(velocity));
+                   displacement, velocity);
   }
 
   DeviceModel<Real, StateReal>& m_;
-  std::vector<Path> paths_;
+  std::vector<Moved> paths_;
   std::vector<Loading> loads_;
   double load_scales_ = -1;
   DeviceArray<Index> held_;

@@ -16,9 +16,9 @@ class Residence {
   static constexpr int most_steps = 256;
 
   /// Nothing unless each body fits a cluster, or all bodies fit at once; gradients must be as they
-  /// come.
+  /// come, and bodies of one material.
   static std::unique_ptr<Residence> of(const DeviceModel<Real, StateReal>& model) {
-    if (model.closed()) return nullptr;
+    if (model.closed() || model.model().has_inclusions()) return nullptr;
     std::unique_ptr<Residence> residence(new Residence(model));
     return residence->make() ? std::move(residence) : nullptr;
   }

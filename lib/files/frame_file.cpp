@@ -42,8 +42,11 @@ Ends ends_of(const Model& model) {
   Ends ends;
   std::int64_t phyxels = 0, surfels = 0;
   for (const Part& part : model.parts) {
-    ends.phyxels.push_back(phyxels = model.share ? phyxels + part.size : part.end);
-    ends.surfels.push_back(surfels = model.share ? surfels + part.surfels : part.surfel_end);
+    const auto bodies = static_cast<std::size_t>(part.body) + 1;
+    ends.phyxels.resize(bodies);
+    ends.surfels.resize(bodies);
+    ends.phyxels.back() = phyxels = model.share ? phyxels + part.size : part.end;
+    ends.surfels.back() = surfels = model.share ? surfels + part.surfels : part.surfel_end;
   }
   return ends;
 }
@@ -205,7 +208,7 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   out.later<std::int64_t>("/VTKHDF/Offsets", cells + 1, 0, stretch, counting(3));
   out.group("/VTKHDF/PointData");
   vectors("/VTKHDF/PointData/Normals", true, Quantity::surfel_normal);
-  if (model.parts.size() > 1) {
+  if (ends.surfels.size() > 1) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }
   write_metadata(out, scene, diagnostics);

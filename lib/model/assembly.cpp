@@ -14,20 +14,21 @@
 namespace phyxel {
 namespace {
 
-/// Rotation by |r| degrees about r (Rodrigues).
-Mat3d rotation_matrix(Vec3d degrees) {
-  const double angle = norm(degrees) * std::numbers::pi / 180;
+constexpr double degree = std::numbers::pi / 180;
+
+}  // namespace
+
+Mat3d rotation_by(Vec3d radians) {
+  const double angle = norm(radians);
   if (angle == 0) return identity<double>();
-  const Vec3d a = normalised(degrees);
+  const Vec3d a = normalised(radians);
   Mat3d k;
   k(0, 1) = -a.z, k(0, 2) = a.y, k(1, 0) = a.z, k(1, 2) = -a.x, k(2, 0) = -a.y, k(2, 1) = a.x;
   return identity<double>() + std::sin(angle) * k + (1 - std::cos(angle)) * (k * k);
 }
 
-}  // namespace
-
 void place(Cloud& cloud, const BodyRequest& request) {
-  const Mat3d rotation = rotation_matrix(request.rotation);
+  const Mat3d rotation = rotation_by(degree * request.rotation);
   const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {
@@ -237,6 +238,13 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
   return choice;
 }
 
+void BoundaryChoice::renumber(const std::vector<Index>& place) {
+  for (std::vector<Index>& phyxels : chosen) {
+    for (Index& i : phyxels) i = place[i];
+    std::sort(phyxels.begin(), phyxels.end());
+  }
+}
+
 std::vector<std::int64_t> BoundaryChoice::counts() const {
   std::vector<std::int64_t> counts;
   for (const std::vector<Index>& phyxels : chosen) {
@@ -276,6 +284,8 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
   for (const MotionRequest& m : request.motions) {
     model.motions.push_back({.phyxels = next(),
                              .displacement = m.displacement,
+                             .rotation = degree * m.rotation,
+                             .about = m.about,
                              .duration = m.duration,
                              .velocity = m.velocity,
                              .amplitude = m.amplitude,

@@ -18,6 +18,9 @@ Cloud rest_cloud(const BodySource& source);
 /// The lattice that a source is, with its spacing, if it is one. @param piece that is to be made
 std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 
+/// Rotation by |r| about r (Rodrigues).
+Mat3d rotation_by(Vec3d radians);
+
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);
 
@@ -89,6 +92,8 @@ struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
   std::size_t first_load = 0;
 
+  /// Phyxel i of the cloud is phyxel place[i] of the body.
+  void renumber(const std::vector<Index>& place);
   std::vector<std::int64_t> counts() const;
   /// Of each load.
   std::vector<ExactSum> loaded_masses(const Model& model, Index shift) const;

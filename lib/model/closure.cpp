@@ -53,7 +53,7 @@ std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Tr
   }
   return facets;
 }
-/// A body's own surface. Triangles stand part by part.
+/// A body's own surface. Triangles stand body by body.
 std::vector<Facet> facets_of(const Model& model, const Part& part) {
   const std::vector<Triangle>& all = model.surfels.triangle;
   const auto before = [&](Index surfel) {
@@ -340,7 +340,20 @@ Enclosed enclosed_by(const std::vector<Facet>& facets) {
   return found;
 }
 
-void close_part(Model& model, Part& part) {
+/// All parts of a body as if they were one.
+Part whole_of(std::span<const Part> parts) {
+  Part whole = parts.front();
+  for (const Part& part : parts.subspan(1)) {
+    whole.end = part.end;
+    whole.size += part.size;
+    whole.volume += part.volume;
+  }
+  return whole;
+}
+
+/// @param parts of one body
+void close_body(Model& model, std::span<Part> parts) {
+  const Part part = whole_of(parts);
   const Phase phase("closing gradients");
   const std::vector<Facet> facets = facets_of(model, part);
   const auto begin = static_cast<std::size_t>(part.begin), end = static_cast<std::size_t>(part.end);
@@ -365,9 +378,11 @@ void close_part(Model& model, Part& part) {
     model.volume[i] *= 1 + change;
     model.closing[i] = (sums.unit() / model.volume[i]) * x.closing;
   }
-  ExactSum whole;
-  for (std::size_t i = begin; i < end; ++i) whole.add(model.volume[i]);
-  part.volume = whole.value();
+  for (Part& own : parts) {
+    ExactSum sum;
+    for (Index i = own.begin; i < own.end; ++i) sum.add(model.volume[i]);
+    own.volume = sum.value();
+  }
   for (Load& load : model.loads) {
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
       const Index i = load.phyxels[k];
@@ -407,10 +422,13 @@ void check_closure(const BodyRequest& request, const Surface& surface,
 }
 
 void close_gradients(Model& model) {
-  for (Part& part : model.parts) {
-    if (!(part.closure > 0) || part.begin == part.end) continue;
-    model.closing.resize(static_cast<std::size_t>(model.with_lists().size()));
-    close_part(model, part);
+  for (auto part = model.parts.begin(); part != model.parts.end();) {
+    const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
+    if (part->closure > 0 && part->begin < part->end) {
+      model.closing.resize(static_cast<std::size_t>(model.with_lists().size()));
+      close_body(model, {part, next});
+    }
+    part = next;
   }
 }
 

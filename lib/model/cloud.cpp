@@ -66,11 +66,14 @@ void order_along_curve(Cloud& cloud) {
               static_cast<Index>(i)};
   }
   std::sort(key.begin(), key.end());
-  std::vector<Index> order(n), place(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    order[k] = key[k].second;
-    place[order[k]] = static_cast<Index>(k);
-  }
+  std::vector<Index> order(n);
+  for (std::size_t k = 0; k < n; ++k) order[k] = key[k].second;
+  reorder(cloud, order);
+}
+
+void reorder(Cloud& cloud, const std::vector<Index>& order) {
+  std::vector<Index> place(order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Index>(k);
   permute(cloud.position, order);
   permute(cloud.volume, order);
   for (auto& [name, members] : cloud.regions) {

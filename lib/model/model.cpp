@@ -9,6 +9,7 @@
 #include "model/box.hpp"
 #include "model/closure.hpp"
 #include "model/host_memory.hpp"
+#include "model/inclusions.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -22,6 +23,18 @@ void append(std::vector<T>& to, const std::vector<T>& values) {
   to.insert(to.end(), values.begin(), values.end());
 }
 
+ListLengths lengths_of(const Csr& lists, Index begin, Index end) {
+  ListLengths lengths;
+  if (begin == end) return lengths;
+  lengths.fewest = lengths.most = lists.length(begin);
+  for (Index i = begin; i < end; ++i) {
+    lengths.pairs += lists.length(i);
+    lengths.fewest = std::min(lengths.fewest, lists.length(i));
+    lengths.most = std::max(lengths.most, lists.length(i));
+  }
+  return lengths;
+}
+
 /// What a survey tells, found here along with the lists.
 Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool kernel_volumes,
                          Neighbourhood& hood) {
@@ -32,19 +45,21 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
     survey.kernel_sum = kernel_sums(cloud.position, hood, survey.spacing);
   }
   survey.support = hood.support;
-  survey.lists.pairs = hood.neighbours.entries();
-  const Index rows = hood.neighbours.rows();
-  if (rows > 0) survey.lists.fewest = survey.lists.most = hood.neighbours.length(0);
-  for (Index i = 1; i < rows; ++i) {
-    survey.lists.fewest = std::min(survey.lists.fewest, hood.neighbours.length(i));
-    survey.lists.most = std::max(survey.lists.most, hood.neighbours.length(i));
-  }
+  survey.lists = lengths_of(hood.neighbours, 0, hood.neighbours.rows());
   return survey;
 }
 
+void refuse_inclusions(const BodyRequest& request, const char* why, const char* allowed) {
+  throw InputError(fmt::format("{}: body \"{}\" has inclusions, {}: allowed is {}",
+                               request.inclusions[0].select.where, request.name, why, allowed));
+}
+
 /// @param surveyor null: lists and moments are made here.
-void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
+void add_body(Model& model, const BodyRequest& request, const Cloud& given,
               const Surveyor* surveyor) {
+  std::optional<SortedCloud> sorted;
+  if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
+  const Cloud& cloud = sorted ? sorted->cloud : given;
   // The most that a phyxel takes at any time. With its neighbour lists and the CPU's arrays:
   // measured while the time step is found, in `phyxel check` of a block of two million. Without:
   // its cloud, its share of the model and of two states.
@@ -61,8 +76,15 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
         request.where, request.name, request.closure));
   }
+  if (surveyor && sorted) {
+    refuse_inclusions(request, "which are numbered on the host",
+                      "a model built without a surveyor");
+  }
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
+  if (kernel_volumes && sorted) {
+    refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
+  }
   Survey survey;
   if (surveyor) {
     survey = (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
@@ -73,14 +95,23 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
     survey = survey_with_lists(cloud, request, kernel_volumes, hood);
     append_lists(model.neighbourhood, hood, shift);
   }
+  const std::vector<MaterialGroup> groups =
+      sorted ? sorted->groups
+             : std::vector<MaterialGroup>{
+                   {request.material, request.name, 0, static_cast<Index>(cloud.position.size())}};
   const double density = request.material.density;
   ExactSum kernel_sum;
   for (const double w : survey.kernel_sum) kernel_sum.add(w);
-  const Masses masses =
+  Masses masses =
       kernel_volumes
           ? kernel_masses(survey.spacing, survey.kernel_sum,
                           kernel_sum.value() / static_cast<double>(survey.spacing.size()), density)
           : geometric_masses(cloud.volume, density);
+  for (std::size_t g = 1; g < groups.size(); ++g) {
+    for (Index i = groups[g].begin; i < groups[g].end; ++i) {
+      masses.mass[i] = masses.volume[i] * groups[g].material.density;
+    }
+  }
   append(model.neighbourhood.support, survey.support);
   append(model.position, cloud.position);
   append(model.mass, masses.mass);
@@ -99,27 +130,41 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& cloud,
   for (const Triangle& t : cloud.surface.triangle) {
     surfels.triangle.push_back({t[0] + surfel_shift, t[1] + surfel_shift, t[2] + surfel_shift});
   }
-  model.parts.push_back({.name = request.name,
-                         .begin = shift,
-                         .end = model.size(),
-                         .surfel_begin = surfel_shift,
-                         .surfel_end = static_cast<Index>(surfels.position.size()),
-                         .material = request.material,
-                         .neighbourhood = in_words(request.neighbourhood),
-                         .lists = survey.lists,
-                         .closure = request.closure,
-                         .kernel_volumes = kernel_volumes,
-                         .size = model.size() - shift,
-                         .surfels = static_cast<Index>(cloud.surface.position.size())});
-  Part& part = model.parts.back();
-  if (part.begin < part.end) part.origin = model.position[part.begin];
-  BodySums sums;
-  sums.add(model, part.begin, part.end);
-  sums.tell(part);
-  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(part.volume));
+  BodySums whole;
+  whole.add(model, shift, model.size());
+  Part body;  // all of it
+  whole.tell(body);
+  const Index number = model.parts.empty() ? 0 : model.parts.back().body + 1;
+  for (const MaterialGroup& group : groups) {
+    const bool first = group.begin == 0;
+    const auto surfel_end = static_cast<Index>(surfels.position.size());
+    Part& part = model.parts.emplace_back();
+    part = {.name = group.name,
+            .body = number,
+            .begin = shift + group.begin,
+            .end = shift + group.end,
+            .surfel_begin = first ? surfel_shift : surfel_end,
+            .surfel_end = surfel_end,
+            .material = group.material,
+            .neighbourhood = in_words(request.neighbourhood),
+            .lists = groups.size() == 1 ? survey.lists
+                                        : lengths_of(model.neighbourhood.neighbours,
+                                                     shift + group.begin, shift + group.end),
+            .closure = request.closure,
+            .kernel_volumes = kernel_volumes,
+            .size = group.end - group.begin,
+            .surfels = surfel_end - (first ? surfel_shift : surfel_end)};
+    if (shift < model.size()) part.origin = model.position[shift];
+    BodySums sums;
+    sums.add(model, part.begin, part.end);
+    sums.tell(part);
+    part.centre = body.centre;
+  }
+  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(body.volume));
 
-  const BoundaryChoice choice =
-      choose_boundary(request, cloud, {}, static_cast<Index>(cloud.position.size()));
+  BoundaryChoice choice =
+      choose_boundary(request, given, {}, static_cast<Index>(given.position.size()));
+  if (sorted) choice.renumber(sorted->place);
   std::vector<double> loaded;
   for (const ExactSum& mass : choice.loaded_masses(model, shift)) loaded.push_back(mass.value());
   choice.refuse_empty(request, choice.counts(), box_around(cloud.position));
@@ -149,11 +194,18 @@ std::string Degenerate::describe() const {
   return fmt::format("degenerate phyxels: {}", fmt::join(kinds, "; "));
 }
 
-Vec3d Motion::displacement_at(double time) const {
+Path Motion::path_after(double share) const {
+  Path path{share * displacement, {}, about};
+  if (rotation != Vec3d{}) path.turn = rotation_by(share * rotation) - identity<double>();
+  return path;
+}
+
+Path Motion::path_at(double time) const {
   const double s = duration > 0 ? std::clamp(time / duration, 0.0, 1.0) : 1.0;
-  const double smoothstep = s * s * (3 - 2 * s);
-  const double wave = std::sin(2 * std::numbers::pi * frequency * time);
-  return smoothstep * displacement + time * velocity + wave * amplitude;
+  Path path = path_after(s * s * (3 - 2 * s));
+  path.displacement +=
+      time * velocity + std::sin(2 * std::numbers::pi * frequency * time) * amplitude;
+  return path;
 }
 
 Cloud rest_cloud(const BodySource& source) {
@@ -233,6 +285,17 @@ const Model& Model::with_lists() const {
         "backend on that device, or a model built without a surveyor");
   }
   return *this;
+}
+
+bool Model::has_inclusions() const {
+  return !parts.empty() && parts.back().body + 1 < static_cast<Index>(parts.size());
+}
+
+std::span<const Part> Model::parts_of_body(const Part& part) const {
+  auto first = parts.begin() + (&part - parts.data()), last = first + 1;
+  while (first != parts.begin() && (first - 1)->body == part.body) --first;
+  while (last != parts.end() && last->body == part.body) ++last;
+  return {first, last};
 }
 
 Index Model::whole_surfels() const {

@@ -78,6 +78,10 @@ std::uint64_t model_digest(const Model& model) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
     add(state.get(), std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z,
                                          motion.duration, motion.frequency});
+    if (motion.rotation != Vec3d{}) {
+      const Vec3d &r = motion.rotation, &c = motion.about;
+      add(state.get(), std::vector<double>{r.x, r.y, r.z, c.x, c.y, c.z});
+    }
     if (!motion.axes.all()) {
       add(state.get(), std::vector<char>{motion.axes.x, motion.axes.y, motion.axes.z});
     }

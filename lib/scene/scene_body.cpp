@@ -164,6 +164,17 @@ Selection read_selection(const SceneTable& table) {
   return select;
 }
 
+InclusionRequest read_inclusion(const SceneTable& table, Material material) {
+  const Selection select = read_selection(table);
+  table.read("young", material.young);
+  table.read("poisson", material.poisson);
+  table.read("density", material.density);
+  table.read_choice("law", material.law);
+  table.read("volume_stiffness", material.volume_stiffness);
+  table.read("damping", material.damping);
+  return {select, material};
+}
+
 Axes read_axes(const SceneTable& table) {
   std::string axes = "xyz";
   table.read("axes", axes);
@@ -175,15 +186,24 @@ MotionRequest read_motion(const SceneTable& table) {
   MotionRequest motion;
   motion.select = read_selection(table);
   motion.axes = read_axes(table);
-  table.expect_together("displacement", "duration");
+  if (table.has("rotation")) {
+    table.expect_together("rotation", "duration");
+  } else {
+    table.expect_together("displacement", "duration");
+  }
+  if (table.has("displacement")) table.expect_together("displacement", "duration");
+  if (table.has("about")) table.expect_together("about", "rotation");
   table.expect_together("amplitude", "frequency");
-  if (!table.has("displacement") && !table.has("velocity") && !table.has("amplitude")) {
+  if (!table.has("displacement") && !table.has("rotation") && !table.has("velocity") &&
+      !table.has("amplitude")) {
     throw InputError(
         fmt::format("{}: body.motion: a key is missing; needed: at least one of: "
-                    "displacement, velocity, amplitude",
+                    "displacement, rotation, velocity, amplitude",
                     table.where()));
   }
   table.read("displacement", motion.displacement);
+  table.read("rotation", motion.rotation);
+  table.read("about", motion.about);
   table.read("duration", motion.duration);
   table.read("velocity", motion.velocity);
   table.read("amplitude", motion.amplitude);
@@ -221,6 +241,9 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("closure", body.closure);
   body.material = read_material(table.table("material"));
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
+  for (const SceneTable& inclusion : table.tables("inclusion")) {
+    body.inclusions.push_back(read_inclusion(inclusion, body.material));
+  }
   for (const SceneTable& fixed : table.tables("fixed")) {
     body.fixed.push_back({read_selection(fixed), read_axes(fixed)});
   }
@@ -240,8 +263,12 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
   BodyRequest copy = body;
   copy.name = fmt::format("{} {}", body.name, number);
   copy.translation += by;
+  for (InclusionRequest& inclusion : copy.inclusions) move(inclusion.select, by);
   for (FixRequest& fix : copy.fixed) move(fix.select, by);
-  for (MotionRequest& motion : copy.motions) move(motion.select, by);
+  for (MotionRequest& motion : copy.motions) {
+    move(motion.select, by);
+    motion.about += by;
+  }
   for (LoadRequest& load : copy.loads) move(load.select, by);
   return copy;
 }

@@ -38,6 +38,10 @@ std::vector<SceneSection> make_sections() {
        "- `file` needs nothing else.\n\n"
        "The shape is scaled, then rotated, then translated."},
       {"body.material", "[body.material]", "", "What the body is made of. Required."},
+      {"body.inclusion", "[[body.inclusion]]", "selection",
+       "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
+       "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
+       "phyxels of a body with inclusions are numbered material by material. One rank only."},
       {"body.neighbours", "[body.neighbours]", "",
        "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
        "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
@@ -51,12 +55,13 @@ std::vector<SceneSection> make_sections() {
       {"body.motion", "[[body.motion]]", "selection",
        "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
        "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
-       "to s = 1. At least one of the three terms is needed; `displacement` and `duration` go "
-       "together, and so do `amplitude` and `frequency`."},
+       "to s = 1, and turned by rotation * smoothstep(t / duration). At least one of the four terms "
+       "is needed; `displacement` and `rotation` need `duration`, and `amplitude` and `frequency` "
+       "go together."},
       {"body.load", "[[body.load]]", "selection",
        "A force on phyxels: exactly one of `force` and `force_density`."},
       {"selection", "Selections", "",
-       "Each `[[body.fixed]]`, `[[body.motion]]` and `[[body.load]]` has exactly one of these "
+       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]` and `[[body.load]]` has exactly one of these "
        "keys. Positions are those at rest, after the body is placed."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
@@ -208,6 +213,8 @@ std::vector<SceneKey> body_keys() {
        .otherwise = "its defaults", .meaning = "Which phyxels interact."},
       {.section = "body", .name = "array", .type = KeyType::table, .otherwise = "one body",
        .meaning = "Repeats the body on a grid."},
+      {.section = "body", .name = "inclusion", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Phyxels of another material."},
       {.section = "body", .name = "fixed", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Phyxels held where they are."},
       {.section = "body", .name = "motion", .type = KeyType::tables, .otherwise = "none",
@@ -240,7 +247,22 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "hourglass", .fallback = "0", .range = at_least(0),
        .meaning = "Strength of hourglass control, as a share of young: energy of what does not "
            "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
-           "see; 0: none. Needs one support for the body."},
+           "see; 0: none. Needs one support for the body. With inclusions, a share of the smallest "
+           "`young`."},
+
+      {.section = "body.inclusion", .name = "young", .unit = "Pa", .otherwise = "the body's",
+       .range = above(0), .meaning = "Young's modulus E."},
+      {.section = "body.inclusion", .name = "poisson", .otherwise = "the body's",
+       .range = strictly_between(-1, 0.5), .meaning = "Poisson's ratio."},
+      {.section = "body.inclusion", .name = "density", .unit = "kg/m^3", .otherwise = "the body's",
+       .range = above(0), .meaning = "Mass density at rest."},
+      {.section = "body.inclusion", .name = "law", .type = KeyType::choice,
+       .otherwise = "the body's", .words = {"hooke", "neo-hookean", "corotated"},
+       .meaning = "As in `[body.material]`."},
+      {.section = "body.inclusion", .name = "volume_stiffness", .unit = "Pa",
+       .otherwise = "the body's", .range = at_least(0), .meaning = "As in `[body.material]`."},
+      {.section = "body.inclusion", .name = "damping", .unit = "1/s", .otherwise = "the body's",
+       .range = at_least(0), .meaning = "As in `[body.material]`."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
        .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},
@@ -276,8 +298,14 @@ std::vector<SceneKey> boundary_keys() {
 
       {.section = "body.motion", .name = "displacement", .type = KeyType::vector, .unit = "m",
        .fallback = "[0, 0, 0]", .meaning = "Reached after `duration`, then kept."},
+      {.section = "body.motion", .name = "rotation", .type = KeyType::vector, .unit = "degrees",
+       .fallback = "[0, 0, 0]",
+       .meaning = "Axis times angle, reached after `duration`, then kept: [1080, 0, 0] is three "
+           "turns about x."},
+      {.section = "body.motion", .name = "about", .type = KeyType::vector, .unit = "m",
+       .fallback = "[0, 0, 0]", .meaning = "A point of the axis of `rotation`."},
       {.section = "body.motion", .name = "duration", .unit = "s", .otherwise = "none",
-       .range = above(0), .meaning = "Time to reach `displacement`."},
+       .range = above(0), .meaning = "Time to reach `displacement` and `rotation`."},
       {.section = "body.motion", .name = "velocity", .type = KeyType::vector, .unit = "m/s",
        .fallback = "[0, 0, 0]", .meaning = "Of a steady motion."},
       {.section = "body.motion", .name = "amplitude", .type = KeyType::vector, .unit = "m",

@@ -125,12 +125,12 @@ class CpuBackend final : public Backend {
       }
     }
     for (const Motion& motion : model_.motions) {
-      const Vec3d after = motion.displacement_at(time + dt);
-      const Vec3d velocity = (after - motion.displacement_at(time)) / dt;
+      const Path before = motion.path_at(time), after = motion.path_at(time + dt);
       for (const Index i : motion.phyxels) {
         const Index slot = layout_.slot(i);
-        set_state(i, motion.along_axes(after, get3(displacement_, slot)),
-                  motion.along_axes(velocity, get3(velocity_, slot)));
+        const Vec3d x = model_.position[i], u = after.at(x);
+        set_state(i, motion.along_axes(u, get3(displacement_, slot)),
+                  motion.along_axes((u - before.at(x)) / dt, get3(velocity_, slot)));
       }
     }
     if (model_.share) refresh(displacement_records());

@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "phyxel/error.hpp"
 #include "solver/newton.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Gravity and loads at their full size, motions at their ends.
-Balance balance_at_the_end(const Model& model, const OwnedVectors& vectors) {
+/// Gravity and loads at their full size; targets are still to be set.
+Balance whole_balance(const Model& model, const OwnedVectors& vectors) {
   Balance balance;
   balance.target = vectors.make();
   balance.free.assign(balance.target.size(), {1, 1, 1});
@@ -21,7 +25,6 @@ Balance balance_at_the_end(const Model& model, const OwnedVectors& vectors) {
     }
     for (const Index i : motion.phyxels) {
       balance.free[i] = motion.along_axes({}, balance.free[i]);
-      balance.target[i] = motion.along_axes(motion.displacement, balance.target[i]);
     }
   }
   balance.applied = vectors.make();
@@ -32,6 +35,23 @@ Balance balance_at_the_end(const Model& model, const OwnedVectors& vectors) {
     }
   }
   return balance;
+}
+
+/// Motions so much of their way.
+void set_targets(const Model& model, double share, Balance& balance) {
+  for (const Motion& motion : model.motions) {
+    const Path path = motion.path_after(share);
+    for (const Index i : motion.phyxels) {
+      balance.target[i] = motion.along_axes(path.at(model.position[i]), balance.target[i]);
+    }
+  }
+}
+
+/// What turns is followed by an eighth of a turn at a time: straight ways there would flatten it.
+int stages_of(const Model& model) {
+  double angle = 0;
+  for (const Motion& motion : model.motions) angle = std::max(angle, norm(motion.rotation));
+  return std::max(1, static_cast<int>(std::ceil(angle / (std::numbers::pi / 4) - 1e-9)));
 }
 
 /// Along an axis that nothing is held along, what is applied must cancel.
@@ -56,12 +76,20 @@ void refuse_free_fall(const Balance& balance, const OwnedVectors& vectors) {
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
   Newton newton(model, backend, options.tolerance, options.most_steps);
-  const Balance balance = balance_at_the_end(model, newton.vectors());
+  Balance balance = whole_balance(model, newton.vectors());
   refuse_free_fall(balance, newton.vectors());
   Equilibrium found;
   found.state.displacement = newton.vectors().make();
   found.state.velocity = newton.vectors().make();
-  const NewtonReport report = newton.solve(balance, found.state.displacement);
+  NewtonReport report;
+  const int stages = stages_of(model);
+  for (int stage = 1; stage <= stages; ++stage) {
+    set_targets(model, static_cast<double>(stage) / stages, balance);
+    report = newton.solve(balance, found.state.displacement);
+    found.steps += report.steps;
+    found.evaluations += report.evaluations;
+    if (!report.found) break;
+  }
   if (!report.found) {
     const std::string why = fmt::format(
         "no equilibrium was found in {} steps of Newton's method: the residual force is {:.2g} of "
@@ -72,8 +100,6 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     throw DivergedError(why);
   }
   found.residual = report.residual;
-  found.steps = report.steps;
-  found.evaluations = report.evaluations;
   backend.upload(found.state);
   return found;
 }

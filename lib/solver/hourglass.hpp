@@ -1,16 +1,25 @@
 /// Which bodies have hourglass control, and how stiff it is.
 #pragma once
 
+#include <algorithm>
+
 #include "phyxel/model.hpp"
 #include "phyxel/physics/hourglass.hpp"
 
 namespace phyxel {
 
-/// κ of a body [N/m]; 0: none. The same on every rank that has phyxels of it.
+/// κ of the body of a part [N/m]; 0: none. The same on every rank that has phyxels of it, and for
+/// all of its parts, whose pairs share it: by the softest. @param part of the model
 inline double hourglass_stiffness(const Model& model, const Part& part) {
-  const Material& m = part.material;
-  if (!(m.hourglass > 0) || part.begin == part.end) return 0;
-  return hourglass_stiffness(m.hourglass, m.young, part.volume / part.size,
+  const double strength = part.material.hourglass;
+  if (!(strength > 0) || part.begin == part.end) return 0;
+  double young = part.material.young, volume = 0, size = 0;
+  for (const Part& other : model.parts_of_body(part)) {
+    young = std::min(young, other.material.young);
+    volume += other.volume;
+    size += other.size;
+  }
+  return hourglass_stiffness(strength, young, volume / size,
                              model.neighbourhood.support[part.begin]);
 }
 

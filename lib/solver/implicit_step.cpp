@@ -51,8 +51,10 @@ void ImplicitStep::find_applied(double time) {
 
 void ImplicitStep::find_targets(double time, Vector& target) const {
   for (const Motion& motion : model_.motions) {
-    const Vec3d path = motion.displacement_at(time);
-    for (const Index i : motion.phyxels) target[i] = motion.along_axes(path, target[i]);
+    const Path path = motion.path_at(time);
+    for (const Index i : motion.phyxels) {
+      target[i] = motion.along_axes(path.at(model_.position[i]), target[i]);
+    }
   }
 }
 

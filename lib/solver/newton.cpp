@@ -12,6 +12,7 @@ constexpr double largest_strain = 0.3;  // of one step
 constexpr int most_cuts = 8;
 constexpr double inner_tolerance = 1e-3;
 constexpr int most_inner = 50'000;
+constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
 
 Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
   return v - by_components(balance.free[i], v);
@@ -30,10 +31,11 @@ Newton::Newton(const Model& model, Backend& backend, double tolerance, int most_
 NewtonReport Newton::solve(const Balance& balance, Vector& u) {
   NewtonReport report;
   evaluations_ = 0;
+  find_stiffness(balance);
   Vector force = forces(balance, u), step = vectors_.make(), next = vectors_.make();
   double energy = potential(balance, u);
   for (;;) {
-    report.residual = residual(balance, force);
+    report.residual = residual(balance, u, force);
     report.evaluations = evaluations_;
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
@@ -109,13 +111,18 @@ double Newton::potential(const Balance& balance, const Vector& u) {
   return elastic - vectors_.product(balance.applied, u) + inert;
 }
 
-double Newton::residual(const Balance& balance, const Vector& force) const {
+/// Of what is applied, reacts and is inert; and of a share of the forces that moving one phyxel
+/// alone so far would take, whose rounding is left where nothing is loaded.
+double Newton::residual(const Balance& balance, const Vector& u, const Vector& force) const {
   const double free = vectors_.sum(
       [&](Index i) { return dot(by_components(balance.free[i], force[i]), force[i]); });
   const double reactions =
       vectors_.sum([&](Index i) { return dot(held_part(balance, i, force[i]), force[i]); });
   const double scale = std::sqrt(vectors_.product(balance.applied, balance.applied)) +
-                       std::sqrt(reactions) + balance.scale;
+                       std::sqrt(reactions) + balance.scale +
+                       rounding_share * std::sqrt(vectors_.sum([&](Index i) {
+                         return stiffness_[i] * stiffness_[i] * dot(u[i], u[i]);
+                       }));
   return scale > 0 ? std::sqrt(free) / scale : std::sqrt(free) > 0 ? 1 : 0;
 }
 
@@ -146,8 +153,22 @@ void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vect
   });
 }
 
+/// About how stiff each phyxel is against its neighbours [N/m]: without inertia, as many times its
+/// true stiffness everywhere.
+void Newton::find_stiffness(const Balance& balance) {
+  stiffness_.resize(static_cast<std::size_t>(model_.size()));
+  for (const Part& part : model_.parts) {
+    const double c = pressure_wave_speed(part.material);
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const double h = model_.neighbourhood.support[i], crossings = h > 0 ? c / h : 1;
+      stiffness_[i] = model_.mass[i] * crossings * crossings;
+      if (!balance.weight.empty()) stiffness_[i] += balance.weight[i];
+    }
+  }
+}
+
 /// The step of Newton's method, held phyxels all the way to their targets: conjugate gradients, by
-/// masses. Where the stiffness has no definite sign, as far as it has.
+/// `stiffness_`. Where the stiffness has no definite sign, as far as it has.
 void Newton::find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step) {
   Vector rest = vectors_.make(), image = vectors_.make();
   vectors_.for_each([&](Index i) { step[i] = held_part(balance, i, balance.target[i] - u[i]); });
@@ -159,7 +180,7 @@ void Newton::find_step(const Balance& balance, const Vector& u, const Vector& fo
   });
 
   Vector way(u.size());
-  const auto preconditioned = [&](Index i) { return (1 / model_.mass[i]) * rest[i]; };
+  const auto preconditioned = [&](Index i) { return (1 / stiffness_[i]) * rest[i]; };
   vectors_.for_each([&](Index i) { way[i] = preconditioned(i); });
   double product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
   const double start = product;

@@ -54,10 +54,11 @@ class Newton {
   Vector forces(const Balance& balance, const Vector& u);
   void put(const Vector& u);
   double potential(const Balance& balance, const Vector& u);
-  double residual(const Balance& balance, const Vector& force) const;
+  double residual(const Balance& balance, const Vector& u, const Vector& force) const;
   double steepest(const Vector& step);
   void stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                        const Vector& v, Vector& out);
+  void find_stiffness(const Balance& balance);
   void find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step);
 
   const Model& model_;
@@ -65,7 +66,8 @@ class Newton {
   double tolerance_;
   int most_steps_;
   OwnedVectors vectors_;
-  double difference_;  ///< How far stiffness moves phyxels at most [m].
+  double difference_;              ///< How far stiffness moves phyxels at most [m].
+  std::vector<double> stiffness_;  ///< About that of each phyxel against its neighbours [N/m].
   State placed_;
   std::int64_t evaluations_ = 0;
 };

@@ -14,12 +14,11 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
-  for (std::size_t p = 0; p < model.parts.size(); ++p) {
-    const Part& part = model.parts[p];
+  for (const Part& part : model.parts) {
+    const BodyRequest& body = scene.bodies[static_cast<std::size_t>(part.body)];
 #pragma omp parallel for schedule(static)
     for (Index i = part.begin; i < part.end; ++i) {
-      state.velocity[i] =
-          scene.bodies[p].velocity + cross(scene.bodies[p].spin, model.position[i] - part.centre);
+      state.velocity[i] = body.velocity + cross(body.spin, model.position[i] - part.centre);
       state.velocity[i] -= lag * model.gravity;
     }
   }
@@ -30,8 +29,9 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
     }
   }
   for (const Motion& motion : model.motions) {
+    const Path start = motion.path_at(0);
     for (const Index i : motion.phyxels) {
-      state.displacement[i] = motion.along_axes(motion.displacement_at(0), {});
+      state.displacement[i] = motion.along_axes(start.at(model.position[i]), state.displacement[i]);
       state.velocity[i] = motion.along_axes({}, state.velocity[i]);
     }
   }

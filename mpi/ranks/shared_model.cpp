@@ -110,11 +110,11 @@ std::vector<double> SharedModel::gathered(Quantity quantity, std::span<const dou
 }
 
 State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) const {
-  struct Instant {
+  struct Header {
     std::int64_t step;
     double time, dt;
   };
-  Instant now{};
+  Header now{};
   ranks_.together([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "accuracy/hard_cases.hpp"
+#include "device.hpp"
+#include "device_option.hpp"
 #include "support/program.hpp"
 
 namespace phyxel {
@@ -108,6 +111,27 @@ TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
   EXPECT_THAT(text, HasSubstr("**nodes, α = 0.3** | 3 | 256 |"));  // finer is better, and slower
   EXPECT_THAT(text, HasSubstr("nodes, α = 0.3, closed"));
   EXPECT_EQ(run({"accuracy", "page", "--results", "nowhere"}).code, 2);
+}
+
+/// Each is answered within its tolerance or refused, as it should be; those that take minutes are
+/// in docs/accuracy.md.
+void expect_good(const app::Machine& machine) {
+  for (const app::HardCase& hard : app::hard_cases()) {
+    if (hard.is_long || (hard.in_double && machine.precision != Precision::double_)) continue;
+    const app::HardOutcome outcome = app::outcome_of(hard, machine);
+    EXPECT_TRUE(outcome.good) << hard.name << ": " << outcome.error << " " << outcome.message;
+    EXPECT_EQ(outcome.refused, !outcome.message.empty());
+  }
+}
+TEST(HardCases, AreAnsweredOrRefused) { expect_good({app::choose_device("cpu")}); }
+TEST(HardCases, AreAnsweredOrRefusedInFloat) {
+  expect_good({app::choose_device("cpu"), Precision::single});
+}
+TEST(HardCases, AreAnsweredOrRefusedOnAGpu) {
+  if (cuda_devices().empty()) GTEST_SKIP() << "[  SKIPPED ] no CUDA device";
+  for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
+    expect_good({app::choose_device("cuda"), precision});
+  }
 }
 
 TEST_F(AccuracyCommand, AnswersAnUnknownCaseWithTheNearest) {

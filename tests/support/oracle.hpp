@@ -12,16 +12,24 @@ namespace oracle {
 using V3 = Eigen::Vector3d;
 using M3 = Eigen::Matrix3d;
 
-struct Body {
-  std::vector<V3> x;
-  std::vector<double> v, h;
-  std::vector<std::vector<int>> neighbours;
+struct Material {
   double young = 0, poisson = 0, volume_stiffness = 0;
-  double hourglass = 0;     // κ [N/m]
-  std::vector<V3> closing;  // ĉ [1/m], or none
   bool green = true;
   bool neo_hooke = false, corotated = false;
 };
+
+struct Body : Material {
+  std::vector<V3> x;
+  std::vector<double> v, h;
+  std::vector<std::vector<int>> neighbours;
+  std::vector<Material> material;  // of each; none: the body's
+  double hourglass = 0;            // κ [N/m]
+  std::vector<V3> closing;         // ĉ [1/m], or none
+};
+
+inline const Material& material_of(const Body& b, int i) {
+  return b.material.empty() ? b : b.material[i];
+}
 
 inline double w(double r, double h) {
   if (r >= h) return 0;
@@ -66,13 +74,13 @@ inline M3 grad_u(const Body& b, const std::vector<V3>& u, int i) {
   return g;
 }
 
-inline M3 strain(const Body& b, const M3& g) {
+inline M3 strain(const Material& b, const M3& g) {
   const M3 linear = 0.5 * (g + g.transpose());
   return b.green ? M3(linear + 0.5 * g.transpose() * g) : linear;
 }
 
 /// Equation (5) of Farias et al. 2008, in its 6x6 engineering layout.
-inline M3 stress(const Body& b, const M3& e) {
+inline M3 stress(const Material& b, const M3& e) {
   const double nu = b.poisson;
   Eigen::Matrix<double, 6, 6> c = Eigen::Matrix<double, 6, 6>::Zero();
   c.topLeftCorner<3, 3>().setConstant(nu);
@@ -89,7 +97,7 @@ inline M3 stress(const Body& b, const M3& e) {
 /// Smith, de Goes and Kim 2018, equations 13 and 14: parameters, energy, stress.
 struct NeoHooke {
   double mu, lambda, alpha;
-  explicit NeoHooke(const Body& b) {
+  explicit NeoHooke(const Material& b) {
     const double shear = b.young / (2 * (1 + b.poisson));
     mu = 4 * shear / 3;
     lambda = b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson)) + 5 * shear / 6;
@@ -117,7 +125,7 @@ inline M3 cofactor(const M3& j) {
 /// ψ = μ |F - R|² + λ/2 (tr S - 3)² with R by singular values, of determinant 1.
 struct Corotated {
   double mu, lambda;
-  explicit Corotated(const Body& b)
+  explicit Corotated(const Material& b)
       : mu(b.young / (2 * (1 + b.poisson))),
         lambda(b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson))) {}
   static M3 rotation(const M3& j) {
@@ -178,12 +186,13 @@ inline double hourglass_energy(const Body& b, const std::vector<V3>& u) {
 inline double energy(const Body& b, const std::vector<V3>& u) {
   double total = b.hourglass > 0 ? hourglass_energy(b, u) : 0;
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
-    const M3 g = closed_grad_u(b, u, i), e = strain(b, g);
+    const Material& m = material_of(b, i);
+    const M3 g = closed_grad_u(b, u, i), e = strain(m, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    const double elastic = b.corotated   ? Corotated(b).energy(M3::Identity() + g)
-                           : b.neo_hooke ? NeoHooke(b).energy(M3::Identity() + g)
-                                         : 0.5 * e.cwiseProduct(stress(b, e)).sum();
-    total += b.v[i] * (elastic + 0.5 * b.volume_stiffness * dj * dj);
+    const double elastic = m.corotated   ? Corotated(m).energy(M3::Identity() + g)
+                           : m.neo_hooke ? NeoHooke(m).energy(M3::Identity() + g)
+                                         : 0.5 * e.cwiseProduct(stress(m, e)).sum();
+    total += b.v[i] * (elastic + 0.5 * m.volume_stiffness * dj * dj);
   }
   return total;
 }
@@ -194,11 +203,12 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const M3 g = closed_grad_u(b, u, i), j = M3::Identity() + g, a = inverse_moment(b, i);
     const M3 fit = grad_u(b, u, i);
-    M3 p = stress(b, strain(b, g));
-    if (b.green) p = j * p;
-    if (b.neo_hooke) p = NeoHooke(b).stress(j, cofactor(j));
-    if (b.corotated) p = Corotated(b).stress(j);
-    if (b.volume_stiffness > 0) p += b.volume_stiffness * (j.determinant() - 1) * cofactor(j);
+    const Material& m = material_of(b, i);
+    M3 p = stress(m, strain(m, g));
+    if (m.green) p = j * p;
+    if (m.neo_hooke) p = NeoHooke(m).stress(j, cofactor(j));
+    if (m.corotated) p = Corotated(m).stress(j);
+    if (m.volume_stiffness > 0) p += m.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
       V3 push = -b.v[i] * p * grad_of(b, a, i, n);
       if (b.hourglass > 0) push -= b.hourglass * shape(b, i, n) * residual(b, u, fit, i, n);

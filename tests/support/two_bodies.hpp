@@ -15,7 +15,8 @@ inline Model two_bodies() {
   model.volume = {0.1, 0.2, 0.3, 0.4, 0.5};
   model.parts.resize(2);
   model.parts[0].end = 2;
-  model.parts[1] = {.name = "second", .begin = 2, .end = 5, .surfel_begin = 0, .surfel_end = 4};
+  model.parts[1] = {
+      .name = "second", .body = 1, .begin = 2, .end = 5, .surfel_begin = 0, .surfel_end = 4};
   model.surfels.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   model.surfels.normal = {{-1, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   model.surfels.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};

@@ -8,8 +8,10 @@
 #include <cmath>
 
 #include "accuracy/accuracy.hpp"
+#include "accuracy/hard_cases.hpp"
 #include "accuracy/page.hpp"
 #include "csv.hpp"
+#include "device_option.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {
@@ -107,6 +109,44 @@ void measure(const AccuracyOptions& options) {
   }
 }
 
+struct HardOptions {
+  std::string device = "cpu";
+  std::vector<std::string> precisions{"double", "mixed", "float"};
+  std::vector<std::string> cases;
+  std::string csv;
+  bool include_long = false;
+  bool force = false;
+};
+
+/// @returns whether all were as they should be
+bool measure_hard(const HardOptions& options) {
+  const ChosenDevice device = choose_device(options.device);
+  PrintedTable table(
+      options.csv, options.force,
+      {"case", "precision", "wanted", "found", "error", "tolerance", "good", "seconds", "message"},
+      device_facts(device));
+  bool all_good = true;
+  for (const HardCase& hard : hard_cases()) {
+    const bool asked =
+        options.cases.empty() ||
+        std::find(options.cases.begin(), options.cases.end(), hard.name) != options.cases.end();
+    if (!asked || (hard.is_long && !options.include_long)) continue;
+    for (const std::string& name : options.precisions) {
+      const Precision precision = *precision_named(name);
+      if (hard.in_double && precision != Precision::double_) continue;
+      const HardOutcome outcome = outcome_of(hard, {device, precision});
+      all_good = all_good && outcome.good;
+      table.row({hard.name, name, hard.tolerance > 0 ? "answer" : "refusal",
+                 outcome.refused ? "refusal" : "answer",
+                 outcome.refused ? "" : fmt::format("{:.2e}", outcome.error),
+                 hard.tolerance > 0 ? fmt::format("{:g}", hard.tolerance) : "",
+                 outcome.good ? "yes" : "no", fmt::format("{:.2f}", outcome.seconds),
+                 outcome.message});
+    }
+  }
+  return all_good;
+}
+
 }  // namespace
 
 void add_accuracy(CLI::App& program) {
@@ -148,8 +188,28 @@ void add_accuracy(CLI::App& program) {
   CLI::App* page = command->add_subcommand("page", "Write the page from the table accuracy.csv");
   page->add_option("--results", *results, "Folder of the table")->capture_default_str();
   page->add_option("--out", *out, "The page")->capture_default_str();
-  command->callback(
-      [=] { page->parsed() ? write_accuracy_page(*results, *out) : measure(*options); });
+  auto hard_options = std::make_shared<HardOptions>();
+  CLI::App* hard = command->add_subcommand(
+      "hard", "Cases that are hard to keep stable: each answered, or refused with its cause");
+  std::string hard_names = "Which, of:";
+  for (const HardCase& c : hard_cases()) hard_names += fmt::format("\n{}: {}", c.name, c.what);
+  hard->add_option("cases", hard_options->cases, hard_names);
+  hard->add_option("--device", hard_options->device, device_help)->capture_default_str();
+  hard->add_option("--precision", hard_options->precisions, "double, mixed, float")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"double", "mixed", "float"}))
+      ->capture_default_str();
+  hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
+  hard->add_option("--csv", hard_options->csv, "Also write the table to this file");
+  hard->add_flag("--force", hard_options->force, "Replace the CSV file");
+  command->callback([=] {
+    if (page->parsed()) return write_accuracy_page(*results, *out);
+    if (!hard->parsed()) return measure(*options);
+    if (!measure_hard(*hard_options)) {
+      throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");
+    }
+  });
 }
 
 }  // namespace phyxel::app

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "accuracy/accuracy.hpp"
+#include "accuracy/hard_cases.hpp"
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
@@ -80,10 +81,61 @@ class AccuracyPage {
         section(c, quantity);
       }
     }
+    hard_section();
     return text_;
   }
 
  private:
+  /// What a table of `phyxel accuracy hard` says of a case, precision by precision.
+  static std::string found_in(const CsvTable& t, const std::string& name) {
+    std::string text;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      if (t.text(r, "case") != name) continue;
+      const bool refused = t.text(r, "found") == "refusal";
+      text += fmt::format("{}{} {}{}", text.empty() ? "" : "; ", t.text(r, "precision"),
+                          refused ? "refused" : t.text(r, "error"),
+                          t.text(r, "good") == "yes" ? "" : " **(wrong)**");
+    }
+    return text.empty() ? "not run" : text;
+  }
+  static std::string refusal_in(const CsvTable& t, const std::string& name) {
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      if (t.text(r, "case") == name && !t.text(r, "message").empty()) return t.text(r, "message");
+    }
+    return "";
+  }
+
+  void hard_section() {
+    const std::pair<const char*, const char*> files[] = {{"CPU", "hard_cases_cpu.csv"},
+                                                         {"GPU", "hard_cases_gpu.csv"}};
+    std::vector<std::string> columns{"case", "what", "allowed"};
+    std::vector<CsvTable> tables;
+    std::string measured;
+    for (const auto& [device, file] : files) {
+      if (!fs::exists(results_ / file)) continue;
+      const CsvTable& t = tables.emplace_back(read_csv(results_ / file));
+      columns.push_back(device);
+      measured += fmt::format("{}: {} on {}; {}; {}. ", device, t.fact("program"),
+                              t.fact("hardware"), t.fact("compiler"), t.fact("date"));
+    }
+    if (tables.empty()) return;
+    std::vector<std::vector<std::string>> cells;
+    std::string refusals;
+    for (const HardCase& hard : hard_cases()) {
+      auto& row = cells.emplace_back(std::vector<std::string>{
+          hard.name, hard.what,
+          hard.tolerance > 0 ? fmt::format("{:g}", hard.tolerance) : "refusal"});
+      for (const CsvTable& t : tables) row.push_back(found_in(t, hard.name));
+      const std::string refusal = refusal_in(tables[0], hard.name);
+      if (!refusal.empty()) refusals += fmt::format("- {}: {}\n", hard.name, refusal);
+    }
+    text_ += fmt::format(
+        "## Hard cases\n\nFrom `phyxel accuracy hard`: each is answered within what is allowed, or "
+        "refused with its cause. {}\n\n",
+        measured);
+    text_ += table_text(columns, cells);
+    if (!refusals.empty()) text_ += "\nWhat refusals say:\n\n" + refusals;
+  }
   void section(const AccuracyCase& c, const std::string& quantity) {
     text_ += fmt::format("## {}: {}\n\n{}\n\n", c.name, quantity, c.what);
     std::vector<std::size_t> rows;

@@ -12,6 +12,8 @@
 namespace phyxel::app {
 namespace {
 
+using Placement = ShapeRequest::Placement;
+
 /// A model and its equilibrium.
 struct Rest {
   Cloud cloud;
@@ -29,10 +31,10 @@ struct Rest {
 
 /// @param change what is to be done with the model first
 template <class Change>
-Rest rest_of(const Scene& scene, Change&& change) {
+Rest rest_of(const Scene& scene, Cloud cloud, Change&& change) {
   Rest rest;
   const auto begin = Clock::now();
-  rest.cloud = make_cloud(scene.bodies[0]);
+  rest.cloud = std::move(cloud);
   rest.model = build_model(scene, std::span(&rest.cloud, 1));
   change(rest.model);
   const auto backend = make_cpu_backend(rest.model, Precision::double_);
@@ -44,6 +46,10 @@ Rest rest_of(const Scene& scene, Change&& change) {
   rest.solution.phyxels = rest.model.size();
   rest.solution.neighbours = static_cast<double>(rest.model.pairs()) / rest.model.size();
   return rest;
+}
+template <class Change>
+Rest rest_of(const Scene& scene, Change&& change) {
+  return rest_of(scene, make_cloud(scene.bodies[0]), std::forward<Change>(change));
 }
 Rest rest_of(const Scene& scene) {
   return rest_of(scene, [](Model&) {});
@@ -71,8 +77,7 @@ Solution patch(const Discretisation& d) {
   Scene scene = bar(d, 1, 1);
   double largest = 0;
   Rest rest = rest_of(scene, [&](Model& model) {
-    const double layer =
-        d.placement == ShapeRequest::Placement::nodes ? 0.1 / d.across : 1.5 / d.across;
+    const double layer = d.placement == Placement::nodes ? 0.1 / d.across : 1.5 / d.across;
     Vec3d low = model.position[0], high = low;
     for (const Vec3d& x : model.position) {
       low = {std::min(low.x, x.x), std::min(low.y, x.y), std::min(low.z, x.z)};
@@ -188,6 +193,57 @@ Solution elastica(const Discretisation& d) {
   return with(std::move(rest), {{"down", down, 0.493457}, {"back", back, 0.160642}});
 }
 
+/// Cook's panel, 48 by 44 to 16, three layers of phyxels between smooth walls: displacements along
+/// y of the middle of the right side and of its upper corner, times E over the force on a unit of
+/// thickness.
+std::pair<double, double> cook_of(const Discretisation& d, double poisson, Solution& total) {
+  constexpr double length = 48, left = 44, strain = 1e-5;
+  const double spacing = left / d.across, thickness = 2 * spacing;
+  Discretisation lattice = d;
+  Scene scene = bar(lattice, length, left, poisson);
+  BodyRequest& body = scene.bodies[0];
+  body.source.shape.size.z = thickness;
+  Cloud cloud = make_cloud(body);
+  const double shift = d.placement == Placement::nodes ? 0 : 0.5 * spacing;
+  const auto height = [](double x) { return left - 28 * x / length; };
+  const auto mapped = [&](Vec3d p) {
+    const double x = p.x - shift;
+    return Vec3d{x, left * x / length + (p.y / left + 0.5) * height(x), p.z};
+  };
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    cloud.volume[i] *= height(cloud.position[i].x - shift) / left;
+    cloud.position[i] = mapped(cloud.position[i]);
+  }
+  for (Vec3d& p : cloud.surface.position) p = mapped(p);
+  body.fixed.push_back({.select = {.all = true}, .axes = {.x = false, .y = false, .z = true}});
+  body.fixed.push_back({.select = {.region = "x-"}, .axes = {.x = true, .y = true, .z = false}});
+  body.loads.push_back({.select = {.region = "x+"}, .force = {0, strain * E * thickness, 0}});
+  Rest rest = rest_of(scene, std::move(cloud), [](Model&) {});
+  double highest = -1, corner = 0, at_corner = 0;
+  for (const Index i : rest.cloud.regions.at("x+")) {
+    const double y = rest.model.position[i].y, u = rest.found.state.displacement[i].y;
+    if (y > highest + 1e-6) highest = y, corner = at_corner = 0;
+    if (y > highest - 1e-6) corner += u, ++at_corner;
+  }
+  total.phyxels = rest.solution.phyxels;
+  total.neighbours = rest.solution.neighbours;
+  total.evaluations += rest.solution.evaluations;
+  total.seconds += rest.solution.seconds;
+  total.setup_seconds += rest.solution.setup_seconds;
+  return {rest.moved("x+").y / strain, corner / at_corner / strain};
+}
+
+Solution cook(const Discretisation& d) {
+  Solution solution;
+  const auto [side, corner] = cook_of(d, 0.3, solution);
+  const auto [soft_side, soft_corner] = cook_of(d, 0.499, solution);
+  solution.found = {{"side, ν = 0.3", side, 22.01224},
+                    {"corner, ν = 0.3", corner, 23.05673},
+                    {"side, ν = 0.499", soft_side, 18.58810},
+                    {"corner, ν = 0.499", soft_corner, 19.45008}};
+  return solution;
+}
+
 }  // namespace
 
 std::vector<AccuracyCase> static_cases() {
@@ -219,6 +275,13 @@ std::vector<AccuracyCase> static_cases() {
        "without thickness, which shear and stretch would bend 0.3% more.",
        {4, 6, 8},
        elastica},
+      {"cook",
+       "Cook's membrane in plane strain: a panel that tapers from 44 to 16 over a length of 48, "
+       "clamped at its left side, under a shear on its right side of which displacements are told, "
+       "in units of force over E. Reference: finite elements of quadratic displacements and linear "
+       "pressure, 128 × 128 of them, graded towards all corners and extrapolated; ± 0.0002%.",
+       {11, 22},
+       cook},
   };
 }
 

@@ -35,6 +35,9 @@ std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
 /// Volume enclosed by a closed surface [m^3] (divergence theorem); negative if inside out.
 double enclosed_volume(const Surface& surface);
 
+/// Puts phyxel order[k] at place k; regions follow.
+void reorder(Cloud& cloud, const std::vector<Index>& order);
+
 /// Reorders the phyxels along a Morton (Z-order) curve, so that neighbours in space are
 /// neighbours in memory; regions follow. Every generator and sampler ends with this.
 void order_along_curve(Cloud& cloud);

@@ -19,7 +19,7 @@ enum class Law { hooke, neo_hooke, corotated };
 /// Strain and law in one.
 enum class Elasticity { green_hooke, cauchy_hooke, neo_hooke, corotated };
 
-/// Isotropic elastic material, one per body.
+/// Isotropic elastic material.
 struct Material {
   double young = 0;               ///< Young's modulus E [Pa], > 0.
   double poisson = 0;             ///< Poisson's ratio, -1 < nu < 0.5.
@@ -27,10 +27,11 @@ struct Material {
   Strain strain = Strain::green;  ///< Of Hooke's law.
   Law law = Law::hooke;
   double volume_stiffness =
-      0;                 ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
-  double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
-  double hourglass = 0;  ///< Strength α of hourglass control, in shares of E; 0: none. Needs one
-                         ///< support for the body.
+      0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
+  double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
+  /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
+  /// support for the body.
+  double hourglass = 0;
 
   Elasticity elasticity() const {
     if (law == Law::neo_hooke) return Elasticity::neo_hooke;

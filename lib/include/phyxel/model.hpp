@@ -20,24 +20,26 @@ struct ListLengths {
   Index fewest = 0, most = 0;
 };
 
-/// One body of the model: phyxels [begin, end), surfels [surfel_begin, surfel_end). In a rank's
-/// share, the last `ghosts` phyxels are stepped elsewhere, and stresses of the last `far_ghosts`
-/// are not found here.
+/// What is of one material in one body: phyxels [begin, end), surfels [surfel_begin, surfel_end).
+/// Most bodies are one part; those with inclusions are several, side by side, of which the first
+/// has the surfels. In a rank's share, the last `ghosts` phyxels are stepped elsewhere, and
+/// stresses of the last `far_ghosts` are not found here.
 struct Part {
   std::string name;
+  Index body = 0;  ///< Which body of the scene it belongs to.
   Index begin = 0, end = 0;
   Index ghosts = 0, far_ghosts = 0;
   Index surfel_begin = 0, surfel_end = 0;
   Material material;
   std::string neighbourhood;    ///< The rule in words, for summaries.
-  ListLengths lists;            ///< Of the whole body.
+  ListLengths lists;            ///< Of the whole part.
   double closure = 0;           ///< As `BodyRequest::closure`.
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
-  Index size = 0;               ///< Phyxels of the whole body.
-  Index surfels = 0;            ///< Surfels of the whole body.
-  Vec3d origin;                 ///< Its first phyxel at rest [m]: solvers count positions from it.
-  double mass = 0, volume = 0;  ///< Of the whole body [kg, m³].
-  Vec3d centre;                 ///< Of its mass, at rest [m].
+  Index size = 0;               ///< Phyxels of the whole part.
+  Index surfels = 0;            ///< Surfels of the whole part.
+  Vec3d origin;                 ///< Its body's first phyxel at rest [m]: solvers count from it.
+  double mass = 0, volume = 0;  ///< Of the whole part [kg, m³].
+  Vec3d centre;                 ///< Of its body's mass, at rest [m].
 
   Index owned_end() const { return end - ghosts; }
 };
@@ -52,18 +54,31 @@ struct Degenerate {
   std::string describe() const;  ///< Counts and the first few indices of each kind.
 };
 
+/// Where a motion has phyxels go, by where they are at rest.
+struct Path {
+  Vec3d displacement;  ///< [m]
+  Mat3d turn{};        ///< A rotation less the identity.
+  Vec3d about;         ///< What it leaves in place [m].
+  Vec3d at(Vec3d rest) const { return displacement + turn * (rest - about); }  ///< [m]
+};
+
 /// Phyxels that follow a path along some axes. Fixed phyxels are a motion with every term zero.
 struct Motion {
   std::vector<Index> phyxels;
   Vec3d displacement{};
+  Vec3d rotation{};  ///< Axis times angle [rad].
+  Vec3d about{};
   double duration = 0;
   Vec3d velocity{};
   Vec3d amplitude{};
   double frequency = 0;
   Axes axes{};
-  Vec3d displacement_at(double time) const;  ///< [m]
+  Path path_at(double time) const;
+  /// Of displacement and rotation, so much of the way.
+  Path path_after(double share) const;
   bool stands_still() const {
-    return displacement == Vec3d{} && velocity == Vec3d{} && amplitude == Vec3d{};
+    return displacement == Vec3d{} && rotation == Vec3d{} && velocity == Vec3d{} &&
+           amplitude == Vec3d{};
   }
   /// Of a phyxel that was at `free` if nothing moved it: `path` along the axes of this motion.
   Vec3d along_axes(Vec3d path, Vec3d free) const {
@@ -90,8 +105,8 @@ struct Surfels {
 };
 
 /// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never
-/// neighbour each other. Immutable after `build_model`; host memory, double precision. Neighbour
-/// lists and moments are empty where a `Surveyor` left them to its device.
+/// neighbour each other; parts of a body do. Immutable after `build_model`; host memory, double
+/// precision. Neighbour lists and moments are empty where a `Surveyor` left them to its device.
 struct Model {
   std::vector<Part> parts;
   std::vector<Vec3d> position;  ///< Rest positions X [m], shape [n, 3].
@@ -111,6 +126,10 @@ struct Model {
   std::shared_ptr<const Share> share;  ///< Null: this is the whole model.
 
   Index size() const { return static_cast<Index>(position.size()); }
+  /// Whether a body has more than one part.
+  bool has_inclusions() const;
+  /// All parts of the body of a part of this model.
+  std::span<const Part> parts_of_body(const Part& part) const;
   /// Phyxels of the whole model.
   Index whole_size() const { return share ? share->whole : size(); }
   Index whole_surfels() const;

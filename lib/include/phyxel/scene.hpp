@@ -59,6 +59,12 @@ struct Axes {
   bool operator==(const Axes&) const = default;
 };
 
+/// Phyxels of another material than their body's.
+struct InclusionRequest {
+  Selection select;
+  Material material;
+};
+
 /// Phyxels held where they are.
 struct FixRequest {
   Selection select;
@@ -67,11 +73,13 @@ struct FixRequest {
 
 /// Phyxels moved along a given path:
 /// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency
-/// t).
+/// t), turned about a point by rotation * smoothstep(t / duration).
 struct MotionRequest {
   Selection select;
   Vec3d displacement;    ///< [m]
-  double duration = 0;   ///< [s], 0: at once is refused when displacement is not zero
+  Vec3d rotation;        ///< Axis times angle [degrees]; any number of turns.
+  Vec3d about;           ///< A point of that axis [m].
+  double duration = 0;   ///< [s]; of displacement and rotation
   Vec3d velocity;        ///< [m/s]
   Vec3d amplitude;       ///< [m]
   double frequency = 0;  ///< [Hz]
@@ -114,6 +122,8 @@ struct BodyRequest {
   /// miss, as a share of the surface's areas; 0: as they come. Needs a closed surface and one
   /// support for the body.
   double closure = 0;
+  /// Of those that hold a phyxel, the last counts. Strength of hourglass control is the body's.
+  std::vector<InclusionRequest> inclusions;
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;

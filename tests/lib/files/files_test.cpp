@@ -114,7 +114,7 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     EXPECT_EQ(back.info.total_energy, info.total_energy);
     EXPECT_EQ(back.info.initial_energy, info.initial_energy);
     EXPECT_EQ(back.info.frames_written, info.frames_written);
-    EXPECT_EQ(back.info.version, 1);
+    EXPECT_EQ(back.info.version, 2);
   }
 }
 

@@ -213,6 +213,79 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
               ::testing::IsSupersetOf({"loads", "inverse neighbour lists"}));
 }
 
+/// Phyxels are sorted by material, the body's own first; where inclusions overlap, the last counts;
+/// selections by number mean the cloud's, before that.
+TEST(Inclusions, HaveMaterialsOfTheirOwn) {
+  Scene scene = one_body();
+  const Cloud cloud = lattice(4, 2, 2, 0.1);  // phyxel i is in column i % 4 along x
+  BodyRequest& body = scene.bodies[0];
+  body.spin = {0, 0, 1};
+  Material hard = body.material, heavy = body.material;
+  hard.young = 7e5;
+  heavy.density = 3000;
+  body.inclusions = {
+      {.select = {.box = Selection::Box{{0.2, -1, -1}, {1, 1, 1}}}, .material = hard},
+      {.select = {.box = Selection::Box{{0.3, -1, -1}, {1, 1, 1}}}, .material = heavy}};
+  body.fixed.push_back({.select = {.indices = std::vector<Index>{3, 4}}});
+  const Model model = model_of(scene, cloud);
+  ASSERT_EQ(model.parts.size(), 3u);
+  EXPECT_TRUE(model.has_inclusions());
+  EXPECT_EQ(model.parts[0].end, 8);
+  EXPECT_EQ(model.parts[1].end, 12);
+  EXPECT_EQ(model.parts[1].material.young, 7e5);
+  EXPECT_EQ(model.parts[2].name, "body, inclusion 2");
+  EXPECT_NEAR(model.parts[0].mass, 8, 1e-12);
+  EXPECT_NEAR(model.parts[2].mass, 12, 1e-12);
+  for (Index i = 0; i < model.size(); ++i) {
+    const double x = model.position[i].x;
+    EXPECT_EQ(x < 0.2, i < 8);
+    EXPECT_EQ(x > 0.3, i >= 12);
+  }
+  ASSERT_EQ(model.motions[0].phyxels.size(), 2u);
+  EXPECT_EQ(model.position[model.motions[0].phyxels[0]], cloud.position[4]);
+  EXPECT_EQ(model.position[model.motions[0].phyxels[1]], cloud.position[3]);
+  // All turn about the mass centre of the body, (0.05 4 + 0.15 4 + 0.25 4 + 0.35 12) / 24 along x.
+  for (const Part& part : model.parts) EXPECT_NEAR(part.centre.x, 0.25, 1e-12);
+}
+
+TEST(Inclusions, OfNothingOrOfAllAreRefused) {
+  Scene scene = one_body();
+  const Cloud cloud = lattice(2, 2, 2, 0.1);
+  scene.bodies[0].inclusions = {
+      {.select = {.box = Selection::Box{{5, 5, 5}, {6, 6, 6}}, .where = "a.toml:7:1"},
+       .material = rubber()}};
+  const auto message = [&] {
+    try {
+      model_of(scene, cloud);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(message(), HasSubstr("a.toml:7:1"));
+  scene.bodies[0].inclusions[0].select = {.all = true, .where = "a.toml:8:1"};
+  EXPECT_THAT(message(), HasSubstr("no phyxel is left of its own material"));
+  scene.bodies[0].volume_rule = VolumeRule::kernel;
+  scene.bodies[0].inclusions[0].select = {.indices = std::vector<Index>{0}, .where = "a.toml:9:1"};
+  EXPECT_THAT(message(), HasSubstr("volumes = \"geometry\""));
+}
+
+/// One entry for each axis of a phyxel.
+TEST(Selection, EntriesMayShareAPhyxelAlongOtherAxes) {
+  Scene scene = one_body();
+  const Cloud cloud = lattice(3, 3, 3, 0.1);
+  auto& fixed = scene.bodies[0].fixed;
+  fixed = {{.select = {.all = true}, .axes = {.x = false, .y = false, .z = true}},
+           {.select = {.indices = std::vector<Index>{0, 1}},
+            .axes = {.x = true, .y = true, .z = false}}};
+  const Model model = model_of(scene, cloud);
+  EXPECT_EQ(model.motions.size(), 2u);
+  const std::vector<char> held = held_phyxels(model);  // along all axes by one entry
+  EXPECT_EQ(std::count(held.begin(), held.end(), 1), 0);
+  fixed[1].axes.z = true;
+  EXPECT_THROW(model_of(scene, cloud), InputError);
+}
+
 TEST(Model, FarFromTheOriginFloatLosesNothing) {
   // A million metres away: displacements and offsets are relative, so float forces agree with
   // those at the origin to the rounding of positions in double, 1e-10 m over 0.1 m.

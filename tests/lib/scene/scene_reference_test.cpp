@@ -75,8 +75,8 @@ TEST_F(SceneFiles, DocumentedDefaultsAreTheDefaults) {
       defaults_of("solver") + "[output]\n" + defaults_of("output") + "[render]\n" +
       defaults_of("render") + lattice + defaults_of("body", {"relaxations"}) + material +
       defaults_of("body.material") + "[body.neighbours]\n" + defaults_of("body.neighbours") +
-      motion + defaults_of("body.motion", {"displacement", "amplitude"}) + load +
-      defaults_of("body.load", {"force_density"}) + mesh +
+      motion + defaults_of("body.motion", {"displacement", "rotation", "about", "amplitude"}) +
+      load + defaults_of("body.load", {"force_density"}) + mesh +
       defaults_of("body", {"lattice", "jitter", "surfels"}) + material;
   const fs::path file = folder_ / "s.toml";
   EXPECT_EQ(digest(parse_scene(without, file)), digest(parse_scene(with, file)));

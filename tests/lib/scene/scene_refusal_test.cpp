@@ -56,7 +56,10 @@ const std::vector<Malformed>& malformed() {
       {"a = [[[[[[[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]]]]]]]\n", "1:", "not valid TOML"},
       {"[a.b.c.d.e.f.g.h.i.j.k.l.m.n.o.p.q.r]\n", "1:33", "a key of more than 16 parts"},
       // At the top
-      {"", "1:1", "key time: missing; needed: [time]"},
+      {"", "1:1", "key body: missing; needed: [[body]], once or more"},
+      {dino, "1:1", "key time: missing; needed: [time]"},
+      {time_section + "[solver]\nmethod = 'implicit'\nprecision = 'float'\n" + dino, "5:13",
+       "\"float\" found; allowed with method = \"implicit\": \"double\""},
       {time_section, "1:1", "key body: missing; needed: [[body]], once or more"},
       {on_top("gravty = [0, 0, 1]"), "1:1", "unknown (did you mean \"gravity\"?)"},
       {on_top("k_v = 3"), "1:1", "key k_v: unknown; allowed at the top of the file: title"},
@@ -304,7 +307,7 @@ TEST_F(SceneFiles, UnreadableFilesAreNamed) {
       (folder_ / "no.toml").string() + ": cannot read the scene file: No such file or directory");
   EXPECT_THAT(message(folder_), StartsWith(folder_.string() + ": a folder found"));
   EXPECT_THAT(message(folder_ / std::string(300, 'x')), HasSubstr("File name too long"));
-  EXPECT_THAT(message(write("empty.toml")), HasSubstr("empty.toml:1:1: key time: missing"));
+  EXPECT_THAT(message(write("empty.toml")), HasSubstr("empty.toml:1:1: key body: missing"));
   EXPECT_THAT(message("/dev/zero"), StartsWith("/dev/zero: more than 2 MB found"));
 }
 

@@ -211,6 +211,36 @@ TEST(Motion, FollowsItsPath) {
   }
 }
 
+/// A smooth step of two turns about an axis beside the body, and more: positions are set.
+TEST(Motion, TurnsAboutAnAxis) {
+  Scene scene = one_body();
+  MotionRequest request;
+  request.select.all = true;
+  request.rotation = {0, 0, 720};
+  request.about = {0.5, 0, 0};
+  request.displacement = {0, 0, 0.1};
+  request.duration = 0.1;
+  scene.bodies[0].motions.push_back(request);
+  const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
+  for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
+    const auto backend = make_test_backend(model, precision);
+    Solver solver(*backend, initial_state(model, scene, 1e-4));
+    for (int s = 0; s < 730; ++s) solver.step();
+    const double smooth = 0.73 * 0.73 * (3 - 2 * 0.73), angle = 4 * std::numbers::pi * smooth;
+    const State state = solver.state();
+    const double tolerance = precision == Precision::single ? 1e-6 : 1e-14;
+    for (Index i = 0; i < model.size(); ++i) {
+      const Vec3d x = model.position[i], y = x + state.displacement[i];
+      EXPECT_NEAR(y.x, 0.5 + std::cos(angle) * (x.x - 0.5) - std::sin(angle) * x.y, tolerance);
+      EXPECT_NEAR(y.y, std::sin(angle) * (x.x - 0.5) + std::cos(angle) * x.y, tolerance);
+      EXPECT_NEAR(y.z, x.z + 0.1 * smooth, tolerance);
+    }
+    // Nothing is strained, but by rounding; of gradients in float, where forces are.
+    EXPECT_LT(diagnose(model, *backend, solver.now()).strain_energy,
+              precision == Precision::double_ ? 1e-20 : 1e-6);
+  }
+}
+
 /// Held along z, a body falls freely along x: in steps of every precision.
 TEST(Motion, RollersHoldAlongTheirAxesOnly) {
   Scene scene = one_body();
