@@ -12,6 +12,8 @@
 namespace phyxel {
 namespace {
 
+constexpr double on_the_way = 1e-2;  // residual, at which the next stage may begin
+
 /// Gravity and loads at their full size; targets are still to be set.
 Balance whole_balance(const Model& model, const OwnedVectors& vectors) {
   Balance balance;
@@ -75,7 +77,7 @@ void refuse_free_fall(const Balance& balance, const OwnedVectors& vectors) {
 
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
-  Newton newton(model, backend, options.tolerance, options.most_steps);
+  Newton newton(model, backend, options.most_steps);
   Balance balance = whole_balance(model, newton.vectors());
   refuse_free_fall(balance, newton.vectors());
   Equilibrium found;
@@ -85,7 +87,10 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   const int stages = stages_of(model);
   for (int stage = 1; stage <= stages; ++stage) {
     set_targets(model, static_cast<double>(stage) / stages, balance);
-    report = newton.solve(balance, found.state.displacement);
+    const bool last = stage == stages;
+    report =
+        newton.solve(balance, last ? options.tolerance : std::max(options.tolerance, on_the_way),
+                     found.state.displacement);
     found.steps += report.steps;
     found.evaluations += report.evaluations;
     if (!report.found) break;

@@ -17,7 +17,7 @@ const double share_of_step = 1 - std::sqrt(0.5);  // γ
 }  // namespace
 
 ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
-    : model_(model), newton_(model, backend, tolerance, most_newton_steps) {
+    : model_(model), newton_(model, backend, most_newton_steps) {
   const OwnedVectors& vectors = newton_.vectors();
   balance_.target = vectors.make();
   balance_.centre = vectors.make();
@@ -75,7 +75,7 @@ void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector&
                          (model_.mass[i] / s) * by_components(balance_.free[i], v[i]);
                      return dot(force, force);
                    }));
-  const NewtonReport report = newton_.solve(balance_, u);
+  const NewtonReport report = newton_.solve(balance_, tolerance, u);
   work_.steps += report.steps;
   work_.evaluations += report.evaluations + 2;
   work_.residual = std::max(work_.residual, report.residual);

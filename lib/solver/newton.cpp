@@ -20,15 +20,14 @@ Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
 
 }  // namespace
 
-Newton::Newton(const Model& model, Backend& backend, double tolerance, int most_steps)
+Newton::Newton(const Model& model, Backend& backend, int most_steps)
     : model_(model),
       backend_(backend),
-      tolerance_(tolerance),
       most_steps_(most_steps),
       vectors_(model, std::max(1, backend.threads())),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
-NewtonReport Newton::solve(const Balance& balance, Vector& u) {
+NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
   NewtonReport report;
   evaluations_ = 0;
   find_stiffness(balance);
@@ -39,7 +38,7 @@ NewtonReport Newton::solve(const Balance& balance, Vector& u) {
     report.evaluations = evaluations_;
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
-    report.found = report.residual <= tolerance_ && to_move == 0;
+    report.found = report.residual <= tolerance && to_move == 0;
     if (report.found || report.steps == most_steps_ || !std::isfinite(report.residual)) {
       return report;
     }

@@ -41,10 +41,11 @@ class Newton {
   using Vector = OwnedVectors::Vector;
 
   /// @param backend of the model, in double; both must outlive this
-  Newton(const Model& model, Backend& backend, double tolerance, int most_steps);
+  Newton(const Model& model, Backend& backend, int most_steps);
 
   /// From u to the nearest balance downhill. The backend is left somewhere near. Collective.
-  NewtonReport solve(const Balance& balance, Vector& u);
+  /// @param tolerance of the residual
+  NewtonReport solve(const Balance& balance, double tolerance, Vector& u);
 
   /// Inner forces at u [N].
   Vector inner_forces(const Vector& u);
@@ -63,7 +64,6 @@ class Newton {
 
   const Model& model_;
   Backend& backend_;
-  double tolerance_;
   int most_steps_;
   OwnedVectors vectors_;
   double difference_;              ///< How far stiffness moves phyxels at most [m].

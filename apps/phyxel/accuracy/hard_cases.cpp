@@ -452,19 +452,20 @@ std::vector<HardCase> hard_cases() {
        "A bar whose second half is a million times stiffer, stretched: where its "
        "middle goes.",
        0.02, true, false, contrast},
-      {"flattened, Hooke",
+      {"flattened (Hooke)",
        "A block pressed to a tenth and let go: this law gives way there, so it "
        "is refused.",
        0, false, false, flattened_hooke},
-      {"flattened, neo-Hookean", "The same, in a quarter of the step: energy that is left at rest.",
-       1e-3, false, false, flattened_neo},
-      {"flattened, corotated", "The same, in usual steps.", 1e-3, false, false,
+      {"flattened (neo-Hookean)",
+       "The same, in a quarter of the step: energy that is left at rest.", 1e-3, false, false,
+       flattened_neo},
+      {"flattened (corotated)", "The same, in usual steps.", 1e-3, false, false,
        flattened_corotated},
-      {"inside out, neo-Hookean",
+      {"inside out (neo-Hookean)",
        "A block that is its own mirror image, let go: energy that is left "
        "at rest.",
        1e-3, false, false, inside_out_neo},
-      {"inside out, corotated", "The same.", 1e-3, false, false, inside_out_corotated},
+      {"inside out (corotated)", "The same.", 1e-3, false, false, inside_out_corotated},
       {"three turns",
        "A column, neo-Hookean, stretched by a fifth, one end turned three times: "
        "its middle turns by half of that.",

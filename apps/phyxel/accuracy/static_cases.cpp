@@ -237,10 +237,10 @@ Solution cook(const Discretisation& d) {
   Solution solution;
   const auto [side, corner] = cook_of(d, 0.3, solution);
   const auto [soft_side, soft_corner] = cook_of(d, 0.499, solution);
-  solution.found = {{"side, ν = 0.3", side, 22.01224},
-                    {"corner, ν = 0.3", corner, 23.05673},
-                    {"side, ν = 0.499", soft_side, 18.58810},
-                    {"corner, ν = 0.499", soft_corner, 19.45008}};
+  solution.found = {{"side at ν = 0.3", side, 22.01224},
+                    {"corner at ν = 0.3", corner, 23.05673},
+                    {"side at ν = 0.499", soft_side, 18.58810},
+                    {"corner at ν = 0.499", soft_corner, 19.45008}};
   return solution;
 }
 
