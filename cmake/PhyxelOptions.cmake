@@ -47,10 +47,11 @@ function(phyxel_configure_test name)
     RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
 endfunction()
 
-# phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds] [PREFIX p]):
-# a GoogleTest program, one ctest entry a case.
+# phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds] [PREFIX p]
+# [WHOLE]): a GoogleTest program, one ctest entry a case; or one for all of them, which then share
+# what is costly to make.
 function(phyxel_add_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT;PREFIX" "LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "WHOLE" "TIMEOUT;PREFIX" "LIBRARIES;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 300)
   endif()
@@ -64,6 +65,11 @@ function(phyxel_add_test name)
     foreach(label IN LISTS arg_LABELS)
       add_dependencies(phyxel_${label}_tests ${name})
     endforeach()
+  endif()
+  if(arg_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES ${properties} TIMEOUT 900)
+    return()
   endif()
   gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
 endfunction()

@@ -113,6 +113,25 @@ TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
   EXPECT_EQ(run({"accuracy", "page", "--results", "nowhere"}).code, 2);
 }
 
+/// A study's table becomes a section; the errors of its steps fall.
+TEST_F(AccuracyCommand, StudiesStepsAndHardCases) {
+  EXPECT_EQ(run({"accuracy", "rotation", "--across", "2", "--csv", "accuracy.csv"}).code, 0);
+  const auto steps = run({"accuracy", "steps", "--csv", "accuracy_steps.csv"});
+  EXPECT_EQ(steps.code, 0) << steps.err;
+  EXPECT_THAT(steps.out, HasSubstr("way,step_s,error"));
+  const auto hard = run({"accuracy", "hard", "step 1.01", "lone phyxel", "--precision", "float",
+                         "--csv", "hard_cases_cpu.csv"});
+  EXPECT_EQ(hard.code, 0) << hard.err;
+  EXPECT_THAT(hard.out, HasSubstr("step 1.01,float,refusal,refusal"));
+  const auto page = run({"accuracy", "page", "--results", ".", "--out", "page.md"});
+  EXPECT_EQ(page.code, 0) << page.err;
+  const std::string text = test::text_of(folder_ / "page.md");
+  EXPECT_THAT(text, HasSubstr("## steps"));
+  EXPECT_THAT(text, HasSubstr("| implicit | 0.0025 |"));
+  EXPECT_THAT(text, HasSubstr("float refused"));
+  EXPECT_THAT(text, HasSubstr("not run"));
+}
+
 /// Each is answered within its tolerance or refused, as it should be; those that take minutes are
 /// in docs/accuracy.md.
 void expect_good(const app::Machine& machine) {

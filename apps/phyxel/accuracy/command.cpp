@@ -10,6 +10,7 @@
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
 #include "accuracy/page.hpp"
+#include "accuracy/studies.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
 #include "phyxel/error.hpp"
@@ -147,6 +148,20 @@ bool measure_hard(const HardOptions& options) {
   return all_good;
 }
 
+struct StudyOptions {
+  std::string csv;
+  bool force = false;
+};
+
+void measure_study(const Study& study, const StudyOptions& options) {
+  PrintedTable table(options.csv, options.force,
+                     {"way", study.x, "error", "evaluations", "seconds"});
+  study.measure([&](const StudyRow& row) {
+    table.row({row.way, fmt::format("{:.4g}", row.x), fmt::format("{:.3e}", row.error),
+               std::to_string(row.evaluations), fmt::format("{:.4g}", row.seconds)});
+  });
+}
+
 }  // namespace
 
 void add_accuracy(CLI::App& program) {
@@ -203,7 +218,17 @@ void add_accuracy(CLI::App& program) {
   hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
   hard->add_option("--csv", hard_options->csv, "Also write the table to this file");
   hard->add_flag("--force", hard_options->force, "Replace the CSV file");
+  for (const Study& study : studies()) {
+    CLI::App* of_study = command->add_subcommand(study.name, study.what);
+    auto study_options = std::make_shared<StudyOptions>();
+    of_study->add_option("--csv", study_options->csv, "Also write the table to this file");
+    of_study->add_flag("--force", study_options->force, "Replace the CSV file");
+    of_study->callback([=] { measure_study(study, *study_options); });
+  }
   command->callback([=] {
+    for (const Study& study : studies()) {
+      if (command->got_subcommand(study.name)) return;
+    }
     if (page->parsed()) return write_accuracy_page(*results, *out);
     if (!hard->parsed()) return measure(*options);
     if (!measure_hard(*hard_options)) {

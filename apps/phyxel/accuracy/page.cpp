@@ -8,6 +8,7 @@
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
+#include "accuracy/studies.hpp"
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
@@ -81,11 +82,56 @@ class AccuracyPage {
         section(c, quantity);
       }
     }
+    for (const Study& study : studies()) study_section(study);
     hard_section();
     return text_;
   }
 
  private:
+  void study_section(const Study& study) {
+    const fs::path file = results_ / fmt::format("accuracy_{}.csv", study.name);
+    if (!fs::exists(file)) return;
+    const CsvTable t = read_csv(file);
+    text_ += fmt::format("## {}\n\n{} By `phyxel accuracy {}`: {} on {}; {}; {}.\n\n", study.name,
+                         study.what, study.name, t.fact("program"), t.fact("hardware"),
+                         t.fact("compiler"), t.fact("date"));
+    LineChart chart{.title = study.name,
+                    .x_label = study.x_label,
+                    .y_label = "error",
+                    .log_x = true,
+                    .log_y = true,
+                    .curves = {}};
+    std::vector<std::vector<std::string>> cells;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      const std::string way = t.text(r, "way");
+      if (chart.curves.empty() || chart.curves.back().label != way) {
+        auto known = std::find_if(chart.curves.begin(), chart.curves.end(),
+                                  [&](const Curve& c) { return c.label == way; });
+        if (known == chart.curves.end()) {
+          chart.curves.push_back(Curve{way, {}, {}});
+        } else {
+          std::rotate(known, known + 1, chart.curves.end());
+        }
+      }
+      Curve& curve = chart.curves.back();
+      curve.x.push_back(t.number(r, study.by_time ? "seconds" : study.x));
+      curve.y.push_back(std::max(1e-17, t.number(r, "error")));
+      cells.push_back({way, t.text(r, study.x), t.text(r, "error"), t.text(r, "evaluations"),
+                       t.text(r, "seconds")});
+    }
+    draw(chart, "accuracy_" + study.name);
+    text_ += table_text({"", study.x, "error", "evaluations", "s"}, cells);
+    text_ += "\n";
+  }
+  /// Into the results' folder, where it can be drawn; shown where it is there.
+  void draw(const LineChart& chart, const std::string& name) {
+    const fs::path file = results_ / (name + ".svg");
+    if (can_plot()) draw_svg(script_of(chart), file);
+    if (fs::exists(file)) {
+      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_.string(), name);
+    }
+  }
+
   /// What a table of `phyxel accuracy hard` says of a case, precision by precision.
   static std::string found_in(const CsvTable& t, const std::string& name) {
     std::string text;
@@ -194,12 +240,7 @@ class AccuracyPage {
       front.y.push_back(error_of(table_, r));
     }
     chart.curves.push_back(front);
-    const std::string name = fmt::format("accuracy_{}_{}", c.name, charts_++);
-    const fs::path file = results_ / (name + ".svg");
-    if (can_plot()) draw_svg(script_of(chart), file);
-    if (fs::exists(file)) {
-      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_.string(), name);
-    }
+    draw(chart, fmt::format("accuracy_{}_{}", c.name, charts_++));
   }
 
   fs::path results_, link_;
