@@ -483,7 +483,8 @@ class CpuBackend final : public Backend {
   }
   template <class T>
   Records records_of(AlignedVector<T>& array, int size, int first, int count) {
-    return {reinterpret_cast<std::byte*>(array.data() + first), sizeof(T) * size, sizeof(T) * count,
+    T* const begin = array.empty() ? nullptr : array.data() + first;  // a rank may have nothing
+    return {reinterpret_cast<std::byte*>(begin), sizeof(T) * size, sizeof(T) * count,
             layout_.slot_of_phyxel()};
   }
   void refresh(const Records& records) const {
