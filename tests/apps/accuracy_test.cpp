@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ostream>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "accuracy/hard_cases.hpp"
 #include "device.hpp"
@@ -13,6 +16,10 @@
 #include "support/program.hpp"
 
 namespace phyxel {
+namespace app {
+/// For messages of parametrised tests.
+void PrintTo(const HardCase& hard, std::ostream* out) { *out << hard.name; }
+}  // namespace app
 namespace {
 
 using app::AccuracyCase;
@@ -134,25 +141,42 @@ TEST_F(AccuracyCommand, StudiesStepsAndHardCases) {
 
 /// Each is answered within its tolerance or refused, as it should be; those that take minutes are
 /// in docs/accuracy.md.
-void expect_good(const app::Machine& machine) {
-  for (const app::HardCase& hard : app::hard_cases()) {
-    if (hard.is_long || (hard.in_double && machine.precision != Precision::double_)) continue;
+class HardCases : public ::testing::TestWithParam<app::HardCase> {
+ protected:
+  void expect_good(const app::Machine& machine) const {
+    const app::HardCase& hard = GetParam();
+    if (hard.in_double && machine.precision != Precision::double_) return;
     const app::HardOutcome outcome = app::outcome_of(hard, machine);
-    EXPECT_TRUE(outcome.good) << hard.name << ": " << outcome.error << " " << outcome.message;
+    EXPECT_TRUE(outcome.good) << outcome.error << " " << outcome.message;
     EXPECT_EQ(outcome.refused, !outcome.message.empty());
   }
+};
+std::vector<app::HardCase> short_cases() {
+  std::vector<app::HardCase> cases = app::hard_cases();
+  std::erase_if(cases, [](const app::HardCase& c) { return c.is_long; });
+  return cases;
 }
-TEST(HardCases, AreAnsweredOrRefused) { expect_good({app::choose_device("cpu")}); }
-TEST(HardCases, AreAnsweredOrRefusedInFloat) {
-  expect_good({app::choose_device("cpu"), Precision::single});
+INSTANTIATE_TEST_SUITE_P(All, HardCases, ::testing::ValuesIn(short_cases()),
+                         [](const ::testing::TestParamInfo<app::HardCase>& info) {
+                           std::string name = std::to_string(info.index) + "_";
+                           for (const char c : info.param.name) {
+                             const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                                                (c >= '0' && c <= '9');
+                             if (plain) name += c;
+                           }
+                           return name;
+                         });
+TEST_P(HardCases, IsAnsweredOrRefused) {
+  for (const Precision precision : {Precision::double_, Precision::single}) {
+    expect_good({app::choose_device("cpu"), precision});
+  }
 }
-TEST(HardCases, AreAnsweredOrRefusedOnAGpu) {
+TEST_P(HardCases, IsAnsweredOrRefusedOnAGpu) {
   if (cuda_devices().empty()) GTEST_SKIP() << "[  SKIPPED ] no CUDA device";
   for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
     expect_good({app::choose_device("cuda"), precision});
   }
 }
-
 TEST_F(AccuracyCommand, AnswersAnUnknownCaseWithTheNearest) {
   const auto wrong = run({"accuracy", "tensoin"});
   EXPECT_EQ(wrong.code, 2);
