@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <cmath>
 #include <ostream>
 #include <stdexcept>
@@ -160,9 +161,7 @@ INSTANTIATE_TEST_SUITE_P(All, HardCases, ::testing::ValuesIn(short_cases()),
                          [](const ::testing::TestParamInfo<app::HardCase>& info) {
                            std::string name = std::to_string(info.index) + "_";
                            for (const char c : info.param.name) {
-                             const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                                                (c >= '0' && c <= '9');
-                             if (plain) name += c;
+                             if (std::isalnum(static_cast<unsigned char>(c))) name += c;
                            }
                            return name;
                          });
@@ -177,6 +176,7 @@ TEST_P(HardCases, IsAnsweredOrRefusedOnAGpu) {
     expect_good({app::choose_device("cuda"), precision});
   }
 }
+
 TEST_F(AccuracyCommand, AnswersAnUnknownCaseWithTheNearest) {
   const auto wrong = run({"accuracy", "tensoin"});
   EXPECT_EQ(wrong.code, 2);

@@ -225,15 +225,14 @@ void add_accuracy(CLI::App& program) {
     of_study->add_flag("--force", study_options->force, "Replace the CSV file");
     of_study->callback([=] { measure_study(study, *study_options); });
   }
-  command->callback([=] {
-    for (const Study& study : studies()) {
-      if (command->got_subcommand(study.name)) return;
-    }
-    if (page->parsed()) return write_accuracy_page(*results, *out);
-    if (!hard->parsed()) return measure(*options);
+  page->callback([=] { write_accuracy_page(*results, *out); });
+  hard->callback([=] {
     if (!measure_hard(*hard_options)) {
       throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");
     }
+  });
+  command->callback([=] {
+    if (command->get_subcommands().empty()) measure(*options);
   });
 }
 

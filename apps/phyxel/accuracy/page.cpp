@@ -52,6 +52,13 @@ std::vector<std::size_t> front_of(const CsvTable& t, std::vector<std::size_t> ro
   return front;
 }
 
+/// The chart's curve of that label, a new one if there is none.
+Curve& curve_named(LineChart& chart, const std::string& label) {
+  const auto known = std::find_if(chart.curves.begin(), chart.curves.end(),
+                                  [&](const Curve& curve) { return curve.label == label; });
+  return known != chart.curves.end() ? *known : chart.curves.emplace_back(Curve{label, {}, {}});
+}
+
 class AccuracyPage {
  public:
   AccuracyPage(const fs::path& results, const fs::path& page)
@@ -104,16 +111,7 @@ class AccuracyPage {
     std::vector<std::vector<std::string>> cells;
     for (std::size_t r = 0; r < t.rows.size(); ++r) {
       const std::string way = t.text(r, "way");
-      if (chart.curves.empty() || chart.curves.back().label != way) {
-        auto known = std::find_if(chart.curves.begin(), chart.curves.end(),
-                                  [&](const Curve& c) { return c.label == way; });
-        if (known == chart.curves.end()) {
-          chart.curves.push_back(Curve{way, {}, {}});
-        } else {
-          std::rotate(known, known + 1, chart.curves.end());
-        }
-      }
-      Curve& curve = chart.curves.back();
+      Curve& curve = curve_named(chart, way);
       curve.x.push_back(t.number(r, study.by_time ? "seconds" : study.x));
       curve.y.push_back(std::max(1e-17, t.number(r, "error")));
       cells.push_back({way, t.text(r, study.x), t.text(r, "error"), t.text(r, "evaluations"),
@@ -222,15 +220,9 @@ class AccuracyPage {
       if ((table_.number(r, "jitter") > 0) != irregular || !(error > 0) || !std::isfinite(error))
         continue;
       shown.push_back(r);
-      const std::string way = way_of(table_, r);
-      auto curve = std::find_if(chart.curves.begin(), chart.curves.end(),
-                                [&](const Curve& known) { return known.label == way; });
-      if (curve == chart.curves.end()) {
-        chart.curves.push_back(Curve{way, {}, {}});
-        curve = chart.curves.end() - 1;
-      }
-      curve->x.push_back(time_of(table_, r));
-      curve->y.push_back(error_of(table_, r));
+      Curve& curve = curve_named(chart, way_of(table_, r));
+      curve.x.push_back(time_of(table_, r));
+      curve.y.push_back(error_of(table_, r));
     }
     // Rounding has no order, and one resolution no curve.
     if (shown.size() < 2 || c.name == "rotation" || c.across.size() < 2) return;

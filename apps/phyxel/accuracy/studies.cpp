@@ -87,9 +87,8 @@ std::vector<Study> studies() {
        "E_Pa", "E [Pa]", false, measure_precision},
       {"steps",
        "A bar (0.6 m by 0.1 m, 189 phyxels) sways for a second, about a period, from rest under "
-       "its "
-       "weight. Error: of all displacements at the end, by their norm, against Verlet's steps of a "
-       "twentieth of the limit.",
+       "its weight. Error: of all displacements at the end, by their norm, against Verlet's steps "
+       "of a twentieth of the limit.",
        "step_s", "time [s]", true, measure_steps},
   };
 }
