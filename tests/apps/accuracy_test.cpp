@@ -158,9 +158,9 @@ std::vector<app::HardCase> short_cases() {
   return cases;
 }
 INSTANTIATE_TEST_SUITE_P(All, HardCases, ::testing::ValuesIn(short_cases()),
-                         [](const ::testing::TestParamInfo<app::HardCase>& info) {
-                           std::string name = std::to_string(info.index) + "_";
-                           for (const char c : info.param.name) {
+                         [](const ::testing::TestParamInfo<app::HardCase>& one) {
+                           std::string name = std::to_string(one.index) + "_";
+                           for (const char c : one.param.name) {
                              if (std::isalnum(static_cast<unsigned char>(c))) name += c;
                            }
                            return name;
