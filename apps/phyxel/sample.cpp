@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "command.hpp"
 #include "phyxel/body_file.hpp"
@@ -18,6 +19,7 @@ namespace {
 struct SampleOptions {
   std::filesystem::path mesh, out;
   std::int64_t phyxels = 0, relaxations = SampleRequest{}.relaxations, seed = SampleRequest{}.seed;
+  std::optional<bool> on_surface;
   bool force = false, json = false;
 };
 
@@ -38,7 +40,8 @@ SampleRequest request_of(const SampleOptions& options) {
   }
   return {.phyxels = static_cast<Index>(options.phyxels),
           .seed = static_cast<std::uint64_t>(options.seed),
-          .relaxations = static_cast<int>(options.relaxations)};
+          .relaxations = static_cast<int>(options.relaxations),
+          .on_surface = options.on_surface};
 }
 
 /// Refuses an output that could not be written in the end, before any time is spent.
@@ -75,6 +78,7 @@ void say_json(const SampleOptions& options, const Cloud& cloud, const SampleRepo
                                     {"mesh", options.mesh.string()},
                                     {"file", options.out.string()},
                                     {"phyxels", cloud.position.size()},
+                                    {"on_surface", report.on_surface},
                                     {"surfels", cloud.surface.position.size()},
                                     {"triangles", cloud.surface.triangle.size()},
                                     {"parts", defects.parts},
@@ -95,6 +99,7 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
                  double seconds) {
   fmt::print("{}: {} -> {}\n", program_version(), options.mesh.string(), options.out.string());
   fmt::print("  phyxels     {}, in {:.6g} m^3\n", cloud.position.size(), report.volume);
+  if (report.on_surface > 0) fmt::print("  on surface  {}\n", report.on_surface);
   if (cloud.position.size() > 1) {
     fmt::print(
         "  spacing     {:.4g} m to the nearest on average, {:.4g} m at the least ({:.2f} of it)\n",
@@ -143,13 +148,17 @@ void add_sample(CLI::App& program) {
       ->add_option("--relaxations", options->relaxations,
                    "Sweeps that even out the distances; 0: none")
       ->capture_default_str();
+  command->add_flag_function(
+      "--on-surface,!--inside", [options](std::int64_t times) { options->on_surface = times > 0; },
+      "Phyxels on the surface, too, on its corners and along its sharp edges (far more accurate in "
+      "bending), or all inside. Default: as the mesh allows");
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
   command->footer(
       "Examples:\n"
       "  phyxel sample bunny.obj --phyxels 5000 --out bunny.h5\n"
       "  phyxel sample scan.ply --phyxels 200000 --out scan.h5 --seed 7 --force\n"
-      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --relaxations 100 --json");
+      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --relaxations 100 --on-surface");
   command->callback([options] { sample(*options); });
 }
 

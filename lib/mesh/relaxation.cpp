@@ -58,51 +58,93 @@ class GrowingHash {
   std::vector<Vec3d> point_;
 };
 
-}  // namespace
+/// Sample points in a random order, some of which are taken.
+class Darts {
+ public:
+  /// @param share of the sample points that are darts
+  /// @param radius the largest that is asked for [m]
+  /// @param before points taken already
+  /// @param expected how many will be taken, roughly
+  Darts(const std::vector<SampleBlock>& blocks, double share, std::uint64_t seed, double radius,
+        std::span<const Vec3d> before, std::size_t expected)
+      : origin_(blocks.front().centre),
+        before_(before.size()),
+        taken_(radius, before.size() + expected) {
+    std::uint64_t sample = 0;
+    for (const SampleBlock& block : blocks) {
+      for (std::size_t k = 0; k < block.offset.size(); ++k, ++sample) {
+        const std::uint64_t bits = mix_bits(seed ^ mix_bits(sample));
+        if (share < 0.5 && unit_fraction(bits) > share) continue;
+        dart_.push_back({mix_bits(bits), block.position(k) - origin_, HUGE_VAL});
+      }
+    }
+    std::sort(dart_.begin(), dart_.end(),
+              [](const Dart& a, const Dart& b) { return a.rank < b.rank; });
+    for (const Vec3d& p : before) taken_.add(p - origin_);
+  }
 
-std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
-                               std::uint64_t seed) {
+  /// Takes darts that are so far from all that were taken, until there are `most`.
+  void take(double radius, std::size_t most) {
+    for (Dart& dart : dart_) {
+      if (count() == most) return;
+      if (dart.clearance2 < radius * radius) continue;
+      dart.clearance2 = taken_.nearest2(dart.place, radius * radius);
+      if (dart.clearance2 < radius * radius) continue;
+      taken_.add(dart.place);
+      dart.clearance2 = -1;
+    }
+  }
+
+  std::size_t count() const { return taken_.points().size() - before_; }
+  std::vector<Vec3d> points() const {
+    std::vector<Vec3d> site(taken_.points().begin() + static_cast<std::ptrdiff_t>(before_),
+                            taken_.points().end());
+    for (Vec3d& p : site) p += origin_;
+    return site;
+  }
+
+ private:
   struct Dart {
     std::uint64_t rank;
     Vec3d place;
     double clearance2;  ///< Square of the distance to the nearest point taken, when last looked.
   };
+  Vec3d origin_;
+  std::size_t before_;
+  GrowingHash taken_;
+  std::vector<Dart> dart_;
+};
+
+std::size_t samples_in(const std::vector<SampleBlock>& blocks) {
   std::size_t samples = 0;
   for (const SampleBlock& block : blocks) samples += block.offset.size();
+  return samples;
+}
+
+}  // namespace
+
+std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
+                               std::uint64_t seed, std::span<const Vec3d> before) {
   // Twelve darts a point are enough to choose from; the hundred are for a few points, which must
   // not by chance get fewer darts than points.
-  const double share = (12.0 * n + 100) / static_cast<double>(samples);
-  const Vec3d origin = blocks.front().centre;
-  std::vector<Dart> darts;
-  std::uint64_t sample = 0;
-  for (const SampleBlock& block : blocks) {
-    for (std::size_t k = 0; k < block.offset.size(); ++k, ++sample) {
-      const std::uint64_t bits = mix_bits(seed ^ mix_bits(sample));
-      if (share < 0.5 && unit_fraction(bits) > share) continue;
-      darts.push_back({mix_bits(bits), block.position(k) - origin, HUGE_VAL});
-    }
-  }
-  std::sort(darts.begin(), darts.end(),
-            [](const Dart& a, const Dart& b) { return a.rank < b.rank; });
-
+  const double share = (12.0 * n + 100) / static_cast<double>(samples_in(blocks));
   // Random packings of spheres jam at a diameter of 0.90 spacings.
   double radius = 0.9 * spacing;
-  GrowingHash taken(radius, static_cast<std::size_t>(n));
-  while (taken.points().size() < static_cast<std::size_t>(n)) {
-    for (Dart& dart : darts) {
-      if (dart.clearance2 < radius * radius) continue;
-      dart.clearance2 = taken.nearest2(dart.place, radius * radius);
-      if (dart.clearance2 < radius * radius) continue;
-      taken.add(dart.place);
-      dart.clearance2 = -1;
-      if (taken.points().size() == static_cast<std::size_t>(n)) break;
-    }
+  Darts darts(blocks, share, seed, radius, before, static_cast<std::size_t>(n));
+  while (darts.count() < static_cast<std::size_t>(n)) {
+    darts.take(radius, static_cast<std::size_t>(n));
     // Samples closer together than this are told apart by nothing.
     radius = radius > 1e-6 * spacing ? 0.96 * radius : 0;
   }
-  std::vector<Vec3d> site = taken.points();
-  for (Vec3d& p : site) p += origin;
-  return site;
+  return darts.points();
+}
+
+std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, double gap,
+                                   std::uint64_t seed, std::span<const Vec3d> before) {
+  if (blocks.empty()) return {};
+  Darts darts(blocks, 1, seed, gap, before, samples_in(blocks) / 16);
+  darts.take(gap, std::numeric_limits<std::size_t>::max());
+  return darts.points();
 }
 
 NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
@@ -202,7 +244,8 @@ void SampledVoronoi::assign(const std::vector<Vec3d>& site, double spacing) {
   }
 }
 
-void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps) {
+void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
+                           std::size_t fixed) {
   const Vec3d origin = blocks_.front().centre;
   std::vector<Vec3d> sum(site.size());
   std::vector<Offset> count(site.size());
@@ -219,26 +262,27 @@ void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps)
       }
     }
     bool homeless = false;
-    for (std::size_t i = 0; i < site.size(); ++i) {
+    for (std::size_t i = fixed; i < site.size(); ++i) {
       if (count[i] > 0) site[i] = origin + sum[i] / static_cast<double>(count[i]);
       homeless |= count[i] == 0;
     }
-    if (homeless) settle_homeless(site, count);
+    if (homeless) settle_homeless(site, count, fixed);
   }
 }
 
-void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site,
-                                     const std::vector<Offset>& count) const {
-  std::vector<Index> order(site.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(i);
+void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site, const std::vector<Offset>& count,
+                                     std::size_t fixed) const {
+  std::vector<Index> order(site.size() - fixed);
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<Index>(fixed + i);
   std::stable_sort(order.begin(), order.end(),
                    [&](Index a, Index b) { return count[a] > count[b]; });
-  const auto homeless = static_cast<std::size_t>(std::count(count.begin(), count.end(), 0));
+  const auto homeless = static_cast<std::size_t>(
+      std::count_if(order.begin(), order.end(), [&](Index i) { return count[i] == 0; }));
   // Each goes to the sample point farthest from the site of one of the largest cells.
   std::vector<Index> guest(site.size(), -1);
   std::vector<double> farthest(site.size(), -1);
   std::vector<Vec3d> place(site.size());
-  for (std::size_t k = 0; k < std::min(homeless, site.size() - homeless); ++k) {
+  for (std::size_t k = 0; k < std::min(homeless, order.size() - homeless); ++k) {
     guest[order[k]] = order[order.size() - 1 - k];
   }
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
@@ -257,7 +301,7 @@ void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site,
 }
 
 void SampledVoronoi::snap(std::vector<Vec3d>& site, double spacing,
-                          const std::vector<std::uint8_t>& which) {
+                          const std::vector<std::uint8_t>& which, std::size_t fixed) {
   assign(site, spacing);
   std::vector<double> nearest2(site.size(), HUGE_VAL);
   std::vector<Vec3d> place = site;
@@ -274,7 +318,8 @@ void SampledVoronoi::snap(std::vector<Vec3d>& site, double spacing,
     }
   }
   site.swap(place);
-  if (std::count(count.begin(), count.end(), 0) > 0) settle_homeless(site, count);
+  const auto begin = count.begin() + static_cast<std::ptrdiff_t>(fixed);
+  if (std::find(begin, count.end(), 0) != count.end()) settle_homeless(site, count, fixed);
 }
 
 }  // namespace phyxel

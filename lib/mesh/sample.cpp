@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "mesh/relaxation.hpp"
+#include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -215,7 +216,8 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   }
   for (std::string& done : orient(cloud.surface)) found.warnings.push_back(std::move(done));
   cloud.surface.normal = vertex_normals(cloud.surface.position, cloud.surface.triangle);
-  const bool closed = connect(cloud.surface).closed;
+  const SurfaceTopology topology = connect(cloud.surface);
+  const bool closed = topology.closed;
   const InsideSampler sampler(cloud.surface, closed);
 
   const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
@@ -234,18 +236,41 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   }
 
   const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
-  const double spacing = std::cbrt(rough_volume / request.phyxels);
-  cloud.position = throw_darts(blocks, request.phyxels, spacing, seed + 1);
+  double spacing = std::cbrt(rough_volume / request.phyxels);
+  if (request.on_surface.value_or(closed && tally.repeated == 0)) {
+    if (!closed || tally.repeated > 0) {
+      throw InputError(fmt::format(
+          "the surface {}, so it is not known where phyxels would lie on the body's outside; "
+          "allowed: a closed surface without overlaps, or all phyxels inside",
+          closed ? "overlaps itself" : fmt::format("is not closed ({})", defects)));
+    }
+    try {
+      SurfaceSites sites = sites_on(cloud.surface, topology, rough_volume, request.phyxels,
+                                    seed + 3, request.relaxations);
+      cloud.position = std::move(sites.position);
+      spacing = sites.spacing;
+    } catch (const InputError& error) {
+      if (request.on_surface) throw;
+      found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
+    }
+  }
+  const std::size_t on_surface = cloud.position.size();
+  found.on_surface = static_cast<Index>(on_surface);
+  const std::vector<Vec3d> within =
+      throw_darts(blocks, request.phyxels - found.on_surface, spacing, seed + 1, cloud.position);
+  cloud.position.insert(cloud.position.end(), within.begin(), within.end());
   SampledVoronoi voronoi(std::move(blocks));
-  voronoi.relax(cloud.position, spacing, request.relaxations);
+  voronoi.relax(cloud.position, spacing, request.relaxations, on_surface);
 
   // Where the body is thin or hollow, the centroid of a cell may lie outside.
   std::vector<std::uint8_t> outside(cloud.position.size());
   const auto n = static_cast<std::ptrdiff_t>(cloud.position.size());
 #pragma omp parallel for schedule(dynamic, 256)
-  for (std::ptrdiff_t i = 0; i < n; ++i) outside[i] = !sampler.inside(cloud.position[i]);
+  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(on_surface); i < n; ++i) {
+    outside[i] = !sampler.inside(cloud.position[i]);
+  }
   if (std::count(outside.begin(), outside.end(), 1) > 0) {
-    voronoi.snap(cloud.position, spacing, outside);
+    voronoi.snap(cloud.position, spacing, outside, on_surface);
   }
 
   double sampled_volume = 0;

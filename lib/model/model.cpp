@@ -213,9 +213,10 @@ Cloud rest_cloud(const BodySource& source) {
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
     try {
-      return sample_surface(
-          surface,
-          {.phyxels = source.phyxels, .seed = source.seed, .relaxations = source.relaxations});
+      return sample_surface(surface, {.phyxels = source.phyxels,
+                                      .seed = source.seed,
+                                      .relaxations = source.relaxations,
+                                      .on_surface = source.on_surface});
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }

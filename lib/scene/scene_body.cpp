@@ -22,7 +22,7 @@ SourceKeys lattice_keys(std::vector<const char*> needed) {
 }
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
-  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations"}};
+  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations", "on_surface"}};
   if (std::string(kind) == "file") return {};
   if (is_paper_shape(shape)) return {{}, {"surfels"}};
   if (shape == "cylinder") return lattice_keys({"radius", "length"});
@@ -37,7 +37,7 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
   std::vector<std::string> used(keys.needed.begin(), keys.needed.end());
   used.insert(used.end(), keys.optional.begin(), keys.optional.end());
   for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "lattice", "jitter",
-                           "seed", "relaxations", "surfels"}) {
+                           "seed", "relaxations", "on_surface", "surfels"}) {
     if (!body.has(name) || std::find(used.begin(), used.end(), name) != used.end()) continue;
     body.refuse(name,
                 fmt::format("found, but {} does not use it; allowed with {}: {}", source, source,
@@ -94,17 +94,27 @@ BodySource read_source(const SceneTable& body) {
   body.read("size", shape.size);
   body.read("radius", shape.radius);
   body.read("length", shape.length);
+  const bool round = shape.name == "cylinder" || shape.name == "sphere";
+  if (!round) shape.placement = ShapeRequest::Placement::nodes;
   body.read_choice("lattice", shape.placement);
   body.read("jitter", shape.jitter);
   body.read("surfels", shape.surface);
   body.read("seed", source.seed);
   body.read("relaxations", source.relaxations);
+  body.read("on_surface", source.on_surface);
   shape.seed = source.seed;
   return source;
 }
 
-Material read_material(const SceneTable& table) {
+/// Of hourglass control where a scene says nothing: what is most accurate (docs/accuracy.md), but
+/// the paper's bodies are as in the paper, and where supports vary there is no such control.
+double default_hourglass(const BodyRequest& body) {
+  return is_paper_shape(body.source.shape.name) || body.neighbourhood.one_sided() ? 0 : 0.1;
+}
+
+Material read_material(const SceneTable& table, double hourglass) {
   Material material;
+  material.hourglass = hourglass;
   table.read("young", material.young);
   table.read("poisson", material.poisson);
   table.read("density", material.density);
@@ -239,8 +249,8 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
   table.read("closure", body.closure);
-  body.material = read_material(table.table("material"));
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
+  body.material = read_material(table.table("material"), default_hourglass(body));
   for (const SceneTable& inclusion : table.tables("inclusion")) {
     body.inclusions.push_back(read_inclusion(inclusion, body.material));
   }

@@ -34,7 +34,7 @@ std::vector<SceneSection> make_sections() {
        "origin, the cylinder along z.\n"
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
        "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
-       "- `mesh` needs `phyxels`, and may have `seed` and `relaxations`.\n"
+       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`.\n"
        "- `file` needs nothing else.\n\n"
        "The shape is scaled, then rotated, then translated."},
       {"body.material", "[body.material]", "", "What the body is made of. Required."},
@@ -173,7 +173,7 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Of a cylinder or sphere."},
       {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = above(0),
        .meaning = "Of a cylinder."},
-      {.section = "body", .name = "lattice", .type = KeyType::choice, .fallback = "\"cells\"",
+      {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells for round shapes",
        .words = {"cells", "nodes"},
        .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", at the "
            "cells' corners, on faces too (beam and block): far more accurate in bending."},
@@ -183,6 +183,10 @@ std::vector<SceneKey> body_keys() {
        .range = at_least(0), .meaning = "Of the random numbers; the same seed, the same body."},
       {.section = "body", .name = "relaxations", .type = KeyType::integer, .fallback = "30",
        .range = between(0, 10000), .meaning = "Sweeps that spread the phyxels of a mesh evenly."},
+      {.section = "body", .name = "on_surface", .type = KeyType::boolean, .otherwise = "if the mesh allows it",
+       .meaning = "Whether phyxels of a mesh lie on its surface, too, on its corners and along its "
+           "sharp edges: far more accurate in bending. Needs a closed mesh that does not overlap "
+           "itself, and enough phyxels."},
       {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Whether a built-in shape gets its surfels."},
       {.section = "body", .name = "scale", .fallback = "1", .range = above(0),
@@ -244,7 +248,7 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "damping", .unit = "1/s", .fallback = "0",
        .range = at_least(0),
        .meaning = "Slows every velocity v by damping * v each second; 0: none."},
-      {.section = "body.material", .name = "hourglass", .fallback = "0", .range = at_least(0),
+      {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = at_least(0),
        .meaning = "Strength of hourglass control, as a share of young: energy of what does not "
            "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
            "see; 0: none. Needs one support for the body. With inclusions, a share of the smallest "

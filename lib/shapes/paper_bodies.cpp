@@ -98,8 +98,8 @@ const PaperBody* find_paper_body(const std::string& name) {
 }
 
 Cloud make_paper_body(const PaperBody& body, bool surface) {
-  Cloud cloud =
-      sample_surface(mesh_body(body.form, body.surfels), {.phyxels = body.phyxels, .seed = 1});
+  Cloud cloud = sample_surface(mesh_body(body.form, body.surfels),
+                               {.phyxels = body.phyxels, .seed = 1, .on_surface = false});
   cloud.regions[body.region] = nearest_phyxels(cloud, body.region_anchor, body.region_size);
   if (!surface) cloud.surface = {};
   return cloud;

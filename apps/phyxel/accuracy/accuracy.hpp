@@ -10,10 +10,15 @@
 
 namespace phyxel::app {
 
+/// Where phyxels lie: at the nodes of a lattice or in the middle of its cells; or spread on and in
+/// the body's surface as in any mesh, as many as there would be nodes.
+enum class Filling { nodes, cells, mesh };
+const char* filling_name(Filling filling);
+
 /// What a problem is solved with.
 struct Discretisation {
-  ShapeRequest::Placement placement = ShapeRequest::Placement::nodes;
-  double jitter = 0;     ///< In spacings.
+  Filling filling = Filling::nodes;
+  double jitter = 0;     ///< Of a lattice, in spacings.
   double factor = 1.8;   ///< Of the support.
   double hourglass = 0;  ///< Strength of hourglass control.
   double closure = 0;    ///< Of gradients.
@@ -41,6 +46,7 @@ struct AccuracyCase {
   std::string what;         ///< The problem and where its answer comes from, in a sentence or two.
   std::vector<int> across;  ///< Resolutions that it is run with if none are asked for.
   Solution (*solve)(const Discretisation&);
+  std::vector<double> closures{0, 1e-3};  ///< Closures of gradients, likewise.
 };
 
 /// Bodies at rest, and bodies that move.

@@ -1,10 +1,32 @@
 #include "accuracy/bar.hpp"
 
+#include <algorithm>
+#include <utility>
+
+#include "phyxel/mesh.hpp"
+
 namespace phyxel::app {
+
+const char* filling_name(Filling filling) {
+  switch (filling) {
+    case Filling::nodes:
+      return "nodes";
+    case Filling::cells:
+      return "cells";
+    case Filling::mesh:
+      return "mesh";
+  }
+  return "";
+}
+
+ShapeRequest::Placement placement_of(Filling filling) {
+  return filling == Filling::cells ? ShapeRequest::Placement::cells
+                                   : ShapeRequest::Placement::nodes;
+}
 
 Scene bar(const Discretisation& d, double length, double side, double poisson) {
   const double spacing = side / d.across;
-  const bool nodes = d.placement == ShapeRequest::Placement::nodes;
+  const bool nodes = d.filling != Filling::cells;
   BodyRequest body;
   body.name = "bar";
   body.where = "phyxel accuracy";
@@ -12,7 +34,7 @@ Scene bar(const Discretisation& d, double length, double side, double poisson) {
                        .size = {nodes ? length : length + spacing, side, side},
                        .spacing = spacing,
                        .jitter = d.jitter,
-                       .placement = d.placement,
+                       .placement = placement_of(d.filling),
                        .surface = d.closure > 0};
   body.material = {.young = E, .poisson = poisson, .density = rho, .hourglass = d.hourglass};
   body.neighbourhood.factor = d.factor;
@@ -25,6 +47,33 @@ Scene bar(const Discretisation& d, double length, double side, double poisson) {
 Scene clamped(Scene scene) {
   scene.bodies[0].fixed.push_back({.select = {.region = "x-"}});
   return scene;
+}
+
+Cloud cloud_of(const Scene& scene, const Discretisation& d) {
+  BodyRequest body = scene.bodies[0];
+  if (d.filling != Filling::mesh) return make_cloud(body);
+  body.source.shape.surface = true;
+  const Cloud lattice = make_cloud(body);
+  Cloud cloud =
+      sample_surface(lattice.surface,
+                     {.phyxels = static_cast<Index>(lattice.position.size()), .on_surface = true});
+  Vec3d low = cloud.surface.position.front(), high = low;
+  for (const Vec3d& p : cloud.surface.position) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const double near = 1e-9 * body.source.shape.spacing;
+  for (Index i = 0; i < static_cast<Index>(cloud.position.size()); ++i) {
+    const Vec3d& p = cloud.position[i];
+    const std::pair<const char*, double> faces[] = {{"x-", p.x - low.x}, {"x+", high.x - p.x},
+                                                    {"y-", p.y - low.y}, {"y+", high.y - p.y},
+                                                    {"z-", p.z - low.z}, {"z+", high.z - p.z}};
+    for (const auto& [name, depth] : faces) {
+      if (depth < near) cloud.regions[name].push_back(i);
+    }
+  }
+  if (d.closure == 0) cloud.surface = {};
+  return cloud;
 }
 
 Vec3d mean_of(const Model& model, const std::vector<Index>& phyxels, const std::vector<Vec3d>& v) {

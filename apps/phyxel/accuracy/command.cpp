@@ -21,8 +21,9 @@ namespace {
 struct AccuracyOptions {
   std::vector<std::string> cases{"all"};
   std::vector<int> across;  ///< Empty: each case's own.
-  std::vector<std::string> lattices{"nodes", "cells"};
-  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1}, closures{0, 1e-3};
+  std::vector<std::string> lattices{"nodes", "cells", "mesh"};
+  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1};
+  std::vector<double> closures;  ///< Empty: each case's own.
   std::string csv;
   bool force = false;
 };
@@ -46,16 +47,22 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
   return chosen;
 }
 
-std::vector<Discretisation> discretisations(const AccuracyOptions& options) {
+std::vector<Discretisation> discretisations(const AccuracyOptions& options,
+                                            const AccuracyCase& of) {
+  const std::vector<double>& closures = options.closures.empty() ? of.closures : options.closures;
   std::vector<Discretisation> list;
-  for (const std::string& lattice : options.lattices) {
+  for (const Filling filling : {Filling::nodes, Filling::cells, Filling::mesh}) {
+    if (std::find(options.lattices.begin(), options.lattices.end(), filling_name(filling)) ==
+        options.lattices.end()) {
+      continue;
+    }
     for (const double jitter : options.jitters) {
+      if (filling == Filling::mesh && jitter != options.jitters.front()) continue;  // has none
       for (const double factor : options.factors) {
         for (const double hourglass : options.hourglass) {
-          for (const double closure : options.closures) {
-            list.push_back({.placement = lattice == "nodes" ? ShapeRequest::Placement::nodes
-                                                            : ShapeRequest::Placement::cells,
-                            .jitter = jitter,
+          for (const double closure : closures) {
+            list.push_back({.filling = filling,
+                            .jitter = filling == Filling::mesh ? 0 : jitter,
                             .factor = factor,
                             .hourglass = hourglass,
                             .closure = closure});
@@ -82,7 +89,7 @@ void measure(const AccuracyOptions& options) {
                       "across", "phyxels", "neighbours", "value", "reference", "error", "order",
                       "evaluations", "seconds", "setup_seconds"});
   for (const AccuracyCase& c : cases) {
-    for (Discretisation d : discretisations(options)) {
+    for (Discretisation d : discretisations(options, c)) {
       std::vector<double> before;
       int across_before = 0;
       for (const int across : options.across.empty() ? c.across : options.across) {
@@ -91,13 +98,12 @@ void measure(const AccuracyOptions& options) {
         for (std::size_t q = 0; q < solution.found.size(); ++q) {
           const Quantity& found = solution.found[q];
           table.row(
-              {c.name, found.name,
-               d.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells",
-               fmt::format("{:g}", d.jitter), fmt::format("{:g}", d.factor),
-               fmt::format("{:g}", d.hourglass), fmt::format("{:g}", d.closure),
-               std::to_string(across), std::to_string(solution.phyxels),
-               fmt::format("{:.1f}", solution.neighbours), fmt::format("{:.7g}", found.value),
-               fmt::format("{:.7g}", found.reference), fmt::format("{:.3e}", found.error()),
+              {c.name, found.name, filling_name(d.filling), fmt::format("{:g}", d.jitter),
+               fmt::format("{:g}", d.factor), fmt::format("{:g}", d.hourglass),
+               fmt::format("{:g}", d.closure), std::to_string(across),
+               std::to_string(solution.phyxels), fmt::format("{:.1f}", solution.neighbours),
+               fmt::format("{:.7g}", found.value), fmt::format("{:.7g}", found.reference),
+               fmt::format("{:.3e}", found.error()),
                before.empty() ? "" : order_of(before[q], found.error(), across_before, across),
                std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds),
                fmt::format("{:.4g}", solution.setup_seconds)});
@@ -174,9 +180,11 @@ void add_accuracy(CLI::App& program) {
   command->add_option("--across", options->across, "Cells across the thinner sides")
       ->delimiter(',')
       ->check(CLI::Range(2, 200));
-  command->add_option("--lattice", options->lattices, "nodes, cells")
+  command
+      ->add_option("--lattice", options->lattices,
+                   "nodes, cells; mesh: spread on and in the surface, as in any mesh")
       ->delimiter(',')
-      ->check(CLI::IsMember({"nodes", "cells"}))
+      ->check(CLI::IsMember({"nodes", "cells", "mesh"}))
       ->capture_default_str();
   command->add_option("--jitter", options->jitters, "Phyxels moved by so many spacings")
       ->delimiter(',')
@@ -194,8 +202,7 @@ void add_accuracy(CLI::App& program) {
       ->capture_default_str();
   command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 1.0));
   command->add_option("--csv", options->csv, "Also write the table to this file");
   command->add_flag("--force", options->force, "Replace the CSV file");
   auto results = std::make_shared<std::string>("docs/results");

@@ -84,7 +84,7 @@ class Drift {
 
 /// Nodes, closed, with hourglass control: what is the most accurate (docs/accuracy.md).
 constexpr Discretisation best{
-    .placement = Placement::nodes, .hourglass = 0.1, .closure = 1e-3, .across = 6};
+    .filling = Filling::nodes, .hourglass = 0.1, .closure = 1e-3, .across = 6};
 
 Cloud box_of(int nx, int ny, int nz, double spacing) {
   Cloud cloud;
@@ -314,8 +314,7 @@ double inside_out_corotated(const Machine& m) {
 /// A column, stretched by a fifth, so that it does not buckle into a helix, and one end turned
 /// three times: its middle, by symmetry, by half of that.
 double twist(const Machine& machine) {
-  Scene scene =
-      clamped(bar({.placement = Placement::nodes, .hourglass = 0.1, .across = 3}, 1, 0.1));
+  Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 3}, 1, 0.1));
   scene.bodies[0].material.law = Law::neo_hooke;
   scene.bodies[0].motions.push_back({.select = {.region = "x+"},
                                      .displacement = {0.2, 0, 0},
@@ -363,7 +362,7 @@ double impact(const Machine& machine) {
 // --- steps ---------------------------------------------------------------------------------------
 
 double ringing(double safety, std::int64_t steps, const Machine& machine) {
-  Scene scene = bar({.placement = Placement::nodes, .hourglass = 0.1, .across = 3}, 0.4, 0.1);
+  Scene scene = bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 3}, 0.4, 0.1);
   scene.time.end = 1;
   Trial trial(scene, machine);
   const double dt = trial.step_at(safety);
@@ -388,8 +387,7 @@ double ten_million_steps(const Machine& m) { return ringing(0.5, 10'000'000, m);
 
 /// The clamped bar sags for a while; displacements by its length.
 std::vector<Vec3d> sagging(double size, Vec3d where, const Machine& machine) {
-  Scene scene =
-      clamped(bar({.placement = Placement::nodes, .hourglass = 0.1, .across = 4}, 1, 0.2));
+  Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 4}, 1, 0.2));
   scene.bodies[0].scale = size;
   scene.bodies[0].translation = where;
   scene.gravity = {0, 0, -1 / size};

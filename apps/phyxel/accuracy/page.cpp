@@ -29,6 +29,7 @@ std::string way_of(const CsvTable& t, std::size_t r) {
   const bool held = t.number(r, "hourglass") > 0, closed = t.number(r, "closure") > 0;
   if (held) way += fmt::format(", α = {}", t.text(r, "hourglass"));
   if (closed) way += ", closed";
+  if (closed && t.number(r, "closure") != 1e-3) way += fmt::format(" to {}", t.text(r, "closure"));
   return held || closed ? way : way + ", plain";
 }
 
@@ -72,7 +73,9 @@ class AccuracyPage {
         "`docs/results/`: problems with known answers, solved on the CPU in double (*inf*: it flew "
         "apart). *Cells*: a "
         "phyxel in the middle of each cell of a lattice; *nodes*: one at each corner, so on faces, "
-        "edges and corners of the body, too. *Jitter*: phyxels moved at random by up to so many "
+        "edges and corners of the body, too; *mesh*: spread on and in the body's surface as "
+        "`phyxel sample --on-surface` does, as many as there are nodes. *Jitter*: phyxels moved at "
+        "random by up to so many "
         "spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: "
         "with "
         "closed gradients; *plain*: with neither. "
@@ -217,8 +220,9 @@ class AccuracyPage {
     std::vector<std::size_t> shown;
     for (const std::size_t r : rows) {
       const double error = error_of(table_, r);
-      if ((table_.number(r, "jitter") > 0) != irregular || !(error > 0) || !std::isfinite(error))
-        continue;
+      const bool is_irregular =
+          table_.number(r, "jitter") > 0 || table_.text(r, "lattice") == "mesh";
+      if (is_irregular != irregular || !(error > 0) || !std::isfinite(error)) continue;
       shown.push_back(r);
       Curve& curve = curve_named(chart, way_of(table_, r));
       curve.x.push_back(time_of(table_, r));

@@ -11,7 +11,6 @@ namespace phyxel::app {
 namespace {
 
 using Add = std::function<void(const StudyRow&)>;
-using Placement = ShapeRequest::Placement;
 
 struct Stepped {
   State end;
@@ -33,7 +32,7 @@ Stepped step_through(const Model& model, Scene scene, Precision precision, Metho
 /// A spinning block is thrown and falls for a second.
 void measure_precision(const Add& add) {
   for (double young = 1e3; young < 2e12; young *= 10) {
-    Scene scene = bar({.placement = Placement::cells, .across = 3}, 0.3, 0.3);
+    Scene scene = bar({.filling = Filling::cells, .across = 3}, 0.3, 0.3);
     scene.bodies[0].material.young = young;
     scene.bodies[0].velocity = {1, 0, 2};
     scene.bodies[0].spin = {0.3, 0.5, 1};
@@ -56,8 +55,7 @@ void measure_precision(const Add& add) {
 /// A bar sways for a second, about a period of it.
 void measure_steps(const Add& add) {
   constexpr double end = 1;
-  Scene scene =
-      clamped(bar({.placement = Placement::nodes, .hourglass = 0.1, .across = 2}, 0.6, 0.1));
+  Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 2}, 0.6, 0.1));
   scene.gravity = {0, 0, -1};
   const Model model = build_model(scene);
   const double limit = step_limit(model).largest_step;

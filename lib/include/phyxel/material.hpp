@@ -30,7 +30,7 @@ struct Material {
       0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
   double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
-  /// support for the body.
+  /// support for the body. Scene files that say nothing have 0.1, but for the paper's bodies.
   double hourglass = 0;
 
   Elasticity elasticity() const {

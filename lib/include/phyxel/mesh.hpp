@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct SampleRequest {
   Index phyxels = 0;       ///< Exact number of phyxels.
   std::uint64_t seed = 1;  ///< The same seed gives the same cloud on any number of threads.
   int relaxations = 30;    ///< Sweeps of the relaxation (Lloyd); 0: none.
+  /// Whether phyxels lie on the surface, too, on its corners and along its sharp edges, or all
+  /// inside, each in the middle of its share. Unset: on the surface if it allows that.
+  std::optional<bool> on_surface;
 };
 
 /// What sampling found out.
@@ -44,14 +48,16 @@ struct SampleReport {
   double doubtful_fraction = 0;  ///< Share of inside tests with a winding number far from 0 and 1.
   double spacing = 0;            ///< Mean distance to the nearest phyxel [m].
   double smallest_gap = 0;       ///< Smallest distance between two phyxels [m].
+  Index on_surface = 0;          ///< Phyxels that lie on the surface.
   std::vector<std::string> warnings;
 };
 
-/// Fills `surface` with exactly `request.phyxels` well-spread phyxels, all inside; each gets its
-/// share of the enclosed volume. The surface's vertices become the surfels.
+/// Fills `surface` with exactly `request.phyxels` well-spread phyxels; each gets its share of the
+/// enclosed volume. The surface's vertices become the surfels.
 /// Source of the inside test: Jacobson et al. 2013 (generalised winding number), with the fast
 /// summation of Barill et al. 2018.
-/// @throws InputError for a surface without volume, or so open that inside has no meaning.
+/// @throws InputError for a surface without volume, or so open that inside has no meaning; if some
+///   must lie on the surface, for one that is open or overlaps itself, and for too few phyxels.
 Cloud sample_surface(const Surface& surface, const SampleRequest& request,
                      SampleReport* report = nullptr);
 

@@ -103,6 +103,7 @@ struct BodySource {
   Index phyxels = 0;           ///< Mesh: exact count. Lattice shapes: about this many.
   std::uint64_t seed = 1;
   int relaxations = 30;
+  std::optional<bool> on_surface;  ///< Mesh: whether phyxels lie on it, too; unset: if it can be.
   bool operator==(const BodySource&) const = default;
 };
 

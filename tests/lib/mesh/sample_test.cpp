@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
 #include <random>
 
@@ -19,7 +22,7 @@ using ::testing::Each;
 using ::testing::HasSubstr;
 
 Cloud sampled(const Surface& surface, Index phyxels, SampleReport* report = nullptr) {
-  return sample_surface(surface, {.phyxels = phyxels}, report);
+  return sample_surface(surface, {.phyxels = phyxels, .on_surface = false}, report);
 }
 
 std::string refusal(const Surface& surface, SampleRequest request = {.phyxels = 100}) {
@@ -60,8 +63,8 @@ TEST(Sample, CountIsExactAllAreInsideAndVolumesSumToTheEnclosedVolume) {
   for (const Index n : {1, 2, 10, 575, 20000}) {
     SCOPED_TRACE(n);
     SampleReport report;
-    const Cloud cloud =
-        sample_surface(ball, {.phyxels = n, .relaxations = n < 1000 ? 30 : 3}, &report);
+    const Cloud cloud = sample_surface(
+        ball, {.phyxels = n, .relaxations = n < 1000 ? 30 : 3, .on_surface = false}, &report);
     ASSERT_EQ(cloud.position.size(), static_cast<std::size_t>(n));
     ASSERT_EQ(cloud.volume.size(), cloud.position.size());
     for (const Vec3d& p : cloud.position) ASSERT_GT(winding(p), 0.5);
@@ -116,7 +119,8 @@ TEST(Sample, PhyxelsAreSpreadEvenlyWithoutClumps) {
 
 TEST(Sample, WithoutRelaxationThereIsStillAGap) {
   SampleReport report;
-  sample_surface(test::unit_cube(), {.phyxels = 3000, .relaxations = 0}, &report);
+  sample_surface(test::unit_cube(), {.phyxels = 3000, .relaxations = 0, .on_surface = false},
+                 &report);
   // Darts leave at least 0.7 spacings before room runs out; random points come within 0.05.
   EXPECT_GT(report.smallest_gap, 0.6 * std::cbrt(1.0 / 3000));
 }
@@ -277,6 +281,112 @@ TEST(Sample, UnusedVerticesAreNoSurfels) {
   EXPECT_EQ(cloud.surface.triangle, test::unit_cube().triangle);
   EXPECT_THAT(report.warnings,
               ::testing::ElementsAre(HasSubstr("1 vertices that no triangle uses")));
+}
+
+/// Distance inside the unit cube's nearest face; 0 on it.
+double depth_in_cube(Vec3d p) { return std::min({p.x, p.y, p.z, 1 - p.x, 1 - p.y, 1 - p.z}); }
+
+TEST(SampleOnSurface, CornersEdgesFacesAndInsideGetTheirShares) {
+  const Index n = 2000;
+  SampleReport report;
+  const Cloud cloud =
+      sample_surface(test::unit_cube(), {.phyxels = n, .on_surface = true}, &report);
+  ASSERT_EQ(cloud.position.size(), static_cast<std::size_t>(n));
+  EXPECT_NEAR(sum(cloud.volume), 1, 1e-12 * n);  // rounding of n terms
+  EXPECT_TRUE(report.warnings.empty());
+
+  // Kinds by the number of faces that a phyxel lies on, exactly as the faces lie across axes.
+  std::array<int, 4> count{};
+  std::array<double, 4> volume{};
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const Vec3d p = cloud.position[i];
+    int faces = 0;
+    for (const double x : {p.x, p.y, p.z}) faces += x == 0 || x == 1;
+    ++count[faces];
+    volume[faces] += cloud.volume[i];
+    // The others keep off: half a gap of those on faces.
+    if (faces == 0) {
+      EXPECT_GT(depth_in_cube(p), 0.4 * report.spacing);
+    }
+  }
+  EXPECT_EQ(count[3], 8);
+  EXPECT_EQ(report.on_surface, count[1] + count[2] + count[3]);
+  // A lattice of as many nodes has 12.6 along an edge: 127 within the edges, 671 within the faces.
+  EXPECT_NEAR(count[2], 127, 20);
+  EXPECT_NEAR(count[1], 671, 70);
+  // Nodes have halves of a cell on faces, quarters on edges, eighths in corners.
+  const double inside = volume[0] / count[0];
+  EXPECT_NEAR(volume[1] / count[1], inside / 2, 0.1 * inside);
+  EXPECT_NEAR(volume[2] / count[2], inside / 4, 0.06 * inside);
+  EXPECT_NEAR(volume[3] / count[3], inside / 8, 0.04 * inside);
+  EXPECT_GT(report.smallest_gap, 0.5 * report.spacing);
+}
+
+TEST(SampleOnSurface, RoundBodiesHaveNoCornersAndKeepTheirSurface) {
+  const Surface ball = test::sphere({0, 0, 0}, 1, 4);
+  SampleReport report;
+  const Cloud cloud = sample_surface(ball, {.phyxels = 1000, .on_surface = true}, &report);
+  Index outer = 0;
+  double flattest = 1;
+  for (const Triangle& t : ball.triangle) {
+    flattest = std::min(flattest,
+                        norm(ball.position[t[0]] + ball.position[t[1]] + ball.position[t[2]]) / 3);
+  }
+  for (const Vec3d& p : cloud.position) {
+    EXPECT_LT(norm(p), 1 + 1e-7);
+    outer += norm(p) > flattest - 1e-7;
+  }
+  EXPECT_EQ(outer, report.on_surface);
+  // Spheres of 1,000 phyxels have radii of 6.2 spacings: 4 pi r^2 of one on each spacing squared.
+  EXPECT_NEAR(report.on_surface, 440, 50);
+  EXPECT_NEAR(sum(cloud.volume), enclosed_volume(ball), 1e-9);
+}
+
+TEST(SampleOnSurface, DoesNotDependOnThreadsAndServesParts) {
+  const Surface two = test::together(test::sphere({3, 0, 0}, 1, 3), test::unit_cube());
+  const auto run = [&](int threads) {
+    const int before = omp_get_max_threads();
+    omp_set_num_threads(threads);
+    Cloud cloud = sample_surface(two, {.phyxels = 1500, .relaxations = 10, .on_surface = true});
+    omp_set_num_threads(before);
+    return cloud;
+  };
+  const Cloud one = run(1), three = run(3);
+  EXPECT_EQ(one.position, three.position);
+  EXPECT_EQ(one.volume, three.volume);
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p{corner & 1 ? 1.0 : 0.0, corner & 2 ? 1.0 : 0.0, corner & 4 ? 1.0 : 0.0};
+    EXPECT_THAT(one.position, ::testing::Contains(p));
+  }
+}
+
+TEST(SampleOnSurface, IsChosenWhereTheSurfaceAllowsIt) {
+  SampleReport report;
+  const auto on_surface = [&](const Surface& surface, Index phyxels) {
+    sample_surface(surface, {.phyxels = phyxels, .relaxations = 2}, &report);
+    return report.on_surface;
+  };
+  EXPECT_GT(on_surface(test::unit_cube(), 500), 250);
+  EXPECT_TRUE(report.warnings.empty());
+  EXPECT_EQ(on_surface(test::box({0, 0, 0}, {1, 1, 0.001}), 400), 0);
+  EXPECT_THAT(report.warnings,
+              ::testing::ElementsAre(HasSubstr("all phyxels lie inside: 400 phyxels are too few")));
+  EXPECT_EQ(on_surface(test::without(test::sphere({0, 0, 0}, 1, 4), 100), 500), 0);
+  EXPECT_EQ(on_surface(test::together(test::unit_cube(), test::box({0.5, 0, 0}, {1.5, 1, 1})), 500),
+            0);
+}
+
+TEST(SampleOnSurface, IsRefusedWhereTheSurfaceDoesNotAllowIt) {
+  const SampleRequest request{.phyxels = 400, .on_surface = true};
+  EXPECT_THAT(refusal(test::box({0, 0, 0}, {1, 1, 0.001}), request),
+              HasSubstr("400 phyxels are too few for some to lie on the surface"));
+  EXPECT_THAT(refusal(test::unit_cube(), {.phyxels = 5, .on_surface = true}),
+              HasSubstr("5 phyxels are too few"));
+  EXPECT_THAT(refusal(test::without(test::sphere({0, 0, 0}, 1, 4), 100), request),
+              HasSubstr("the surface is not closed (1 part, 3 open edges"));
+  EXPECT_THAT(
+      refusal(test::together(test::unit_cube(), test::box({0.5, 0, 0}, {1.5, 1, 1})), request),
+      HasSubstr("the surface overlaps itself"));
 }
 
 TEST(Sample, RequestsOutOfRangeAreRefused) {

@@ -1,0 +1,215 @@
+#include "mesh/surface_sites.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "mesh/random_bits.hpp"
+#include "mesh/relaxation.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Faces that turn by more than this meet in a sharp edge, which turns no more than this unless in
+/// a corner.
+const double sharp = std::cos(40 * std::numbers::pi / 180);
+/// Sample points for each site on a face, and for each on an edge.
+constexpr double samples_per_site = 64;
+/// Distances between random sites, in spacings, at which lines, faces and what they enclose get
+/// about one each on a spacing, its square and its cube.
+constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.82;
+
+/// A point of a vertex, an edge or a triangle, by its number.
+struct PointOn {
+  std::size_t piece;
+  Vec3d point;
+};
+
+/// Ends of a sharp edge.
+struct Crease {
+  Vec3d from, to;
+};
+
+struct Features {
+  std::vector<PointOn> corners;  ///< By their vertices.
+  std::vector<Crease> creases;
+};
+
+Vec3d area_of(const Surface& surface, Index triangle) {
+  const Triangle& t = surface.triangle[triangle];
+  const Vec3d a = surface.position[t[0]];
+  return 0.5 * cross(surface.position[t[1]] - a, surface.position[t[2]] - a);
+}
+
+Features features_of(const Surface& surface, const SurfaceTopology& topology) {
+  Features features;
+  std::vector<std::vector<Vec3d>> leaving(surface.position.size());  // sharp edges, as unit vectors
+  const std::vector<SurfaceEdge>& edges = topology.edges;
+  for (std::size_t k = 0, next = 0; k < edges.size(); k = next) {
+    while (next < edges.size() && edges[next].low == edges[k].low &&
+           edges[next].high == edges[k].high) {
+      ++next;
+    }
+    const Vec3d from = surface.position[edges[k].low], to = surface.position[edges[k].high];
+    const double length = norm(to - from);
+    bool is_sharp = next - k != 2;
+    if (!is_sharp) {
+      const Vec3d a = area_of(surface, edges[k].triangle),
+                  b = area_of(surface, edges[k + 1].triangle);
+      const double size = norm(a) * norm(b);
+      is_sharp = size > 0 && dot(a, b) < sharp * size;
+    }
+    if (!is_sharp || !(length > 0)) continue;
+    features.creases.push_back({from, to});
+    leaving[edges[k].low].push_back((to - from) / length);
+    leaving[edges[k].high].push_back((from - to) / length);
+  }
+  for (std::size_t v = 0; v < leaving.size(); ++v) {
+    const std::vector<Vec3d>& at = leaving[v];
+    const bool goes_on = at.empty() || (at.size() == 2 && dot(at[0], at[1]) < -sharp);
+    if (!goes_on) features.corners.push_back({v, surface.position[v]});
+  }
+  return features;
+}
+
+/// Neighbouring points of a piece in one block: the points of a plane across an axis stay exactly
+/// on it.
+std::vector<SampleBlock> blocks_of(const std::vector<PointOn>& points, double side) {
+  struct Placed {
+    std::array<std::int64_t, 4> cell;
+    Vec3d point;
+  };
+  std::vector<Placed> placed;
+  placed.reserve(points.size());
+  const auto cell = [&](double v) { return static_cast<std::int64_t>(std::floor(v / side)); };
+  for (const auto& [piece, p] : points) {
+    placed.push_back({{cell(p.x), cell(p.y), cell(p.z), static_cast<std::int64_t>(piece)}, p});
+  }
+  std::stable_sort(placed.begin(), placed.end(),
+                   [](const Placed& a, const Placed& b) { return a.cell < b.cell; });
+  std::vector<SampleBlock> blocks;
+  for (std::size_t k = 0; k < placed.size(); ++k) {
+    if (k == 0 || placed[k].cell != placed[k - 1].cell) {
+      blocks.push_back({.centre = placed[k].point, .offset = {}});
+    }
+    const Vec3d d = placed[k].point - blocks.back().centre;
+    blocks.back().offset.push_back(
+        {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)});
+  }
+  return blocks;
+}
+
+/// Says how many samples each piece gets, so that every stretch of pieces gets its share.
+class Shares {
+ public:
+  explicit Shares(double size_of_one) : one_(size_of_one) {}
+  std::int64_t next(double size) {
+    size_ += size;
+    const auto before = given_;
+    given_ = static_cast<std::int64_t>(size_ / one_ + 0.5);
+    return given_ - before;
+  }
+
+ private:
+  double one_, size_ = 0;
+  std::int64_t given_ = 0;
+};
+
+std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, double spacing) {
+  std::vector<PointOn> points;
+  Shares shares(spacing / samples_per_site);
+  for (std::size_t e = 0; e < creases.size(); ++e) {
+    const Vec3d from = creases[e].from, along = creases[e].to - from;
+    const std::int64_t n = shares.next(norm(along));
+    for (std::int64_t k = 0; k < n; ++k) {
+      points.push_back(
+          {e, from + ((static_cast<double>(k) + 0.5) / static_cast<double>(n)) * along});
+    }
+  }
+  return blocks_of(points, spacing);
+}
+
+/// Each triangle's by a sequence that covers it evenly.
+/// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
+std::vector<SampleBlock> samples_over(const Surface& surface, double spacing, std::uint64_t seed) {
+  constexpr double step_1 = 0.7548776662466927, step_2 = 0.5698402909980532;
+  std::vector<PointOn> points;
+  Shares shares(spacing * spacing / samples_per_site);
+  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+    const Triangle& corner = surface.triangle[t];
+    const Vec3d a = surface.position[corner[0]];
+    const Vec3d ab = surface.position[corner[1]] - a, ac = surface.position[corner[2]] - a;
+    const std::int64_t n = shares.next(norm(area_of(surface, static_cast<Index>(t))));
+    const std::uint64_t bits = mix_bits(seed ^ mix_bits(t));
+    double u = unit_fraction(bits), v = unit_fraction(bits >> 21);
+    for (std::int64_t k = 0; k < n; ++k) {
+      u += step_1, v += step_2;
+      u -= std::floor(u), v -= std::floor(v);
+      points.push_back({t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac});
+    }
+  }
+  return blocks_of(points, spacing);
+}
+
+/// Adds sites at random sample points and spreads them, those that are there staying.
+void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
+               double spacing, std::uint64_t seed, int relaxations) {
+  const std::size_t fixed = site.size();
+  const std::vector<Vec3d> more = fill_with_darts(blocks, gap, seed, site);
+  if (more.empty()) return;
+  site.insert(site.end(), more.begin(), more.end());
+  SampledVoronoi voronoi(std::move(blocks));
+  voronoi.relax(site, spacing, relaxations, fixed);
+  // Centroids lie beside curves and curved faces.
+  std::vector<std::uint8_t> which(site.size(), 1);
+  std::fill_n(which.begin(), fixed, 0);
+  voronoi.snap(site, spacing, which, fixed);
+}
+
+/// Σ volumes = V/s³ + A/(2 s²): those on faces take half of a phyxel's volume each.
+double spacing_for(double volume, double area, Index phyxels) {
+  double low = std::cbrt(volume / phyxels), high = low;
+  const auto needed = [&](double s) { return volume / (s * s * s) + area / (2 * s * s); };
+  while (needed(high) > phyxels) high *= 2;
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    (needed(middle) > phyxels ? low : high) = middle;
+  }
+  return high;
+}
+
+}  // namespace
+
+SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
+                      Index phyxels, std::uint64_t seed, int relaxations) {
+  double area = 0;
+  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+    area += norm(area_of(surface, static_cast<Index>(t)));
+  }
+  const Features features = features_of(surface, topology);
+  SurfaceSites found;
+  found.spacing = spacing_for(volume, area, phyxels);
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const double s = found.spacing;
+    if (s > 2 * volume / area) break;
+    found.position = fill_with_darts(blocks_of(features.corners, s), gap_at_corners * s, seed, {});
+    add_sites(found.position, samples_along(features.creases, s), gap_along_edges * s, s, seed,
+              relaxations);
+    add_sites(found.position, samples_over(surface, s, seed + 1), gap_on_faces * s, s, seed + 2,
+              relaxations);
+    if (found.position.size() < static_cast<std::size_t>(phyxels)) return found;
+    found.spacing *= 1.1;
+  }
+  const double thickness = 2 * volume / area;
+  throw InputError(fmt::format(
+      "{} phyxels are too few for some to lie on the surface: those on opposite sides would be "
+      "nearer to each other than those side by side; allowed: about {:.2g} or more, or all of them "
+      "inside",
+      phyxels, 1.5 * area / (thickness * thickness)));
+}
+
+}  // namespace phyxel
