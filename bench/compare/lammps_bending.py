@@ -58,9 +58,9 @@ def lammps_rows(lmp, across, ranks):
 
 def phyxel_rows(phyxel, across, cores):
     for way, options in {"cells": ["--lattice", "cells", "--hourglass", "0"],
-                         "cells, α = 0.1": ["--lattice", "cells", "--hourglass", "0.1"],
+                         "cells α = 0.1": ["--lattice", "cells", "--hourglass", "0.1"],
                          "nodes": ["--lattice", "nodes", "--hourglass", "0"],
-                         "nodes, α = 0.1": ["--lattice", "nodes", "--hourglass", "0.1"]}.items():
+                         "nodes α = 0.1": ["--lattice", "nodes", "--hourglass", "0.1"]}.items():
         out = subprocess.run([phyxel, "accuracy", "bending", "--across", str(across), "--jitter", "0", "--closure",
                               "0"] + options, capture_output=True, text=True, check=True,
                              env={**os.environ, "OMP_NUM_THREADS": str(cores)}).stdout
@@ -73,7 +73,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("lmp")
     parser.add_argument("phyxel")
-    parser.add_argument("--what", default="LAMMPS.")
+    parser.add_argument("--what", default="LAMMPS smd/tlsph.")
     parser.add_argument("--cores", type=int, default=2)
     parser.add_argument("--across", type=int, nargs="+", default=[4, 6, 8])
     options = parser.parse_args()

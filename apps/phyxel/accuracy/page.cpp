@@ -53,6 +53,29 @@ std::vector<std::size_t> front_of(const CsvTable& t, std::vector<std::size_t> ro
   return front;
 }
 
+/// Its letters and digits, words apart.
+std::string file_name_of(const std::string& quantity) {
+  std::string name;
+  for (std::size_t k = 0; k < quantity.size(); ++k) {
+    if (quantity.compare(k, 2, "ν") == 0) {
+      name += "nu";
+      ++k;
+    } else {
+      const char c = quantity[k];
+      const bool kept = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+      name += kept ? c : '-';
+    }
+  }
+  return name;
+}
+
+/// As a reader takes it in: percents where they say something.
+std::string short_error(double error) {
+  error = std::abs(error);
+  if (!std::isfinite(error)) return "flew apart";
+  return error >= 1e-4 ? fmt::format("{:.2g}%", 100 * error) : fmt::format("{:.0e}", error);
+}
+
 /// The chart's curve of that label, a new one if there is none.
 Curve& curve_named(LineChart& chart, const std::string& label) {
   const auto known = std::find_if(chart.curves.begin(), chart.curves.end(),
@@ -87,6 +110,8 @@ class AccuracyPage {
         "what the quantity says.\n\nMeasured by {} on {}; {}; {}.\n\n",
         table_.fact("program"), table_.fact("hardware"), table_.fact("compiler"),
         table_.fact("date"));
+    summary();
+    peers_section();
     for (const AccuracyCase& c : accuracy_cases()) {
       for (const std::string& quantity : table_.values("quantity", {{"case", c.name}})) {
         section(c, quantity);
@@ -98,6 +123,86 @@ class AccuracyPage {
   }
 
  private:
+  /// The finest of each way, side by side.
+  void summary() {
+    const std::string ways[] = {"cells, plain",
+                                "nodes, plain",
+                                "nodes, α = 0.1",
+                                "nodes, jitter 0.2, plain",
+                                "nodes, jitter 0.2, α = 0.1, closed",
+                                "mesh, plain",
+                                "mesh, α = 0.1",
+                                "mesh, α = 0.1, closed"};
+    std::vector<std::string> head{"", "phyxels"};
+    for (const std::string& way : ways) {
+      for (std::size_t r = 0; r < table_.rows.size(); ++r) {
+        if (way_of(table_, r) != way) continue;
+        head.push_back(way);
+        break;
+      }
+    }
+    if (head.size() < 4) return;  // nothing to compare
+    std::vector<std::vector<std::string>> cells;
+    for (const AccuracyCase& c : accuracy_cases()) {
+      for (const std::string& quantity : table_.values("quantity", {{"case", c.name}})) {
+        auto& row = cells.emplace_back(
+            std::vector<std::string>{fmt::format("{}: {}", c.name, quantity), ""});
+        double most = 0;
+        for (std::size_t k = 2; k < head.size(); ++k) {
+          std::string found = "–";
+          double finest = 0;
+          for (std::size_t r = 0; r < table_.rows.size(); ++r) {
+            if (!table_.matches(r, {{"case", c.name}, {"quantity", quantity}}) ||
+                way_of(table_, r) != head[k] || table_.number(r, "across") < finest) {
+              continue;
+            }
+            finest = table_.number(r, "across");
+            most = std::max(most, table_.number(r, "phyxels"));
+            found = short_error(table_.number(r, "error"));
+          }
+          row.push_back(found);
+        }
+        row[1] = fmt::format("{:g}", most);
+      }
+    }
+    text_ +=
+        "## What is reached\n\nErrors at the finest resolution of each problem, with up to so "
+        "many phyxels (cells have fewer). Scenes that say nothing have nodes, or meshes, with "
+        "α = 0.1.\n\n" +
+        table_text(head, cells);
+  }
+
+  /// LAMMPS on the same beam and the same cores.
+  void peers_section() {
+    const fs::path file = results_ / "accuracy_lammps.csv";
+    if (!fs::exists(file)) return;
+    const CsvTable t = read_csv(file);
+    LineChart chart{.title = "frequency of a bending bar",
+                    .x_label = "time for ten periods [s]",
+                    .y_label = "error",
+                    .log_x = true,
+                    .log_y = true,
+                    .curves = {}};
+    std::vector<std::vector<std::string>> cells;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      const std::string way = t.text(r, "program") + ", " + t.text(r, "discretisation");
+      Curve& curve = curve_named(chart, way);
+      curve.x.push_back(t.number(r, "seconds"));
+      curve.y.push_back(error_of(t, r));
+      cells.push_back({way, t.text(r, "across"), t.text(r, "phyxels"),
+                       short_error(t.number(r, "error")), t.text(r, "seconds")});
+    }
+    text_ += fmt::format(
+        "## Beside LAMMPS\n\nThe bar of *bending* below rings for ten periods, on the same cores: "
+        "what its frequency is off by, and how long it takes. {}. "
+        "`bench/compare/lammps_bending.py` "
+        "runs both, with the largest stable step of LAMMPS and without its set-up, with phyxel's "
+        "own step and its set-up. {} on {}; {}.\n\n",
+        t.fact("what"), t.fact("program"), t.fact("hardware"), t.fact("date"));
+    draw(chart, "accuracy_lammps");
+    text_ += table_text({"", "across", "phyxels", "error", "s"}, cells);
+  }
+
   void study_section(const Study& study) {
     const fs::path file = results_ / fmt::format("accuracy_{}.csv", study.name);
     if (!fs::exists(file)) return;
@@ -236,13 +341,13 @@ class AccuracyPage {
       front.y.push_back(error_of(table_, r));
     }
     chart.curves.push_back(front);
-    draw(chart, fmt::format("accuracy_{}_{}", c.name, charts_++));
+    draw(chart, fmt::format("accuracy_{}_{}_{}", c.name, file_name_of(quantity),
+                            irregular ? "irregular" : "regular"));
   }
 
   fs::path results_, link_;
   CsvTable table_;
   std::string text_;
-  int charts_ = 0;
 };
 
 }  // namespace
