@@ -149,10 +149,10 @@ TEST_F(AccuracyCommand, WritesAPageFromTheTable) {
 
 /// A study's table becomes a section; the errors of its steps fall.
 TEST_F(AccuracyCommand, StudiesStepsAndHardCases) {
-  EXPECT_EQ(run({"accuracy", "rotation", "--across", "2", "--lattice", "nodes", "--csv",
-                 "accuracy.csv"})
-                .code,
-            0);
+  EXPECT_EQ(
+      run({"accuracy", "rotation", "--across", "2", "--lattice", "nodes", "--csv", "accuracy.csv"})
+          .code,
+      0);
   const auto steps = run({"accuracy", "steps", "--csv", "accuracy_steps.csv"});
   EXPECT_EQ(steps.code, 0) << steps.err;
   EXPECT_THAT(steps.out, HasSubstr("way,step_s,error"));
