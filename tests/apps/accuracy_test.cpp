@@ -169,6 +169,22 @@ TEST_F(AccuracyCommand, StudiesStepsAndHardCases) {
   EXPECT_THAT(text, HasSubstr("not run"));
 }
 
+/// The drawn bars differ, and the page shows them.
+TEST_F(AccuracyCommand, DrawsPicturesForItsPage) {
+  ASSERT_EQ(
+      run({"accuracy", "rotation", "--across", "2", "--lattice", "nodes", "--csv", "accuracy.csv"})
+          .code,
+      0);
+  const auto drawn = run({"accuracy", "pictures", "--results", "."});
+  EXPECT_EQ(drawn.code, 0) << drawn.err;
+  const std::string plain = test::text_of(folder_ / "accuracy_swing_plain.png"),
+                    held = test::text_of(folder_ / "accuracy_swing_held.png");
+  EXPECT_EQ(plain.substr(1, 3), "PNG");
+  EXPECT_NE(plain, held);
+  EXPECT_EQ(run({"accuracy", "page", "--results", ".", "--out", "page.md"}).code, 0);
+  EXPECT_THAT(test::text_of(folder_ / "page.md"), HasSubstr("![nodes, plain]("));
+}
+
 /// Each is answered within its tolerance or refused, as it should be; those that take minutes are
 /// in docs/accuracy.md.
 class HardCases : public ::testing::TestWithParam<app::HardCase> {

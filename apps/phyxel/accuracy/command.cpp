@@ -10,6 +10,7 @@
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
 #include "accuracy/page.hpp"
+#include "accuracy/pictures.hpp"
 #include "accuracy/studies.hpp"
 #include "csv.hpp"
 #include "device_option.hpp"
@@ -210,6 +211,9 @@ void add_accuracy(CLI::App& program) {
   CLI::App* page = command->add_subcommand("page", "Write the page from the table accuracy.csv");
   page->add_option("--results", *results, "Folder of the table")->capture_default_str();
   page->add_option("--out", *out, "The page")->capture_default_str();
+  CLI::App* pictures = command->add_subcommand(
+      "pictures", "Draw what hourglass control holds, into the folder of the tables");
+  pictures->add_option("--results", *results, "Folder of the tables")->capture_default_str();
   auto hard_options = std::make_shared<HardOptions>();
   CLI::App* hard = command->add_subcommand(
       "hard", "Cases that are hard to keep stable: each answered, or refused with its cause");
@@ -233,6 +237,7 @@ void add_accuracy(CLI::App& program) {
     of_study->callback([=] { measure_study(study, *study_options); });
   }
   page->callback([=] { write_accuracy_page(*results, *out); });
+  pictures->callback([=] { draw_accuracy_pictures(*results); });
   hard->callback([=] {
     if (!measure_hard(*hard_options)) {
       throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");

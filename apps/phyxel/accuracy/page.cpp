@@ -8,6 +8,7 @@
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
+#include "accuracy/pictures.hpp"
 #include "accuracy/studies.hpp"
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
@@ -112,6 +113,7 @@ class AccuracyPage {
         table_.fact("date"));
     summary();
     peers_section();
+    hourglass_section();
     for (const AccuracyCase& c : accuracy_cases()) {
       for (const std::string& quantity : table_.values("quantity", {{"case", c.name}})) {
         section(c, quantity);
@@ -170,6 +172,49 @@ class AccuracyPage {
         "many phyxels (cells have fewer). Scenes that say nothing have nodes, or meshes, with "
         "α = 0.1.\n\n" +
         table_text(head, cells);
+  }
+
+  /// What hourglass control holds, and what it takes.
+  void hourglass_section() {
+    std::vector<std::string> names, shown;
+    for (const AccuracyPicture& picture : accuracy_pictures()) {
+      if (!fs::exists(results_ / picture.file)) continue;
+      names.push_back(picture.what);
+      shown.push_back(fmt::format("![{}]({}{})", picture.what, link_.string(), picture.file));
+    }
+    const std::pair<const char*, const char*> files[] = {{"CPU", "cpu_terms.csv"},
+                                                         {"GPU", "gpu_terms.csv"}};
+    std::vector<std::vector<std::string>> costs;
+    for (const auto& [device, file] : files) {
+      if (!fs::exists(results_ / file)) continue;
+      const CsvTable t = read_csv(results_ / file);
+      for (const char* precision : {"double", "mixed", "float"}) {
+        const auto plain = t.find({{"terms", "green"}, {"precision", precision}});
+        if (!plain) continue;
+        std::vector<std::string> row{device, precision, t.text(*plain, "phyxels")};
+        for (const char* terms : {"hourglass", "closure"}) {
+          const auto with = t.find({{"terms", terms}, {"precision", precision}});
+          row.push_back(with ? fmt::format("{:+.0f}%", 100 * (t.number(*plain, "steps_per_s") /
+                                                                  t.number(*with, "steps_per_s") -
+                                                              1))
+                             : "–");
+        }
+        costs.push_back(row);
+      }
+    }
+    if (shown.empty() && costs.empty()) return;
+    text_ += "## What hourglass control holds, and what it costs\n\n";
+    if (!shown.empty()) {
+      text_ +=
+          "A soft bar of neo-Hookean material, clamped at its upper end, after it was let go: "
+          "its phyxels as they lie, drawn by `phyxel accuracy pictures`.\n\n" +
+          table_text(names, {shown});
+    }
+    if (!costs.empty()) {
+      text_ +=
+          "Time of a step beside one without, from `phyxel bench step`:\n\n" +
+          table_text({"", "precision", "phyxels", "hourglass control", "closed gradients"}, costs);
+    }
   }
 
   /// LAMMPS on the same beam and the same cores.
