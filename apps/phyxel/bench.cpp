@@ -413,7 +413,8 @@ void add_device_options(CLI::App& command, BenchOptions& options) {
 }
 
 CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
-                       std::vector<Index> sizes, void (*body)(const BenchOptions&)) {
+                       std::vector<Index> sizes, void (*body)(const BenchOptions&),
+                       const char* examples) {
   CLI::App* command = bench.add_subcommand(name, what);
   auto options = std::make_shared<BenchOptions>();
   options->sizes = std::move(sizes);
@@ -444,6 +445,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
     command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
         ->check(CLI::Range(0.01, 60.0));
   }
+  command->footer(examples);
   command->callback([options, body] { body(*options); });
   return command;
 }
@@ -463,6 +465,10 @@ void add_bench_cantilever(CLI::App& bench) {
   add_factors(*command, *options);
   add_device_options(*command, *options);
   add_table_options(*command, *options);
+  command->footer(
+      "Examples:\n"
+      "  phyxel bench cantilever\n"
+      "  phyxel bench cantilever --across 8,16 --factor 1.8 --device cuda --csv cantilever.csv");
   command->callback([options] { bench_cantilever(*options); });
 }
 
@@ -472,12 +478,22 @@ void add_bench(CLI::App& program) {
   CLI::App* bench = program.add_subcommand("bench", "Measure speed beside error and bandwidth");
   bench->require_subcommand(1);
   add_bench_of(*bench, "step", "Time steps per second of a jittered cube, per term and precision",
-               {1000, 10648, 103823, 1000000}, bench_step);
+               {1000, 10648, 103823, 1000000}, bench_step,
+               "Examples:\n"
+               "  phyxel bench step\n"
+               "  phyxel bench step --terms green,hourglass --phyxels 1000000 --csv step.csv\n"
+               "  phyxel bench step --shape dino --bodies 100 --device cuda");
   add_bench_of(*bench, "setup", "From a cloud to the first step: neighbours, moments, step limit",
-               {10648, 103823, 1000000}, bench_setup);
+               {10648, 103823, 1000000}, bench_setup,
+               "Examples:\n"
+               "  phyxel bench setup\n"
+               "  phyxel bench setup --device cuda --csv setup.csv");
   add_bench_of(*bench, "neighbours",
                "Neighbour search: time per phyxel against the number of phyxels",
-               {10648, 103823, 1000000, 9938375}, bench_neighbours);
+               {10648, 103823, 1000000, 9938375}, bench_neighbours,
+               "Examples:\n"
+               "  phyxel bench neighbours\n"
+               "  phyxel bench neighbours --threads 1,2 --csv neighbours.csv");
   add_bench_cantilever(*bench);
   add_bench_scaling(*bench);
 
@@ -489,6 +505,15 @@ void add_bench(CLI::App& program) {
   auto scaling = std::make_shared<std::string>("docs/scaling.md");
   page->add_option("--out", *out, "The page about the GPU")->capture_default_str();
   page->add_option("--scaling", *scaling, "The page about ranks")->capture_default_str();
+  page->footer(
+      "Example:\n"
+      "  phyxel bench page");
+  bench->footer(
+      "Examples:\n"
+      "  phyxel bench step\n"
+      "  phyxel bench cantilever --across 4,8\n"
+      "  mpirun -n 2 phyxel bench scaling\n"
+      "Each has more: phyxel bench step --help");
   page->callback([results, out, scaling] {
     write_bench_page(*results, *out);
     write_scaling_page(*results, *scaling);

@@ -312,6 +312,10 @@ void add_bench_scaling(CLI::App& bench) {
       ->check(CLI::Range(1, 1000));
   command->add_option("--csv", options->csv, "Also write the table to this file");
   command->add_flag("--force", options->force, "Replace the CSV file");
+  command->footer(
+      "Examples:\n"
+      "  mpirun -n 2 phyxel bench scaling\n"
+      "  mpirun -n 4 phyxel bench scaling --phyxels 16000000 --weak --csv ranks.csv");
   command->callback([options] { bench_scaling(*options); });
 }
 

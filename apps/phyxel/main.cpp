@@ -14,13 +14,14 @@ using phyxel::app::ranks;
 
 /// What several ranks can do.
 void check_ranks(const CLI::App& program) {
-  if (ranks().size() == 1 || program.got_subcommand("run") || program.got_subcommand("doctor") ||
+  if (ranks().size() == 1 || program.got_subcommand("run") || program.got_subcommand("check") ||
+      program.got_subcommand("doctor") ||
       program.get_subcommand("bench")->got_subcommand("scaling")) {
     return;
   }
   throw phyxel::AgreedError(
       phyxel::ExitCode::bad_input,
-      fmt::format("{} ranks: allowed with \"phyxel run\", \"phyxel doctor\" and "
+      fmt::format("{} ranks: allowed with \"phyxel run\", \"phyxel check\", \"phyxel doctor\" and "
                   "\"phyxel bench scaling\"; start all else without mpirun",
                   ranks().size()));
 }
@@ -54,6 +55,7 @@ int main(int argc, char** argv) {
   phyxel::app::add_accuracy(program);
   phyxel::app::add_paper(program);
   phyxel::app::add_doctor(program);
+  phyxel::app::add_completion(program);
   return phyxel::on_ranks(argc, argv, [&](const phyxel::Ranks& all) {
     phyxel::app::set_ranks(all);
     program.parse_complete_callback([&] { check_ranks(program); });

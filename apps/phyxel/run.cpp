@@ -35,6 +35,7 @@ struct RunOptions {
   bool no_pictures = false;
   bool quiet = false;
   bool json = false;
+  bool dry_run = false;
 };
 
 /// A state that passed the watch.
@@ -85,7 +86,7 @@ class Run {
     // Last, because it replaces what an earlier run has left: all that could be refused, or find no
     // memory, has been tried by now.
     ranks().together([&] {
-      if (!leads()) return;
+      if (!leads() || options_.dry_run) return;
       recorder_.emplace(model(), scene_, options.force,
                         begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
     });
@@ -94,6 +95,44 @@ class Run {
     const BoundarySize boundary = boundary_size(model());
     boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
     setup_seconds_ = seconds_since(start_);
+  }
+
+  /// The plan, and how long it would take: a few steps tell. Writes nothing.
+  void rehearse() {
+    say_plan();
+    const std::vector<ArrayBytes> memory = backend_->memory();
+    std::int64_t bytes = 0;
+    for (const ArrayBytes& array : memory) bytes += static_cast<std::int64_t>(array.bytes);
+    bytes = ranks().sum(bytes);
+    const std::optional<double> seconds = forecast();
+    if (!leads()) return;
+    const double phyxels = std::max(1, model().whole_size());
+    if (options_.json) {
+      nlohmann::ordered_json j = identity();
+      j["time_step_s"] = plan_.dt;
+      j["largest_stable_step_s"] = plan_.limit.largest_step;
+      j["omega_max_rad_s"] = plan_.limit.omega_max;
+      j["end_s"] = end_time();
+      j["steps"] = plan_.steps;
+      j["steps_per_frame"] = plan_.steps_per_frame;
+      j["setup_seconds"] = setup_seconds_;
+      j["bytes"] = bytes;
+      if (seconds) j["forecast_seconds"] = *seconds;
+      j["warnings"] = model().warnings;
+      fmt::print("{}\n", j.dump(2));
+      return;
+    }
+    if (options_.quiet) return;
+    if (ranks().size() == 1) {
+      for (const ArrayBytes& array : memory) {
+        fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: {}\n", array.bytes,
+                   static_cast<double>(array.bytes) / phyxels, array.name);
+      }
+    } else {
+      fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: all ranks'\n", bytes,
+                 static_cast<double>(bytes) / phyxels);
+    }
+    if (seconds) fmt::print("  forecast    {:.3g} s for the steps alone\n", *seconds);
   }
 
   void execute() {
@@ -197,6 +236,36 @@ class Run {
   static constexpr double watch_share = 50;
 
   const Model& model() const { return shared_.here(); }
+
+  /// Of all steps [s]; none for a search for equilibrium, whose length nobody knows.
+  std::optional<double> forecast() {
+    if (scene_.solver.method == Method::equilibrium) return std::nullopt;
+    const auto timed = [&](std::int64_t steps) {
+      const auto start = Clock::now();
+      for (std::int64_t k = 0; k < steps; ++k) solver_.step();
+      backend_->wait();
+      return std::max(1e-9, seconds_since(start)) / static_cast<double>(steps);
+    };
+    const double first = timed(2);
+    // As many on all ranks.
+    const auto more = ranks().largest(static_cast<std::int64_t>(std::min(1000.0, 0.2 / first)));
+    return (more > 2 ? timed(more) : first) * static_cast<double>(plan_.steps);
+  }
+
+  /// What a summary or a plan in JSON begins with.
+  nlohmann::ordered_json identity() const {
+    const Index phyxels = model().whole_size();
+    return {{"program", program_version()},
+            {"scene", scene_.file.string()},
+            {"title", scene_.title},
+            {"device", backend_->name()},
+            {"ranks", ranks().size()},
+            {"phyxels", phyxels},
+            {"surfels", model().whole_surfels()},
+            {"neighbours_per_phyxel", static_cast<double>(model().pairs()) / std::max(1, phyxels)},
+            {"method", method_name(scene_.solver.method)}};
+  }
+
   bool steps_explicitly() const { return scene_.solver.method == Method::verlet; }
   double end_time() const { return static_cast<double>(plan_.steps) * plan_.dt; }
   /// Whether this rank speaks and writes.
@@ -233,7 +302,9 @@ class Run {
 
   /// Before the model is built, so that a wrong --resume or output folder costs no time.
   std::optional<CheckpointReader> find_checkpoint() const {
-    check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
+    if (!options_.dry_run) {
+      check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
+    }
     if (options_.resume.empty()) return std::nullopt;
     std::filesystem::path file = options_.resume;
     if (options_.resume == "auto") {
@@ -444,44 +515,35 @@ class Run {
     const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
     const Index phyxels = model().whole_size();
     if (options_.json) {
-      nlohmann::ordered_json j = {
-          {"program", program_version()},
-          {"scene", scene_.file.string()},
-          {"title", scene_.title},
-          {"device", backend_->name()},
-          {"ranks", ranks().size()},
-          {"phyxels", phyxels},
-          {"surfels", model().whole_surfels()},
-          {"neighbours_per_phyxel", static_cast<double>(model().pairs()) / std::max(1, phyxels)},
-          {"time_s", now.time},
-          {"steps", solver_.steps()},
-          {"time_step_s", plan_.dt},
-          {"method", method_name(scene_.solver.method)},
-          {"largest_stable_step_s", plan_.limit.largest_step},
-          {"omega_max_rad_s", plan_.limit.omega_max},
-          {"force_evaluations", solver_.work().evaluations},
-          {"newton_steps", solver_.work().newton_steps},
-          {"newton_residual", solver_.work().residual},
-          {"setup_seconds", setup_seconds_},
-          {"loop_seconds", loop_seconds_},
-          {"step_seconds", step_seconds_},
-          {"steps_per_second", steps / step_seconds_},
-          {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
-          {"bytes", bytes},
-          {"transport", transport_},
-          {"gpus", gpus_},
-          {"exchange_bytes", traffic.bytes_sent},
-          {"exchange_seconds", traffic.seconds},
-          {"energy_j", now.total_energy()},
-          {"energy_drift", energy_drift},
-          {"conservative", is_conservative(model())},
-          {"internal_force_balance", force_balance},
-          {"internal_torque_balance", torque_balance},
-          {"inverted_phyxels", now.inverted},
-          {"warnings", model().warnings},
-          {"frames", recorder_->frames_written()},
-          {"directory", recorder_->directory().string()},
-          {"checkpoint", checkpoint_.string()}};
+      nlohmann::ordered_json j = identity();
+      j.update({{"time_s", now.time},
+                {"steps", solver_.steps()},
+                {"time_step_s", plan_.dt},
+                {"largest_stable_step_s", plan_.limit.largest_step},
+                {"omega_max_rad_s", plan_.limit.omega_max},
+                {"force_evaluations", solver_.work().evaluations},
+                {"newton_steps", solver_.work().newton_steps},
+                {"newton_residual", solver_.work().residual},
+                {"setup_seconds", setup_seconds_},
+                {"loop_seconds", loop_seconds_},
+                {"step_seconds", step_seconds_},
+                {"steps_per_second", steps / step_seconds_},
+                {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
+                {"bytes", bytes},
+                {"transport", transport_},
+                {"gpus", gpus_},
+                {"exchange_bytes", traffic.bytes_sent},
+                {"exchange_seconds", traffic.seconds},
+                {"energy_j", now.total_energy()},
+                {"energy_drift", energy_drift},
+                {"conservative", is_conservative(model())},
+                {"internal_force_balance", force_balance},
+                {"internal_torque_balance", torque_balance},
+                {"inverted_phyxels", now.inverted},
+                {"warnings", model().warnings},
+                {"frames", recorder_->frames_written()},
+                {"directory", recorder_->directory().string()},
+                {"checkpoint", checkpoint_.string()}});
       fmt::print("{}\n", j.dump(2));
       return;
     }
@@ -565,6 +627,10 @@ class Run {
 };
 
 void run(const RunOptions& options) {
+  if (options.dry_run) {
+    Run(options).rehearse();
+    return;
+  }
   if (options.profile.empty()) {
     Run(options).execute();
     return;
@@ -577,32 +643,6 @@ void run(const RunOptions& options) {
     throw;
   }
   write_profile(options.profile);
-}
-
-void check(const Overrides& overrides) {
-  const Scene scene = scene_with(overrides);
-  const ChosenDevice device = choose_device(scene.solver.device, "device");
-  const Model model = build_model(scene, device);
-  const auto backend = make_backend(model, scene.solver.precision, device, scene.solver.threads);
-  const StepPlan plan = plan_steps(scene, model, *backend, overrides.unsafe_step);
-  fmt::print("{}\n{}", scene.file.string(), describe_model(scene, model, boundary_size(model)));
-  fmt::print("  device      {}\n  time step   {}\n", backend->name(), plan.why);
-  fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps\n", plan.steps,
-             scene.time.end, plan.steps_per_frame);
-  for (const ArrayBytes& array : backend->memory()) {
-    fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: {}\n", array.bytes,
-               static_cast<double>(array.bytes) / std::max(1, model.size()), array.name);
-  }
-  // A few steps tell how long the run will take.
-  diagnose(model, *backend, 0, plan.dt);  // has memory of its own, which must be there too
-  if (scene.solver.method == Method::equilibrium) return;
-  Solver solver(model, *backend, initial_state(model, scene, plan.dt), scene.solver.method);
-  const auto start = Clock::now();
-  int steps = 0;
-  for (; steps < 2 || (seconds_since(start) < 0.2 && steps < 1000); ++steps) solver.step();
-  backend->wait();
-  fmt::print("  forecast    {:.3g} s for the steps alone\n",
-             seconds_since(start) / steps * static_cast<double>(plan.steps));
 }
 
 }  // namespace
@@ -637,6 +677,8 @@ void add_run(CLI::App& program) {
                     "Leave out the pictures the scene asks for");
   command->add_flag("--quiet", options->quiet, "No progress, no plan; only the summary");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
+  command->add_flag("--dry-run", options->dry_run,
+                    "Only the plan: step, memory, device, ranks, forecast; as phyxel check does");
   command->add_option("--profile", options->profile,
                       "Write what each rank does when to this file, for a trace viewer "
                       "(chrome://tracing, ui.perfetto.dev)");
@@ -644,6 +686,7 @@ void add_run(CLI::App& program) {
       "Examples:\n"
       "  phyxel run examples/dino/scene.toml --out out/dino\n"
       "  phyxel run scene.toml --precision double --until 0.5 --force\n"
+      "  phyxel run scene.toml --dry-run\n"
       "  phyxel run scene.toml --resume auto\n"
       "  mpirun -n 8 phyxel run scene.toml");
   command->callback([options] { run(*options); });
@@ -652,9 +695,16 @@ void add_run(CLI::App& program) {
 void add_check(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "check", "Read a scene, build its model and print the plan: time step, memory, forecast");
-  auto overrides = std::make_shared<Overrides>();
-  add_overrides(*command, *overrides);
-  command->callback([overrides] { check(*overrides); });
+  auto options = std::make_shared<RunOptions>();
+  options->dry_run = true;
+  add_overrides(*command, options->overrides);
+  command->add_flag("--json", options->json, "The plan as JSON, nothing else on stdout");
+  command->footer(
+      "Examples:\n"
+      "  phyxel check examples/dino/scene.toml\n"
+      "  phyxel check scene.toml --device cpu --precision double --json\n"
+      "  mpirun -n 8 phyxel check scene.toml");
+  command->callback([options] { run(*options); });
 }
 
 }  // namespace phyxel::app

@@ -230,7 +230,7 @@ density = 1000
                {{"run", "scene.toml", "--transport", "pigeon"}, "pigeon"},
                {{"run", "huge.toml"}, "to each of 2 ranks"},
                {{"run", "scene.toml", "--out", "kept"}, "kept"},
-               {{"check", "scene.toml"}, "2 ranks"}};
+               {{"render", "out"}, "2 ranks"}};
   for (const auto& c : cases) {
     const Outcome outcome = run_on(2, c.arguments);
     EXPECT_EQ(outcome.code, 2) << outcome.err;
@@ -238,6 +238,22 @@ density = 1000
   }
   EXPECT_EQ(text_of(folder_ / "kept"), "precious");
   EXPECT_EQ(count_of("Usage:", run_on(2, {"--help"}).out), 1);
+}
+
+/// The plan of two ranks is that of one, and no file is written.
+TEST_F(Mpirun, CheckTellsThePlanOnce) {
+  write_scene();
+  const Outcome one = run_on(0, {"check", "scene.toml", "--json"});
+  const Outcome two = run_on(2, {"check", "scene.toml", "--json"});
+  ASSERT_EQ(two.code, 0) << two.err;
+  const auto alone = nlohmann::json::parse(one.out), shared = nlohmann::json::parse(two.out);
+  for (const char* key : {"phyxels", "surfels", "steps", "time_step_s", "neighbours_per_phyxel"}) {
+    EXPECT_EQ(shared[key], alone[key]) << key;
+  }
+  EXPECT_EQ(shared["ranks"], 2);
+  EXPECT_GT(shared["forecast_seconds"], 0.0);
+  EXPECT_THAT(run_on(2, {"run", "scene.toml", "--dry-run"}).out, HasSubstr("all ranks'"));
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
 TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {

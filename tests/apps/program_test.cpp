@@ -500,6 +500,26 @@ TEST_F(Program, AGpuThatIsNotThereIsExitCode4AndAutoTakesTheCpu) {
   EXPECT_THAT(automatic.out, HasSubstr("cpu, float"));
 }
 
+TEST_F(Program, DryRunTellsThePlanOfTheRunAndWritesNothing) {
+  write_beam();
+  const Outcome dry = run({"run", "beam.toml", "--dry-run", "--json"});
+  ASSERT_EQ(dry.code, 0) << dry.err;
+  EXPECT_FALSE(fs::exists(folder_ / "out"));
+  const Outcome real = run({"run", "beam.toml", "--json"});
+  ASSERT_EQ(real.code, 0) << real.err;
+  const auto plan = nlohmann::json::parse(dry.out), summary = nlohmann::json::parse(real.out);
+  for (const char* key : {"steps", "time_step_s", "phyxels", "largest_stable_step_s"}) {
+    EXPECT_EQ(plan[key], summary[key]) << key;
+  }
+  EXPECT_GT(plan["bytes"], 0);
+  EXPECT_GT(plan["forecast_seconds"], 0.0);
+  EXPECT_THAT(run({"check", "beam.toml"}).out, HasSubstr("forecast"));
+  // Beside an earlier trajectory, too, which stays.
+  EXPECT_EQ(run({"run", "beam.toml", "--dry-run"}).code, 0);
+  EXPECT_EQ(run({"run", "beam.toml"}).code, 2);
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "energy.csv"));
+}
+
 TEST_F(Program, SamplesAMeshAndRunsIt) {
   // An octahedron, refined by nothing: eight triangles are enough of a mesh.
   write("gem.obj",

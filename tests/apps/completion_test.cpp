@@ -1,0 +1,125 @@
+/// What shells offer while a command is typed, and the help of every command.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <regex>
+#include <sstream>
+
+#include "support/program.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
+
+class Completion : public test::Program {
+ protected:
+  /// What the shell would offer for the last of these words.
+  std::vector<std::string> offered(const std::vector<std::string>& typed) const {
+    const test::Outcome outcome = run(typed);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    std::istringstream text(outcome.out);
+    std::vector<std::string> words;
+    // fish says what each is for, after a tab.
+    for (std::string line; std::getline(text, line);)
+      words.push_back(line.substr(0, line.find('\t')));
+    return words;
+  }
+  bool there_is(const char* shell) const {
+    return std::system((std::string("command -v ") + shell + " >/dev/null").c_str()) == 0;
+  }
+  void expect_what_is_offered() const {
+    EXPECT_THAT(offered({"che"}), ElementsAre("check"));
+    EXPECT_THAT(offered({"bench", "st"}), ElementsAre("step"));
+    EXPECT_THAT(offered({"run", "--st"}), ElementsAre("--step"));
+    EXPECT_THAT(offered({"accuracy", "hard", "--pre"}), ElementsAre("--precision"));
+    EXPECT_THAT(offered({"render", "--"}), IsSupersetOf({"--frames", "--view", "--help"}));
+    EXPECT_THAT(offered({"sample", "--frames"}), IsEmpty());
+  }
+};
+
+TEST_F(Completion, BashOffersCommandsAndTheirOptions) {
+  write("complete.sh",
+        "eval \"$(\"$1\" completion bash)\"\n"
+        "COMP_WORDS=(phyxel \"${@:2}\"); COMP_CWORD=$(($# - 1)); _phyxel\n"
+        "for word in \"${COMPREPLY[@]}\"; do echo \"$word\"; done\n");
+  launcher_ = {"/bin/bash", "complete.sh"};
+  expect_what_is_offered();
+}
+
+TEST_F(Completion, FishOffersCommandsAndTheirOptions) {
+  if (!there_is("fish")) GTEST_SKIP() << "no fish";
+  write("complete.fish",
+        "$argv[1] completion fish | source\n"
+        "complete -C \"phyxel $argv[2..]\"\n");
+  launcher_ = {"/usr/bin/env", "fish", "complete.fish"};
+  expect_what_is_offered();
+}
+
+TEST_F(Completion, ZshTakesTheScript) {
+  if (!there_is("zsh")) GTEST_SKIP() << "no zsh";
+  write("complete.zsh",
+        "autoload -U compinit && compinit -u -D\n"
+        "eval \"$($1 completion zsh)\"\n"
+        "echo $_comps[phyxel]\n");
+  launcher_ = {"/usr/bin/env", "zsh", "-f", "complete.zsh"};
+  EXPECT_THAT(run({}).out, HasSubstr("_phyxel"));
+}
+
+TEST_F(Completion, OtherShellsAreRefused) {
+  const test::Outcome outcome = run({"completion", "csh"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("bash"));
+}
+
+class Help : public test::Program {
+ protected:
+  /// All commands but the program itself, "bench step" and the like: the script for bash names
+  /// them.
+  std::vector<std::string> commands() const {
+    const std::string script = run({"completion", "bash"}).out;
+    const std::regex one("\"([a-z ]+)\"\\) options");
+    std::vector<std::string> paths;
+    for (std::sregex_iterator it(script.begin(), script.end(), one), end; it != end; ++it) {
+      paths.push_back((*it)[1]);
+    }
+    return paths;
+  }
+  std::string help_of(const std::string& path) const {
+    std::istringstream text(path + " --help");
+    std::vector<std::string> words;
+    for (std::string word; text >> word;) words.push_back(word);
+    return run(words).out;
+  }
+};
+
+TEST_F(Help, HasExamplesForEveryCommandOfOptionsThatThereAre) {
+  const std::vector<std::string> paths = commands();
+  EXPECT_GT(paths.size(), 20u);
+  for (const std::string& path : paths) {
+    SCOPED_TRACE(path);
+    const std::string help = help_of(path);
+    const std::size_t examples = help.find("Example");
+    ASSERT_NE(examples, std::string::npos);
+    EXPECT_THAT(help.substr(examples), HasSubstr("phyxel " + path));
+    std::istringstream lines(help.substr(examples));
+    for (std::string line; std::getline(lines, line);) {
+      const bool of_a_part = std::any_of(paths.begin(), paths.end(), [&](const std::string& other) {
+        return other.size() > path.size() && line.find("phyxel " + other) != std::string::npos;
+      });
+      if (of_a_part) continue;
+      std::istringstream words(line);
+      for (std::string word; words >> word;) {
+        if (word.rfind("--", 0) != 0) continue;
+        EXPECT_THAT(help.substr(0, examples), HasSubstr("  " + word));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace phyxel
