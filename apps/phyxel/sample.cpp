@@ -148,10 +148,14 @@ void add_sample(CLI::App& program) {
       ->add_option("--relaxations", options->relaxations,
                    "Sweeps that even out the distances; 0: none")
       ->capture_default_str();
-  command->add_flag_function(
-      "--on-surface,!--inside", [options](std::int64_t times) { options->on_surface = times > 0; },
-      "Phyxels on the surface, too, on its corners and along its sharp edges (far more accurate in "
-      "bending), or all inside. Default: as the mesh allows");
+  CLI::Option* const on_surface = command->add_flag_callback(
+      "--on-surface", [options] { options->on_surface = true; },
+      "Phyxels on the surface, too, on its corners and along its sharp edges: far more accurate in "
+      "bending. Default: if the mesh allows it");
+  command
+      ->add_flag_callback(
+          "--inside", [options] { options->on_surface = false; }, "All phyxels inside")
+      ->excludes(on_surface);
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
   command->footer(

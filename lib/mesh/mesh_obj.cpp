@@ -24,10 +24,11 @@ constexpr std::string_view keywords[] = {
 
 /// What tinyobjloader is given. It takes damaged numbers and indices without complaint and knows no
 /// line numbers in what it returns, so every line is checked first, and only vertices and faces,
-/// with absolute indices, are passed on.
+/// with absolute indices, are passed on. Coordinates are kept as they were read here: its own are
+/// off in their last digit.
 struct CheckedText {
   std::string text;
-  std::size_t vertices = 0;
+  std::vector<Vec3d> position;
 };
 
 class LineCheck {
@@ -50,9 +51,10 @@ class LineCheck {
       check(text);
     }
     // Faces may name vertices that come later, so this can be told only now.
-    if (greatest_ > checked_.vertices) {
+    if (greatest_ > checked_.position.size()) {
       line_ = greatest_line_;
-      fail(fmt::format("a corner names vertex {}, but there are {}", greatest_, checked_.vertices));
+      fail(fmt::format("a corner names vertex {}, but there are {}", greatest_,
+                       checked_.position.size()));
     }
     return std::move(checked_);
   }
@@ -82,7 +84,7 @@ class LineCheck {
   }
 
   void check_vertex(TextCursor& words) {
-    checked_.text += 'v';
+    double place[3];
     for (int axis = 0; axis < 3; ++axis) {
       const std::string_view word = words.word();
       if (word.empty()) fail(fmt::format("a vertex needs three coordinates, here are {}", axis));
@@ -91,10 +93,10 @@ class LineCheck {
         fail(fmt::format("the coordinate \"{}\" is not a number within +-{:g}", printable(word),
                          largest_coordinate));
       }
-      checked_.text += fmt::format(" {}", *value);  // 0e999 would become NaN in tinyobjloader
+      place[axis] = *value;
     }
-    checked_.text += '\n';
-    ++checked_.vertices;
+    checked_.text += "v 0 0 0\n";
+    checked_.position.push_back({place[0], place[1], place[2]});
   }
 
   void check_face(TextCursor& words) {
@@ -104,7 +106,7 @@ class LineCheck {
       if (word.front() == '#') break;
       const std::string_view vertex = word.substr(0, word.find('/'));
       const auto index = parse_integer(vertex);
-      const auto before = static_cast<long long>(checked_.vertices);
+      const auto before = static_cast<long long>(checked_.position.size());
       if (!index || *index == 0) {
         fail(fmt::format("the corner \"{}\" does not name a vertex (they count from 1)",
                          printable(word)));
@@ -136,7 +138,6 @@ class LineCheck {
 };
 
 struct Polygons {
-  std::vector<Vec3d> position;
   std::vector<Index> corner;
   std::vector<std::size_t> face_start{0};
 };
@@ -147,11 +148,7 @@ Surface parse_obj(std::string_view content, const std::string& name) {
   CheckedText checked = LineCheck(content, name).run();
   std::istringstream stream(std::move(checked.text));
   Polygons polygons;
-  polygons.position.reserve(checked.vertices);
   tinyobj::callback_t callback;
-  callback.vertex_cb = [](void* user, double x, double y, double z, double) {
-    static_cast<Polygons*>(user)->position.push_back({x, y, z});
-  };
   callback.index_cb = [](void* user, tinyobj::index_t* indices, int count) {
     auto& into = *static_cast<Polygons*>(user);
     for (int k = 0; k < count; ++k) into.corner.push_back(indices[k].vertex_index - 1);
@@ -163,7 +160,7 @@ Surface parse_obj(std::string_view content, const std::string& name) {
   }
 
   Surface surface;
-  surface.position = std::move(polygons.position);
+  surface.position = std::move(checked.position);
   for (std::size_t f = 0; f + 1 < polygons.face_start.size(); ++f) {
     const std::size_t first = polygons.face_start[f];
     append_polygon({polygons.corner.data() + first, polygons.face_start[f + 1] - first},

@@ -196,6 +196,17 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
 }
 
+/// A few samples inside an overlap, or beside a fold, are no matter.
+void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::string& defects) {
+  constexpr double allowed = 1e-3;
+  const double repeated = static_cast<double>(tally.repeated) / static_cast<double>(tally.samples);
+  if (closed && repeated <= allowed) return;
+  throw InputError(fmt::format(
+      "the surface {}, so it is not known where phyxels would lie on the body's outside; allowed: "
+      "a closed surface without overlaps, or all phyxels inside",
+      closed ? "overlaps itself" : fmt::format("is not closed ({})", defects)));
+}
+
 }  // namespace
 
 Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
@@ -237,14 +248,9 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
 
   const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
   double spacing = std::cbrt(rough_volume / request.phyxels);
-  if (request.on_surface.value_or(closed && tally.repeated == 0)) {
-    if (!closed || tally.repeated > 0) {
-      throw InputError(fmt::format(
-          "the surface {}, so it is not known where phyxels would lie on the body's outside; "
-          "allowed: a closed surface without overlaps, or all phyxels inside",
-          closed ? "overlaps itself" : fmt::format("is not closed ({})", defects)));
-    }
+  if (request.on_surface.value_or(true)) {
     try {
+      refuse_surface_phyxels(tally, closed, defects);
       SurfaceSites sites = sites_on(cloud.surface, topology, rough_volume, request.phyxels,
                                     seed + 3, request.relaxations);
       cloud.position = std::move(sites.position);

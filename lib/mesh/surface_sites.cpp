@@ -9,6 +9,7 @@
 
 #include "mesh/random_bits.hpp"
 #include "mesh/relaxation.hpp"
+#include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
@@ -17,8 +18,12 @@ namespace {
 /// Faces that turn by more than this meet in a sharp edge, which turns no more than this unless in
 /// a corner.
 const double sharp = std::cos(40 * std::numbers::pi / 180);
+/// Areas below so many squares of a side are nothing but rounding.
+constexpr double no_area = 1e-12;
 /// Sample points for each site on a face, and for each on an edge.
 constexpr double samples_per_site = 64;
+/// What a sample point on a face takes while sites are chosen among all.
+constexpr double bytes_per_sample = 150;
 /// Distances between random sites, in spacings, at which lines, faces and what they enclose get
 /// about one each on a spacing, its square and its cube.
 constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.82;
@@ -60,8 +65,9 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
     if (!is_sharp) {
       const Vec3d a = area_of(surface, edges[k].triangle),
                   b = area_of(surface, edges[k + 1].triangle);
-      const double size = norm(a) * norm(b);
-      is_sharp = size > 0 && dot(a, b) < sharp * size;
+      // A triangle without area, as repair leaves them along edges, hides how its neighbours meet.
+      const double size = norm(a) * norm(b), least = no_area * length * length;
+      is_sharp = norm(a) <= least || norm(b) <= least || dot(a, b) < sharp * size;
     }
     if (!is_sharp || !(length > 0)) continue;
     features.creases.push_back({from, to});
@@ -70,8 +76,15 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
   }
   for (std::size_t v = 0; v < leaving.size(); ++v) {
     const std::vector<Vec3d>& at = leaving[v];
-    const bool goes_on = at.empty() || (at.size() == 2 && dot(at[0], at[1]) < -sharp);
-    if (!goes_on) features.corners.push_back({v, surface.position[v]});
+    if (at.empty()) continue;
+    // An edge that goes on does so in two directions, each of which several may share.
+    bool back = false, other = false;
+    for (const Vec3d& direction : at) {
+      const double along = dot(direction, at[0]);
+      back = back || along < -sharp;
+      other = other || std::abs(along) <= sharp;
+    }
+    if (other || !back) features.corners.push_back({v, surface.position[v]});
   }
   return features;
 }
@@ -170,6 +183,16 @@ void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double
   voronoi.snap(site, spacing, which, fixed);
 }
 
+/// Corners that are not too near to each other.
+std::vector<Vec3d> corners_of(const Features& features, double spacing, std::uint64_t seed) {
+  const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing);
+  std::vector<Vec3d> site = fill_with_darts(blocks, gap_at_corners * spacing, seed, {});
+  if (site.empty()) return site;
+  // Darts are rounded, corners are exact.
+  SampledVoronoi(blocks).snap(site, spacing, std::vector<std::uint8_t>(site.size(), 1), 0);
+  return site;
+}
+
 /// Σ volumes = V/s³ + A/(2 s²): those on faces take half of a phyxel's volume each.
 double spacing_for(double volume, double area, Index phyxels) {
   double low = std::cbrt(volume / phyxels), high = low;
@@ -196,12 +219,16 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
   for (int attempt = 0; attempt < 8; ++attempt) {
     const double s = found.spacing;
     if (s > 2 * volume / area) break;
-    found.position = fill_with_darts(blocks_of(features.corners, s), gap_at_corners * s, seed, {});
+    const double samples = samples_per_site * area / (s * s);
+    require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
+    found.position = corners_of(features, s, seed);
     add_sites(found.position, samples_along(features.creases, s), gap_along_edges * s, s, seed,
               relaxations);
     add_sites(found.position, samples_over(surface, s, seed + 1), gap_on_faces * s, s, seed + 2,
               relaxations);
-    if (found.position.size() < static_cast<std::size_t>(phyxels)) return found;
+    // Some are for the inside: at least a quarter of those of a lattice without surface.
+    const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
+    if (inside > 0.25 * volume / (s * s * s)) return found;
     found.spacing *= 1.1;
   }
   const double thickness = 2 * volume / area;

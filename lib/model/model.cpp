@@ -213,10 +213,17 @@ Cloud rest_cloud(const BodySource& source) {
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
     try {
-      return sample_surface(surface, {.phyxels = source.phyxels,
-                                      .seed = source.seed,
-                                      .relaxations = source.relaxations,
-                                      .on_surface = source.on_surface});
+      SampleReport report;
+      Cloud cloud = sample_surface(surface,
+                                   {.phyxels = source.phyxels,
+                                    .seed = source.seed,
+                                    .relaxations = source.relaxations,
+                                    .on_surface = source.on_surface},
+                                   &report);
+      for (const std::string& warning : report.warnings) {
+        cloud.warnings.push_back(fmt::format("{}: {}", source.mesh.string(), warning));
+      }
+      return cloud;
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
@@ -248,7 +255,10 @@ Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
   const BodySource* made = nullptr;
   Cloud rest;
   for (const BodyRequest& request : scene.bodies) {
-    if (!made || !(*made == request.source)) rest = rest_cloud(request.source);
+    if (!made || !(*made == request.source)) {
+      rest = rest_cloud(request.source);
+      model.warnings.insert(model.warnings.end(), rest.warnings.begin(), rest.warnings.end());
+    }
     made = &request.source;
     Cloud cloud = rest;
     place(cloud, request);

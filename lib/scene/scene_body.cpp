@@ -94,8 +94,6 @@ BodySource read_source(const SceneTable& body) {
   body.read("size", shape.size);
   body.read("radius", shape.radius);
   body.read("length", shape.length);
-  const bool round = shape.name == "cylinder" || shape.name == "sphere";
-  if (!round) shape.placement = ShapeRequest::Placement::nodes;
   body.read_choice("lattice", shape.placement);
   body.read("jitter", shape.jitter);
   body.read("surfels", shape.surface);
@@ -104,6 +102,21 @@ BodySource read_source(const SceneTable& body) {
   body.read("on_surface", source.on_surface);
   shape.seed = source.seed;
   return source;
+}
+
+/// Phyxels on the body's surface where a scene says nothing of it: most accurate. Not in what is
+/// thinner than a spacing, where those on opposite faces would be nearest to each other; nor where
+/// the kernel rule tells volumes, which takes them for phyxels with others all around.
+void choose_placement(const SceneTable& table, BodyRequest& body) {
+  ShapeRequest& shape = body.source.shape;
+  const bool kernel = body.volume_rule == VolumeRule::kernel;
+  if (kernel && !body.source.on_surface) body.source.on_surface = false;
+  if (table.has("lattice") || kernel || (shape.name != "beam" && shape.name != "block")) return;
+  const double thinnest = std::min({shape.size.x, shape.size.y, shape.size.z});
+  if (!(thinnest > 0)) return;  // refused later
+  const double spacing =
+      shape.spacing > 0 ? shape.spacing : spacing_for(shape, std::max(1, body.source.phyxels));
+  if (thinnest > 0.999 * spacing) shape.placement = ShapeRequest::Placement::nodes;
 }
 
 /// Of hourglass control where a scene says nothing: what is most accurate (docs/accuracy.md), but
@@ -248,6 +261,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("velocity", body.velocity);
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
+  choose_placement(table, body);
   table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   body.material = read_material(table.table("material"), default_hourglass(body));

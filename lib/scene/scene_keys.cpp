@@ -173,7 +173,7 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Of a cylinder or sphere."},
       {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = above(0),
        .meaning = "Of a cylinder."},
-      {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells for round shapes",
+      {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells where those cannot be, in what is thinner than a spacing, and with `volumes = \"kernel\"`",
        .words = {"cells", "nodes"},
        .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", at the "
            "cells' corners, on faces too (beam and block): far more accurate in bending."},
@@ -183,10 +183,10 @@ std::vector<SceneKey> body_keys() {
        .range = at_least(0), .meaning = "Of the random numbers; the same seed, the same body."},
       {.section = "body", .name = "relaxations", .type = KeyType::integer, .fallback = "30",
        .range = between(0, 10000), .meaning = "Sweeps that spread the phyxels of a mesh evenly."},
-      {.section = "body", .name = "on_surface", .type = KeyType::boolean, .otherwise = "if the mesh allows it",
+      {.section = "body", .name = "on_surface", .type = KeyType::boolean, .otherwise = "if the mesh allows it, and not with `volumes = \"kernel\"`",
        .meaning = "Whether phyxels of a mesh lie on its surface, too, on its corners and along its "
-           "sharp edges: far more accurate in bending. Needs a closed mesh that does not overlap "
-           "itself, and enough phyxels."},
+           "sharp edges: far more accurate in bending, with `closure` above all. Needs a closed "
+           "mesh that does not overlap itself, and enough phyxels."},
       {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Whether a built-in shape gets its surfels."},
       {.section = "body", .name = "scale", .fallback = "1", .range = above(0),

@@ -95,7 +95,15 @@ void measure(const AccuracyOptions& options) {
       int across_before = 0;
       for (const int across : options.across.empty() ? c.across : options.across) {
         d.across = across;
-        const Solution solution = c.solve(d);
+        Solution solution;
+        try {
+          solution = c.solve(d);
+        } catch (const InputError& error) {  // so few phyxels that a mesh has no inside
+          if (d.filling != Filling::mesh) throw;
+          fmt::print(stderr, "phyxel: {} on a mesh, {} across, is left out: {}\n", c.name, across,
+                     error.what());
+          continue;
+        }
         for (std::size_t q = 0; q < solution.found.size(); ++q) {
           const Quantity& found = solution.found[q];
           table.row(
@@ -234,8 +242,27 @@ void add_accuracy(CLI::App& program) {
     auto study_options = std::make_shared<StudyOptions>();
     of_study->add_option("--csv", study_options->csv, "Also write the table to this file");
     of_study->add_flag("--force", study_options->force, "Replace the CSV file");
+    of_study->footer(
+        fmt::format("Example:\n"
+                    "  phyxel accuracy {} --csv {}.csv",
+                    study.name, study.name));
     of_study->callback([=] { measure_study(study, *study_options); });
   }
+  page->footer(
+      "Example:\n"
+      "  phyxel accuracy page");
+  pictures->footer(
+      "Example:\n"
+      "  phyxel accuracy pictures");
+  hard->footer(
+      "Examples:\n"
+      "  phyxel accuracy hard\n"
+      "  phyxel accuracy hard \"three turns\" --precision double --device cuda");
+  command->footer(
+      "Examples:\n"
+      "  phyxel accuracy tension gravity\n"
+      "  phyxel accuracy bending --across 4,6,8 --lattice nodes,mesh --closure 0,1e-3\n"
+      "  phyxel accuracy all --csv docs/results/accuracy.csv --force && phyxel accuracy page");
   page->callback([=] { write_accuracy_page(*results, *out); });
   pictures->callback([=] { draw_accuracy_pictures(*results); });
   hard->callback([=] {

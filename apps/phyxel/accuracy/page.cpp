@@ -74,7 +74,8 @@ std::string file_name_of(const std::string& quantity) {
 std::string short_error(double error) {
   error = std::abs(error);
   if (!std::isfinite(error)) return "flew apart";
-  return error >= 1e-4 ? fmt::format("{:.2g}%", 100 * error) : fmt::format("{:.0e}", error);
+  if (error < 1e-4) return fmt::format("{:.0e}", error);
+  return error < 0.095 ? fmt::format("{:.2g}%", 100 * error) : fmt::format("{:.0f}%", 100 * error);
 }
 
 /// The chart's curve of that label, a new one if there is none.
@@ -169,8 +170,8 @@ class AccuracyPage {
     }
     text_ +=
         "## What is reached\n\nErrors at the finest resolution of each problem, with up to so "
-        "many phyxels (cells have fewer). Scenes that say nothing have nodes, or meshes, with "
-        "α = 0.1.\n\n" +
+        "many phyxels (cells have fewer). Scenes that say nothing have nodes (cells in round "
+        "bodies), or meshes, with α = 0.1.\n\n" +
         table_text(head, cells);
   }
 

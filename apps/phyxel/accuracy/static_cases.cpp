@@ -27,12 +27,12 @@ struct Rest {
   }
 };
 
+/// @param begin when the cloud began to be made
 /// @param change what is to be done with the model first
 template <class Change>
-Rest rest_of(const Scene& scene, Cloud cloud, Change&& change,
+Rest rest_of(Clock::time_point begin, const Scene& scene, Cloud cloud, Change&& change,
              const EquilibriumOptions& options = {}) {
   Rest rest;
-  const auto begin = Clock::now();
   rest.cloud = std::move(cloud);
   rest.model = build_model(scene, std::span(&rest.cloud, 1));
   change(rest.model);
@@ -47,7 +47,8 @@ Rest rest_of(const Scene& scene, Cloud cloud, Change&& change,
   return rest;
 }
 Rest rest_of(const Scene& scene, const Discretisation& d) {
-  return rest_of(scene, cloud_of(scene, d), [](Model&) {});
+  const auto begin = Clock::now();
+  return rest_of(begin, scene, cloud_of(scene, d), [](Model&) {});
 }
 
 /// A case of several solutions takes as long as all of them.
@@ -95,7 +96,8 @@ Solution patch(const Discretisation& d) {
       if (inside < layer) model.motions.push_back({.phyxels = {i}, .displacement = g * x});
     }
   };
-  Rest rest = rest_of(scene, cloud_of(scene, d), hold, {.tolerance = 1e-11});
+  const auto begin = Clock::now();
+  Rest rest = rest_of(begin, scene, cloud_of(scene, d), hold, {.tolerance = 1e-11});
   double worst = 0;
   for (Index i = 0; i < rest.model.size(); ++i) {
     worst = std::max(worst, norm(rest.found.state.displacement[i] - g * rest.model.position[i]));
@@ -156,8 +158,9 @@ Solution tension(const Discretisation& d) {
   constexpr double length = 1, side = 0.2, strain = 1e-6;
   Scene scene = bar(d, length, side);
   const double force = strain * E * side * side;
+  const auto begin = Clock::now();
   const Cloud cloud = cloud_of(scene, d);
-  Rest rest = rest_of(scene, cloud, [&](Model& model) {
+  Rest rest = rest_of(begin, scene, cloud, [&](Model& model) {
     model.loads.push_back(on_axis(model, cloud.regions.at("x-"), -force));
     model.loads.push_back(on_axis(model, cloud.regions.at("x+"), force));
   });
@@ -184,7 +187,7 @@ Solution shear(const Discretisation& d) {
   scene.bodies[0].loads.push_back({.select = {.region = "x+"}, .force = {0, 0, -1}});
   Rest rest = rest_of(scene, d);
   const double found = sag(rest);
-  return with(std::move(rest), {{"deflection", found, 2.541718e-03}});
+  return with(std::move(rest), {{"deflection", found, 2.5440e-03}});
 }
 
 Solution elastica(const Discretisation& d) {
@@ -195,7 +198,7 @@ Solution elastica(const Discretisation& d) {
       {.select = {.region = "x+"}, .force = {0, 0, -2 * E * inertia / (length * length)}});
   Rest rest = rest_of(scene, d);
   const double down = sag(rest) / length, back = -rest.moved("x+").x / length;
-  return with(std::move(rest), {{"down", down, 0.493457}, {"back", back, 0.160642}});
+  return with(std::move(rest), {{"down", down, 0.49457}, {"back", back, 0.16133}});
 }
 
 /// Energy [J] of a column whose end is turned about its axis.
@@ -204,12 +207,11 @@ double energy_of_twist(const Discretisation& d, double degrees, Solution& total)
   scene.bodies[0].material.law = Law::neo_hooke;
   scene.bodies[0].motions.push_back(
       {.select = {.region = "x+"}, .rotation = {degrees, 0, 0}, .duration = 1});
-  const Cloud cloud = cloud_of(scene, d);
-  const Rest rest = rest_of(scene, cloud, [](Model&) {});
+  const Rest rest = rest_of(scene, d);
   const auto backend = make_cpu_backend(rest.model, Precision::double_);
   backend->upload(rest.found.state);
   add_to(total, rest.solution);
-  return diagnose(rest.model, *backend, 0, 1).strain_energy;
+  return diagnose(rest.model, *backend, 0, 1).elastic_energy();
 }
 Solution twist(const Discretisation& d) {
   Solution solution;
@@ -228,6 +230,7 @@ std::pair<double, double> cook_of(const Discretisation& d, double poisson, Solut
   Scene scene = bar(lattice, length, left, poisson);
   BodyRequest& body = scene.bodies[0];
   body.source.shape.size.z = thickness;
+  const auto begin = Clock::now();
   Cloud cloud = cloud_of(scene, d);
   const double shift = d.filling == Filling::cells ? 0.5 * spacing : 0;
   const auto height = [](double x) { return left - 28 * x / length; };
@@ -243,7 +246,7 @@ std::pair<double, double> cook_of(const Discretisation& d, double poisson, Solut
   body.fixed.push_back({.select = {.all = true}, .axes = {.x = false, .y = false, .z = true}});
   body.fixed.push_back({.select = {.region = "x-"}, .axes = {.x = true, .y = true, .z = false}});
   body.loads.push_back({.select = {.region = "x+"}, .force = {0, strain * E * thickness, 0}});
-  Rest rest = rest_of(scene, std::move(cloud), [](Model&) {});
+  Rest rest = rest_of(begin, scene, std::move(cloud), [](Model&) {});
   double highest = -1, corner = 0, at_corner = 0;
   for (const Index i : rest.cloud.regions.at("x+")) {
     const double y = rest.model.position[i].y, u = rest.found.state.displacement[i].y;
@@ -288,14 +291,16 @@ std::vector<AccuracyCase> static_cases() {
        {4, 6, 8, 12},
        gravity},
       {"shear",
-       "The same bar under a shear at its end. Reference: the same elements, 0.14% from those of "
-       "twice the size.",
+       "The same bar under a shear at its end. Reference: quadratic finite elements, graded "
+       "towards "
+       "the held edges and extrapolated; ± 0.005%.",
        {4, 6, 8, 12},
        shear},
       {"elastica",
        "A bar, twenty times as long as wide, ν = 0, clamped at one end, under an end load F L² = 2 "
-       "E I that bends it by half its length. Reference: Bisshopp and Drucker 1945, for a bar "
-       "without thickness, which shear and stretch would bend 0.3% more.",
+       "E I that bends it by half its length. Reference: quadratic finite elements in the plane, "
+       "which is exact for ν = 0; ± 0.001%. Bisshopp and Drucker's bar of 1945 without thickness, "
+       "which neither shears nor stretches, goes 0.2% less down and 0.4% less back.",
        {4, 6, 8},
        elastica},
       {"twist",

@@ -26,6 +26,7 @@ struct Cloud {
   Surface surface;              ///< Surfels; may be empty.
   /// Named groups of phyxels (sorted indices) that scenes can select, e.g. "mouth".
   std::map<std::string, std::vector<Index>> regions;
+  std::vector<std::string> warnings;  ///< Of what made it, for the summary.
 };
 
 /// Area-weighted vertex normals of a triangulated surface, outward for outward triangles.

@@ -322,6 +322,39 @@ TEST(SampleOnSurface, CornersEdgesFacesAndInsideGetTheirShares) {
   EXPECT_GT(report.smallest_gap, 0.5 * report.spacing);
 }
 
+/// Two ends of an edge, and a vertex in its middle that only one side knows: the triangle between
+/// has no area.
+TEST(SampleOnSurface, EdgesAreFoundBesideTrianglesWithoutArea) {
+  Surface cube = test::unit_cube();
+  cube.position.push_back({0.5, 0, 0});
+  cube.triangle[5] = {0, 5, 4};
+  cube.triangle[4] = {8, 1, 5};  // of {0, 1, 5}, on y = 0
+  cube.triangle.push_back({0, 8, 5});
+  cube.triangle.push_back({0, 1, 8});  // the edge's own
+  ASSERT_EQ(inspect_surface(cube).open_edges, 0);
+  const Cloud cloud = sample_surface(cube, {.phyxels = 1000, .on_surface = true});
+  int along = 0;
+  for (const Vec3d& p : cloud.position) along += p.y == 0 && p.z == 0;
+  // As many as along the other edges: 1,000 nodes have ten.
+  EXPECT_GE(along, 8);
+  EXPECT_THAT(cloud.position, ::testing::Contains(Vec3d{0, 0, 0}));
+  EXPECT_THAT(cloud.position, ::testing::Contains(Vec3d{1, 0, 0}));
+}
+
+TEST(SampleOnSurface, CornersAreExactWhereverTheBodyLies) {
+  for (const Vec3d low : {Vec3d{0.3, -0.7, 0.88}, Vec3d{-3.14159, 0.1, 1e-3}}) {
+    const Vec3d high = low + Vec3d{0.61, 0.73, 0.59};
+    const Surface box = test::box(low, high);
+    const Cloud cloud = sample_surface(box, {.phyxels = 500, .on_surface = true});
+    for (const Vec3d& corner : box.position) {
+      EXPECT_THAT(cloud.position, ::testing::Contains(corner));
+    }
+    for (const Vec3d& p : cloud.position) {
+      EXPECT_TRUE(p.x >= low.x && p.x <= high.x && p.z >= low.z && p.z <= high.z) << p.x;
+    }
+  }
+}
+
 TEST(SampleOnSurface, RoundBodiesHaveNoCornersAndKeepTheirSurface) {
   const Surface ball = test::sphere({0, 0, 0}, 1, 4);
   SampleReport report;
