@@ -527,6 +527,11 @@ TEST_F(Program, SamplesAMeshAndRunsIt) {
         "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n");
   const Outcome sampled = run({"sample", "gem.obj", "--phyxels", "300", "--out", "gem.h5"});
   ASSERT_EQ(sampled.code, 0) << sampled.err;
+  // A scene tells what sampling warns of.
+  write("few.toml",
+        "[time]\nend = 1\n[[body]]\nmesh = \"gem.obj\"\nphyxels = 9\n[body.material]\n"
+        "young = 1e5\npoisson = 0.34\ndensity = 1000\n");
+  EXPECT_THAT(run({"check", "few.toml"}).out, HasSubstr("gem.obj: all phyxels lie inside: 9"));
   write("gem.toml", R"(
 [time]
 end = 0.02

@@ -81,6 +81,13 @@ TEST(Mesh, ObjTakesCarriageReturnsContinuedLinesColoursAndFacesFirst) {
   expect_unit_cube(obj(text));
 }
 
+/// To the last digit: a box in a scene may end where the mesh does.
+TEST(Mesh, ObjCoordinatesAreReadExactly) {
+  const Surface s = obj("v 0.3 -0.7 0.1\nv 1.1 2.2e-3 -4.7e5\nv 0.88 1e-7 3.3\nf 1 2 3\n");
+  EXPECT_EQ(s.position,
+            (std::vector<Vec3d>{{0.3, -0.7, 0.1}, {1.1, 2.2e-3, -4.7e5}, {0.88, 1e-7, 3.3}}));
+}
+
 TEST(Mesh, ObjVerticesAreTheSurfelsEvenWhereTheyCoincide) {
   // Files repeat a vertex where its texture changes; the count must not change, the hole must
   // close.
