@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Measures the table behind docs/accuracy.md on a machine of many cores: `phyxel accuracy` in slices of one
+case, lattice, jitter and way, each on cores of its own, several at a time, put together in one file.
+
+    scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4]
+
+Times in the table are those of so many cores, with the rest of the machine at work.
+"""
+import argparse
+import concurrent.futures
+import itertools
+import os
+import queue
+import re
+import subprocess
+import tempfile
+
+SLOW = ["elastica", "L-block", "spinning", "twist"]  # begun first
+
+
+def cases(program):
+    text = subprocess.run([program, "accuracy", "--help"], check=True, capture_output=True, text=True).stdout
+    listed = text.split("Which, of:", 1)[1].split("OPTIONS", 1)[0]
+    return re.findall(r"^\s*([A-Za-z][\w-]*): ", listed, re.MULTILINE)
+
+
+def slices(names):
+    ways = [("nodes", "0"), ("nodes", "0.2"), ("cells", "0"), ("cells", "0.2"), ("mesh", "0")]
+    for name, (lattice, jitter), hourglass in itertools.product(names, ways, ("0", "0.1")):
+        arguments = ["--lattice", lattice, "--jitter", jitter, "--hourglass", hourglass]
+        if name == "elastica":
+            for closure in ("0", "1e-3"):
+                yield [name, *arguments, "--closure", closure]
+        else:
+            yield [name, *arguments]
+
+
+def measured(program, arguments, free, folder, number):
+    cores = free.get()
+    file = os.path.join(folder, f"{number}.csv")
+    environment = dict(os.environ, OMP_NUM_THREADS=str(len(cores.split(","))), OMP_PROC_BIND="true")
+    done = subprocess.run(["taskset", "-c", cores, program, "accuracy", *arguments, "--csv", file],
+                          env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    free.put(cores)
+    print(" ".join(arguments), f": exit code {done.returncode}", done.stderr.strip(), flush=True)
+    if not os.path.exists(file):
+        return [], []
+    with open(file) as text:
+        lines = text.read().splitlines()
+    facts = [line for line in lines if line.startswith("#")]
+    return facts, lines[len(facts):]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("program")
+    parser.add_argument("table")
+    parser.add_argument("--cores", type=int, default=4, help="for each slice")
+    options = parser.parse_args()
+    cores = sorted(os.sched_getaffinity(0))
+    free = queue.Queue()
+    for first in range(0, len(cores) - options.cores + 1, options.cores):
+        free.put(",".join(map(str, cores[first:first + options.cores])))
+    at_once = free.qsize()
+    if at_once == 0:
+        parser.error(f"--cores {options.cores}: this machine has {len(cores)}")
+    work = list(slices(cases(options.program)))
+    order = sorted(range(len(work)), key=lambda k: SLOW.index(work[k][0]) if work[k][0] in SLOW else len(SLOW))
+    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(at_once) as pool:
+        found = {k: pool.submit(measured, options.program, work[k], free, folder, k) for k in order}
+        results = [found[k].result() for k in range(len(work))]
+    facts = next(facts for facts, _ in results if facts)
+    head = next(rows[0] for _, rows in results if rows)
+    with open(options.table, "w") as table:
+        table.write("\n".join(facts + [f"# at once: {at_once}", head]
+                              + [row for _, rows in results for row in rows[1:]]) + "\n")
+
+
+if __name__ == "__main__":
+    main()
