@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mpi/pulse.hpp"
+#include "terminal.hpp"
 
 namespace phyxel {
 
@@ -75,9 +76,9 @@ struct Watchdog::Kennel {
     const std::int64_t step = pulse.step;
     if (pulse.ended || still < limit || pulse.named_at.exchange(step) == step) return;
     fmt::print(stderr,
-               "phyxel: warning: rank {} of {} has not come on for {:.0f} s, since step {}; the "
+               "phyxel: {}rank {} of {} has not come on for {:.0f} s, since step {}; the "
                "others wait for it\n",
-               numbers[k], all, still, step);
+               warning_word(), numbers[k], all, still, step);
   }
 
   double limit;

@@ -13,9 +13,9 @@
 #include "bench_scaling.hpp"
 #include "cantilever.hpp"
 #include "command.hpp"
-#include "csv.hpp"
 #include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
+#include "printed_table.hpp"
 #include "scaling_page.hpp"
 #include "setup.hpp"
 #include "setup/survey.hpp"
@@ -30,12 +30,12 @@ struct BenchOptions {
   std::vector<int> threads;
   std::vector<std::string> precisions = {"float", "double", "mixed"};
   std::vector<std::string> terms;
-  std::string device = "cpu", csv, shape = "cube";
+  std::string device = "cpu", shape = "cube";
   int repeats = 5, bodies = 1;
   std::vector<int> across;
   std::vector<double> factors = {NeighbourhoodRule{}.factor};
   double seconds = 0.3;
-  bool force = false;
+  TableOptions table;
 };
 
 /// Bytes per second that `threads` threads copy between arrays far larger than any cache; read and
@@ -161,11 +161,6 @@ std::string force_error(const Model& model, Backend& backend, const std::vector<
   return exact.empty() ? "" : largest_error(forces_of(backend, deformed(model)), exact);
 }
 
-struct Table : PrintedTable {
-  Table(const BenchOptions& options, const std::vector<std::string>& columns, Facts more = {})
-      : PrintedTable(options.csv, options.force, columns, std::move(more)) {}
-};
-
 /// How a backend steps: what follows its precision in its name.
 std::string path_of(const Backend& backend) {
   std::string name = backend.name();
@@ -201,12 +196,12 @@ void bench_step(const BenchOptions& options) {
                                    did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
     }
   }
-  Table table(options,
-              {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels", "neighbours",
-               "surfels", "steps_per_s", "phyxel_steps_per_s", "spread", "pairs_per_s",
-               "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
-               "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
-              device_facts(device));
+  PrintedTable table(options.table,
+                     {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels",
+                      "neighbours", "surfels", "steps_per_s", "phyxel_steps_per_s", "spread",
+                      "pairs_per_s", "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
+                      "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
+                     device_facts(device));
   // A GPU has no thread counts: 0 stands for it.
   const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
   std::vector<double> copy;
@@ -273,8 +268,8 @@ void bench_step(const BenchOptions& options) {
 }
 
 void bench_neighbours(const BenchOptions& options) {
-  Table table(options, {"threads", "phyxels", "neighbours", "spacing_us_per_phyxel",
-                        "search_us_per_phyxel", "transpose_us_per_phyxel"});
+  PrintedTable table(options.table, {"threads", "phyxels", "neighbours", "spacing_us_per_phyxel",
+                                     "search_us_per_phyxel", "transpose_us_per_phyxel"});
   for (const int threads : options.threads) {
     omp_set_num_threads(threads);
     for (const Index size : options.sizes) {
@@ -309,10 +304,10 @@ void bench_neighbours(const BenchOptions& options) {
 /// its lists, the step limit. Without a survey, on the CPU, the model has the lists.
 void bench_setup(const BenchOptions& options) {
   const ChosenDevice device = choose_device(options.device);
-  Table table(options,
-              {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s", "backend_s",
-               "limit_s", "omega_max", "iterations"},
-              device_facts(device));
+  PrintedTable table(options.table,
+                     {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s",
+                      "backend_s", "limit_s", "omega_max", "iterations"},
+                     device_facts(device));
   for (const Index size : options.sizes) {
     const Scene scene = bench_scene("green");
     const Cloud cloud = cube(size);
@@ -363,11 +358,11 @@ void bench_cantilever(const BenchOptions& options) {
   for (const std::string& name : options.precisions) {
     if (name != "double") precisions.push_back(precision_option(name));
   }
-  Table table(options,
-              {"across", "factor", "precision", "path", "threads", "phyxels", "neighbours", "steps",
-               "seconds", "phyxel_steps_per_s", "deflection_m", "over_timoshenko",
-               "discretisation_error", "rounding_error", "last_change"},
-              device_facts(device));
+  PrintedTable table(options.table,
+                     {"across", "factor", "precision", "path", "threads", "phyxels", "neighbours",
+                      "steps", "seconds", "phyxel_steps_per_s", "deflection_m", "over_timoshenko",
+                      "discretisation_error", "rounding_error", "last_change"},
+                     device_facts(device));
   for (const int across : options.across) {
     for (const double factor : options.factors) {
       const Scene scene = cantilever_scene(across, factor);
@@ -392,11 +387,6 @@ void bench_cantilever(const BenchOptions& options) {
       }
     }
   }
-}
-
-void add_table_options(CLI::App& command, BenchOptions& options) {
-  command.add_option("--csv", options.csv, "Also write the table to this file");
-  command.add_flag("--force", options.force, "Replace the CSV file");
 }
 
 void add_factors(CLI::App& command, BenchOptions& options) {
@@ -426,7 +416,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   command->add_option("--threads", options->threads, "Thread counts, comma separated")
       ->delimiter(',')
       ->check(CLI::Range(1, 4096));
-  add_table_options(*command, *options);
+  add_table_options(*command, options->table);
   command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
   if (std::string(name) != "neighbours") add_device_options(*command, *options);
@@ -464,7 +454,7 @@ void add_bench_cantilever(CLI::App& bench) {
       ->capture_default_str();
   add_factors(*command, *options);
   add_device_options(*command, *options);
-  add_table_options(*command, *options);
+  add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"
       "  phyxel bench cantilever\n"

@@ -12,11 +12,11 @@
 #include <set>
 #include <span>
 
-#include "csv.hpp"
 #include "device_option.hpp"
 #include "model/host_memory.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/phyxel.hpp"
+#include "printed_table.hpp"
 #include "program_ranks.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
@@ -31,8 +31,7 @@ struct Options {
   std::vector<int> rings{1, 2};
   double seconds = 1;
   int repeats = 5;
-  std::string csv;
-  bool force = false;
+  TableOptions table;
   std::string device = "cpu", transport = "auto";
   bool weak = false;         ///< Sizes are of one rank.
   bool without_one = false;  ///< One rank alone is not measured.
@@ -230,16 +229,11 @@ void bench_scaling(const Options& options) {
   // Of all ranks, which may be bound to some.
   const auto cores = static_cast<int>(std::min<std::int64_t>(
       ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
-  Facts facts = machine_facts(cores);
-  for (const auto& fact : device_facts(device)) facts.push_back(fact);
+  Facts facts = device_facts(device);
   if (device.gpu) facts.emplace_back("gpus", std::to_string(gpus_of_ranks(device)));
-  CsvTable table{facts, columns, {}};
+  std::optional<PrintedTable> table;  // of the first rank
   ranks().together([&] {
-    if (!leads) return;
-    if (!options.csv.empty() && std::filesystem::exists(options.csv) && !options.force) {
-      throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options.csv));
-    }
-    fmt::print("{}", csv_text(table));
+    if (leads) table.emplace(options.table, columns, facts, cores);
   });
   for (const Index size : options.sizes) {
     const std::int64_t all = options.weak ? std::int64_t{size} * ranks().size() : size;
@@ -266,12 +260,9 @@ void bench_scaling(const Options& options) {
           // Of the host, so far: if larger bodies come last, of this one.
           const double host_gb = 1e-9 * ranks().size() * ranks().largest(peak_memory());
           ranks().together([&] {
-            if (!leads) return;
-            table.rows.push_back(row_of(ensemble, partitioner, rings, precision, set_up,
-                                        one ? one->size() : 0, host_gb, m));
-            fmt::print("{}\n", fmt::join(table.rows.back(), ","));
-            std::fflush(stdout);
-            if (!options.csv.empty()) write_csv(options.csv, table);
+            if (!table) return;
+            table->row(row_of(ensemble, partitioner, rings, precision, set_up,
+                              one ? one->size() : 0, host_gb, m));
           });
         }
         if (alone) break;
@@ -310,8 +301,7 @@ void add_bench_scaling(CLI::App& bench) {
       ->check(CLI::Range(0.01, 60.0));
   command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
-  command->add_option("--csv", options->csv, "Also write the table to this file");
-  command->add_flag("--force", options->force, "Replace the CSV file");
+  add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"
       "  mpirun -n 2 phyxel bench scaling\n"

@@ -115,10 +115,13 @@ std::string csv_text(const CsvTable& table) {
   std::string text;
   for (const auto& [name, value] : table.facts) text += fmt::format("# {}: {}\n", name, value);
   text += fmt::format("{}\n", fmt::join(table.columns, ","));
-  for (const auto& row : table.rows) {
-    for (std::size_t k = 0; k < row.size(); ++k) text += (k ? "," : "") + cell(row[k]);
-    text += '\n';
-  }
+  for (const auto& row : table.rows) text += csv_row(row) + '\n';
+  return text;
+}
+
+std::string csv_row(const std::vector<std::string>& cells) {
+  std::string text;
+  for (std::size_t k = 0; k < cells.size(); ++k) text += (k ? "," : "") + cell(cells[k]);
   return text;
 }
 
@@ -148,28 +151,6 @@ CsvTable read_csv(const std::filesystem::path& file) {
     }
   }
   return table;
-}
-
-PrintedTable::PrintedTable(const std::string& file, bool force,
-                           const std::vector<std::string>& columns, Facts more)
-    : file_(file), table_{machine_facts(), columns, {}} {
-  table_.facts.insert(table_.facts.end(), more.begin(), more.end());
-  fmt::print("{}", csv_text(table_));
-  if (!file_.empty() && std::filesystem::exists(file_) && !force) {
-    throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", file));
-  }
-  write();
-}
-
-void PrintedTable::row(const std::vector<std::string>& cells) {
-  fmt::print("{}\n", fmt::join(cells, ","));
-  std::fflush(stdout);
-  table_.rows.push_back(cells);
-  write();
-}
-
-void PrintedTable::write() const {
-  if (!file_.empty()) write_csv(file_, table_);
 }
 
 Median median_of(std::vector<double> values) {

@@ -45,27 +45,12 @@ struct CsvTable {
 /// @throws OutputError
 void write_csv(const std::filesystem::path& file, const CsvTable& table);
 std::string csv_text(const CsvTable& table);
+/// One row as it stands in the file, without the line's end.
+std::string csv_row(const std::vector<std::string>& cells);
 
 /// @throws InputError if the file cannot be read, or a row has another number of cells than the
 ///   header.
 CsvTable read_csv(const std::filesystem::path& file);
-
-/// A table whose rows go to the terminal as they come; the CSV file, if there is to be one, is
-/// written whole after each.
-class PrintedTable {
- public:
-  /// @param force whether the file may be replaced
-  /// @throws InputError if the file is there and must not be replaced
-  PrintedTable(const std::string& file, bool force, const std::vector<std::string>& columns,
-               Facts more = {});
-  void row(const std::vector<std::string>& cells);
-
- private:
-  void write() const;
-
-  std::filesystem::path file_;
-  CsvTable table_;
-};
 
 /// The median and the spread, (largest - smallest) / median. @param values at least one
 struct Median {

@@ -1,6 +1,8 @@
 /// phyxel export: a trajectory in other forms.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "command.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
@@ -10,14 +12,21 @@ namespace {
 
 struct ExportOptions {
   std::filesystem::path series, single;
-  bool force = false;
+  bool force = false, json = false;
 };
 
 void export_command(const ExportOptions& options) {
   const std::size_t frames = read_series(options.series).size();
   export_single(options.series, options.single, options.force);
+  const std::uintmax_t bytes = std::filesystem::file_size(options.single);
+  if (options.json) {
+    const nlohmann::ordered_json said{
+        {"file", options.single.string()}, {"frames", frames}, {"bytes", bytes}};
+    fmt::print("{}\n", said.dump(2));
+    return;
+  }
   fmt::print("{}: {} frames, {:.1f} MB\n", options.single.string(), frames,
-             static_cast<double>(std::filesystem::file_size(options.single)) / 1e6);
+             static_cast<double>(bytes) / 1e6);
 }
 
 }  // namespace
@@ -31,6 +40,7 @@ void add_export(CLI::App& program) {
   command->add_option("--single", options->single, "The file to write, .vtkhdf or .hdf")
       ->required();
   command->add_flag("--force", options->force, "Replace the file if it exists");
+  command->add_flag("--json", options->json, "What was written as JSON, nothing else on stdout");
   command->footer(
       "Example:\n"
       "  phyxel export out/dino/surface.hdf.series --single dino.vtkhdf");

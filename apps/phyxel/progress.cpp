@@ -8,18 +8,14 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <string_view>
+
+#include "terminal.hpp"
 
 namespace phyxel::app {
 namespace {
 
 constexpr double redraw_interval = 0.1, line_interval = 5;  // [s]
 constexpr std::size_t bar_length = 16;  // leaves an 80-column terminal room for the speed
-
-bool can_redraw(std::FILE* stream) {
-  const char* kind = std::getenv("TERM");
-  return ::isatty(::fileno(stream)) == 1 && !(kind != nullptr && std::string_view(kind) == "dumb");
-}
 
 int terminal_columns(std::FILE* stream) {
   winsize size = {};
@@ -47,7 +43,7 @@ Progress::Progress(double end_time, std::FILE* stream, const ProgressStyle& styl
       phyxels_(style.phyxels),
       clock_(style.clock ? style.clock : steady_seconds) {
   if (stream_ == nullptr) return;
-  terminal_ = style.terminal.value_or(can_redraw(stream_));
+  terminal_ = style.terminal.value_or(is_terminal(stream_));
   if (terminal_) columns_ = style.columns.value_or(terminal_columns(stream_));
   // On a terminal the first update shows at once; elsewhere short runs get only their last line.
   last_shown_ = clock_() - (terminal_ ? redraw_interval : 0);

@@ -1,6 +1,8 @@
 /// phyxel render: pictures of a trajectory, without display or GPU.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "command.hpp"
 #include "phyxel/error.hpp"
 #include "picture.hpp"
@@ -14,7 +16,7 @@ struct RenderOptions {
   std::filesystem::path input, out;
   PictureRequest request;
   std::vector<double> view, up;
-  bool no_phyxels = false, no_surface = false, force = false;
+  bool no_phyxels = false, no_surface = false, force = false, json = false;
 };
 
 Vec3d vector_of(const std::vector<double>& values, const char* option, Vec3d otherwise) {
@@ -41,6 +43,12 @@ void render_command(const RenderOptions& options) {
     folder = (directory ? options.input : options.input.parent_path()) / "pictures";
   }
   const auto files = render(options.input, folder, request, options.force);
+  if (options.json) {
+    nlohmann::ordered_json pictures = nlohmann::ordered_json::array();
+    for (const auto& file : files) pictures.push_back(file.string());
+    fmt::print("{}\n", nlohmann::ordered_json{{"pictures", pictures}}.dump(2));
+    return;
+  }
   fmt::print("{} picture{}: {}", files.size(), files.size() == 1 ? "" : "s",
              files.front().string());
   fmt::print("{}{}\n", files.size() > 1 ? " ... " : "",
@@ -88,6 +96,7 @@ void add_render(CLI::App& program) {
   command->add_flag("--no-phyxels", options->no_phyxels, "The surface only");
   command->add_flag("--no-surface", options->no_surface, "The phyxels only, as balls");
   command->add_flag("--force", options->force, "Replace pictures that exist");
+  command->add_flag("--json", options->json, "The pictures' names as JSON, nothing else on stdout");
   command->footer(
       "Examples:\n"
       "  phyxel render out/dino --count 6\n"

@@ -19,6 +19,7 @@
 #include "setup.hpp"
 #include "stop_signal.hpp"
 #include "stopwatch.hpp"
+#include "terminal.hpp"
 #include "timeline.hpp"
 #include "version.hpp"
 
@@ -310,7 +311,7 @@ class Run {
     if (options_.resume == "auto") {
       std::string warning;
       const auto latest = latest_checkpoint(scene_.output.directory, &warning);
-      if (!warning.empty()) fmt::print(stderr, "phyxel: warning: {}\n", warning);
+      if (!warning.empty()) fmt::print(stderr, "phyxel: {}{}\n", warning_word(), warning);
       if (!latest) return std::nullopt;
       file = *latest;
     }

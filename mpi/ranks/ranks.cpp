@@ -15,6 +15,7 @@
 #include "exact_sum.hpp"
 #include "model/host_memory.hpp"
 #include "mpi/communicator.hpp"
+#include "terminal.hpp"
 
 namespace phyxel {
 namespace {
@@ -66,13 +67,13 @@ int on_ranks(int& argc, char**& argv, const std::function<int(const Ranks&)>& pr
   std::optional<Ranks> ranks;
   const auto fail = [&](ExitCode code, const char* message, bool agreed = false) {
     if (!ranks || ranks->size() == 1) {
-      fmt::print(stderr, "{}: error: {}\n", name, message);
+      fmt::print(stderr, "{}: {}{}\n", name, error_word(), message);
     } else if (!agreed) {
-      fmt::print(stderr, "{}: error: rank {} of {}: {}\n", name, ranks->rank(), ranks->size(),
-                 message);
+      fmt::print(stderr, "{}: {}rank {} of {}: {}\n", name, error_word(), ranks->rank(),
+                 ranks->size(), message);
       ranks->communicator().abort(code);
     } else if (ranks->leads()) {
-      fmt::print(stderr, "{}: error: {}\n", name, message);
+      fmt::print(stderr, "{}: {}{}\n", name, error_word(), message);
     }
     return static_cast<int>(code);
   };

@@ -278,6 +278,51 @@ TEST_F(Program, BenchPageIsMadeOfTheTables) {
   EXPECT_EQ(text.find("What each term costs"), std::string::npos);  // that table is not there
 }
 
+TEST_F(Program, TablesAndWhatWasWrittenAreJsonOnRequest) {
+  const Outcome bench =
+      run({"bench", "step", "--phyxels", "27,64", "--precision", "double", "--terms", "green",
+           "--threads", "1", "--seconds", "0.01", "--repeat", "1", "--json", "--csv", "step.csv"});
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  const auto table = nlohmann::json::parse(bench.out);
+  ASSERT_EQ(table["rows"].size(), 2u);
+  EXPECT_EQ(table["rows"][1]["phyxels"], 64);
+  EXPECT_EQ(table["rows"][1]["terms"], "green");
+  EXPECT_THAT(text_of(folder_ / "step.csv"),
+              HasSubstr("# program: " + table["facts"]["program"].get<std::string>()));
+  write_beam();
+  ASSERT_EQ(run({"run", "beam.toml", "--quiet"}).code, 0);
+  const Outcome drawn = run({"render", "out", "--count", "2", "--json"});
+  ASSERT_EQ(drawn.code, 0) << drawn.err;
+  const auto pictures = nlohmann::json::parse(drawn.out)["pictures"];
+  ASSERT_EQ(pictures.size(), 2u);
+  for (const std::string name : pictures) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  const Outcome gathered =
+      run({"export", "out/phyxels.hdf.series", "--single", "one.vtkhdf", "--json"});
+  ASSERT_EQ(gathered.code, 0) << gathered.err;
+  EXPECT_EQ(nlohmann::json::parse(gathered.out)["bytes"], fs::file_size(folder_ / "one.vtkhdf"));
+}
+
+TEST_F(Program, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
+  EXPECT_THAT(run({"rum", "x.toml"}).err, HasSubstr("did you mean \"run\""));
+  EXPECT_THAT(run({"bench", "stop"}).err, HasSubstr("did you mean \"step\""));
+  EXPECT_THAT(run({"run", "x.toml", "--forse"}).err, HasSubstr("did you mean \"--force\""));
+}
+
+/// On a terminal, where stderr is shown beside stdout.
+TEST_F(Program, ColoursAreForTerminalsOnly) {
+  EXPECT_THAT(run({"check", "none.toml"}).err, Not(HasSubstr("\033[")));
+  write("on_terminal.sh", "exec script -qec \"$*\" /dev/null\n");
+  launcher_ = {"/bin/sh", "on_terminal.sh"};
+  environment_ = {{"TERM", "xterm"}, {"NO_COLOR", ""}};
+  EXPECT_THAT(run({"check", "none.toml"}).out, HasSubstr("\033[31merror: \033[0m"));
+  environment_ = {{"TERM", "xterm"}, {"NO_COLOR", "1"}};
+  EXPECT_THAT(run({"check", "none.toml"}).out,
+              AllOf(HasSubstr("error: none.toml"), Not(HasSubstr("\033["))));
+  environment_ = {{"TERM", "dumb"}, {"NO_COLOR", ""}};
+  EXPECT_THAT(run({"check", "none.toml"}).out,
+              AllOf(HasSubstr("error: none.toml"), Not(HasSubstr("\033["))));
+}
+
 TEST_F(Program, InfoCutsAScene) {
   write_beam();
   replace_in_beam("spacing = 0.05", "spacing = 0.025");  // six tiles

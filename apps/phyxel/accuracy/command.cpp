@@ -12,9 +12,9 @@
 #include "accuracy/page.hpp"
 #include "accuracy/pictures.hpp"
 #include "accuracy/studies.hpp"
-#include "csv.hpp"
 #include "device_option.hpp"
 #include "phyxel/error.hpp"
+#include "printed_table.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -25,8 +25,7 @@ struct AccuracyOptions {
   std::vector<std::string> lattices{"nodes", "cells", "mesh"};
   std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1};
   std::vector<double> closures;  ///< Empty: each case's own.
-  std::string csv;
-  bool force = false;
+  TableOptions table;
 };
 
 std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
@@ -85,7 +84,7 @@ std::string order_of(double coarse, double fine, int across_coarse, int across_f
 
 void measure(const AccuracyOptions& options) {
   const std::vector<AccuracyCase> cases = chosen_cases(options.cases);
-  PrintedTable table(options.csv, options.force,
+  PrintedTable table(options.table,
                      {"case", "quantity", "lattice", "jitter", "factor", "hourglass", "closure",
                       "across", "phyxels", "neighbours", "value", "reference", "error", "order",
                       "evaluations", "seconds", "setup_seconds"});
@@ -129,16 +128,15 @@ struct HardOptions {
   std::string device = "cpu";
   std::vector<std::string> precisions{"double", "mixed", "float"};
   std::vector<std::string> cases;
-  std::string csv;
   bool include_long = false;
-  bool force = false;
+  TableOptions table;
 };
 
 /// @returns whether all were as they should be
 bool measure_hard(const HardOptions& options) {
   const ChosenDevice device = choose_device(options.device);
   PrintedTable table(
-      options.csv, options.force,
+      options.table,
       {"case", "precision", "wanted", "found", "error", "tolerance", "good", "seconds", "message"},
       device_facts(device));
   bool all_good = true;
@@ -163,14 +161,8 @@ bool measure_hard(const HardOptions& options) {
   return all_good;
 }
 
-struct StudyOptions {
-  std::string csv;
-  bool force = false;
-};
-
-void measure_study(const Study& study, const StudyOptions& options) {
-  PrintedTable table(options.csv, options.force,
-                     {"way", study.x, "error", "evaluations", "seconds"});
+void measure_study(const Study& study, const TableOptions& options) {
+  PrintedTable table(options, {"way", study.x, "error", "evaluations", "seconds"});
   study.measure([&](const StudyRow& row) {
     table.row({row.way, fmt::format("{:.4g}", row.x), fmt::format("{:.3e}", row.error),
                std::to_string(row.evaluations), fmt::format("{:.4g}", row.seconds)});
@@ -212,8 +204,7 @@ void add_accuracy(CLI::App& program) {
   command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--csv", options->csv, "Also write the table to this file");
-  command->add_flag("--force", options->force, "Replace the CSV file");
+  add_table_options(*command, options->table);
   auto results = std::make_shared<std::string>("docs/results");
   auto out = std::make_shared<std::string>("docs/accuracy.md");
   CLI::App* page = command->add_subcommand("page", "Write the page from the table accuracy.csv");
@@ -235,13 +226,11 @@ void add_accuracy(CLI::App& program) {
       ->check(CLI::IsMember({"double", "mixed", "float"}))
       ->capture_default_str();
   hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
-  hard->add_option("--csv", hard_options->csv, "Also write the table to this file");
-  hard->add_flag("--force", hard_options->force, "Replace the CSV file");
+  add_table_options(*hard, hard_options->table);
   for (const Study& study : studies()) {
     CLI::App* of_study = command->add_subcommand(study.name, study.what);
-    auto study_options = std::make_shared<StudyOptions>();
-    of_study->add_option("--csv", study_options->csv, "Also write the table to this file");
-    of_study->add_flag("--force", study_options->force, "Replace the CSV file");
+    auto study_options = std::make_shared<TableOptions>();
+    add_table_options(*of_study, *study_options);
     of_study->footer(
         fmt::format("Example:\n"
                     "  phyxel accuracy {} --csv {}.csv",

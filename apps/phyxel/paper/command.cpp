@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "device_option.hpp"
 #include "files/atomic_file.hpp"
@@ -18,12 +19,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using Json = nlohmann::ordered_json;
+
+FILE* progress = stdout;  ///< Where `say` speaks: with --json, stdout is for what was written.
+
 struct PaperOptions {
   PaperRequest request;
   std::vector<int> figures;
   std::vector<std::string> tables;
   std::string device = "auto";
-  bool force = false, redraw = false;
+  bool force = false, redraw = false, json = false;
 };
 
 const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
@@ -50,7 +55,29 @@ void refuse_foreign_files(const fs::path& folder, bool force) {
   }
 }
 
+/// Tables, figures and page that the folder has now.
+void say_files(const fs::path& folder) {
+  const auto there = [](const std::vector<fs::path>& files) {
+    Json names = Json::array();
+    for (const fs::path& file : files) {
+      if (fs::exists(file)) names.push_back(file.string());
+    }
+    return names;
+  };
+  std::vector<fs::path> tables{table_file(folder, paper_table::frames)}, figures;
+  for (const std::string& table : all_tables) tables.push_back(table_file(folder, table));
+  for (const std::string& body : paper::body_names()) {
+    figures.push_back(figure_1_file(folder, body));
+  }
+  for (const fs::path& file : figure_files(folder)) figures.push_back(file);
+  const Json said{{"page", (folder / paper_page_name).string()},
+                  {"tables", there(tables)},
+                  {"figures", there(figures)}};
+  fmt::print("{}\n", said.dump(2));
+}
+
 void paper_command(PaperOptions& options) {
+  if (options.json) progress = stderr;
   PaperRequest& request = options.request;
   if (request.bodies.empty()) request.bodies = paper::body_names();
   for (const std::string& body : request.bodies) paper::body_scene(body);  // is there such a body?
@@ -141,13 +168,14 @@ void paper_command(PaperOptions& options) {
   }
   write_paper_page(request.out);
   say((request.out / paper_page_name).string());
+  if (options.json) say_files(request.out);
 }
 
 }  // namespace
 
 void say(const std::string& line) {
-  fmt::print("{}\n", line);
-  std::fflush(stdout);
+  fmt::print(progress, "{}\n", line);
+  std::fflush(progress);
 }
 
 void add_paper(CLI::App& program) {
@@ -177,6 +205,8 @@ void add_paper(CLI::App& program) {
       ->capture_default_str()
       ->check(CLI::Range(0.001, 60.0));
   command->add_flag("--force", options->force, "Replace earlier tables in the folder");
+  command->add_flag("--json", options->json,
+                    "What the folder then holds as JSON, nothing else on stdout");
   command->add_flag("--redraw", options->redraw,
                     "Measure nothing; draw figures and page from the folder's tables");
   command->footer(

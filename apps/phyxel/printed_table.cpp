@@ -1,0 +1,66 @@
+#include "printed_table.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json value_of(const std::string& cell) {
+  if (cell.empty()) return nullptr;
+  const Json value = Json::parse(cell, nullptr, false);
+  return value.is_number() ? value : Json(cell);
+}
+
+}  // namespace
+
+void add_table_options(CLI::App& command, TableOptions& options) {
+  command.add_option("--csv", options.csv, "Also write the table to this file");
+  command.add_flag("--force", options.force, "Replace the CSV file");
+  command.add_flag("--json", options.json, "The table as JSON, nothing else on stdout");
+}
+
+PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>& columns,
+                           Facts more, int cores)
+    : options_(std::move(options)), table_{machine_facts(cores), columns, {}} {
+  table_.facts.insert(table_.facts.end(), more.begin(), more.end());
+  if (!options_.csv.empty() && std::filesystem::exists(options_.csv) && !options_.force) {
+    throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options_.csv));
+  }
+  if (options_.json) {
+    Json facts;
+    for (const auto& [name, value] : table_.facts) facts[name] = value;
+    fmt::print("{{\"facts\": {},\n \"rows\": [", facts.dump());
+  } else {
+    fmt::print("{}", csv_text(table_));
+  }
+  write();
+}
+
+PrintedTable::~PrintedTable() {
+  if (options_.json) fmt::print("]}}\n");
+}
+
+void PrintedTable::row(const std::vector<std::string>& cells) {
+  if (options_.json) {
+    Json row;
+    for (std::size_t k = 0; k < cells.size(); ++k) row[table_.columns[k]] = value_of(cells[k]);
+    fmt::print("{}\n  {}", table_.rows.empty() ? "" : ",", row.dump());
+  } else {
+    fmt::print("{}\n", csv_row(cells));
+  }
+  std::fflush(stdout);
+  table_.rows.push_back(cells);
+  write();
+}
+
+void PrintedTable::write() const {
+  if (!options_.csv.empty()) write_csv(options_.csv, table_);
+}
+
+}  // namespace phyxel::app
