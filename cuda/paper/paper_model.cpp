@@ -121,7 +121,7 @@ void check_paper_model(const Model& model) {
                     "none of them",
                     part.name));
   }
-  if (part.material.law != Law::hooke) {
+  if (part.material.law != Law::hooke || part.material.custom_law) {
     refuse(fmt::format("body \"{}\" has another law; allowed: law = \"hooke\"", part.name));
   }
   if (part.closure > 0) {

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "phyxel/custom_law.hpp"
 #include "solver/boundary.cuh"
 #include "solver/cuda_backend.hpp"
 #include "solver/device_model.cuh"
@@ -309,6 +310,12 @@ std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precisi
   if (model.share && (model.share->place.size() != static_cast<std::size_t>(model.size()) ||
                       model.share->rings != 1)) {
     throw InputError("a GPU steps shares that are cut between tiles and have one ring of ghosts");
+  }
+  for (const Part& part : model.parts) {
+    if (!part.material.custom_law) continue;
+    throw InputError("body \"" + part.name + "\" has a law of the caller's own, \"" +
+                     part.material.custom_law->name() +
+                     "\", which no GPU knows: allowed is the CPU");
   }
   switch (precision) {
     case Precision::single:

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "model/selection.hpp"
+#include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -40,6 +41,11 @@ void place(Cloud& cloud, const BodyRequest& request) {
 }
 
 void check_terms(const BodyRequest& request) {
+  const auto check_law = [](const Material& material) {
+    if (material.custom_law) check_custom_law(*material.custom_law, material.young);
+  };
+  check_law(request.material);
+  for (const InclusionRequest& inclusion : request.inclusions) check_law(inclusion.material);
   if (!request.neighbourhood.one_sided()) return;
   const auto refuse_if = [&](double value, const char* term, const char* key) {
     if (!(value > 0)) return;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "phyxel/custom_law.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
@@ -72,6 +73,10 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
                                          m.damping, m.strain == Strain::green ? 1.0 : 0.0,
                                          m.hourglass, static_cast<double>(m.law), part.closure});
+    if (m.custom_law) {
+      const std::string name = m.custom_law->name();
+      add(state.get(), std::vector<char>(name.begin(), name.end()));
+    }
     if (part.closure > 0) add_surface(state.get(), model.surfels, part);
   }
   for (const Motion& motion : model.motions) {

@@ -13,6 +13,8 @@
 #include <optional>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/custom_law.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
@@ -38,6 +40,27 @@ struct PointRecord {
 struct StressRecord {
   static constexpr int size = 16;
   enum { pair_stress = 0, closing_stress = 9, position = 12, inverse_h_squared = 15 };
+};
+
+/// A caller's law for the phyxels of a pack, one by one.
+template <class P>
+struct LaneByLane {
+  const CustomLaw& law;
+
+  Mat3<P> first_piola_stress(const Mat3<P>& grad_u) const {
+    constexpr int width = sizeof(P) / sizeof(grad_u(0, 0)[0]);
+    Mat3<P> stress;
+    for (int l = 0; l < width; ++l) {
+      Mat3d of_lane;
+      for (int e = 0; e < 9; ++e) of_lane(e / 3, e % 3) = grad_u(e / 3, e % 3)[l];
+      of_lane = law.first_piola_stress(of_lane);
+      for (int e = 0; e < 9; ++e) {
+        auto& lanes = stress(e / 3, e % 3).lanes;
+        lanes[l] = static_cast<std::decay_t<decltype(lanes[0])>>(of_lane(e / 3, e % 3));
+      }
+    }
+    return stress;
+  }
 };
 
 template <class Real, class StateReal>
@@ -100,6 +123,29 @@ class CpuBackend final : public Backend {
     }
   }
 
+  std::optional<StateView> view() const override {
+    return StateView{displacement_.data(),
+                     velocity_.data(),
+                     sizeof(StateReal) == sizeof(float),
+                     W,
+                     layout_.packs(),
+                     {layout_.slot_of_phyxel(), static_cast<std::size_t>(model_.size())}};
+  }
+
+  void set_external_forces(std::span<const Vec3d> force) override {
+    if (!force.empty() && force.size() != static_cast<std::size_t>(model_.size())) {
+      throw InputError(fmt::format("{} external forces for {} phyxels: allowed are {} or none",
+                                   force.size(), model_.size(), model_.size()));
+    }
+    external_force_.assign(force.begin(), force.end());
+    external_.resize(force.empty() ? 0 : static_cast<std::size_t>(layout_.slots()) * 3);
+#pragma omp parallel for schedule(static) num_threads(threads())
+    for (Index i = 0; i < static_cast<Index>(force.size()); ++i) {
+      set3(external_, layout_.slot(i), force[i]);
+    }
+  }
+  std::span<const Vec3d> external_forces() const override { return external_force_; }
+
   void stress() override {
     const Phase phase("stresses");
     find_stresses(runs_);
@@ -118,7 +164,7 @@ class CpuBackend final : public Backend {
       const bool damped = run.material.damping > 0;
       if (!closing_.empty()) {
         damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
-      } else if (load_.empty() && pull_.empty()) {
+      } else if (load_.empty() && pull_.empty() && external_.empty()) {
         damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
       } else {
         damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
@@ -222,6 +268,10 @@ class CpuBackend final : public Backend {
         {"neighbour lists", lists_.bytes()}};
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
     if (!load_.empty()) list.push_back({"loads", load_.size() * sizeof(Real)});
+    if (!external_.empty()) {
+      list.push_back({"external forces",
+                      external_.size() * sizeof(Real) + external_force_.size() * sizeof(Vec3d)});
+    }
     if (!pull_.empty()) list.push_back({"hourglass control", pull_.size() * sizeof(Real)});
     if (!closing_.empty()) list.push_back({"closing vectors", closing_.size() * sizeof(Real)});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
@@ -236,7 +286,7 @@ class CpuBackend final : public Backend {
     const std::size_t pass_2 =
         (inverse_.start.empty() ? lists_ : inverse_).bytes() +
         slots * ((StressRecord::size + 3 + 1 + 3) * sizeof(Real) + 4 * 3 * sizeof(StateReal)) +
-        (load_.size() + 2 * pull_.size()) * sizeof(Real);
+        (load_.size() + external_.size() + 2 * pull_.size()) * sizeof(Real);
     return pass_1 + pass_2;
   }
 
@@ -345,6 +395,7 @@ class CpuBackend final : public Backend {
       if constexpr (More) {
         if (!pull_.empty()) force += vec3_of<P>(pull_, p);
         if (!load_.empty()) force += vec3_of<P>(load_, p);
+        if (!external_.empty()) force += vec3_of<P>(external_, p);
       }
       const Vec3<P> f_over_m = load<P>(&inverse_mass_[p * W]) * force;
       const Vec3<S> acceleration =
@@ -417,11 +468,13 @@ class CpuBackend final : public Backend {
       const Material& m = run.material;
       const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
-      with_law(m.elasticity(), hooke, [&](const auto& law) {
+      const auto apply_to = [&](const auto& law) {
         using Law = std::decay_t<decltype(law)>;
         m.volume_stiffness > 0 ? apply(SumOf<Law, VolumeConservation<P>>{law, volume}, run)
                                : apply(law, run);
-      });
+      };
+      m.custom_law ? apply_to(LaneByLane<P>{*m.custom_law})
+                   : with_law(m.elasticity(), hooke, apply_to);
     }
   }
 
@@ -588,9 +641,11 @@ class CpuBackend final : public Backend {
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
-  AlignedVector<Real> load_;     // empty unless the scene has loads
-  AlignedVector<Real> pull_;     // of hourglass control; empty unless the scene has any
-  AlignedVector<Real> closing_;  // of closed gradients; likewise
+  AlignedVector<Real> load_;      // empty unless the scene has loads
+  AlignedVector<Real> pull_;      // of hourglass control; empty unless the scene has any
+  AlignedVector<Real> closing_;   // of closed gradients; likewise
+  AlignedVector<Real> external_;  // of the caller's own forces; likewise
+  std::vector<Vec3d> external_force_;
   double load_scales_ = -1;
   std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
   SurfelState moved_surfels_;                     // of `update_surfels`

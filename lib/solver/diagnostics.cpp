@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/stress.hpp"
@@ -21,10 +22,16 @@ bool all_finite(const Mat3d& m) {
   return std::isfinite(sum);
 }
 
-Mat3d first_piola_stress(const Material& material, const Mat3d& grad_u) {
+/// Calls apply(law) with the material's law, a caller's own or one of ours.
+template <class Apply>
+auto with_law_of(const Material& material, Apply&& apply) {
+  if (material.custom_law) return apply(*material.custom_law);
   const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
-  Mat3d p = with_law(material.elasticity(), hooke,
-                     [&](const auto& law) { return law.first_piola_stress(grad_u); });
+  return with_law(material.elasticity(), hooke, apply);
+}
+
+Mat3d first_piola_stress(const Material& material, const Mat3d& grad_u) {
+  Mat3d p = with_law_of(material, [&](const auto& law) { return law.first_piola_stress(grad_u); });
   if (material.volume_stiffness > 0) {
     p += VolumeConservation<double>{material.volume_stiffness}.first_piola_stress(grad_u);
   }
@@ -65,7 +72,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
 
   // Total force with loads, for the velocity at t; the loads' potential on the way.
   Totals all;
-  std::vector<Vec3d> applied(model.loads.empty() ? 0 : force.size());
+  const std::span<const Vec3d> external = backend.external_forces();
+  std::vector<Vec3d> applied(external.begin(), external.end());
+  if (!model.loads.empty()) applied.resize(force.size());
   for (const Load& load : model.loads) {
     const double scale = load.scale_at(now.time);
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
@@ -84,7 +93,6 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     Totals own;
     for (const Part& part : model.parts) {
       const Material& m = part.material;
-      const Hooke<double> hooke{m.lame_lambda(), m.lame_mu()};
       const VolumeConservation<double> volume_law{m.volume_stiffness};
       const double kappa = hourglass_stiffness(model, part);
 #pragma omp for schedule(static) nowait
@@ -104,9 +112,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         own.momentum.add(p);
         own.angular_momentum.add(cross(x, p));
         own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
-        own.strain_energy.add(model.volume[i] *
-                              with_law(m.elasticity(), hooke,
-                                       [&](const auto& law) { return law.energy(gradient[i]); }));
+        own.strain_energy.add(model.volume[i] * with_law_of(m, [&](const auto& law) {
+                                return law.energy(gradient[i]);
+                              }));
         if (m.volume_stiffness > 0) {
           own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
         }

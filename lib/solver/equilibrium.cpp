@@ -15,7 +15,8 @@ namespace {
 constexpr double on_the_way = 1e-2;  // residual, at which the next stage may begin
 
 /// Gravity and loads at their full size; targets are still to be set.
-Balance whole_balance(const Model& model, const OwnedVectors& vectors) {
+Balance whole_balance(const Model& model, const Newton& newton) {
+  const OwnedVectors& vectors = newton.vectors();
   Balance balance;
   balance.target = vectors.make();
   balance.free.assign(balance.target.size(), {1, 1, 1});
@@ -36,6 +37,7 @@ Balance whole_balance(const Model& model, const OwnedVectors& vectors) {
       balance.applied[load.phyxels[k]] += load.force[k];
     }
   }
+  newton.add_external_forces(balance.applied);
   return balance;
 }
 
@@ -78,7 +80,7 @@ void refuse_free_fall(const Balance& balance, const OwnedVectors& vectors) {
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
   Newton newton(model, backend, options.most_steps);
-  Balance balance = whole_balance(model, newton.vectors());
+  Balance balance = whole_balance(model, newton);
   refuse_free_fall(balance, newton.vectors());
   Equilibrium found;
   found.state.displacement = newton.vectors().make();

@@ -47,6 +47,7 @@ void ImplicitStep::find_applied(double time) {
       balance_.applied[load.phyxels[k]] += scale * load.force[k];
     }
   }
+  newton_.add_external_forces(balance_.applied);
 }
 
 void ImplicitStep::find_targets(double time, Vector& target) const {

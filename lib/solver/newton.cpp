@@ -77,6 +77,11 @@ Newton::Vector Newton::inner_forces(const Vector& u) {
   return force;
 }
 
+void Newton::add_external_forces(Vector& applied) const {
+  const std::span<const Vec3d> external = backend_.external_forces();
+  if (!external.empty()) vectors_.for_each([&](Index i) { applied[i] += external[i]; });
+}
+
 /// Inner, applied and inertia's [N].
 Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
   Vector force = inner_forces(u);

@@ -50,6 +50,8 @@ class Newton {
   /// Inner forces at u [N].
   Vector inner_forces(const Vector& u);
   const OwnedVectors& vectors() const { return vectors_; }
+  /// Adds the caller's own forces [N], shape [n].
+  void add_external_forces(Vector& applied) const;
 
  private:
   Vector forces(const Balance& balance, const Vector& u);

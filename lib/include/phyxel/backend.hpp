@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,19 +39,61 @@ class Vibration {
   virtual void advance(double norm) = 0;
 };
 
-/// Owns the live arrays of one device and the kernels over them. `upload` and `download` are the
-/// only ways in and out.
+/// The live state of a CPU backend, without a copy and read-only: it shows the present state after
+/// every step, as long as the backend lives. Phyxels are renumbered and `lanes` of them lie side by
+/// side: component c of phyxel i is at [(slot[i] / lanes * 3 + c) * lanes + slot[i] % lanes]. Lanes
+/// that no phyxel has hold zeros.
+struct StateView {
+  const void* displacements = nullptr;  ///< u(t) [m], of `float` or `double`.
+  const void* velocities = nullptr;     ///< v(t - dt/2) [m/s], likewise.
+  bool single = false;                  ///< Whether they are `float`.
+  int lanes = 1;                        ///< Phyxels side by side.
+  Index packs = 0;                      ///< Both arrays have shape [packs, 3, lanes].
+  std::span<const Index> slot;          ///< Where each phyxel is, shape [n].
+
+  /// u(t) of phyxel i [m].
+  Vec3d displacement(Index i) const { return vector(displacements, i); }
+  /// v(t - dt/2) of phyxel i [m/s].
+  Vec3d velocity(Index i) const { return vector(velocities, i); }
+
+ private:
+  Vec3d vector(const void* array, Index i) const {
+    const std::ptrdiff_t at = std::ptrdiff_t{slot[i] / lanes} * 3 * lanes + slot[i] % lanes;
+    const auto of = [&](const auto* values) {
+      return Vec3d{values[at], values[at + lanes], values[at + 2 * lanes]};
+    };
+    return single ? of(static_cast<const float*>(array)) : of(static_cast<const double*>(array));
+  }
+};
+
+/// Owns the live arrays of one device and the kernels over them. `upload` and `download` copy all
+/// of a state in and out; on the CPU `view` shows it where it is.
 class Backend {
  public:
   virtual ~Backend() = default;
 
   /// e.g. "cpu, float, 2 threads, 16 lanes".
   virtual std::string name() const = 0;
+  /// Phyxels of the model, n; of a share with its ghosts.
   virtual Index size() const = 0;
   /// Threads of the CPU that share the work; 0: it is another device's.
   virtual int threads() const = 0;
+  /// Copies a state in: shapes [n, 3], in the order of the model's phyxels.
   virtual void upload(const State& state) = 0;
+  /// Copies the present displacements and velocities out, in that order.
   virtual void download(State& state) const = 0;
+  /// The state where it is; nothing where that is no memory of the CPU.
+  virtual std::optional<StateView> view() const { return std::nullopt; }
+
+  /// Forces of the caller's own, which act in every step, beside the scene's loads, until others
+  /// are set: as they are when a step begins. Their work is the caller's to count: energies leave
+  /// it out, and a `StabilityWatch` knows nothing of them.
+  /// @param force [N], shape [n], copied; of a share's ghosts it is not looked at. Empty: none, and
+  ///   then they cost nothing.
+  /// @throws InputError if there are neither n nor none, or this backend takes none (a GPU's)
+  virtual void set_external_forces(std::span<const Vec3d> force);
+  /// Those that act [N], shape [n] or empty.
+  virtual std::span<const Vec3d> external_forces() const { return {}; }
 
   /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q of each phyxel.
   virtual void stress() = 0;
@@ -88,6 +131,7 @@ class Backend {
   /// Of a share: how it exchanges values with the others, and what that has cost it.
   virtual std::optional<Exchanges> exchanges() const { return std::nullopt; }
 
+  /// What it holds, array by array.
   virtual std::vector<ArrayBytes> memory() const = 0;
   /// Bytes one step must move at the least: each array once for every pass that reads or writes it.
   virtual std::size_t step_traffic() const = 0;

@@ -1,6 +1,7 @@
 /// Material of a body and how its volume shares are found.
 #pragma once
 
+#include <memory>
 #include <string>
 
 namespace phyxel {
@@ -19,6 +20,8 @@ enum class Law { hooke, neo_hooke, corotated };
 /// Strain and law in one.
 enum class Elasticity { green_hooke, cauchy_hooke, neo_hooke, corotated };
 
+class CustomLaw;
+
 /// Isotropic elastic material.
 struct Material {
   double young = 0;               ///< Young's modulus E [Pa], > 0.
@@ -32,7 +35,12 @@ struct Material {
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
   /// support for the body. Scene files that say nothing have 0.1, but for the paper's bodies.
   double hourglass = 0;
+  /// A law of the caller's own, in place of `law` and `strain`, on the CPU (phyxel/custom_law.hpp);
+  /// null: none. `young` and `poisson` are then its own at small strains: speeds of waves and
+  /// hourglass control follow from them.
+  std::shared_ptr<const CustomLaw> custom_law = nullptr;
 
+  /// Of `law` and `strain`.
   Elasticity elasticity() const {
     if (law == Law::neo_hooke) return Elasticity::neo_hooke;
     if (law == Law::corotated) return Elasticity::corotated;

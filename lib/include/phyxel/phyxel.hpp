@@ -6,6 +6,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/cloud.hpp"
+#include "phyxel/custom_law.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"

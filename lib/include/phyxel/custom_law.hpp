@@ -1,0 +1,36 @@
+/// Elastic laws of the caller's own.
+#pragma once
+
+#include <string>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// A hyperelastic law that the library does not have, for `Material::custom_law`: the CPU backend
+/// asks it for each phyxel's stress in every step, in double, whatever its precision, from all of
+/// its threads at once. The step limit, energies, searches for rest and implicit steps follow from
+/// it as from any other law. GPUs refuse it.
+class CustomLaw {
+ public:
+  virtual ~CustomLaw();
+
+  /// What tells it from another one in a checkpoint: its name, and the parameters in use.
+  virtual std::string name() const = 0;
+  /// ψ [J/m³ of the body at rest], zero at rest.
+  /// @param grad_u ∇u = F - I
+  virtual double energy(const Mat3d& grad_u) const = 0;
+  /// First Piola–Kirchhoff stress P = ∂ψ/∂∇u [Pa], zero at rest; P(a, b) is the derivative by
+  /// grad_u(a, b).
+  /// @param grad_u ∇u = F - I
+  virtual Mat3d first_piola_stress(const Mat3d& grad_u) const = 0;
+};
+
+/// Makes sure that a law can be stepped: energy and stress are zero at rest, and the stress is the
+/// derivative of the energy, by differences at a few deformations of some percent. `build_model`
+/// asks this of every law.
+/// @param young of its material [Pa], which says what is small
+/// @throws InputError naming the law, the entry of the stress, what it is and what the energy says
+void check_custom_law(const CustomLaw& law, double young);
+
+}  // namespace phyxel
