@@ -37,6 +37,7 @@ std::filesystem::path write_checkpoint(const std::filesystem::path& directory, c
                                        const CheckpointInfo& info, Index phyxels,
                                        Stretches& values);
 
+/// A whole checkpoint.
 struct Checkpoint {
   State state;
   CheckpointInfo info;
@@ -54,7 +55,9 @@ class CheckpointReader {
   CheckpointReader(CheckpointReader&&) noexcept;
   CheckpointReader& operator=(CheckpointReader&&) noexcept;
 
+  /// What is beside the state.
   const CheckpointInfo& info() const { return info_; }
+  /// Phyxels of its state.
   Index phyxels() const { return phyxels_; }
   /// The state of phyxels `begin` to `end`. @throws InputError if a value is not finite.
   State state(Index begin, Index end) const;

@@ -10,6 +10,7 @@
 
 namespace phyxel {
 
+/// Indices of three vertices, counter-clockwise seen from outside.
 using Triangle = std::array<Index, 3>;
 
 /// A triangulated surface. As part of a `Cloud` its vertices are the surfels.

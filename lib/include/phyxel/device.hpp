@@ -26,6 +26,7 @@ struct Device {
   std::string describe() const;  ///< "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
 };
 
+/// What a rank steps on.
 struct ChosenDevice {
   std::optional<Device> gpu;  ///< Nothing: the CPU.
   std::string why_no_gpu;     ///< Where there is none.

@@ -27,6 +27,7 @@ double pressure_wave_speed(const Material& material);
 /// Stops a run that has become unstable.
 class StabilityWatch {
  public:
+  /// Both must outlive this. @param start of the state the run starts from. @throws as `check`
   StabilityWatch(const Model& model, const Diagnostics& start);
 
   /// @throws DivergedError, saying which phyxel and when, if the state is not finite, if a phyxel

@@ -9,6 +9,7 @@
 
 namespace phyxel {
 
+/// When a search ends.
 struct EquilibriumOptions {
   /// Of the residual force over what is applied: loads, weight and reactions, all by their
   /// Euclidean norms over all phyxels.
@@ -16,6 +17,7 @@ struct EquilibriumOptions {
   int most_steps = 200;  ///< Newton's.
 };
 
+/// What a search has found.
 struct Equilibrium {
   State state;                   ///< At rest; step and time are zero.
   double residual = 0;           ///< What is left of it.

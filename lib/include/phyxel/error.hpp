@@ -22,7 +22,9 @@ enum class ExitCode : int {
 /// Base of every error phyxel throws on purpose. `what()` is the whole message for the user.
 class Error : public std::runtime_error {
  public:
+  /// @param message the whole of it, for the user
   Error(ExitCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+  /// What a program that this error ends should return.
   ExitCode code() const { return code_; }
 
  private:
@@ -33,12 +35,14 @@ class Error : public std::runtime_error {
 /// element, the value found, and what is allowed.
 class InputError : public Error {
  public:
+  /// @param message what is wrong, where, and what is allowed
   explicit InputError(const std::string& message) : Error(ExitCode::bad_input, message) {}
 };
 
 /// Writing a file failed while the simulation was under way.
 class OutputError : public Error {
  public:
+  /// @param message the file, and what the system says
   explicit OutputError(const std::string& message) : Error(ExitCode::output_failed, message) {}
 };
 
@@ -46,18 +50,21 @@ class OutputError : public Error {
 /// message names the device and what was asked of it.
 class DeviceError : public Error {
  public:
+  /// @param message the device, and what was asked of it
   explicit DeviceError(const std::string& message) : Error(ExitCode::device_failed, message) {}
 };
 
 /// What every rank of a program throws alike: all have met it, or have agreed on what one has met.
 class AgreedError : public Error {
  public:
+  /// @param message what happened, on whichever rank
   using Error::Error;
 };
 
 /// The simulation became unstable.
 class DivergedError : public Error {
  public:
+  /// @param message where, when, and what may help
   explicit DivergedError(const std::string& message) : Error(ExitCode::diverged, message) {}
 };
 

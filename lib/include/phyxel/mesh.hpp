@@ -26,9 +26,11 @@ struct SurfaceDefects {
   Index parts = 0;          ///< Connected parts.
   bool inside_out = false;  ///< The enclosed volume is negative.
   Vec3d example;            ///< Midpoint of one defective edge or triangle [m].
+  /// Whether nothing is wrong, but for vertices that no triangle uses.
   bool clean() const;
   std::string describe() const;  ///< One line for the user.
 };
+/// Looks for defects; never throws.
 SurfaceDefects inspect_surface(const Surface& surface);
 
 /// How a surface is filled with phyxels.

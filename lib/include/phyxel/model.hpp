@@ -41,6 +41,7 @@ struct Part {
   double mass = 0, volume = 0;  ///< Of the whole part [kg, m³].
   Vec3d centre;                 ///< Of its body's mass, at rest [m].
 
+  /// The first of its ghosts.
   Index owned_end() const { return end - ghosts; }
 };
 
@@ -50,6 +51,7 @@ struct Degenerate {
   std::vector<Index> collinear;   ///< Rank 1.
   std::vector<Index> coplanar;    ///< Rank 2.
   std::vector<Index> coincident;  ///< At the same place as another phyxel.
+  /// Whether every phyxel's neighbours span space.
   bool none() const;
   std::string describe() const;  ///< Counts and the first few indices of each kind.
 };
@@ -73,9 +75,11 @@ struct Motion {
   Vec3d amplitude{};
   double frequency = 0;
   Axes axes{};
+  /// Where it is at a time [s].
   Path path_at(double time) const;
   /// Of displacement and rotation, so much of the way.
   Path path_after(double share) const;
+  /// Whether it only holds.
   bool stands_still() const {
     return displacement == Vec3d{} && rotation == Vec3d{} && velocity == Vec3d{} &&
            amplitude == Vec3d{};
@@ -92,6 +96,7 @@ struct Load {
   std::vector<Vec3d> force;  ///< [N], shape [phyxels]
   Vec3d total, density;      ///< What the scene asks, shared by mass [N] and by volume [N/m³].
   double ramp = 0;           ///< [s]
+  /// Which share of the force acts at a time [s].
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
 
@@ -125,6 +130,7 @@ struct Model {
   std::vector<std::string> warnings;   ///< For the summary.
   std::shared_ptr<const Share> share;  ///< Null: this is the whole model.
 
+  /// Phyxels, n; of a share with its ghosts.
   Index size() const { return static_cast<Index>(position.size()); }
   /// Whether a body has more than one part.
   bool has_inclusions() const;
@@ -132,11 +138,13 @@ struct Model {
   std::span<const Part> parts_of_body(const Part& part) const;
   /// Phyxels of the whole model.
   Index whole_size() const { return share ? share->whole : size(); }
+  /// Surfels of the whole model.
   Index whole_surfels() const;
   /// Which phyxel of the whole model phyxel i is.
   Index number(Index i) const { return share ? share->number[i] : i; }
   /// Whether phyxel i is no ghost.
   bool owns(Index i) const { return !share || share->owned[i]; }
+  /// Whether neighbour lists are here.
   bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
   /// This model, for whoever needs the lists. @throws InputError if they were left to a device.
   const Model& with_lists() const;
@@ -174,11 +182,13 @@ struct Survey {
   ListLengths lists;
   Degenerate degenerate;
 };
+/// A device's search: finds neighbourhoods, leaves their lists there.
 using Surveyor = std::function<Survey(std::span<const Vec3d> position,
                                       const NeighbourhoodRule& rule, bool kernel_volumes)>;
 
 /// Leaves neighbours and moments to the device behind `survey`, whose backend finds them.
 Model build_model(const Scene& scene, const Surveyor& survey);
+/// The same from clouds already in place, one for each body of the scene.
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey);
 
 }  // namespace phyxel

@@ -15,9 +15,13 @@ struct Csr {
   std::vector<Offset> offsets{0};  ///< shape [rows + 1]
   std::vector<Index> indices;      ///< shape [entries]
 
+  /// How many.
   Index rows() const { return static_cast<Index>(offsets.size() - 1); }
+  /// Of all rows.
   Offset entries() const { return offsets.back(); }
+  /// Entries of one row.
   Index length(Index row) const { return static_cast<Index>(offsets[row + 1] - offsets[row]); }
+  /// Entries of row i, ascending.
   std::span<const Index> row(Index i) const {
     return {indices.data() + offsets[i], indices.data() + offsets[i + 1]};
   }
@@ -29,6 +33,7 @@ Csr transpose(const Csr& csr, Index columns);
 /// How the support radius h of each phyxel is chosen. Source: Mueller et al. 2004, section 4.2:
 /// h_i = factor * (mean distance to the `nearest` nearest phyxels).
 struct NeighbourhoodRule {
+  /// Whether bodies or phyxels have a support.
   enum class Support {
     uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for
                ///< both passes.
@@ -52,6 +57,7 @@ struct Neighbourhood {
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
   bool symmetric = true;        ///< N is its own inverse; `inverse()` then returns `neighbours`.
   std::vector<double> support;  ///< h_i [m], shape [n_phyxels].
+  /// {j : i in N(j)}.
   const Csr& inverse() const { return symmetric ? neighbours : inverse_lists; }
 };
 

@@ -30,20 +30,28 @@ class Ranks {
   Ranks(const Ranks&) = delete;
   Ranks& operator=(const Ranks&) = delete;
 
+  /// Which one this is, from 0.
   int rank() const;
+  /// How many there are.
   int size() const;
   /// Whether this rank speaks for all: the first one.
   bool leads() const { return rank() == 0; }
-  /// Ranks of this host, and which of them this is.
+  /// Ranks of this host.
   int host_size() const;
+  /// Which of them this is, from 0.
   int host_rank() const;
 
+  /// Waits for all.
   void barrier() const;
-  /// Over all ranks.
+  /// Σ over all ranks.
   std::int64_t sum(std::int64_t value) const;
+  /// Over all ranks.
   std::int64_t largest(std::int64_t value) const;
+  /// Over all ranks.
   std::int64_t smallest(std::int64_t value) const;
+  /// Over all ranks.
   double largest(double value) const;
+  /// Over all ranks.
   double smallest(double value) const;
   /// Of the terms of all ranks, rounded once: the same bits however many ranks share the terms, and
   /// in whatever order. NaN if a term is not finite.

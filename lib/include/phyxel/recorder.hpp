@@ -60,7 +60,9 @@ class SeriesFile {
  public:
   /// Writes a new file with these entries.
   void create(const std::filesystem::path& file, const std::vector<SeriesEntry>& entries);
+  /// Adds one entry at the end. @throws OutputError
   void append(const SeriesEntry& entry);
+  /// Where it is.
   const std::filesystem::path& file() const { return file_; }
 
  private:
@@ -93,6 +95,7 @@ class Recorder {
 
   /// Including those of the earlier part of a resumed run.
   std::int64_t frames_written() const { return frames_; }
+  /// Where they go.
   const std::filesystem::path& directory() const { return directory_; }
   std::vector<std::filesystem::path> files() const;  ///< Series files and the log, for summaries.
 

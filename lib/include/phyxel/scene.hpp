@@ -54,6 +54,7 @@ struct Selection {
 /// Along which axes a phyxel is held or moved; along the others it is free, as on rollers.
 struct Axes {
   bool x = true, y = true, z = true;
+  /// Whether along every axis.
   bool all() const { return x && y && z; }
   char bits() const { return static_cast<char>(x | y << 1 | z << 2); }  ///< One for each.
   bool operator==(const Axes&) const = default;
@@ -131,12 +132,14 @@ struct BodyRequest {
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
+/// How long, and by which steps.
 struct TimeRequest {
   double end = 0;              ///< Simulated time [s].
   std::optional<double> step;  ///< [s]; unset: from the spectral radius of the stiffness.
   double safety = 0.8;         ///< Fraction of the largest stable step, 0 to 1.
 };
 
+/// What computes, and how precisely.
 struct SolverRequest {
   Method method = Method::verlet;
   std::string device = "auto";  ///< "auto", "cpu" or "cuda".
@@ -144,6 +147,7 @@ struct SolverRequest {
   int threads = 0;  ///< 0: OpenMP's choice.
 };
 
+/// What is written, where and how often.
 struct OutputRequest {
   std::filesystem::path directory;  ///< Default: out/<scene file's name>.
   double frames_per_second = 25;    ///< Frames per simulated second; 0: last frame only.
@@ -155,6 +159,7 @@ struct OutputRequest {
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
 };
 
+/// Pictures at the end of a run.
 struct RenderRequest {
   bool pictures = false;  ///< Write PNG pictures at the end of a run.
   int count = 6;          ///< How many frames, evenly spread, first and last included.
@@ -163,6 +168,7 @@ struct RenderRequest {
   Vec3d up{0, 0, 1};
 };
 
+/// A whole request: `build_model` takes it.
 struct Scene {
   std::string title;
   std::filesystem::path file;  ///< Where it was read from; may be empty.

@@ -17,6 +17,7 @@ struct Records {
   std::size_t stride = 0, bytes = 0;
   const Index* slot = nullptr;  ///< Null: phyxel i is in slot i.
 
+  /// Where those of phyxel i begin.
   std::byte* of(Index i) const {
     return base + static_cast<std::size_t>(slot ? slot[i] : i) * stride;
   }
@@ -45,11 +46,15 @@ class Others {
   virtual ~Others() = default;
   /// Over all ranks, element by element.
   virtual void add(std::span<std::int64_t> values) const = 0;
+  /// Over all ranks.
   virtual double largest(double value) const = 0;
+  /// Over all ranks.
   virtual double smallest(double value) const = 0;
 
+  /// Which one this is.
   virtual int rank() const = 0;
   virtual int count() const = 0;  ///< Of all ranks.
+  /// Those with which this one exchanges.
   virtual const std::vector<Peer>& peers() const = 0;
   /// What each peer is told, by peer, and so what they tell.
   virtual std::vector<std::vector<std::byte>> told(
@@ -60,11 +65,13 @@ class Others {
   /// Sends `outgoing` of each peer to it, and takes `incoming` from it. Between `begin` and
   /// `finish` neither may be touched, and nothing else may begin.
   using Bytes = std::vector<std::span<std::byte>>;
+  /// Sends and takes; `finish` waits for it.
   virtual void begin(const Bytes& outgoing, const Bytes& incoming) const = 0;
   /// Copies values from the ranks that own phyxels to those that have them as ghosts: `begin`
   /// takes them, and `finish` puts them there. Between the two, neither what is sent nor ghosts'
   /// values may be touched, and nothing else may begin.
   virtual void begin(const Records& records) const = 0;
+  /// Waits until all values are in place.
   virtual void finish() const = 0;
   /// Of those two, since the start.
   virtual Traffic traffic() const = 0;

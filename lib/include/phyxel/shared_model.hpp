@@ -53,6 +53,7 @@ class SharedModel {
   struct Shares {
     std::int64_t fewest = 0, most = 0, most_ghosts = 0;
   };
+  /// How evenly it is cut.
   const Shares& shares() const { return shares_; }
   const std::string& partitioner() const { return partitioner_; }  ///< Who cut it; "": nobody.
 

@@ -55,10 +55,13 @@ class Solver {
   /// @throws DivergedError if Newton's method finds no balance
   void step();
   double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
+  /// Taken since t = 0.
   std::int64_t steps() const { return steps_; }
   double dt() const { return dt_; }  ///< [s]
+  /// When the present state is, for `diagnose`.
   Instant now() const;
   State state() const;  ///< Downloaded copy.
+  /// Since this solver began.
   SolverWork work() const;
 
  private:

@@ -42,6 +42,7 @@ struct Diagnostics {
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// [J], of the deformation.
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
+  /// [J], constant where nothing damps, moves or grows (see `is_conservative`).
   double total_energy() const {
     return kinetic_energy + elastic_energy() + gravity_energy + load_energy;
   }

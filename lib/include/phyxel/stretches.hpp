@@ -36,6 +36,7 @@ constexpr std::size_t width_of(Quantity quantity) {
       return 3;
   }
 }
+/// Whether surfels have it; else phyxels do.
 constexpr bool is_of_surfels(Quantity quantity) {
   return quantity == Quantity::surfel_position || quantity == Quantity::surfel_normal;
 }
@@ -56,6 +57,7 @@ class Stretches {
   /// rank holds anyway.
   static constexpr Index usual_length = 1 << 20;
 
+  /// @param length of what is asked for at a time, at most
   explicit Stretches(Index length = usual_length) : length_(length) {}
   virtual ~Stretches() = default;
   Stretches(const Stretches&) = default;
@@ -63,6 +65,7 @@ class Stretches {
 
   /// Phyxels, surfels or triangles asked for at a time, at most.
   Index length() const { return length_; }
+  /// Whether there are such values.
   virtual bool has(Quantity quantity) const = 0;
   /// Those of the whole model's phyxels, or surfels, `begin` to `end`. Valid until the next call.
   virtual std::span<const double> values(Quantity quantity, Index begin, Index end) = 0;

@@ -18,6 +18,7 @@
 
 namespace phyxel {
 
+/// Three components.
 template <class Real>
 struct Vec3 {
   Real x{}, y{}, z{};
@@ -43,6 +44,7 @@ PHYXEL_HD Vec3<To> to(const Vec3<From>& v) {
   return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
 }
 
+/// The same in another precision.
 template <class To, class From>
 PHYXEL_HD Mat3<To> to(const Mat3<From>& m) {
   Mat3<To> out;
@@ -50,8 +52,11 @@ PHYXEL_HD Mat3<To> to(const Mat3<From>& m) {
   return out;
 }
 
+/// In double.
 using Vec3d = Vec3<double>;
+/// In double.
 using Mat3d = Mat3<double>;
+/// In double.
 using Sym3d = Sym3<double>;
 using Index = std::int32_t;   ///< index of a phyxel, surfel or triangle on one rank
 using Offset = std::int64_t;  ///< offset into a list of pairs; never 32-bit
@@ -111,6 +116,7 @@ template <class R>
 PHYXEL_HD bool operator==(const Vec3<R>& a, const Vec3<R>& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z;
 }
+/// a · b.
 template <class R>
 PHYXEL_HD R dot(Vec3<R> a, Vec3<R> b) {
   return fused(a.z, b.z, fused(a.y, b.y, a.x * b.x));
@@ -120,23 +126,27 @@ template <class R>
 PHYXEL_HD Vec3<R> fused(R s, Vec3<R> a, Vec3<R> b) {
   return {fused(s, a.x, b.x), fused(s, a.y, b.y), fused(s, a.z, b.z)};
 }
+/// a × b.
 template <class R>
 PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 /// Component by component.
 inline Vec3d by_components(Vec3d a, Vec3d b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+/// |a|.
 inline double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 /// Unit vector along `a`; the zero vector stays zero.
 inline Vec3d normalised(Vec3d a) {
   const double length = norm(a);
   return length > 0 ? a / length : Vec3d{};
 }
+/// Whether no component is NaN or infinite.
 inline bool is_finite(Vec3d a) {
   return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
 }
 
 // --- Mat3 ---------------------------------------------------------------------------------------
+/// I.
 template <class R>
 PHYXEL_HD Mat3<R> identity() {
   Mat3<R> m;
@@ -197,6 +207,7 @@ PHYXEL_HD Mat3<R> fused(const Mat3<R>& p, const Mat3<R>& q, Mat3<R> m) {
       m(r, c) = fused(p(r, 2), q(2, c), fused(p(r, 1), q(1, c), fused(p(r, 0), q(0, c), m(r, c))));
   return m;
 }
+/// qᵀ.
 template <class R>
 PHYXEL_HD Mat3<R> transpose(const Mat3<R>& q) {
   Mat3<R> m;
@@ -248,6 +259,7 @@ PHYXEL_HD Mat3<R> cofactor(const Mat3<R>& m) {
   c(2, 2) = minor(m(0, 0), m(1, 1), m(0, 1), m(1, 0));
   return c;
 }
+/// det m.
 template <class R>
 PHYXEL_HD R determinant(const Mat3<R>& m) {
   using detail::minor;
@@ -270,6 +282,7 @@ template <class R>
 PHYXEL_HD Sym3<R> operator*(R s, const Sym3<R>& q) {
   return {s * q.xx, s * q.xy, s * q.xz, s * q.yy, s * q.yz, s * q.zz};
 }
+/// tr s.
 template <class R>
 PHYXEL_HD R trace(const Sym3<R>& s) {
   return s.xx + s.yy + s.zz;
@@ -281,6 +294,7 @@ PHYXEL_HD R contract(const Sym3<R>& p, const Sym3<R>& q) {
   const R diagonal = fused(p.zz, q.zz, fused(p.yy, q.yy, p.xx * q.xx));
   return fused(R(2), off_diagonal, diagonal);
 }
+/// All nine entries of it.
 template <class R>
 PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
   Mat3<R> m;

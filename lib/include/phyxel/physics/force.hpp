@@ -38,6 +38,7 @@ PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec
   force.z = fused(q_j(2, 2), wx.z, force.z);
 }
 
+/// The same from x_ij [m] and w_ji apart.
 template <class Real>
 PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> x_ij,
                                    Real w_ji) {

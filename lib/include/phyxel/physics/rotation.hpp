@@ -15,6 +15,7 @@
 
 namespace phyxel {
 
+/// F = R S with a rotation R and a symmetric S.
 template <class Real>
 struct NearestRotation {
   Mat3<Real> change;  ///< R - I.

@@ -18,6 +18,7 @@ template <class Real>
 struct Hooke {
   Real lambda, mu;  ///< Lamé's parameters [Pa].
 
+  /// S [Pa] of a strain.
   PHYXEL_HD Sym3<Real> stress(const Sym3<Real>& strain) const {
     const Real pressure = lambda * trace(strain);
     const Real two_mu = Real(2) * mu;
@@ -35,6 +36,7 @@ struct Hooke {
 template <class Real>
 struct GreenHooke {
   Hooke<Real> hooke;
+  /// ½ ε : S [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return hooke.energy(green_strain(grad_u));
   }
@@ -49,9 +51,11 @@ struct GreenHooke {
 template <class Real>
 struct CauchyHooke {
   Hooke<Real> hooke;
+  /// ½ ε : S [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return hooke.energy(cauchy_strain(grad_u));
   }
+  /// First Piola–Kirchhoff stress [Pa].
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return full(hooke.stress(cauchy_strain(grad_u)));
   }
@@ -89,6 +93,7 @@ template <class Real>
 struct NeoHooke {
   Hooke<Real> hooke;
 
+  /// ψ [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     using std::log1p;
     const Real quarter = Real(0.25) * excess(grad_u), change = volume_change(grad_u);
@@ -131,6 +136,7 @@ template <class Real>
 struct CorotatedHooke {
   Hooke<Real> hooke;
 
+  /// ψ [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     const NearestRotation<Real> r = nearest_rotation(grad_u);
     return hooke.mu * detail::squares(grad_u - r.change) +
@@ -182,6 +188,7 @@ template <class Real>
 struct VolumeConservation {
   Real stiffness;  ///< k_v [Pa]
 
+  /// ½ k_v (det F - 1)² [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     const Real change = volume_change(grad_u);
     return Real(0.5) * stiffness * change * change;
@@ -197,10 +204,12 @@ template <class First, class Second>
 struct SumOf {
   First first;
   Second second;
+  /// Of both [J/m³].
   template <class Real>
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return first.energy(grad_u) + second.energy(grad_u);
   }
+  /// Of both [Pa].
   template <class Real>
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return first.first_piola_stress(grad_u) + second.first_piola_stress(grad_u);

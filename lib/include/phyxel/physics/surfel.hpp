@@ -12,6 +12,7 @@ struct SurfelBlend {
   Mat3<Real> gradient;      ///< Σ w ∇u_i
   Real weight{};            ///< Σ w
 
+  /// Adds phyxel i. @param w its weight. @param x_is x_s - x_i [m]
   PHYXEL_HD void add(Real w, Vec3<Real> u_i, const Mat3<Real>& grad_u_i, Vec3<Real> x_is) {
     add(w, u_i + grad_u_i * x_is, grad_u_i);
   }
