@@ -2,6 +2,16 @@
 
 set(PHYXEL_SANITIZE "" CACHE STRING "Sanitizers, e.g. address,undefined or thread")
 
+# Semantic versioning: before 1.0 a minor version may break what used the one before, after that only
+# a major version may.
+if(PROJECT_VERSION_MAJOR EQUAL 0)
+  set(PHYXEL_COMPATIBILITY SameMinorVersion)
+  set(PHYXEL_SOVERSION 0.${PROJECT_VERSION_MINOR})
+else()
+  set(PHYXEL_COMPATIBILITY SameMajorVersion)
+  set(PHYXEL_SOVERSION ${PROJECT_VERSION_MAJOR})
+endif()
+
 add_library(phyxel_flags INTERFACE)
 target_compile_options(phyxel_flags INTERFACE
   "$<$<COMPILE_LANGUAGE:CXX>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>"
@@ -30,7 +40,7 @@ function(phyxel_library name)
   add_library(phyxel::${export_name} ALIAS ${name})
   set_target_properties(${name} PROPERTIES
     EXPORT_NAME ${export_name} POSITION_INDEPENDENT_CODE ON
-    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}
+    VERSION ${PROJECT_VERSION} SOVERSION ${PHYXEL_SOVERSION}
     INSTALL_RPATH $ORIGIN INSTALL_RPATH_USE_LINK_PATH ON)
   target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
                                      PRIVATE ${PROJECT_SOURCE_DIR}/lib)

@@ -11,9 +11,9 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
        libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev
        libmetis-dev libopenmpi-dev openmpi-bin
        gnuplot-nox)  # the figures of phyxel paper
-# clang for the sanitizers and the fuzzers, Doxygen for the reference, Python to read our files
-# independently.
-tests=(ccache pkg-config doxygen libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
+# clang for the sanitizers and the fuzzers, Doxygen for the reference, help2man and dpkg-dev for
+# packages, Python to read our files independently.
+tests=(ccache pkg-config doxygen help2man dpkg-dev libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
        python3-h5py python3-vtk9)
 
 wanted=("${build[@]}")

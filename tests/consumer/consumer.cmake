@@ -2,14 +2,7 @@
 set(prefix ${WORK}/prefix)
 file(REMOVE_RECURSE ${WORK}/prefix ${WORK}/build)
 
-function(run)
-  execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out)
-  if(NOT code EQUAL 0)
-    list(JOIN ARGN " " command)
-    message(FATAL_ERROR "exit code ${code} of: ${command}\n${out}")
-  endif()
-  set(out "${out}" PARENT_SCOPE)
-endfunction()
+include(${CMAKE_CURRENT_LIST_DIR}/../support/run.cmake)
 
 # Two numbers that a program prints, with as many decimals each, in the pattern's two groups, must
 # agree within so many thousandths of the second. What it prints is put into `out`.
@@ -112,6 +105,23 @@ run(${prefix}/${BINDIR}/phyxel --version)
 if(NOT out MATCHES "phyxel ${VERSION}")
   message(FATAL_ERROR "the installed program says ${out}")
 endif()
+
+# Semantic versioning: before 1.0 another minor version may break who asks for this one.
+function(check_version asked expected)
+  set(PACKAGE_FIND_VERSION ${asked})
+  include(${prefix}/${LIBDIR}/cmake/phyxel/phyxelConfigVersion.cmake)
+  if(NOT PACKAGE_VERSION_COMPATIBLE STREQUAL expected)
+    message(FATAL_ERROR "who asks for ${asked} is told that ${VERSION} is compatible: "
+                        "${PACKAGE_VERSION_COMPATIBLE}, not ${expected}")
+  endif()
+endfunction()
+string(REGEX MATCH "^([0-9]+)[.]([0-9]+)" version_asked ${VERSION})
+set(major ${CMAKE_MATCH_1})
+math(EXPR next_minor "${CMAKE_MATCH_2} + 1")
+math(EXPR next_major "${major} + 1")
+check_version(${version_asked} TRUE)
+check_version(${major}.${next_minor} FALSE)
+check_version(${next_major}.0 FALSE)
 
 build(link_library)
 check_sag(${WORK}/build/link_library/link_library)
