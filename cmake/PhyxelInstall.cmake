@@ -42,9 +42,15 @@ function(phyxel_pkg_config pc_name pc_description pc_requires pc_requires_privat
   install(FILES ${PROJECT_BINARY_DIR}/${pc_name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
           COMPONENT development)
 endfunction()
-phyxel_pkg_config(phyxel "${PROJECT_DESCRIPTION}" "" fmt phyxel ${OpenMP_CXX_FLAGS}
-                  ${PHYXEL_HDF5_LIBRARY})
-if(TARGET phyxel_ranks)
+if(BUILD_SHARED_LIBS)  # which say themselves what they need
+  phyxel_pkg_config(phyxel "${PROJECT_DESCRIPTION}" "" "" phyxel)
+else()
+  phyxel_pkg_config(phyxel "${PROJECT_DESCRIPTION}" "" fmt phyxel ${OpenMP_CXX_FLAGS}
+                    ${PHYXEL_HDF5_LIBRARY})
+endif()
+if(TARGET phyxel_ranks AND BUILD_SHARED_LIBS)
+  phyxel_pkg_config(phyxel-ranks "phyxel on the ranks of a program, and on GPUs" phyxel "" phyxel_ranks)
+elseif(TARGET phyxel_ranks)
   set(private ${METIS_LIBRARY})
   if(PHYXEL_HAVE_MPI)
     list(APPEND private ${MPI_CXX_LIBRARIES})

@@ -14,6 +14,7 @@
 #include "setup/tiling.hpp"
 #include "solver/cuda_backend.hpp"
 #include "solver/nccl.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -53,6 +54,15 @@ Model controlled() {
   return testing::model_of(scene, testing::lattice(12, 11, 10, 0.1, 0.3));
 }
 
+/// A cube of a law that is the caller's own; forces of the caller's own act on it, too.
+Model custom() {
+  Material material = testing::rubber();
+  material.custom_law = std::make_shared<testing::Repeated>(material, 2);
+  Scene scene = testing::one_body(material);
+  scene.bodies[0].spin = {1, 2, 3};
+  return testing::model_of(scene, testing::lattice(9, 8, 7, 0.1, 0.3));
+}
+
 struct ShareCase {
   const char* name;
   Model (*make)();
@@ -61,7 +71,7 @@ const std::vector<ShareCase>& share_cases() {
   static const std::vector<ShareCase> cases{{"Cube", testing::cube},     {"Coil", testing::coil},
                                             {"Thread", testing::thread}, {"Apart", testing::apart},
                                             {"Tiny", testing::tiny},     {"Everything", everything},
-                                            {"Controlled", controlled}};
+                                            {"Controlled", controlled},  {"Custom", custom}};
   return cases;
 }
 
@@ -82,6 +92,7 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
     if (on_gpus() && world().smallest(std::int64_t{!cuda_devices().empty()}) == 0) {
       GTEST_SKIP() << "no CUDA device";
     }
+    if (on_gpus() && whole_.parts[0].material.custom_law) GTEST_SKIP() << "no GPU knows its law";
     const bool own_gpu = static_cast<int>(cuda_devices().size()) >= world().host_size();
     if (way_ == Way::gpu_nccl && world().smallest(std::int64_t{own_gpu && cuda::has_nccl()}) == 0) {
       GTEST_SKIP() << "NCCL needs a GPU for each rank, and itself: " << cuda::nccl_version();
@@ -141,6 +152,14 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
   Model model_;
 };
 
+/// 10 m/s² on each phyxel of the whole, each time in another direction. @param step of the solver
+std::vector<Vec3d> callers_forces(const Model& whole, int step) {
+  std::mt19937_64 engine(static_cast<unsigned>(step));
+  std::vector<Vec3d> force;
+  for (const double mass : whole.mass) force.push_back(mass * testing::uniform_vector(engine, 10));
+  return force;
+}
+
 /// A thousand steps of the first body, a few of the others.
 TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
   const State start_of_whole = start(whole_), start_of_share = start(model_);
@@ -154,6 +173,11 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     const auto alone = backend(whole_, precision), here = backend(model_, precision);
     Solver whole(*alone, start_of_whole), share(*here, start_of_share);
     for (int s = 0; s < steps; ++s) {
+      if (whole_.parts[0].material.custom_law) {
+        const std::vector<Vec3d> force = callers_forces(whole_, s);
+        alone->set_external_forces(force);
+        here->set_external_forces(model_.share ? values_of(*model_.share, force) : force);
+      }
       whole.step();
       share.step();
     }

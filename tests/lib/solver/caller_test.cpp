@@ -12,6 +12,7 @@
 #include "phyxel/physics/stress.hpp"
 #include "phyxel/solver.hpp"
 #include "support/clouds.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -20,22 +21,6 @@ using namespace phyxel::testing;
 using ::testing::HasSubstr;
 
 constexpr Precision all_precisions[] = {Precision::single, Precision::double_, Precision::mixed};
-
-/// The library's neo-Hookean law once more, so many times as stiff.
-class Repeated final : public CustomLaw {
- public:
-  explicit Repeated(const Material& m, double factor = 1)
-      : law_{{m.lame_lambda(), m.lame_mu()}}, factor_(factor) {}
-  std::string name() const override { return "repeated " + std::to_string(factor_); }
-  double energy(const Mat3d& grad_u) const override { return factor_ * law_.energy(grad_u); }
-  Mat3d first_piola_stress(const Mat3d& grad_u) const override {
-    return factor_ * law_.first_piola_stress(grad_u);
-  }
-
- private:
-  NeoHooke<double> law_;
-  double factor_;
-};
 
 /// ψ = a / 2 (exp(E : S / a) - 1) of Green's strain, as in Fung, Fronek and Patitucci 1979.
 class Exponential final : public CustomLaw {
