@@ -10,6 +10,7 @@
 #include "phyxel/solver.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -411,6 +412,29 @@ TEST(CudaMemory, TermsThatAreOffTakeNone) {
   EXPECT_THAT(
       names(model_of_case({"", true, true, true}), Precision::mixed),
       ::testing::IsSupersetOf({"loads", "supports", "inverse neighbour lists", "displacements"}));
+}
+
+TEST(CudaRefusal, OfWhatIsTheCallersOwn) {
+  const auto refusal_of = [](auto&& work) -> std::string {
+    try {
+      work();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  using ::testing::HasSubstr;
+  const Cloud cloud = lattice(8, 8, 8, 0.1);
+  Material material = rubber();
+  material.custom_law = std::make_shared<Repeated>(material);
+  const Model custom = model_of(one_body(material), cloud), ours = model_of(one_body(), cloud);
+  EXPECT_THAT(refusal_of([&] { make_test_backend(custom, Precision::single); }),
+              HasSubstr("body \"body\" has a law of the caller's own, \"repeated"));
+  const auto backend = make_test_backend(ours, Precision::single);
+  EXPECT_THAT(refusal_of([&] { backend->set_external_forces(ours.position); }),
+              HasSubstr("forces of the caller's own are for the CPU"));
+  EXPECT_EQ(refusal_of([&] { backend->set_external_forces({}); }), "");
+  EXPECT_FALSE(backend->view());
 }
 
 }  // namespace
