@@ -130,7 +130,8 @@ Facts scene_facts(const fs::path& file) {
     bodies.push_back({{"name", body.name},
                       {"from", !source.shape.name.empty() ? source.shape.name
                                : !source.mesh.empty()     ? source.mesh.string()
-                                                          : source.file.string()},
+                               : !source.file.empty()     ? source.file.string()
+                                                          : source.cloud},
                       {"E [Pa]", body.material.young},
                       {"nu", body.material.poisson},
                       {"rho [kg/m^3]", body.material.density}});

@@ -24,22 +24,6 @@ void add_overrides(CLI::App& command, Overrides& overrides);
 /// Reads the scene and applies the overrides. @throws InputError
 Scene scene_with(const Overrides& overrides);
 
-/// The step a run takes and why.
-struct StepPlan {
-  StepLimit limit;                   ///< Of Verlet's steps.
-  double dt = 0;                     ///< [s]
-  std::int64_t steps = 0;            ///< To the end of the run.
-  std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it; 0: only the last.
-  std::string why;                   ///< One line for the summary.
-};
-
-/// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
-/// digits are kept; slightly shortened so that frames and the end fall on whole steps. A search for
-/// equilibrium is one step. Uses the arrays of the backend.
-/// @throws InputError for a step above the largest stable one unless `unsafe_step`, and for
-///   implicit steps of no given size.
-StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step);
-
 /// Phyxels that follow a path, and that loads pull.
 struct BoundarySize {
   std::int64_t moved = 0, loaded = 0;

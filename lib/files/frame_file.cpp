@@ -215,7 +215,7 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   write_sealed(file, surface_frame_kind, out.content(), Durable::no);
 }
 
-FrameData read_frame(const std::filesystem::path& file) {
+FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
   const std::string kind = check_seal(file);
   if (kind != phyxel_frame_kind && kind != surface_frame_kind) {
     throw InputError(
@@ -244,6 +244,24 @@ FrameData read_frame(const std::filesystem::path& file) {
   if (in.has("/VTKHDF/PointData/body")) {
     frame.body = in.array<Index>("/VTKHDF/PointData/body");
     fits("/VTKHDF/PointData/body", frame.body.size());
+  }
+  const auto field = [&](const char* name, auto&& values_at) {
+    const std::string path = std::string("/VTKHDF/PointData/") + name;
+    if (!with_fields || !in.has(path)) return;
+    auto values = values_at(path);
+    fits(path.c_str(), values.size());
+    if constexpr (std::is_same_v<decltype(values), std::vector<Vec3d>>) {
+      std::vector<double>& flat = frame.field[name];
+      for (const Vec3d& v : values) flat.insert(flat.end(), {v.x, v.y, v.z});
+    } else {
+      frame.field[name] = std::move(values);
+    }
+  };
+  for (const char* name : {"displacement", "velocity"}) {
+    field(name, [&](const std::string& path) { return in.vectors(path); });
+  }
+  for (const char* name : {"von_mises", "volume_ratio", "mass", "volume"}) {
+    field(name, [&](const std::string& path) { return in.array<double>(path); });
   }
   if (kind == surface_frame_kind) {
     const auto corners = in.array<std::int64_t>("/VTKHDF/Connectivity");

@@ -1,6 +1,7 @@
 #include "phyxel/model.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <numbers>
@@ -210,6 +211,12 @@ Path Motion::path_at(double time) const {
 
 Cloud rest_cloud(const BodySource& source) {
   if (!source.file.empty()) return read_body(source.file);
+  if (!source.cloud.empty()) {
+    throw InputError(fmt::format(
+        "cloud = \"{}\": only a program that has a cloud of that name can use this scene; allowed "
+        "here: shape, mesh or file",
+        source.cloud));
+  }
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
     try {
@@ -233,7 +240,7 @@ Cloud rest_cloud(const BodySource& source) {
 }
 
 std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {
-  if (!source.file.empty() || !source.mesh.empty() || is_paper_shape(source.shape.name)) return {};
+  if (source.shape.name.empty() || is_paper_shape(source.shape.name)) return {};
   ShapeRequest shape = source.shape;
   shape.seed = source.seed;
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, source.phyxels, piece);
@@ -248,22 +255,43 @@ Cloud make_cloud(const BodyRequest& request) {
 
 namespace {
 
-Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
-  Model model;
-  model.gravity = scene.gravity;
+const Cloud& named_cloud(const BodyRequest& request, const std::map<std::string, Cloud>& named) {
+  const std::string& name = request.source.cloud;
+  if (const auto found = named.find(name); found != named.end()) return found->second;
+  std::vector<std::string> names;
+  for (const auto& [known, cloud] : named) names.push_back(known);
+  throw InputError(fmt::format("{}: key body.cloud: \"{}\" found{}; allowed: {}", request.where,
+                               name, did_you_mean(name, names),
+                               names.empty() ? "shape, mesh or file, as no clouds were passed"
+                                             : fmt::format("{}", fmt::join(names, ", "))));
+}
+
+/// `use(request, cloud)` of every body of the scene, its cloud in place.
+template <class Use>
+void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& named, Use&& use) {
   // Copies of a body follow one another; filling a mesh once serves them all.
   const BodySource* made = nullptr;
   Cloud rest;
   for (const BodyRequest& request : scene.bodies) {
     if (!made || !(*made == request.source)) {
-      rest = rest_cloud(request.source);
-      model.warnings.insert(model.warnings.end(), rest.warnings.begin(), rest.warnings.end());
+      rest =
+          request.source.cloud.empty() ? rest_cloud(request.source) : named_cloud(request, named);
     }
     made = &request.source;
     Cloud cloud = rest;
+    rest.warnings.clear();  // once is enough
     place(cloud, request);
-    add_body(model, request, cloud, surveyor);
+    use(request, std::move(cloud));
   }
+}
+
+Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
+  Model model;
+  model.gravity = scene.gravity;
+  for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
+    append(model.warnings, cloud.warnings);
+    add_body(model, request, cloud, surveyor);
+  });
   find_moments(model);
   close_gradients(model);
   add_warnings(model, model.surfels.position.size());
@@ -279,6 +307,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
   Model model;
   model.gravity = scene.gravity;
   for (std::size_t b = 0; b < clouds.size(); ++b) {
+    append(model.warnings, clouds[b].warnings);
     add_body(model, scene.bodies[b], clouds[b], surveyor);
   }
   find_moments(model);
@@ -288,6 +317,13 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
 }
 
 }  // namespace
+
+std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named) {
+  std::vector<Cloud> clouds;
+  for_each_cloud(scene, named,
+                 [&](const BodyRequest&, Cloud&& cloud) { clouds.push_back(std::move(cloud)); });
+  return clouds;
+}
 
 const Model& Model::with_lists() const {
   if (!has_lists()) {

@@ -23,7 +23,7 @@ SourceKeys lattice_keys(std::vector<const char*> needed) {
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
   if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations", "on_surface"}};
-  if (std::string(kind) == "file") return {};
+  if (std::string(kind) == "file" || std::string(kind) == "cloud") return {};
   if (is_paper_shape(shape)) return {{}, {"surfels"}};
   if (shape == "cylinder") return lattice_keys({"radius", "length"});
   if (shape == "sphere") return lattice_keys({"radius"});
@@ -72,7 +72,7 @@ void check_file_exists(const SceneTable& body, const char* kind,
 }
 
 BodySource read_source(const SceneTable& body) {
-  body.expect_one_of({"shape", "mesh", "file"});
+  body.expect_one_of({"shape", "mesh", "file", "cloud"});
   BodySource source;
   ShapeRequest& shape = source.shape;
   body.read("shape", shape.name);
@@ -83,10 +83,14 @@ BodySource read_source(const SceneTable& body) {
                                        did_you_mean(shape.name, known), fmt::join(known, ", ")));
     }
   }
-  const char* kind = body.has("shape") ? "shape" : body.has("mesh") ? "mesh" : "file";
+  const char* kind = "cloud";
+  for (const char* other : {"shape", "mesh", "file"}) {
+    if (body.has(other)) kind = other;
+  }
   check_source_keys(body, kind, shape.name);
   body.read("mesh", source.mesh);
   body.read("file", source.file);
+  body.read("cloud", source.cloud);
   if (body.has("mesh")) check_file_exists(body, kind, source.mesh);
   if (body.has("file")) check_file_exists(body, kind, source.file);
   body.read("phyxels", source.phyxels);
@@ -246,6 +250,7 @@ LoadRequest read_load(const SceneTable& table) {
 
 std::string name_of_source(const BodySource& source) {
   if (!source.shape.name.empty()) return source.shape.name;
+  if (!source.cloud.empty()) return source.cloud;
   return (source.mesh.empty() ? source.file : source.mesh).stem().string();
 }
 

@@ -25,8 +25,8 @@ std::vector<SceneSection> make_sections() {
       {"output", "[output]", "", "What is written, where and how often."},
       {"render", "[render]", "", "Pictures made at the end of a run."},
       {"body", "[[body]]", "",
-       "One such section for each body. Exactly one of `shape`, `mesh` and `file` says where its "
-       "rest shape comes from:\n\n"
+       "One such section for each body. Exactly one of `shape`, `mesh`, `file` and `cloud` says "
+       "where its rest shape comes from:\n\n"
        "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
        "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
        "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
@@ -35,7 +35,9 @@ std::vector<SceneSection> make_sections() {
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
        "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
        "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`.\n"
-       "- `file` needs nothing else.\n\n"
+       "- `file` needs nothing else.\n"
+       "- `cloud` names what a program that links phyxel, or uses it from Python, passes along with "
+       "the scene: it needs nothing else either.\n\n"
        "The shape is scaled, then rotated, then translated."},
       {"body.material", "[body.material]", "", "What the body is made of. Required."},
       {"body.inclusion", "[[body.inclusion]]", "selection",
@@ -161,6 +163,8 @@ std::vector<SceneKey> body_keys() {
            "the surfels. Resolved from the scene file's folder."},
       {.section = "body", .name = "file", .type = KeyType::path, .otherwise = "none",
        .meaning = "A body made by `phyxel sample`. Resolved from the scene file's folder."},
+      {.section = "body", .name = "cloud", .type = KeyType::text, .otherwise = "none",
+       .meaning = "The name of a cloud that a program passes; not for `phyxel run`."},
       {.section = "body", .name = "phyxels", .type = KeyType::integer, .otherwise = "none",
        .range = between(1, largest_index),
        .meaning = "How many: exactly for a mesh, about for a shape."},

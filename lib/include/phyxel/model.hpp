@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -163,6 +164,10 @@ std::uint64_t model_digest(const Model& model);
 
 /// The rest cloud of one body of a scene: shape, mesh or file; scaled, rotated, moved into place.
 Cloud make_cloud(const BodyRequest& request);
+
+/// The clouds of all bodies of a scene, in place. @param named those that bodies name as `cloud`
+/// @throws InputError for a name that is not among them
+std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named);
 
 /// Builds the model: clouds, neighbours, masses, volumes, moments, selections.
 /// @throws InputError naming the scene's line for selections that match nothing, and for clouds

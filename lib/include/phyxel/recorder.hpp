@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -121,9 +122,12 @@ struct FrameData {
   std::vector<Triangle> triangle;  ///< Empty for phyxel frames.
   std::vector<Vec3d> normal;       ///< Empty unless the frame has them.
   std::vector<Index> body;         ///< Body of each point, or empty.
+  /// The other fields that the frame has, by the names of `OutputRequest::fields`, shape [n] or
+  /// [n, 3].
+  std::map<std::string, std::vector<double>> field;
 };
-/// @throws InputError.
-FrameData read_frame(const std::filesystem::path& file);
+/// @param with_fields whether `field` is filled @throws InputError.
+FrameData read_frame(const std::filesystem::path& file, bool with_fields = false);
 
 /// The entries of a series file, paths resolved from its folder.
 /// @throws InputError.

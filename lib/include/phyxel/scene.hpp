@@ -96,11 +96,13 @@ struct LoadRequest {
   double ramp = 0;      ///< [s]
 };
 
-/// Where a body's rest shape comes from. Exactly one of `shape.name`, `mesh`, `file` is set.
+/// Where a body's rest shape comes from. Exactly one of `shape.name`, `mesh`, `file`, `cloud` is
+/// set.
 struct BodySource {
   ShapeRequest shape;
   std::filesystem::path mesh;  ///< Surface to fill with `phyxels` phyxels.
   std::filesystem::path file;  ///< body.h5 written by `phyxel sample`.
+  std::string cloud;           ///< A name: the program that uses the scene has the cloud.
   Index phyxels = 0;           ///< Mesh: exact count. Lattice shapes: about this many.
   std::uint64_t seed = 1;
   int relaxations = 30;

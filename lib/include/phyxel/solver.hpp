@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
@@ -26,6 +27,23 @@ StepLimit step_limit(const Model& model, int threads = 0);
 /// The same on the backend's device, in its working precision: equal to the limit found on the CPU
 /// to rounding. It uses the backend's arrays: a state is to be uploaded after.
 StepLimit step_limit(const Model& model, Backend& backend);
+
+/// The steps a scene is taken in, and why.
+struct StepPlan {
+  StepLimit limit;                   ///< Of Verlet's steps.
+  double dt = 0;                     ///< [s]
+  std::int64_t steps = 0;            ///< To the end of the run.
+  std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it.
+  std::string why;                   ///< One line for the summary.
+};
+
+/// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
+/// digits are kept; slightly shortened so that frames and the end fall on whole steps. A search for
+/// equilibrium is one step. Uses the arrays of the backend.
+/// @throws InputError for a step above the largest stable one unless `unsafe_step`, and for
+///   implicit steps of no given size.
+StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend,
+                    bool unsafe_step = false);
 
 /// The state at t = 0: initial velocities of the bodies, motions at their start, velocities as the
 /// scene's method has them.

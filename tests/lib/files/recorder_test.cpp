@@ -49,6 +49,10 @@ TEST_F(Recording, FramesComeBack) {
       EXPECT_EQ(frame.point[i].z, model_.position[i].z);
     }
     EXPECT_EQ(frame.body, (std::vector<Index>{0, 0, 1, 1, 1}));
+    EXPECT_TRUE(frame.field.empty());
+    const FrameData with_fields = read_frame(series[2].file, true);
+    ASSERT_EQ(with_fields.field.at("displacement").size(), 3 * 5u);
+    for (int i = 0; i < 5; ++i) EXPECT_EQ(with_fields.field.at("displacement")[3 * i], 1);
     const FrameData surface =
         read_frame(read_series(folder_ / "out" / "surface.hdf.series")[1].file);
     EXPECT_EQ(surface.triangle, model_.surfels.triangle);

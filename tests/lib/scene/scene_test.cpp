@@ -5,6 +5,8 @@
 
 #include <filesystem>
 
+#include "phyxel/model.hpp"
+#include "phyxel/shapes.hpp"
 #include "support/scene_text.hpp"
 
 namespace phyxel {
@@ -276,6 +278,38 @@ TEST_F(SceneFiles, PathsStartAtTheSceneFile) {
   EXPECT_EQ(scene.bodies[1].name, "b");
   EXPECT_EQ(scene.bodies[2].source.file, body);
   EXPECT_EQ(scene.output.directory, folder_ / "results");
+}
+
+TEST(Scene, ABodyMayBeAProgramsOwnCloud) {
+  const Scene scene = parse_scene(time_section + "[[body]]\ncloud = 'mine'\n" + material, "s.toml");
+  EXPECT_EQ(scene.bodies.at(0).source.cloud, "mine");
+  EXPECT_EQ(scene.bodies.at(0).name, "mine");
+  ShapeRequest shape;
+  shape.name = "block";
+  shape.size = {1, 1, 1};
+  shape.spacing = 0.25;
+  const Cloud cloud = make_shape(shape);
+  const std::vector<Cloud> clouds = make_clouds(scene, {{"mine", cloud}});
+  EXPECT_TRUE(clouds.at(0).position == cloud.position);
+  EXPECT_EQ(build_model(scene, clouds).size(), static_cast<Index>(cloud.position.size()));
+  const auto refusal = [&](auto&& attempt) -> std::string {
+    try {
+      attempt();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "nothing";
+  };
+  EXPECT_EQ(refusal([&] {
+              make_clouds(scene, {{"mines", cloud}});
+            }),
+            "s.toml:3:1: key body.cloud: \"mine\" found (did you mean \"mines\"?); allowed: mines");
+  EXPECT_EQ(
+      refusal([&] { build_model(scene); }),
+      "s.toml:3:1: key body.cloud: \"mine\" found; allowed: shape, mesh or file, as no clouds "
+      "were passed");
+  EXPECT_THROW(parse_scene(time_section + "[[body]]\ncloud = 'a'\nphyxels = 9\n" + material, ""),
+               InputError);
 }
 
 TEST(Scene, OutputGoesToAFolderNamedAfterTheSceneHere) {

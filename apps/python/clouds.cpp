@@ -1,0 +1,210 @@
+/// Bodies at rest: built-in shapes, filled meshes, arrays of the caller's own.
+#include <algorithm>
+
+#include "arrays.hpp"
+#include "phyxel/body_file.hpp"
+#include "phyxel/mesh.hpp"
+#include "phyxel/shapes.hpp"
+
+namespace phyxel::python {
+namespace {
+
+std::vector<Triangle> triangles_from(const py::handle& object, std::size_t corners) {
+  using Array = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+  const auto array = Array::ensure(object);
+  if (!array || array.ndim() != 2 || array.shape(1) != 3) {
+    PyErr_Clear();
+    throw InputError(fmt::format("triangles: {} found; allowed: shape (n, 3), integers",
+                                 array ? "shape " + shape_words(array) : "no array"));
+  }
+  std::vector<Triangle> triangles(static_cast<std::size_t>(array.shape(0)));
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    for (int c = 0; c < 3; ++c) {
+      const std::int64_t corner = array.at(t, c);
+      if (corner < 0 || corner >= static_cast<std::int64_t>(corners)) {
+        throw InputError(fmt::format("triangles: {} found in row {}; allowed: 0 to {}", corner, t,
+                                     static_cast<std::int64_t>(corners) - 1));
+      }
+      triangles[t][static_cast<std::size_t>(c)] = static_cast<Index>(corner);
+    }
+  }
+  return triangles;
+}
+
+Surface surface_from(const py::handle& points, const py::handle& triangles) {
+  Surface surface;
+  surface.position = vectors_from(points, "points");
+  surface.triangle = triangles_from(triangles, surface.position.size());
+  surface.normal = vertex_normals(surface.position, surface.triangle);
+  return surface;
+}
+
+Cloud cloud_from(const py::object& position, const py::object& volume, const py::object& surface,
+                 const std::map<std::string, std::vector<Index>>& regions) {
+  Cloud cloud;
+  cloud.position = vectors_from(position, "position");
+  const auto n = static_cast<py::ssize_t>(cloud.position.size());
+  if (n == 0) throw InputError("position: no phyxel; allowed: at least one");
+  if (!volume.is_none()) {
+    const auto array = py::array_t<double, py::array::forcecast>::ensure(volume);
+    if (!array || array.ndim() != 1 || array.shape(0) != n) {
+      PyErr_Clear();
+      throw InputError(fmt::format("volume: {} found; allowed: shape ({},)",
+                                   array ? "shape " + shape_words(array) : "no array", n));
+    }
+    for (py::ssize_t i = 0; i < n; ++i) {
+      const double v = array.at(i);
+      if (!(v > 0 && std::isfinite(v))) {
+        throw InputError(fmt::format("volume: {} found in row {}; allowed: > 0 m^3", v, i));
+      }
+      cloud.volume.push_back(v);
+    }
+  }
+  if (!surface.is_none()) {
+    const auto pair = surface.cast<std::pair<py::object, py::object>>();
+    cloud.surface = surface_from(pair.first, pair.second);
+  }
+  for (const auto& [name, phyxels] : regions) {
+    std::vector<Index> sorted = phyxels;
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    if (sorted.empty() || sorted.front() < 0 || sorted.back() >= n) {
+      throw InputError(fmt::format("regions: \"{}\" {}; allowed: indices from 0 to {}", name,
+                                   sorted.empty() ? "is empty" : "has others", n - 1));
+    }
+    cloud.regions[name] = std::move(sorted);
+  }
+  return cloud;
+}
+
+Cloud make(const std::string& name, Vec3d size, double radius, double length, double spacing,
+           Index phyxels, const std::string& lattice, double jitter, std::uint64_t seed,
+           bool surfels) {
+  ShapeRequest request;
+  request.name = name;
+  request.size = size;
+  request.radius = radius;
+  request.length = length;
+  request.spacing = spacing;
+  request.jitter = jitter;
+  request.seed = seed;
+  request.surface = surfels;
+  if (lattice != "nodes" && lattice != "cells" && lattice != "auto") {
+    throw InputError(fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes", lattice));
+  }
+  const bool box = name == "beam" || name == "block";
+  if (lattice == "nodes" || (lattice == "auto" && box)) {
+    request.placement = ShapeRequest::Placement::nodes;
+  }
+  if (!is_paper_shape(name)) {
+    if ((spacing > 0) == (phyxels > 0)) {
+      throw InputError(
+          fmt::format("shape \"{}\": exactly one of spacing and phyxels is needed", name));
+    }
+    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
+  }
+  return make_shape(request);
+}
+
+/// A mesh file, or (points, triangles).
+Surface surface_of(const py::object& mesh) {
+  if (py::isinstance<py::tuple>(mesh)) {
+    const auto pair = mesh.cast<std::pair<py::object, py::object>>();
+    return surface_from(pair.first, pair.second);
+  }
+  return read_mesh(mesh.cast<std::filesystem::path>());
+}
+
+Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int relaxations,
+             std::optional<bool> on_surface) {
+  if (phyxels < 1) throw InputError(fmt::format("phyxels: {} found; allowed: >= 1", phyxels));
+  const Surface surface = surface_of(mesh);
+  const py::gil_scoped_release others;
+  SampleReport report;
+  Cloud cloud = sample_surface(
+      surface,
+      {.phyxels = phyxels, .seed = seed, .relaxations = relaxations, .on_surface = on_surface},
+      &report);
+  cloud.warnings = std::move(report.warnings);
+  return cloud;
+}
+
+}  // namespace
+
+void add_clouds(py::module_& module) {
+  using namespace py::literals;
+  py::class_<Cloud, std::shared_ptr<Cloud>>(
+      module, "Cloud",
+      "Rest points of one body.\n\n"
+      "Cloud(position, volume=None, surface=None, regions={}): `position` (n, 3) [m]; `volume` "
+      "(n,)\n"
+      "[m^3], without which masses follow from the kernel; `surface`, a pair of surfels (m, 3) "
+      "[m]\n"
+      "and triangles (t, 3); `regions`, names for phyxels that scenes select.")
+      .def(py::init(&cloud_from), "position"_a, "volume"_a = py::none(), "surface"_a = py::none(),
+           "regions"_a = std::map<std::string, std::vector<Index>>{})
+      .def_property_readonly(
+          "position", [](py::object self) { return view(self.cast<Cloud&>().position, self); },
+          "Phyxels at rest [m], (n, 3).")
+      .def_property_readonly(
+          "volume", [](py::object self) { return view(self.cast<Cloud&>().volume, self); },
+          "Volumes [m^3], (n,); empty if unknown.")
+      .def_property_readonly(
+          "surfels",
+          [](py::object self) { return view(self.cast<Cloud&>().surface.position, self); },
+          "Surfels at rest [m], (m, 3).")
+      .def_property_readonly(
+          "normals", [](py::object self) { return view(self.cast<Cloud&>().surface.normal, self); },
+          "Unit normals of the surfels, (m, 3).")
+      .def_property_readonly(
+          "triangles",
+          [](py::object self) { return view(self.cast<Cloud&>().surface.triangle, self); },
+          "Triangles of surfels, (t, 3).")
+      .def_property_readonly(
+          "regions",
+          [](py::object self) {
+            py::dict regions;
+            for (const auto& [name, phyxels] : self.cast<Cloud&>().regions) {
+              regions[py::str(name)] = view(phyxels, self);
+            }
+            return regions;
+          },
+          "Named phyxels: {name: indices}.")
+      .def_readonly("warnings", &Cloud::warnings, "What made it has to say.")
+      .def("__len__", [](const Cloud& cloud) { return cloud.position.size(); })
+      .def("__repr__",
+           [](const Cloud& cloud) {
+             return fmt::format("<phyxel.Cloud: {} phyxels, {} surfels>", cloud.position.size(),
+                                cloud.surface.position.size());
+           })
+      .def(
+          "write",
+          [](const Cloud& cloud, const std::filesystem::path& file, bool overwrite) {
+            write_body(file, cloud, overwrite);
+          },
+          "file"_a, "overwrite"_a = false, "Writes a body file, which scenes name as `file`.");
+  module.def("read_body", &read_body, "file"_a, "A body file as `phyxel sample` writes it.");
+  module.def("sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
+             "on_surface"_a = py::none(),
+             "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
+             "exactly so many phyxels.");
+  module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
+             "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
+             "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,
+             "A built-in shape, as scenes have it: beam, block (size), cylinder (radius, length),\n"
+             "sphere (radius), each with `spacing` or `phyxels`; alien_head, horn_bug, dino.");
+  module.def(
+      "read_mesh",
+      [](const std::filesystem::path& file) {
+        Surface surface = read_mesh(file);
+        return py::make_tuple(taken(std::move(surface.position)),
+                              taken(std::move(surface.triangle)));
+      },
+      "file"_a, "Points (n, 3) [m] and triangles (t, 3) of an OBJ, PLY or STL file.");
+  module.def(
+      "inspect",
+      [](const py::object& mesh) { return inspect_surface(surface_of(mesh)).describe(); }, "mesh"_a,
+      "What is wrong with a surface, in one line.");
+}
+
+}  // namespace phyxel::python

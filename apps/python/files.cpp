@@ -1,0 +1,61 @@
+/// Trajectories on disk.
+#include "arrays.hpp"
+#include "phyxel/recorder.hpp"
+
+namespace phyxel::python {
+
+void add_files(py::module_& module) {
+  using namespace py::literals;
+  py::class_<FrameData, std::shared_ptr<FrameData>>(module, "Frame", "One instant of a trajectory.")
+      .def_readonly("time", &FrameData::time, "[s]")
+      .def_property_readonly(
+          "points", [](py::object self) { return view(self.cast<FrameData&>().point, self); },
+          "Deformed positions [m], (n, 3).")
+      .def_property_readonly(
+          "triangles", [](py::object self) { return view(self.cast<FrameData&>().triangle, self); },
+          "Of the surface, (t, 3); empty for phyxels.")
+      .def_property_readonly(
+          "normals", [](py::object self) { return view(self.cast<FrameData&>().normal, self); },
+          "Of the surface, (n, 3); empty for phyxels.")
+      .def_property_readonly(
+          "body", [](py::object self) { return view(self.cast<FrameData&>().body, self); },
+          "Which body each point is of, (n,); empty if there is one.")
+      .def_property_readonly(
+          "fields",
+          [](py::object self) {
+            const auto& frame = self.cast<FrameData&>();
+            const auto n = static_cast<py::ssize_t>(frame.point.size());
+            py::dict fields;
+            for (const auto& [name, values] : frame.field) {
+              const bool scalar = values.size() == frame.point.size();
+              fields[py::str(name)] =
+                  view(values.data(), scalar ? Shape{n} : Shape{n, 3}, py::handle(self));
+            }
+            return fields;
+          },
+          "What the scene's output.fields asked for: {name: array}, (n,) or (n, 3).")
+      .def("__len__", [](const FrameData& frame) { return frame.point.size(); })
+      .def("__repr__", [](const FrameData& frame) {
+        return fmt::format("<phyxel.Frame: t = {:g} s, {} points, {} triangles>", frame.time,
+                           frame.point.size(), frame.triangle.size());
+      });
+  module.def(
+      "read_frame",
+      [](const std::filesystem::path& file) {
+        const py::gil_scoped_release others;
+        return read_frame(file, true);
+      },
+      "file"_a, "One frame, with all its fields.");
+  module.def(
+      "read_series",
+      [](const std::filesystem::path& file) {
+        std::vector<std::pair<std::filesystem::path, double>> entries;
+        for (const SeriesEntry& entry : read_series(file)) {
+          entries.emplace_back(entry.file, entry.time);
+        }
+        return entries;
+      },
+      "file"_a, "Files and times [s] of a series: [(file, time), ...].");
+}
+
+}  // namespace phyxel::python

@@ -1,0 +1,65 @@
+/// The compiled half of the Python module: `phyxel/__init__.py` has the other.
+#include "arrays.hpp"
+#include "version.hpp"
+
+namespace phyxel::python {
+namespace {
+
+// Of the interpreter's whole life: never released.
+struct Exceptions {
+  py::handle error, input, output, device, diverged;
+  py::handle of(ExitCode code) const {
+    switch (code) {
+      case ExitCode::bad_input:
+        return input;
+      case ExitCode::output_failed:
+        return output;
+      case ExitCode::device_failed:
+        return device;
+      case ExitCode::diverged:
+        return diverged;
+      default:
+        return error;
+    }
+  }
+};
+
+py::handle add_exception(py::module_& module, const char* name, const py::object& bases) {
+  const std::string full = std::string("phyxel.") + name;
+  const py::handle made = PyErr_NewException(full.c_str(), bases.ptr(), nullptr);
+  if (!made) throw py::error_already_set();
+  module.attr(name) = made;
+  return made;
+}
+
+/// What Python programs expect to catch: wrong input is a ValueError, too.
+const Exceptions& add_exceptions(py::module_& module) {
+  static Exceptions e;
+  const auto base = [](py::handle type) { return py::reinterpret_borrow<py::object>(type); };
+  e.error = add_exception(module, "Error", base(PyExc_RuntimeError));
+  e.input =
+      add_exception(module, "InputError", py::make_tuple(base(e.error), base(PyExc_ValueError)));
+  e.output = add_exception(module, "OutputError", base(e.error));
+  e.device = add_exception(module, "DeviceError", base(e.error));
+  e.diverged = add_exception(module, "DivergedError", base(e.error));
+  return e;
+}
+
+}  // namespace
+}  // namespace phyxel::python
+
+PYBIND11_MODULE(_phyxel, module) {
+  namespace py = pybind11;
+  static const phyxel::python::Exceptions& exceptions = phyxel::python::add_exceptions(module);
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const phyxel::Error& e) {
+      PyErr_SetString(exceptions.of(e.code()).ptr(), e.what());
+    }
+  });
+  module.attr("version") = phyxel::program_version();
+  phyxel::python::add_clouds(module);
+  phyxel::python::add_files(module);
+  phyxel::python::add_simulation(module);
+}

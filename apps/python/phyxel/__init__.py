@@ -1,0 +1,141 @@
+"""phyxel: deformable bodies made of points, simulated.
+
+    import phyxel
+    beam = phyxel.shape("beam", size=(1, 0.1, 0.1), spacing=0.02)
+    simulation = phyxel.Simulation({
+        "gravity": [0, 0, -9.81],
+        "solver": {"method": "equilibrium"},
+        "body": [{"cloud": "beam",
+                  "material": {"young": 1e7, "poisson": 0.3, "density": 1000},
+                  "fixed": [{"region": "x-"}]}]}, clouds={"beam": beam})
+    simulation.run()
+    print(simulation.displacement[:, 2].min())
+
+Lengths in m, masses in kg, times in s. Errors are `phyxel.Error`; wrong input is an `InputError`,
+which is a ValueError, too.
+"""
+
+import csv
+import json
+import os
+import pathlib
+
+import numpy
+
+from ._phyxel import (Cloud, DeviceError, DivergedError, Error, Frame, InputError, Live,
+                      OutputError, SimulationBase, inspect, read_body, read_frame, read_mesh,
+                      sample, shape, version)
+from ._phyxel import read_series as _read_series
+
+__version__ = version.split()[1]
+__all__ = ["Cloud", "DeviceError", "DivergedError", "Error", "Frame", "InputError", "Live",
+           "OutputError", "Simulation", "Trajectory", "inspect", "read_body", "read_frame",
+           "read_mesh", "sample", "shape", "to_toml", "version"]
+
+
+def _value(value):
+    """As TOML writes it on one line."""
+    if isinstance(value, numpy.generic):
+        value = value.item()
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple, numpy.ndarray)):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, (bool, str)):
+        return json.dumps(value)
+    if isinstance(value, os.PathLike):
+        return json.dumps(os.fspath(value))
+    if isinstance(value, (int, float)):
+        return repr(value)
+    raise InputError(f"scene: {value!r} found; allowed: text, numbers, booleans, lists and dicts")
+
+
+def to_toml(scene):
+    """The text of a scene given as a dict: what `phyxel run` reads."""
+    return "".join(f"{json.dumps(key)} = {_value(value)}\n" for key, value in scene.items())
+
+
+class Simulation(SimulationBase):
+    """A scene that steps.
+
+    scene: a scene file (docs/scenes.md), its text, or a dict of the same keys.
+    clouds: {name: Cloud} for bodies that say `cloud = "name"`.
+    device, precision, method, threads, step, end: instead of the scene's.
+    unsafe_step: allow a step above the largest stable one.
+    """
+
+    def __init__(self, scene, clouds=None, *, device=None, precision=None, method=None,
+                 threads=None, step=None, end=None, unsafe_step=False):
+        file, text = None, ""
+        if isinstance(scene, dict):
+            text = to_toml(scene)
+        elif isinstance(scene, str) and ("\n" in scene or "=" in scene):
+            text = scene
+        else:
+            file = os.fspath(scene)
+        super().__init__(file, text, dict(clouds or {}), device, precision, method, threads, step,
+                         end, unsafe_step)
+
+    @property
+    def position(self):
+        """Deformed positions [m], (n, 3), a copy."""
+        return self.rest + self.displacement
+
+    def __repr__(self):
+        return (f"<phyxel.Simulation: {len(self)} phyxels, t = {self.time:g} s, "
+                f"dt = {self.dt:.3g} s, {self.device}>")
+
+
+class _Family:
+    """Frames of a trajectory, read when they are asked for."""
+
+    def __init__(self, entries):
+        self.files = [file for file, _ in entries]
+        self.times = numpy.array([time for _, time in entries])
+
+    def __len__(self):
+        return len(self.files)
+
+    def __getitem__(self, number):
+        if isinstance(number, slice):
+            return [read_frame(file) for file in self.files[number]]
+        return read_frame(self.files[number])
+
+    def __repr__(self):
+        return f"<{len(self)} frames>"
+
+
+class Trajectory:
+    """What a run has written: `phyxels` and `surface`, frames each, and `energy`, the columns of
+    energy.csv.
+
+        trajectory = phyxel.Trajectory("out/dino")
+        for frame in trajectory.surface: ...
+    """
+
+    def __init__(self, directory):
+        self.directory = pathlib.Path(directory)
+        families = {name: self.directory / f"{name}.hdf.series" for name in ("phyxels", "surface")}
+        if not any(file.exists() for file in families.values()):
+            raise InputError(f"{self.directory}: holds no trajectory; allowed: the folder of a run")
+        self.phyxels, self.surface = (_Family(_read_series(file) if file.exists() else [])
+                                      for file in families.values())
+
+    @property
+    def times(self):
+        """Of the frames [s], (frames,)."""
+        return (self.phyxels if len(self.phyxels) else self.surface).times
+
+    @property
+    def energy(self):
+        """{column: values}, one for each frame; energies [J]."""
+        with open(self.directory / "energy.csv", newline="") as file:
+            rows = list(csv.reader(file))
+        table = numpy.array(rows[1:], dtype=float).reshape(-1, len(rows[0]))
+        return {name.split(" [")[0]: table[:, k] for k, name in enumerate(rows[0])}
+
+    def __len__(self):
+        return len(self.times)
+
+    def __repr__(self):
+        return f"<phyxel.Trajectory: {self.directory}, {len(self)} frames>"

@@ -1,0 +1,424 @@
+/// A scene that steps, under Python's control.
+#include <algorithm>
+#include <chrono>
+#include <optional>
+
+#include "arrays.hpp"
+#include "files/frame_file.hpp"
+#include "phyxel/backend.hpp"
+#include "phyxel/device.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/recorder.hpp"
+#include "phyxel/scene.hpp"
+#include "phyxel/solver.hpp"
+
+namespace phyxel::python {
+namespace {
+
+struct Overrides {
+  std::optional<std::string> device, precision, method;
+  std::optional<int> threads;
+  std::optional<double> step, end;
+  bool unsafe_step = false;
+};
+
+void check_positive(const char* name, double value) {
+  if (value > 0 && std::isfinite(value)) return;
+  throw InputError(fmt::format("{}: {} found; allowed: > 0 s", name, value));
+}
+
+Scene with_overrides(Scene scene, const Overrides& o) {
+  if (o.device) {
+    check_device_name(*o.device, "device");
+    scene.solver.device = *o.device;
+  }
+  if (o.method) {
+    const auto method = method_named(*o.method);
+    if (!method) {
+      throw InputError(
+          fmt::format("method: \"{}\" found; allowed: verlet, implicit, equilibrium", *o.method));
+    }
+    scene.solver.method = *method;
+    if (*method != Method::verlet) scene.solver.precision = Precision::double_;
+  }
+  if (o.precision) {
+    const auto precision = precision_named(*o.precision);
+    if (!precision) {
+      throw InputError(
+          fmt::format("precision: \"{}\" found; allowed: float, double, mixed", *o.precision));
+    }
+    scene.solver.precision = *precision;
+  }
+  if (scene.solver.method != Method::verlet && scene.solver.precision != Precision::double_) {
+    throw InputError(fmt::format("precision: \"{}\" found; allowed with method = \"{}\": double",
+                                 precision_name(scene.solver.precision),
+                                 method_name(scene.solver.method)));
+  }
+  if (o.threads) {
+    if (*o.threads < 1 || *o.threads > 4096) {
+      throw InputError(fmt::format("threads: {} found; allowed: 1 to 4096", *o.threads));
+    }
+    scene.solver.threads = *o.threads;
+  }
+  if (o.step) {
+    check_positive("step", *o.step);
+    scene.time.step = *o.step;
+  }
+  if (o.end) {
+    check_positive("end", *o.end);
+    scene.time.end = *o.end;
+  }
+  if (scene.solver.method != Method::equilibrium && !(scene.time.end > 0)) {
+    throw InputError(
+        fmt::format("end: missing, and so is the scene's [time]; needed with method = "
+                    "\"{}\"",
+                    method_name(scene.solver.method)));
+  }
+  return scene;
+}
+
+/// The live state of the CPU, as NumPy sees it.
+struct Live {
+  py::array displacement, velocity;  // (packs, 3, lanes)
+  py::array pack, lane;              // of each phyxel, (n,)
+};
+
+class Simulation {
+ public:
+  Simulation(const Scene& scene, const std::map<std::string, Cloud>& clouds,
+             const Overrides& overrides)
+      : scene_(with_overrides(scene, overrides)) {
+    device_ = choose_device(scene_.solver.device, "device");
+    model_ = build_model(scene_, make_clouds(scene_, clouds), device_);
+    backend_ = make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads);
+    plan_ = plan_steps(scene_, model_, *backend_, overrides.unsafe_step);
+    start(initial_state(model_, scene_, plan_.dt));
+  }
+
+  void step(std::int64_t count) {
+    if (count < 0) throw InputError(fmt::format("steps: {} found; allowed: >= 0", count));
+    const py::gil_scoped_release others;
+    take(count);
+  }
+
+  /// To the end of the scene, or until then.
+  void run(std::optional<double> until) {
+    if (until) check_positive("until", *until);
+    const std::int64_t last =
+        until ? static_cast<std::int64_t>(std::ceil(*until / plan_.dt - 1e-9)) : plan_.steps;
+    const py::gil_scoped_release others;
+    while (solver_->steps() < last) {
+      const std::int64_t frame =
+          (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
+      take(std::min(last, frame) - solver_->steps());
+      if (recorder_ && (solver_->steps() == last || solver_->steps() == frame)) write_frame();
+    }
+    look();
+  }
+
+  void record(const std::filesystem::path& directory, bool force) {
+    scene_.output.directory = directory;
+    const py::gil_scoped_release others;
+    recorder_ = std::make_unique<Recorder>(model_, scene_, force);
+    write_frame();
+  }
+
+  void write_frame() {
+    if (!recorder_) throw InputError("write_frame: nothing is recorded yet; needed first: record");
+    const State state = solver_->state();
+    Frame frame;
+    frame.state = &state;
+    frame.diagnostics = look();
+    SurfelState surfels;
+    if (scene_.output.surface && !model_.surfels.position.empty()) {
+      backend_->advect_surfels(surfels);
+      frame.surfels = &surfels;
+    }
+    const auto wants = [&](const char* field) {
+      const auto& fields = scene_.output.fields;
+      return std::find(fields.begin(), fields.end(), field) != fields.end();
+    };
+    stress_fields(model_, *backend_, wants("von_mises") ? &frame.von_mises : nullptr,
+                  wants("volume_ratio") ? &frame.volume_ratio : nullptr);
+    recorder_->write(frame);
+  }
+
+  Diagnostics energies() {
+    const py::gil_scoped_release others;
+    return diagnose(model_, *backend_, solver_->now());
+  }
+
+  State state() const { return solver_->state(); }
+
+  void set_state(const py::object& displacement, const py::object& velocity) {
+    State state = solver_->state();
+    const auto n = static_cast<py::ssize_t>(model_.size());
+    if (!displacement.is_none()) {
+      state.displacement = vectors_from(displacement, "displacement", n);
+    }
+    if (!velocity.is_none()) state.velocity = vectors_from(velocity, "velocity", n);
+    const py::gil_scoped_release others;
+    start(state);
+  }
+
+  void set_external_forces(const py::object& forces) {
+    const auto n = static_cast<py::ssize_t>(model_.size());
+    backend_->set_external_forces(forces.is_none() ? std::vector<Vec3d>{}
+                                                   : vectors_from(forces, "external_forces", n));
+    watch_.reset();  // it knows nothing of their work
+  }
+
+  std::vector<Vec3d> internal_forces() {
+    const py::gil_scoped_release others;
+    std::vector<Vec3d> force;
+    backend_->internal_forces(force);
+    return force;
+  }
+  std::vector<Mat3d> gradients() {
+    const py::gil_scoped_release others;
+    std::vector<Mat3d> gradient;
+    backend_->displacement_gradients(gradient);
+    return gradient;
+  }
+  std::pair<std::vector<double>, std::vector<double>> stresses() {
+    const py::gil_scoped_release others;
+    std::pair<std::vector<double>, std::vector<double>> fields;
+    stress_fields(model_, *backend_, &fields.first, &fields.second);
+    return fields;
+  }
+  SurfelState surfels() {
+    const py::gil_scoped_release others;
+    SurfelState surfels;
+    if (!model_.surfels.position.empty()) backend_->advect_surfels(surfels);
+    return surfels;
+  }
+
+  Live live(const py::handle& self) const {
+    const auto view_now = backend_->view();
+    if (!view_now) {
+      throw InputError(
+          fmt::format("live: the state is in the memory of {}; allowed: device = "
+                      "\"cpu\", or the copies displacement and velocity",
+                      backend_->name()));
+    }
+    const Shape shape{view_now->packs, 3, view_now->lanes};
+    const auto array = [&](const void* data) {
+      return view_now->single ? view(static_cast<const float*>(data), shape, self)
+                              : view(static_cast<const double*>(data), shape, self);
+    };
+    std::vector<Index> pack, lane;
+    for (const Index slot : view_now->slot) {
+      pack.push_back(slot / view_now->lanes);
+      lane.push_back(slot % view_now->lanes);
+    }
+    return {array(view_now->displacements), array(view_now->velocities), taken(std::move(pack)),
+            taken(std::move(lane))};
+  }
+
+  const Scene& scene() const { return scene_; }
+  const Model& model() const { return model_; }
+  const Backend& backend() const { return *backend_; }
+  const StepPlan& plan() const { return plan_; }
+  const Solver& solver() const { return *solver_; }
+
+ private:
+  static constexpr std::int64_t watch_interval = 250;
+
+  void start(const State& state) {
+    solver_ = std::make_unique<Solver>(model_, *backend_, state, scene_.solver.method);
+    looked_ = solver_->steps();
+    const Diagnostics now = diagnose(model_, *backend_, solver_->now());
+    watch_.reset();
+    if (backend_->external_forces().empty()) watch_.emplace(model_, now);
+  }
+
+  void take(std::int64_t count) {
+    auto last = std::chrono::steady_clock::now();
+    for (std::int64_t k = 0; k < count; ++k) {
+      solver_->step();
+      if (solver_->steps() - looked_ >= watch_interval) look();
+      if (std::chrono::steady_clock::now() - last > std::chrono::milliseconds(100)) {
+        const py::gil_scoped_acquire here;
+        if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
+        last = std::chrono::steady_clock::now();
+      }
+    }
+    backend_->wait();
+  }
+
+  /// @throws DivergedError
+  Diagnostics look() {
+    const Diagnostics now = diagnose(model_, *backend_, solver_->now());
+    looked_ = solver_->steps();
+    if (watch_) {
+      watch_->check(now);
+    } else if (now.bad_phyxel >= 0) {
+      throw DivergedError(fmt::format("step {}, t = {:g} s: the state of phyxel {} is not finite",
+                                      now.step, now.time, now.bad_phyxel));
+    }
+    return now;
+  }
+
+  Scene scene_;
+  ChosenDevice device_;
+  Model model_;
+  std::unique_ptr<Backend> backend_;
+  StepPlan plan_;
+  std::unique_ptr<Solver> solver_;
+  std::optional<StabilityWatch> watch_;
+  std::unique_ptr<Recorder> recorder_;
+  std::int64_t looked_ = 0;
+};
+
+py::dict energies_of(const Diagnostics& now) {
+  py::dict values;
+  values["step"] = now.step;
+  for (const DiagnosticColumn& column : diagnostic_columns()) {
+    values[column.name] = column.value(now);
+  }
+  values["elastic_energy"] = now.elastic_energy();
+  values["momentum"] = now.momentum;
+  values["angular_momentum"] = now.angular_momentum;
+  return values;
+}
+
+std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>& file,
+                                     const std::string& text,
+                                     const std::map<std::string, Cloud>& clouds,
+                                     Overrides overrides) {
+  const py::gil_scoped_release others;
+  return std::make_unique<Simulation>(file ? read_scene(*file) : parse_scene(text, ""), clouds,
+                                      overrides);
+}
+
+}  // namespace
+
+void add_simulation(py::module_& module) {
+  using namespace py::literals;
+  py::class_<Live>(
+      module, "Live",
+      "The state where the CPU steps it, without a copy and read-only: it changes with\n"
+      "every step. Phyxel i is at [pack[i], :, lane[i]].")
+      .def_readonly("displacement", &Live::displacement, "u [m], (packs, 3, lanes).")
+      .def_readonly("velocity", &Live::velocity, "v half a step before [m/s], (packs, 3, lanes).")
+      .def_readonly("pack", &Live::pack, "(n,)")
+      .def_readonly("lane", &Live::lane, "(n,)");
+
+  const auto of_model = [](auto member) {
+    return
+        [member](py::object self) { return view(self.cast<Simulation&>().model().*member, self); };
+  };
+  py::class_<Simulation>(module, "SimulationBase")
+      .def(py::init([](const std::optional<std::filesystem::path>& file, const std::string& text,
+                       const std::map<std::string, Cloud>& clouds,
+                       const std::optional<std::string>& device,
+                       const std::optional<std::string>& precision,
+                       const std::optional<std::string>& method, std::optional<int> threads,
+                       std::optional<double> step, std::optional<double> end, bool unsafe_step) {
+             return simulate(file, text, clouds,
+                             {device, precision, method, threads, step, end, unsafe_step});
+           }),
+           "file"_a, "text"_a, "clouds"_a, "device"_a, "precision"_a, "method"_a, "threads"_a,
+           "step"_a, "end"_a, "unsafe_step"_a)
+      .def("step", &Simulation::step, "steps"_a = 1, "Takes so many steps.")
+      .def("run", &Simulation::run, "until"_a = py::none(),
+           "Steps until then [s], or to the scene's end; writes frames if they are recorded.")
+      .def("record", &Simulation::record, "directory"_a, "force"_a = false,
+           "From now on frames go there, the present one first, as the scene's [output] asks.")
+      .def("write_frame", &Simulation::write_frame, "Records the present state.")
+      .def(
+          "energies", [](Simulation& s) { return energies_of(s.energies()); },
+          "Energies [J], momenta and the other columns of energy.csv, now: {name: value}.")
+      .def(
+          "forces", [](Simulation& s) { return taken(s.internal_forces()); },
+          "Internal forces [N], (n, 3), a copy.")
+      .def(
+          "gradients", [](Simulation& s) { return taken(s.gradients()); },
+          "Displacement gradients, F - 1, (n, 3, 3), a copy.")
+      .def(
+          "von_mises", [](Simulation& s) { return taken(s.stresses().first); },
+          "Von Mises equivalent of the Cauchy stress [Pa], (n,), a copy.")
+      .def(
+          "volume_ratio", [](Simulation& s) { return taken(s.stresses().second); },
+          "det F, (n,), a copy.")
+      .def(
+          "surface",
+          [](Simulation& s) {
+            SurfelState surfels = s.surfels();
+            return py::make_tuple(taken(std::move(surfels.position)),
+                                  taken(std::move(surfels.normal)));
+          },
+          "Deformed surfels [m] and their normals, both (m, 3), copies.")
+      .def("set_state", &Simulation::set_state, "displacement"_a = py::none(),
+           "velocity"_a = py::none(),
+           "Replaces displacements [m], velocities [m/s] or both, (n, 3); time goes on.")
+      .def_property_readonly(
+          "live", [](py::object self) { return self.cast<Simulation&>().live(self); },
+          "The state without a copy (on the CPU): see Live.")
+      .def_property_readonly(
+          "displacement", [](const Simulation& s) { return taken(s.state().displacement); },
+          "u [m], (n, 3), a copy.")
+      .def_property_readonly(
+          "velocity", [](const Simulation& s) { return taken(s.state().velocity); },
+          "v half a step before [m/s], (n, 3), a copy.")
+      .def_property(
+          "external_forces",
+          [](py::object self) {
+            const auto force = self.cast<Simulation&>().backend().external_forces();
+            std::vector<Vec3d> copy(force.begin(), force.end());
+            return taken(std::move(copy));
+          },
+          &Simulation::set_external_forces,
+          "Forces of your own [N], (n, 3), copied when set; they act until set again. None: none.")
+      .def_property_readonly("rest", of_model(&Model::position), "Positions at rest [m], (n, 3).")
+      .def_property_readonly("mass", of_model(&Model::mass), "[kg], (n,)")
+      .def_property_readonly("volume", of_model(&Model::volume), "At rest [m^3], (n,)")
+      .def_property_readonly(
+          "triangles",
+          [](py::object self) {
+            return view(self.cast<Simulation&>().model().surfels.triangle, self);
+          },
+          "Of the surface, (t, 3).")
+      .def_property_readonly(
+          "neighbours",
+          [](py::object self) {
+            const Csr& lists =
+                self.cast<Simulation&>().model().with_lists().neighbourhood.neighbours;
+            return py::make_tuple(view(lists.offsets, self), view(lists.indices, self));
+          },
+          "Lists of neighbours as (offsets, indices): those of i are\n"
+          "indices[offsets[i]:offsets[i + 1]].")
+      .def_property_readonly(
+          "time", [](const Simulation& s) { return s.solver().time(); }, "[s]")
+      .def_property_readonly(
+          "steps", [](const Simulation& s) { return s.solver().steps(); }, "Taken so far.")
+      .def_property_readonly(
+          "dt", [](const Simulation& s) { return s.solver().dt(); }, "Time step [s].")
+      .def_property_readonly(
+          "largest_step", [](const Simulation& s) { return s.plan().limit.largest_step; },
+          "Largest stable time step of Verlet's method [s]; 0 for other methods.")
+      .def_property_readonly(
+          "end",
+          [](const Simulation& s) { return s.plan().dt * static_cast<double>(s.plan().steps); },
+          "Of the scene [s].")
+      .def_property_readonly(
+          "residual", [](const Simulation& s) { return s.solver().work().residual; },
+          "Largest force that Newton's method has left, of what acts.")
+      .def_property_readonly(
+          "device", [](const Simulation& s) { return s.backend().name(); }, "What steps, in words.")
+      .def_property_readonly("warnings", [](const Simulation& s) { return s.model().warnings; })
+      .def_property_readonly(
+          "memory",
+          [](const Simulation& s) {
+            py::dict bytes;
+            for (const ArrayBytes& array : s.backend().memory()) {
+              bytes[py::str(array.name)] = array.bytes;
+            }
+            return bytes;
+          },
+          "Bytes the device holds: {array: bytes}.")
+      .def("__len__", [](const Simulation& s) { return s.model().size(); });
+}
+
+}  // namespace phyxel::python
