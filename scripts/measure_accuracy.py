@@ -2,9 +2,10 @@
 """Measures the table behind docs/accuracy.md on a machine of many cores: `phyxel accuracy` in slices of one
 case, lattice, jitter and way, each on cores of its own, several at a time, put together in one file.
 
-    scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4]
+    scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4] [--case CASE]
 
-Times in the table are those of so many cores, with the rest of the machine at work.
+Times in the table are those of so many cores, with the rest of the machine at work. With --case the table is
+there already: rows of that case are replaced, and a fact says by which program.
 """
 import argparse
 import concurrent.futures
@@ -56,6 +57,7 @@ def main():
     parser.add_argument("program")
     parser.add_argument("table")
     parser.add_argument("--cores", type=int, default=4, help="for each slice")
+    parser.add_argument("--case", help="this one alone")
     options = parser.parse_args()
     cores = sorted(os.sched_getaffinity(0))
     free = queue.Queue()
@@ -64,16 +66,30 @@ def main():
     at_once = free.qsize()
     if at_once == 0:
         parser.error(f"--cores {options.cores}: this machine has {len(cores)}")
-    work = list(slices(cases(options.program)))
+    work = list(slices([options.case] if options.case else cases(options.program)))
     order = sorted(range(len(work)), key=lambda k: SLOW.index(work[k][0]) if work[k][0] in SLOW else len(SLOW))
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(at_once) as pool:
         found = {k: pool.submit(measured, options.program, work[k], free, folder, k) for k in order}
         results = [found[k].result() for k in range(len(work))]
     facts = next(facts for facts, _ in results if facts)
     head = next(rows[0] for _, rows in results if rows)
+    rows = [row for _, rows in results for row in rows[1:]]
+    if options.case:
+        with open(options.table) as table:
+            lines = table.read().splitlines()
+        program = next(fact for fact in facts if fact.startswith("# program: ")).split(": ", 1)[1]
+        said = f"# {options.case}: "
+        facts = [line for line in lines if line.startswith("#") and not line.startswith(said)] + [said + program]
+        old = [line for line in lines if not line.startswith("#")]
+        if old[0] != head:
+            raise SystemExit(f"{options.table}: has other columns")
+        place = next(k for k, row in enumerate(old) if row.startswith(options.case + ","))
+        others = [row for row in old[1:] if not row.startswith(options.case + ",")]
+        rows = others[:place - 1] + rows + others[place - 1:]
+    else:
+        facts.append(f"# at once: {at_once}")
     with open(options.table, "w") as table:
-        table.write("\n".join(facts + [f"# at once: {at_once}", head]
-                              + [row for _, rows in results for row in rows[1:]]) + "\n")
+        table.write("\n".join(facts + [head] + rows) + "\n")
 
 
 if __name__ == "__main__":

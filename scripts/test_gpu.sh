@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # On a machine with a GPU: all tests of the CUDA build, then NVIDIA's sanitizers on the kernels.
 #
-#   scripts/test_gpu.sh [summary.txt [tests | sanitizers]]
+#   scripts/test_gpu.sh [summary.txt [tests | cuda | sanitizers]]
 #
 # after cmake --preset cuda && cmake --build --preset cuda. Ends with exit code 1 if anything failed.
-# With a file name, a summary goes there too; with a part, that part is added to it.
+# With a file name, a summary goes there too; with a part, that part is added to it. `cuda` is what CUDA
+# changes of the tests, and those of several ranks.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -24,12 +25,13 @@ say() { echo "$*" | tee -a "$summary"; }
 : >"$summary"
 say "$(build/cuda/bin/phyxel --version), $(nvidia-smi --query-gpu=name --format=csv,noheader | head -1), $(date -u +%F)"
 
+# run_tests [ctest's options]
 run_tests() {
   OMP_WAIT_POLICY=passive ctest --test-dir build/cuda -j "$(nproc)" --timeout 300 \
-    --no-tests=error --output-on-failure >"$logs/ctest.log" 2>&1 || failed=1
+    --no-tests=error --output-on-failure "$@" >"$logs/ctest.log" 2>&1 || failed=1
   # Tests that find no device skip themselves.
   grep -q "no CUDA device" "$logs/ctest.log" && failed=1
-  say "ctest: $(grep -E 'tests passed' "$logs/ctest.log")"
+  say "ctest${*:+ $*}: $(grep -E 'tests passed' "$logs/ctest.log")"
 }
 
 # Several at a time, a GPU each if there are several: a tool keeps a core busy more than a GPU.
@@ -98,9 +100,10 @@ run_sanitizers() {
 case $part in
   all) run_tests && run_sanitizers ;;
   tests) run_tests ;;
+  cuda) run_tests -L 'cuda|mpi' ;;
   sanitizers) run_sanitizers ;;
   *)
-    echo "scripts/test_gpu.sh: $part: allowed are tests, sanitizers" >&2
+    echo "scripts/test_gpu.sh: $part: allowed are tests, cuda, sanitizers" >&2
     exit 2
     ;;
 esac
