@@ -12,10 +12,10 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
        libmetis-dev libopenmpi-dev openmpi-bin
        gnuplot-nox)  # the figures of phyxel paper
 # clang for the sanitizers and the fuzzers, Doxygen for the reference, help2man and dpkg-dev for
-# packages, Python to read our files independently.
+# packages, Python for the module and to read our files independently, Chromium to look at pages.
 tests=(ccache pkg-config doxygen help2man dpkg-dev libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
        python3-h5py python3-vtk9 python3-dev pybind11-dev python3-numpy python3-pytest
-       python3-matplotlib)
+       python3-matplotlib chromium)
 
 wanted=("${build[@]}")
 if [[ ${1-} == --tests ]]; then

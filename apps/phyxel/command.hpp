@@ -12,6 +12,7 @@ void add_sample(CLI::App& program);
 void add_info(CLI::App& program);
 void add_export(CLI::App& program);
 void add_render(CLI::App& program);
+void add_report(CLI::App& program);
 void add_bench(CLI::App& program);
 void add_accuracy(CLI::App& program);
 void add_paper(CLI::App& program);

@@ -78,6 +78,7 @@ int main(int argc, char** argv) {
   phyxel::app::add_render(program);
   phyxel::app::add_info(program);
   phyxel::app::add_export(program);
+  phyxel::app::add_report(program);
   phyxel::app::add_bench(program);
   phyxel::app::add_accuracy(program);
   phyxel::app::add_paper(program);

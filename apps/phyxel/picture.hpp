@@ -7,19 +7,9 @@
 
 #include "compose.hpp"
 #include "phyxel/scene.hpp"
+#include "trajectory.hpp"
 
 namespace phyxel::app {
-
-/// Which frames of a series; at most one member is set, none means all of them.
-struct FrameChoice {
-  std::vector<std::int64_t> frames;  ///< Numbers from 0; negative ones count from the end.
-  std::int64_t count = 0;            ///< This many, evenly spread, first and last included.
-  std::int64_t every = 0;            ///< Every so many, from the first.
-};
-
-/// Frame numbers in rising order, each once.
-/// @throws InputError for a number outside [-available, available), or a negative count or step.
-std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t available);
 
 struct PictureRequest {
   int width = 960, height = 720;  ///< [px]

@@ -58,6 +58,40 @@ auto alike(Work&& work) {
   }
 }
 
+/// Where a run's seconds go, in the order of their first ones; spans of its profile, too.
+class TimeSpent {
+ public:
+  template <class Work>
+  auto timed(const char* what, Work&& work) {
+    const Timing timing(*this, what);
+    return work();
+  }
+  const std::vector<std::pair<std::string, double>>& all() const { return seconds_; }
+
+ private:
+  class Timing {
+   public:
+    Timing(TimeSpent& sum, const char* what) : phase_(what), sum_(sum), what_(what) {}
+    ~Timing() { sum_.of(what_) += seconds_since(start_); }
+    Timing(const Timing&) = delete;
+    Timing& operator=(const Timing&) = delete;
+
+   private:
+    Phase phase_;
+    TimeSpent& sum_;
+    const char* what_;
+    Clock::time_point start_ = Clock::now();
+  };
+  double& of(std::string_view what) {
+    for (auto& [known, seconds] : seconds_) {
+      if (known == what) return seconds;
+    }
+    return seconds_.emplace_back(what, 0).second;
+  }
+
+  std::vector<std::pair<std::string, double>> seconds_;
+};
+
 /// One run from its plan to its summary, on one rank or on several: all step, and the first one
 /// speaks and writes. Files are written on a thread of their own, while stepping goes on if a core
 /// is left for that. HDF5 is not made for threads: after the constructor that thread alone uses it,
@@ -70,16 +104,18 @@ class Run {
         scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
         device_(choose_device(scene_.solver.device, "device")),
         begin_(checkpoint_for_all()),
-        shared_(in_phase("model",
-                         [&] { return SharedModel(all_ranks(), scene_, device_, options_.cut); })),
-        backend_(in_phase("backend",
-                          [&] {
-                            return shared_.make_backend(scene_.solver.precision,
-                                                        scene_.solver.threads, options_.transport);
-                          })),
+        shared_(spent_.timed(
+            "model", [&] { return SharedModel(all_ranks(), scene_, device_, options_.cut); })),
+        backend_(spent_.timed("backend",
+                              [&] {
+                                return shared_.make_backend(scene_.solver.precision,
+                                                            scene_.solver.threads,
+                                                            options_.transport);
+                              })),
         plan_(alike([&] {
-          const Phase phase("time step");
-          return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
+          return spent_.timed("time step", [&] {
+            return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
+          });
         })),
         solver_(model(), *backend_, first_state(), scene_.solver.method),
         first_step_(solver_.steps()),
@@ -183,7 +219,7 @@ class Run {
         step_seconds_ += seconds_since(stepping_since);
         if (frame) writer_.wait_for_room();
         const auto look_start = Clock::now();
-        now = in_phase("energies", [&] { return diagnose(model(), backend, solver.now()); });
+        now = spent_.timed("energies", [&] { return diagnose(model(), backend, solver.now()); });
         watch.check(now);
         peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
         auto good = good_state(now);
@@ -220,7 +256,9 @@ class Run {
     loop_seconds_ = seconds_since(loop_start_);
     ranks().together([&] {
       if (leads() && scene_.render.pictures && !options_.no_pictures) {
-        pictures_ = render_directory(recorder_->directory(), scene_.render, true);
+        pictures_ = spent_.timed("pictures", [&] {
+          return render_directory(recorder_->directory(), scene_.render, true);
+        });
       }
     });
     std::int64_t bytes = 0;
@@ -228,7 +266,16 @@ class Run {
       bytes += static_cast<std::int64_t>(array.bytes);
     bytes = ranks().sum(bytes);
     const Traffic traffic = most_traffic(*backend_);
-    if (leads()) say_summary(now, bytes, traffic);
+    ranks().together([&] {
+      if (!leads()) return;
+      const nlohmann::ordered_json summary = summary_of(now, bytes, traffic);
+      recorder_->write_summary(summary.dump(2) + "\n");
+      if (options_.json) {
+        fmt::print("{}\n", summary.dump(2));
+      } else {
+        say_summary(now, bytes, traffic);
+      }
+    });
   }
 
  private:
@@ -508,46 +555,79 @@ class Run {
     }
   }
 
-  void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
-    const double steps = static_cast<double>(solver_.steps() - first_step_);
-    const double energy_drift =
-        (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
-    const double force_balance = norm(now.internal_force) / std::max(now.force_scale, 1e-300);
-    const double torque_balance = norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
-    const Index phyxels = model().whole_size();
-    if (options_.json) {
-      nlohmann::ordered_json j = identity();
-      j.update({{"time_s", now.time},
-                {"steps", solver_.steps()},
-                {"time_step_s", plan_.dt},
-                {"largest_stable_step_s", plan_.limit.largest_step},
-                {"omega_max_rad_s", plan_.limit.omega_max},
-                {"force_evaluations", solver_.work().evaluations},
-                {"newton_steps", solver_.work().newton_steps},
-                {"newton_residual", solver_.work().residual},
-                {"setup_seconds", setup_seconds_},
-                {"loop_seconds", loop_seconds_},
-                {"step_seconds", step_seconds_},
-                {"steps_per_second", steps / step_seconds_},
-                {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
-                {"bytes", bytes},
-                {"transport", transport_},
-                {"gpus", gpus_},
-                {"exchange_bytes", traffic.bytes_sent},
-                {"exchange_seconds", traffic.seconds},
-                {"energy_j", now.total_energy()},
-                {"energy_drift", energy_drift},
-                {"conservative", is_conservative(model())},
-                {"internal_force_balance", force_balance},
-                {"internal_torque_balance", torque_balance},
-                {"inverted_phyxels", now.inverted},
-                {"warnings", model().warnings},
-                {"frames", recorder_->frames_written()},
-                {"directory", recorder_->directory().string()},
-                {"checkpoint", checkpoint_.string()}});
-      fmt::print("{}\n", j.dump(2));
-      return;
+  /// Where the seconds went, in the order of the run.
+  nlohmann::ordered_json timing() const {
+    nlohmann::ordered_json timing;
+    double energies = 0, pictures = 0, others = 0;
+    for (const auto& [what, seconds] : spent_.all()) {
+      if (what == "energies") {
+        energies = seconds;
+      } else if (what == "pictures") {
+        pictures = seconds;
+      } else {
+        timing[what] = seconds;
+        others += seconds;
+      }
     }
+    timing["rest of the set-up"] = std::max(0.0, setup_seconds_ - others);
+    timing["steps"] = step_seconds_;
+    timing["energies"] = energies;
+    timing["frames and checkpoints"] = std::max(0.0, loop_seconds_ - step_seconds_ - energies);
+    if (!pictures_.empty()) timing["pictures"] = pictures;
+    return timing;
+  }
+
+  double energy_drift(const Diagnostics& now) const {
+    return (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
+  }
+  static double force_balance(const Diagnostics& now) {
+    return norm(now.internal_force) / std::max(now.force_scale, 1e-300);
+  }
+  static double torque_balance(const Diagnostics& now) {
+    return norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
+  }
+  double steps_taken() const { return static_cast<double>(solver_.steps() - first_step_); }
+
+  nlohmann::ordered_json summary_of(const Diagnostics& now, std::int64_t bytes,
+                                    const Traffic& traffic) const {
+    const double steps = steps_taken();
+    const Index phyxels = model().whole_size();
+    nlohmann::ordered_json j = identity();
+    j.update({{"time_s", now.time},
+              {"steps", solver_.steps()},
+              {"time_step_s", plan_.dt},
+              {"largest_stable_step_s", plan_.limit.largest_step},
+              {"omega_max_rad_s", plan_.limit.omega_max},
+              {"force_evaluations", solver_.work().evaluations},
+              {"newton_steps", solver_.work().newton_steps},
+              {"newton_residual", solver_.work().residual},
+              {"setup_seconds", setup_seconds_},
+              {"loop_seconds", loop_seconds_},
+              {"step_seconds", step_seconds_},
+              {"seconds", timing()},
+              {"steps_per_second", steps / step_seconds_},
+              {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
+              {"bytes", bytes},
+              {"transport", transport_},
+              {"gpus", gpus_},
+              {"exchange_bytes", traffic.bytes_sent},
+              {"exchange_seconds", traffic.seconds},
+              {"energy_j", now.total_energy()},
+              {"energy_drift", energy_drift(now)},
+              {"conservative", is_conservative(model())},
+              {"internal_force_balance", force_balance(now)},
+              {"internal_torque_balance", torque_balance(now)},
+              {"inverted_phyxels", now.inverted},
+              {"warnings", model().warnings},
+              {"frames", recorder_->frames_written()},
+              {"directory", recorder_->directory().string()},
+              {"checkpoint", checkpoint_.string()}});
+    return j;
+  }
+
+  void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
+    const double steps = steps_taken();
+    const Index phyxels = model().whole_size();
     fmt::print(
         "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
         "with "
@@ -575,14 +655,14 @@ class Run {
                  now.elastic_energy());
     } else if (is_conservative(model())) {
       fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
-                 energy_drift, peak_energy_);
+                 energy_drift(now), peak_energy_);
     } else {
       fmt::print(
           "  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n",
           now.total_energy());
     }
     fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
-               force_balance, torque_balance);
+               force_balance(now), torque_balance(now));
     if (now.inverted > 0) {
       fmt::print(
           "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "
@@ -603,6 +683,7 @@ class Run {
 
   const RunOptions& options_;
   Clock::time_point start_ = Clock::now();
+  TimeSpent spent_;
   Scene scene_;
   ChosenDevice device_;
   std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until its state is read

@@ -257,6 +257,11 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
       frame.field[name] = std::move(values);
     }
   };
+  if (with_fields) {
+    frame.program = in.text_attribute("/phyxel", "program");
+    frame.title = in.text_attribute("/phyxel", "title");
+    frame.scene = in.text("/phyxel/scene");
+  }
   for (const char* name : {"displacement", "velocity"}) {
     field(name, [&](const std::string& path) { return in.vectors(path); });
   }

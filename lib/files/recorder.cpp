@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* log_name = "energy.csv";
+constexpr const char* summary_name = "run.json";
 constexpr std::size_t largest_log = std::size_t{1} << 30;
 
 fs::path frame_file(const fs::path& directory, const char* family, std::int64_t number) {
@@ -25,7 +26,9 @@ fs::path frame_file(const fs::path& directory, const char* family, std::int64_t 
 /// Whether a name is one of ours, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
-  if (name == "phyxels.hdf.series" || name == "surface.hdf.series" || name == log_name) return true;
+  for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, summary_name}) {
+    if (name == one) return true;
+  }
   const auto numbered = [name](std::string_view prefix, std::string_view suffix) {
     if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
     if (name.size() <= prefix.size() + suffix.size()) return false;
@@ -261,6 +264,10 @@ void Recorder::write(const Diagnostics& diagnostics, Stretches& values) {
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
   ++frames_;
+}
+
+void Recorder::write_summary(const std::string& text) const {
+  write_whole_file(directory_ / summary_name, text, Durable::no);
 }
 
 std::vector<fs::path> Recorder::files() const {

@@ -109,9 +109,9 @@ class AccuracyPage {
         "forces, in Newton's method and what it needs. *Set-up*: from the scene to the first of "
         "them; "
         "bold rows and charts count both times. Errors are relative to the reference, or to "
-        "what the quantity says.\n\nMeasured by {} on {}; {}; {}.\n\n",
+        "what the quantity says.\n\nMeasured by {} on {}; {}; {}{}.\n\n",
         table_.fact("program"), table_.fact("hardware"), table_.fact("compiler"),
-        table_.fact("date"));
+        table_.fact("date"), measured_apart());
     summary();
     peers_section();
     hourglass_section();
@@ -127,6 +127,17 @@ class AccuracyPage {
 
  private:
   /// The finest of each way, side by side.
+  /// Cases that another program has measured since.
+  std::string measured_apart() const {
+    std::string text;
+    for (const AccuracyCase& c : accuracy_cases()) {
+      if (const std::string program = table_.fact(c.name); !program.empty()) {
+        text += fmt::format("; {} by {}", c.name, program);
+      }
+    }
+    return text;
+  }
+
   void summary() {
     const std::string ways[] = {"cells, plain",
                                 "nodes, plain",

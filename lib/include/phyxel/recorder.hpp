@@ -76,6 +76,7 @@ class SeriesFile {
 ///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
+///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written to a temporary name, for which the disk must have room beforehand, and
 /// renamed. Metadata sit in the group `/phyxel`.
 class Recorder {
@@ -93,6 +94,9 @@ class Recorder {
   void write(const Frame& frame);
   /// A frame whose values are not all here, or not at once. @throws likewise
   void write(const Diagnostics& diagnostics, Stretches& values);
+
+  /// What a program has to say of a run that is done, as run.json. @throws OutputError
+  void write_summary(const std::string& text) const;
 
   /// Including those of the earlier part of a resumed run.
   std::int64_t frames_written() const { return frames_; }
@@ -125,8 +129,9 @@ struct FrameData {
   /// The other fields that the frame has, by the names of `OutputRequest::fields`, shape [n] or
   /// [n, 3].
   std::map<std::string, std::vector<double>> field;
+  std::string program, title, scene;  ///< What wrote it, and the scene's title and text.
 };
-/// @param with_fields whether `field` is filled @throws InputError.
+/// @param with_fields whether `field` and what follows it are filled @throws InputError.
 FrameData read_frame(const std::filesystem::path& file, bool with_fields = false);
 
 /// The entries of a series file, paths resolved from its folder.

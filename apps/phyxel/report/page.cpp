@@ -1,0 +1,105 @@
+#include "report/page.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "report/page_files.hpp"
+
+namespace phyxel::app {
+
+std::string filled_page(std::string_view name, const Fillings& fillings) {
+  std::string_view rest = page_file(name);
+  std::string page;
+  while (true) {
+    const std::size_t begin = rest.find('@');
+    if (begin == std::string_view::npos) break;
+    const std::size_t end = rest.find('@', begin + 1);
+    if (end == std::string_view::npos) break;
+    page += rest.substr(0, begin);
+    const std::string_view wanted = rest.substr(begin + 1, end - begin - 1);
+    const auto filling = fillings.find(wanted);
+    const std::string_view found = filling != fillings.end() ? filling->second : page_file(wanted);
+    if (filling == fillings.end() && found.empty()) {
+      throw std::logic_error(fmt::format("{}: nothing for @{}@", name, wanted));
+    }
+    page += found;
+    rest = rest.substr(end + 1);
+  }
+  page += rest;
+  return page;
+}
+
+std::string html_text(std::string_view text) {
+  std::string html;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        html += "&amp;";
+        break;
+      case '<':
+        html += "&lt;";
+        break;
+      case '>':
+        html += "&gt;";
+        break;
+      case '"':
+        html += "&quot;";
+        break;
+      default:
+        html += c;
+    }
+  }
+  return html;
+}
+
+std::string script_json(const nlohmann::ordered_json& json) {
+  // Bytes that are no UTF-8 come from file names at most.
+  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  std::string safe;
+  safe.reserve(text.size());
+  for (const char c : text) {  // neither </script> nor <!-- can begin
+    if (c == '<') {
+      safe += "\\u003c";
+    } else {
+      safe += c;
+    }
+  }
+  return safe;
+}
+
+std::string base64(std::span<const std::byte> bytes) {
+  constexpr char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t k = 0; k < bytes.size(); k += 3) {
+    const auto byte = [&](std::size_t at) {
+      return at < bytes.size() ? std::to_integer<unsigned>(bytes[at]) : 0U;
+    };
+    const unsigned three = byte(k) << 16U | byte(k + 1) << 8U | byte(k + 2);
+    text += letters[three >> 18U];
+    text += letters[three >> 12U & 63U];
+    text += k + 1 < bytes.size() ? letters[three >> 6U & 63U] : '=';
+    text += k + 2 < bytes.size() ? letters[three & 63U] : '=';
+  }
+  return text;
+}
+
+std::string html_warnings(std::span<const std::string> warnings) {
+  std::string html;
+  for (const std::string& warning : warnings) {
+    html += fmt::format("<p class=\"warning\">{}</p>\n", html_text(warning));
+  }
+  return html;
+}
+
+std::string html_facts(std::span<const std::pair<std::string, std::string>> facts) {
+  std::string html = "<table>\n";
+  for (const auto& [name, value] : facts) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td></tr>\n", html_text(name), html_text(value));
+  }
+  return html + "</table>\n";
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,405 @@
+// A trajectory: the moving body, its energies and momenta.
+const stage = document.getElementById('stage'), canvas = stage.querySelector('canvas');
+const frames = data.frames, steps = frames.length;
+
+/// Bytes of a frame, decoded when it is first shown; the last few are kept.
+const kept = new Map();
+function bytesOf(id) {
+  if (kept.has(id)) return kept.get(id);
+  const text = atob(document.getElementById(id).textContent.trim());
+  const bytes = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; ++k) bytes[k] = text.charCodeAt(k);
+  kept.set(id, bytes.buffer);
+  return bytes.buffer;
+}
+const frameKept = [];
+function frameOf(k) {
+  const found = frameKept.find(f => f.number === k);
+  if (found) return found;
+  const id = `frame${k}`, buffer = bytesOf(id);
+  kept.delete(id);
+  const frame = {number: k, surfels: null, phyxels: null};
+  let at = 0;
+  const take = (count, width) => { const a = new Uint16Array(buffer, at, count * width); at += 2 * count * width; return a; };
+  for (const [family, count] of [['surfels', data.surfels], ['phyxels', data.phyxels]]) {
+    if (count) frame[family] = {points: take(count, 3), fields: null};
+  }
+  const fields = data.fields.map(() => take(data.phyxels || data.surfels, 1));
+  frame[data.phyxels ? 'phyxels' : 'surfels'].fields = fields;
+  frameKept.push(frame);
+  if (frameKept.length > 64) frameKept.shift();
+  return frame;
+}
+
+const triangles = data.surfels ? new Uint32Array(bytesOf('triangles')) : null;
+const carriers = data.surfels && data.phyxels ? new Uint32Array(bytesOf('carriers')) : null;
+const weights = carriers ? new Uint8Array(bytesOf('weights')) : null;
+
+/// A field of a frame's family; surfels have what the phyxels around them have.
+function fieldOf(frame, family, number) {
+  const own = frame[family].fields;
+  if (own && own[number]) return own[number];
+  const made = new Uint16Array(data.surfels), from = frame.phyxels.fields[number], each = data.carriers;
+  for (let s = 0, k = 0; s < data.surfels; ++s) {
+    let sum = 0;
+    for (let c = 0; c < each; ++c, ++k) sum += weights[k] * from[carriers[k]];
+    made[s] = sum / 255;
+  }
+  (frame[family].fields ??= [])[number] = made;
+  return made;
+}
+
+/// Of the surface, area-weighted; in bytes for the GPU.
+function normalsOf(points) {
+  const n = new Float32Array(points.length), [sx, sy, sz] = data.scale;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const a = 3 * triangles[t], b = 3 * triangles[t + 1], c = 3 * triangles[t + 2];
+    const ux = (points[b] - points[a]) * sx, uy = (points[b + 1] - points[a + 1]) * sy, uz = (points[b + 2] - points[a + 2]) * sz;
+    const vx = (points[c] - points[a]) * sx, vy = (points[c + 1] - points[a + 1]) * sy, vz = (points[c + 2] - points[a + 2]) * sz;
+    const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+    for (const i of [a, b, c]) { n[i] += x; n[i + 1] += y; n[i + 2] += z; }
+  }
+  const out = new Int8Array(4 * points.length / 3);
+  for (let i = 0, o = 0; i < n.length; i += 3, o += 4) {
+    const size = Math.hypot(n[i], n[i + 1], n[i + 2]) || 1;
+    out[o] = 127 * n[i] / size; out[o + 1] = 127 * n[i + 1] / size; out[o + 2] = 127 * n[i + 2] / size;
+  }
+  return out;
+}
+
+// --- colours -------------------------------------------------------------------------------------
+// Viridis, by a polynomial of degree six (Matt Zucker's fit, public domain).
+const ramp = `
+vec3 ramp(float t) {
+  t = clamp(t, 0.0, 1.0);
+  const vec3 c0 = vec3(0.2777273272234177, 0.005407344544966578, 0.3340998053353061);
+  const vec3 c1 = vec3(0.1050930431085774, 1.404613529898575, 1.384590162594685);
+  const vec3 c2 = vec3(-0.3308618287255563, 0.214847559468213, 0.09509516302823659);
+  const vec3 c3 = vec3(-4.634230498983486, -5.799100973351585, -19.33244095627987);
+  const vec3 c4 = vec3(6.228269936347081, 14.17993336680509, 56.69055260068105);
+  const vec3 c5 = vec3(4.776384997670288, -13.74514537774601, -65.35303263337234);
+  const vec3 c6 = vec3(-5.435455855934631, 4.645852612178535, 26.3124352495832);
+  return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))));
+}`;
+function rampColour(t) {
+  const c = [[0.2777273, 0.1050930, -0.3308618, -4.6342305, 6.2282699, 4.7763850, -5.4354559],
+             [0.0054073, 1.4046135, 0.2148476, -5.7991010, 14.1799334, -13.7451454, 4.6458526],
+             [0.3340998, 1.3845902, 0.0950952, -19.3324410, 56.6905526, -65.3530326, 26.3124352]];
+  return c.map(k => Math.round(255 * Math.min(1, Math.max(0, k.reduceRight((sum, v) => sum * t + v, 0)))));
+}
+
+// --- drawing -------------------------------------------------------------------------------------
+const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
+const view = {};
+const shown = {frame: 0, field: data.fields.length ? 0 : -1, surface: data.surfels > 0, phyxels: data.surfels === 0, range: 'bulk'};
+let programs = null, buffers = null;
+
+function compile(vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, '#version 300 es\nprecision highp float;\n' + text);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(program, shader);
+  }
+  ['point', 'field', 'normal'].forEach((name, k) => gl.bindAttribLocation(program, k, name));
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  const at = {};
+  for (const name of ['scale', 'low', 'turn', 'eye', 'lens', 'range', 'plain', 'ball']) at[name] = gl.getUniformLocation(program, name);
+  return {program, at};
+}
+
+const place = `
+in vec3 point; in float field;
+uniform vec3 scale, low, eye; uniform mat3 turn; uniform vec4 lens; uniform vec2 range;
+out float value; out vec3 seen;
+void put() {
+  seen = turn * (point * scale + low) - eye;  // looking along -z
+  gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, -seen.z);
+  value = (field - range.x) / max(range.y - range.x, 1e-6);
+}`;
+
+function prepare() {
+  const surface = compile(place + `
+in vec4 normal; out vec3 facing;
+void main() { put(); facing = turn * normal.xyz; }`, ramp + `
+in float value; in vec3 seen; in vec3 facing; uniform vec3 plain; out vec4 colour;
+void main() {
+  vec3 n = normalize(facing), v = normalize(-seen);
+  if (dot(n, v) < 0.0) n = -n;
+  vec3 base = plain.x < 0.0 ? ramp(value) : plain;
+  float light = 0.35 + 0.55 * max(0.0, dot(n, normalize(vec3(0.4, 0.7, 0.6)))) + 0.12 * max(0.0, dot(n, v));
+  float shine = 0.18 * pow(max(0.0, dot(reflect(-v, n), normalize(vec3(0.4, 0.7, 0.6)))), 24.0);
+  colour = vec4(base * light + shine, 1.0);
+}`);
+  const balls = compile(place + `
+uniform float ball;
+void main() { put(); gl_PointSize = clamp(ball / max(-seen.z, 1e-9), 2.0, 200.0); }`, ramp + `
+in float value; in vec3 seen; uniform vec3 plain; out vec4 colour;
+void main() {
+  vec2 p = 2.0 * gl_PointCoord - 1.0;
+  float rest = 1.0 - dot(p, p);
+  if (rest < 0.0) discard;
+  vec3 n = vec3(p.x, -p.y, sqrt(rest));
+  vec3 base = plain.x < 0.0 ? ramp(value) : plain;
+  colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, normalize(vec3(0.4, 0.7, 0.6))))), 1.0);
+}`);
+  programs = {surface, balls};
+  buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer()), triangles: gl.createBuffer()};
+  if (triangles) {
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
+  }
+}
+
+const focal = 1 / Math.tan(35 * Math.PI / 360);  // 35 degrees from bottom to top
+
+/// The outermost points along the axes of the first view: right, up, backwards.
+const outermost = data.outermost.map(p => matrix(data.view).map(row => row[0] * p[0] + row[1] * p[1] + row[2] * p[2]));
+const middle = [0, 1].map(axis => {
+  const all = outermost.map(p => p[axis]);
+  return (Math.min(...all) + Math.max(...all)) / 2;
+});
+/// From how far all of them are seen in that view.
+function distanceForAll(aspect) {
+  return Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
+}
+
+function matrix(from) {  // rows: right, up, backwards
+  const [cy, sy, cp, sp] = [Math.cos(from.yaw), Math.sin(from.yaw), Math.cos(from.pitch), Math.sin(from.pitch)];
+  return [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
+}
+
+function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }
+
+let uploaded = null;
+function upload(frame) {
+  const key = `${frame.number} ${shown.field}`;
+  if (uploaded === key) return;
+  const fill = (buffer, array) => { gl.bindBuffer(gl.ARRAY_BUFFER, buffer); gl.bufferData(gl.ARRAY_BUFFER, array, gl.DYNAMIC_DRAW); };
+  for (const family of ['surfels', 'phyxels']) {
+    const f = frame[family];
+    if (!f) continue;
+    fill(buffers[family][0], f.points);
+    fill(buffers[family][1], shown.field < 0 ? new Uint16Array(f.points.length / 3) : fieldOf(frame, family, shown.field));
+  }
+  if (frame.surfels) fill(buffers.surfels[2], frame.surfels.normals ??= normalsOf(frame.surfels.points));
+  uploaded = key;
+}
+
+/// What the colours span, in units of the field.
+function span(frame) {
+  if (shown.field < 0) return [0, 1];
+  const field = data.fields[shown.field];
+  if (shown.range === 'all') return [field.low, field.high];
+  if (shown.range === 'bulk') return field.bulk;
+  const f = fieldOf(frame, frame.surfels && (shown.surface || !frame.phyxels) ? 'surfels' : 'phyxels', shown.field);
+  let low = 65535, high = 0;
+  for (const v of f) { if (v < low) low = v; if (v > high) high = v; }
+  const real = v => field.low + v / 65535 * (field.high - field.low);
+  return [real(low), real(high)];
+}
+
+function draw() {
+  const frame = frameOf(shown.frame), time = frames[shown.frame];
+  stage.querySelector('.clock').textContent = `t = ${time.toFixed(data.decimals)} s`;
+  const [low, high] = span(frame), field = data.fields[shown.field];
+  const legend = stage.querySelector('.legend');
+  legend.hidden = !field;
+  if (field) {
+    legend.querySelector('.name').textContent = `${field.name}${field.unit ? ` [${field.unit}]` : ''}`;
+    legend.querySelector('.low').textContent = (low > field.low ? '≤ ' : '') + short(low);
+    legend.querySelector('.high').textContent = (high < field.high ? '≥ ' : '') + short(high);
+  }
+  for (const chart of charts) chart.now(time);
+  if (!gl) return;
+  const ratio = Math.min(2, window.devicePixelRatio || 1);
+  const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  gl.viewport(0, 0, width, height);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  gl.enable(gl.DEPTH_TEST);
+  upload(frame);
+  const aspect = width / height;
+  const distance = view.distance * distanceForAll(aspect);
+  const near = Math.max(0.01, distance - 2.5), far = distance + 2.5;
+  const rows = matrix(view), turn = [];
+  for (let c = 0; c < 3; ++c) for (let r = 0; r < 3; ++r) turn.push(rows[r][c]);
+  const spread = field ? Math.max(field.high - field.low, 1e-300) : 1;
+  const use = ({program, at}) => {
+    gl.useProgram(program);
+    gl.uniform3fv(at.scale, data.scale.map(s => 65535 * s));
+    gl.uniform3fv(at.low, data.low);
+    gl.uniformMatrix3fv(at.turn, false, turn);
+    gl.uniform3f(at.eye, view.shift[0], view.shift[1], distance);
+    gl.uniform4f(at.lens, focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near));
+    gl.uniform2f(at.range, field ? (low - field.low) / spread : 0, field ? (high - field.low) / spread : 1);
+  };
+  const attribute = (k, buffer, size, type, normalised) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.enableVertexAttribArray(k);
+    gl.vertexAttribPointer(k, size, type, normalised, 0, 0);
+  };
+  if (shown.surface && frame.surfels) {
+    use(programs.surface);
+    gl.uniform3fv(programs.surface.at.plain, field ? [-1, 0, 0] : [0.36, 0.56, 0.76]);
+    attribute(0, buffers.surfels[0], 3, gl.UNSIGNED_SHORT, true);
+    attribute(1, buffers.surfels[1], 1, gl.UNSIGNED_SHORT, true);
+    attribute(2, buffers.surfels[2], 4, gl.BYTE, true);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
+    gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
+  }
+  if (shown.phyxels && frame.phyxels) {
+    use(programs.balls);
+    gl.disableVertexAttribArray(2);
+    gl.uniform3fv(programs.balls.at.plain, field ? [-1, 0, 0] : [0.82, 0.42, 0.32]);
+    gl.uniform1f(programs.balls.at.ball, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
+    attribute(0, buffers.phyxels[0], 3, gl.UNSIGNED_SHORT, true);
+    attribute(1, buffers.phyxels[1], 1, gl.UNSIGNED_SHORT, true);
+    gl.drawArrays(gl.POINTS, 0, data.phyxels);
+  }
+}
+
+// --- charts --------------------------------------------------------------------------------------
+const charts = [];
+function addCharts() {
+  const column = name => data.log.columns.findIndex(c => c.split(' [')[0] === name);
+  const values = name => data.log.rows.map(row => row[column(name)]);
+  const moving = name => column(name) >= 0 && values(name).some(v => Math.abs(v) > 0);
+  const chart = (title, y, names, labels) => {
+    const present = names.filter(moving);
+    if (!present.length || data.log.rows.length < 2) return;
+    const made = plot({x: 'time [s]', y, seek: time => { pause(); show(nearest(time)); },
+                       series: present.map(name => ({label: labels(name), x: values('time'), y: values(name), dashed: name === 'total_energy'}))});
+    charts.push(made);
+    document.getElementById('charts').append(element('div', {}, element('h2', {}, title), made));
+  };
+  chart('Energy', 'energy [J]', ['kinetic_energy', 'strain_energy', 'volume_energy', 'hourglass_energy', 'gravity_energy', 'load_energy', 'total_energy'], n => n.replace('_energy', ''));
+  chart('Momentum', 'momentum [kg m/s]', ['momentum_x', 'momentum_y', 'momentum_z'], n => n.slice(-1));
+  chart('Angular momentum', 'angular momentum [kg m²/s]', ['angular_momentum_x', 'angular_momentum_y', 'angular_momentum_z'], n => n.slice(-1));
+  chart('Largest displacement', 'displacement [m]', ['largest_displacement'], () => 'largest displacement');
+}
+function nearest(time) {
+  let best = 0;
+  frames.forEach((t, k) => { if (Math.abs(t - time) < Math.abs(frames[best] - time)) best = k; });
+  return best;
+}
+
+// --- controls ------------------------------------------------------------------------------------
+const slider = document.getElementById('time'), playButton = document.getElementById('play'), speed = document.getElementById('speed');
+let playing = null;
+function show(k) {
+  shown.frame = Math.min(steps - 1, Math.max(0, k));
+  slider.value = shown.frame;
+  draw();
+}
+function pause() { if (playing) cancelAnimationFrame(playing.request); playing = null; playButton.textContent = '▶ Play'; }
+function play() {
+  if (steps < 2) return;
+  if (shown.frame === steps - 1) show(0);
+  playing = {since: performance.now(), from: frames[shown.frame]};
+  playButton.textContent = '❚❚ Pause';
+  const tick = now => {
+    const time = playing.from + (now - playing.since) / 1000 * Number(speed.value);
+    let k = shown.frame;
+    while (k + 1 < steps && frames[k + 1] <= time) ++k;
+    if (k !== shown.frame) show(k);
+    if (k === steps - 1) { pause(); return; }
+    playing.request = requestAnimationFrame(tick);
+  };
+  playing.request = requestAnimationFrame(tick);
+}
+function control() {
+  slider.max = steps - 1;
+  slider.addEventListener('input', () => { pause(); show(Number(slider.value)); });
+  playButton.addEventListener('click', () => playing ? pause() : play());
+  // As fast as lets the whole be seen in ten seconds, or as it was.
+  const length = frames[steps - 1] - frames[0], whole = length / 10;
+  for (const factor of [0.1, 0.25, 0.5, 1, 2, 5]) speed.append(element('option', {value: factor}, `${factor} × real time`));
+  if (length > 0) speed.append(element('option', {value: whole}, 'in 10 s'));
+  speed.value = length > 0 && (length < 1 || length > 30) ? whole : 1;
+  const field = document.getElementById('field');
+  field.append(element('option', {value: -1}, 'nothing'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
+  field.value = shown.field;
+  field.addEventListener('change', () => { shown.field = Number(field.value); draw(); });
+  const range = document.getElementById('range');
+  range.addEventListener('change', () => { shown.range = range.value; draw(); });
+  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels]]) {
+    const box = document.getElementById(name);
+    box.checked = shown[name]; box.disabled = !count;
+    box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
+  }
+  document.getElementById('reset').addEventListener('click', () => { startView(); draw(); });
+  const pointers = new Map();
+  canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, event => pointers.delete(event.pointerId));
+  canvas.addEventListener('pointermove', event => {
+    const before = pointers.get(event.pointerId);
+    if (!before) return;
+    const dx = event.clientX - before.clientX, dy = event.clientY - before.clientY, size = canvas.clientHeight;
+    if (pointers.size === 2) {
+      const other = [...pointers.values()].find(p => p.pointerId !== event.pointerId);
+      const apart = p => Math.hypot(p.clientX - other.clientX, p.clientY - other.clientY) || 1;
+      zoom(apart(before) / apart(event));
+    } else if (event.shiftKey || event.buttons & 6) {
+      view.shift[0] -= 2.2 * view.distance * dx / size; view.shift[1] += 2.2 * view.distance * dy / size;
+    } else {
+      view.yaw -= 3 * dx / size; view.pitch = Math.min(1.57, Math.max(-1.57, view.pitch + 3 * dy / size));
+    }
+    pointers.set(event.pointerId, event);
+    draw();
+  });
+  const zoom = by => { view.distance = Math.min(8, Math.max(0.05, view.distance * by)); };
+  canvas.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(event.deltaY / 700)); draw(); }, {passive: false});
+  document.addEventListener('keydown', event => {
+    if (['INPUT', 'SELECT', 'TEXTAREA'].includes(event.target.tagName) && event.target.type !== 'range') return;
+    if (event.key === ' ') { event.preventDefault(); playing ? pause() : play(); }
+    if (event.target.type === 'range') return;
+    if (event.key === 'ArrowRight') { pause(); show(shown.frame + 1); }
+    if (event.key === 'ArrowLeft') { pause(); show(shown.frame - 1); }
+    if (event.key === 'Home') { pause(); show(0); }
+    if (event.key === 'End') { pause(); show(steps - 1); }
+  });
+  new ResizeObserver(draw).observe(canvas);
+  const legend = stage.querySelector('.legend canvas'), pen = legend.getContext('2d');
+  for (let k = 0; k < legend.width; ++k) {
+    pen.fillStyle = `rgb(${rampColour(k / (legend.width - 1)).join()})`;
+    pen.fillRect(k, 0, 1, legend.height);
+  }
+}
+
+function addTiming() {
+  const longest = Math.max(...data.timing.map(([, seconds]) => seconds), 1e-9);
+  document.getElementById('timing').append(element('table', {}, ...data.timing.map(([name, seconds]) => element('tr', {},
+    element('td', {}, name), element('td', {class: 'number'}, `${short(seconds)} s`),
+    element('td', {style: 'width: 50%'}, element('div', {class: 'bar', style: `width: ${100 * seconds / longest}%`}))))));
+}
+
+/// For whoever tests the page: how much of the stage is drawn on, and what went wrong.
+function tell(state) {
+  document.body.dataset.state = state;
+  if (!gl) return;
+  const pixels = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  let drawn = 0;
+  for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
+  document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
+  document.body.dataset.error = gl.getError();
+}
+
+addCharts();
+if (data.timing.length) addTiming();
+else document.getElementById('timing-title').hidden = true;
+if (gl) prepare();
+else stage.append(element('p', {class: 'refusal'}, 'This browser has no WebGL 2, which the moving picture needs; the plots below do not.'));
+const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&play
+const colouring = data.fields.findIndex(f => f.name === asked.get('colours'));
+if (colouring >= 0) shown.field = colouring;
+startView();
+control();
+show(asked.has('t') ? nearest(Number(asked.get('t'))) : 0);
+tell(gl ? 'drawn' : 'no WebGL 2');
+if (asked.has('play')) play();

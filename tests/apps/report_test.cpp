@@ -1,0 +1,328 @@
+/// The pages of phyxel report: what is in them, and that a browser draws it.
+#include "report/report.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "phyxel/error.hpp"
+#include "phyxel/recorder.hpp"
+#include "report/page.hpp"
+#include "support/program.hpp"
+
+namespace phyxel {
+namespace {
+
+namespace fs = std::filesystem;
+using app::FramePlan;
+using nlohmann::json;
+using test::Outcome;
+using test::text_of;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string between(const std::string& text, const std::string& begin, const std::string& end) {
+  const std::size_t from = text.find(begin);
+  EXPECT_NE(from, std::string::npos) << begin;
+  if (from == std::string::npos) return "";
+  const std::size_t start = from + begin.size();
+  return text.substr(start, text.find(end, start) - start);
+}
+
+/// Of base64, by hand.
+std::string decoded(const std::string& text) {
+  const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned held = 0;
+  int bits = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    held = held << 6U | static_cast<unsigned>(letters.find(c));
+    bits += 6;
+    if (bits >= 8) bytes += static_cast<char>(held >> static_cast<unsigned>(bits -= 8) & 255U);
+  }
+  return bytes;
+}
+
+template <class T>
+std::vector<T> embedded(const std::string& page, const std::string& name) {
+  const std::string bytes = decoded(between(page, "id=\"" + name + "\">", "</script>"));
+  std::vector<T> values(bytes.size() / sizeof(T));
+  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
+  return values;
+}
+
+json data_of(const std::string& page) {
+  return json::parse(between(page, "<script type=\"application/json\" id=\"data\">", "</script>"));
+}
+
+TEST(Page, Base64IsThatOfRfc4648) {
+  const auto of = [](std::string_view text) {
+    return app::base64(std::as_bytes(std::span(text.data(), text.size())));
+  };
+  EXPECT_EQ(of(""), "");
+  EXPECT_EQ(of("f"), "Zg==");
+  EXPECT_EQ(of("fo"), "Zm8=");
+  EXPECT_EQ(of("foo"), "Zm9v");
+  EXPECT_EQ(of("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(of("\xff\xfe\xfd"), "//79");
+}
+
+TEST(Page, NothingOfAUserEndsItsElement) {
+  EXPECT_EQ(app::html_text("a < b & \"c\""), "a &lt; b &amp; &quot;c&quot;");
+  const std::string safe = app::script_json({{"title", "</script><!-- @data@"}});
+  EXPECT_THAT(safe, Not(HasSubstr("<")));
+  EXPECT_EQ(json::parse(safe)["title"], "</script><!-- @data@");
+  const std::string page = app::filled_page(
+      "results.html", {{"title", "@summary@"}, {"summary", "s"}, {"footer", ""}, {"data", "{}"}});
+  EXPECT_THAT(page, HasSubstr("<title>@summary@</title>"));  // filled in once
+  EXPECT_THROW(app::filled_page("results.html", {}), std::logic_error);
+}
+
+TEST(FramesThatFit, MotionComesBeforeDetail) {
+  const auto expect = [](const FramePlan& plan, std::size_t frames, std::size_t stride) {
+    EXPECT_EQ(plan.frames, frames);
+    EXPECT_EQ(plan.phyxel_stride, stride);
+  };
+  expect(app::plan_frames(500, 0, 100, 50000), 500, 1);
+  expect(app::plan_frames(500, 0, 100, 20000), 200, 1);
+  expect(app::plan_frames(500, 0, 100, 2000), 80, 4);  // 50 frames of every phyxel would not fit
+  expect(app::plan_frames(3, 0, 100, 300), 3, 1);
+  expect(app::plan_frames(500, 900, 100, 2000), 2, 4096);
+  EXPECT_THROW(app::plan_frames(500, 1001, 100, 2000), InputError);
+  EXPECT_EQ(app::plan_frames(1, 1000, 0, 1000).frames, 1u);
+}
+
+class Reports : public test::Program {
+ protected:
+  /// A beam that falls on its own weight, run into `out`.
+  void run_beam(const std::string& fields = "[\"displacement\", \"velocity\"]",
+                const std::string& frames_per_second = "50") const {
+    write("beam.toml", R"(title = "A </script> beam"
+gravity = [0, 0, -9.81]
+[time]
+end = 0.1
+[solver]
+device = "cpu"
+precision = "double"
+[output]
+directory = "out"
+frames_per_second = )" + frames_per_second +
+                           "\nfields = " + fields + R"(
+[[body]]
+shape = "beam"
+size = [1, 0.2, 0.2]
+spacing = 0.05
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body.fixed]]
+region = "x-"
+)");
+    const Outcome done = run({"run", "beam.toml"});
+    ASSERT_EQ(done.code, 0) << done.err;
+  }
+  std::string page_of(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words{"report", "out", "-o", "page.html", "--force"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome done = run(words);
+    EXPECT_EQ(done.code, 0) << done.err;
+    return text_of(folder_ / "page.html");
+  }
+  /// The attributes of a page's body, as a browser leaves it; "" if there is no browser.
+  std::string seen_by_browser(const fs::path& page) const {
+    if (std::system("command -v chromium >/dev/null") != 0) return "";
+    const std::string command =
+        "HOME=" + folder_.string() +
+        " timeout 60 chromium --headless=new --no-sandbox --use-angle=swiftshader "
+        "--enable-unsafe-swiftshader --window-size=1000,800 --virtual-time-budget=4000 --dump-dom "
+        "file://" +
+        page.string() + " >" + (folder_ / "dom.html").string() + " 2>/dev/null";
+    EXPECT_EQ(std::system(command.c_str()), 0);
+    return between(text_of(folder_ / "dom.html"), "<body", ">");
+  }
+};
+
+TEST_F(Reports, AReplayShowsWhatTheFramesHold) {
+  run_beam("[\"displacement\", \"velocity\", \"von_mises\"]");
+  const std::string page = page_of();
+  const json data = data_of(page);
+  const auto series = read_series(folder_ / "out" / "phyxels.hdf.series");
+  ASSERT_EQ(data["frames"].size(), series.size());
+  std::vector<std::string> names;
+  for (const auto& field : data["fields"]) names.push_back(field["name"]);
+  EXPECT_THAT(names, ElementsAre("displacement", "speed", "stress (von Mises)",
+                                 "strain (equivalent)", "volume ratio"));
+  const std::size_t n = data["phyxels"], m = data["surfels"];
+  const FrameData frame = read_frame(series.back().file, true);
+  const FrameData surface =
+      read_frame(read_series(folder_ / "out" / "surface.hdf.series").back().file);
+  ASSERT_EQ(frame.point.size(), n);
+  ASSERT_EQ(surface.point.size(), m);
+  const auto numbers = embedded<std::uint16_t>(page, "frame" + std::to_string(series.size() - 1));
+  ASSERT_EQ(numbers.size(), 3 * m + (3 + names.size()) * n);
+
+  // Distances are those of the frame by one factor, to half a step of 16 bits at either end.
+  const auto shown = [&](std::size_t i) {
+    const auto at = [&](std::size_t c) {
+      return numbers[3 * i + c] * data["scale"][c].get<double>() + data["low"][c].get<double>();
+    };
+    return Vec3d{at(0), at(1), at(2)};
+  };
+  const auto size = [](Vec3d v) { return std::sqrt(dot(v, v)); };
+  const double factor =
+      size(shown(m + n - 1) - shown(m)) / size(frame.point[n - 1] - frame.point[0]);
+  const double step = std::max({data["scale"][0].get<double>(), data["scale"][1].get<double>(),
+                                data["scale"][2].get<double>()});
+  for (std::size_t i = 0; i < n; ++i) {
+    EXPECT_NEAR(size(shown(m + i) - shown(m)), factor * size(frame.point[i] - frame.point[0]),
+                4 * step);
+  }
+  for (std::size_t s = 0; s < m; ++s) {
+    EXPECT_NEAR(size(shown(s) - shown(m)), factor * size(surface.point[s] - frame.point[0]),
+                4 * step);
+  }
+  const auto field = [&](std::size_t f, std::size_t i) {
+    const double low = data["fields"][f]["low"], high = data["fields"][f]["high"];
+    return low + numbers[3 * (m + n) + f * n + i] / 65535.0 * (high - low);
+  };
+  const double most = data["fields"][2]["high"];
+  const auto& stress = frame.field.at("von_mises");
+  for (std::size_t i = 0; i < n; ++i) EXPECT_NEAR(field(2, i), stress[i], most / 65535);
+
+  // Surfels have the weights of a mean.
+  const auto carriers = embedded<std::uint32_t>(page, "carriers");
+  const auto weights = embedded<std::uint8_t>(page, "weights");
+  ASSERT_EQ(carriers.size(), data["carriers"].get<std::size_t>() * m);
+  ASSERT_EQ(weights.size(), carriers.size());
+  for (std::size_t s = 0; s < m; ++s) {
+    int sum = 0;
+    for (std::size_t k = 0; k < weights.size() / m; ++k) {
+      sum += weights[s * (weights.size() / m) + k];
+      EXPECT_LT(carriers[s * (weights.size() / m) + k], n);
+    }
+    EXPECT_EQ(sum, 255);
+  }
+  EXPECT_EQ(embedded<Triangle>(page, "triangles"), surface.triangle);
+
+  EXPECT_THAT(page, HasSubstr("A &lt;/script&gt; beam"));
+  EXPECT_THAT(page, HasSubstr("shape = &quot;beam&quot;"));
+  EXPECT_EQ(data["log"]["rows"].size(), series.size());
+  EXPECT_GT(data["timing"].size(), 3u);
+  EXPECT_THAT(page, Not(HasSubstr("http://www.w3.org/1999")));
+  EXPECT_THAT(page, Not(HasSubstr("src=")));  // all of it is here
+  EXPECT_THAT(page, Not(HasSubstr("link rel")));
+}
+
+TEST_F(Reports, StressThatFramesLackIsFoundFromTheScene) {
+  run_beam("[\"displacement\", \"velocity\", \"von_mises\"]");
+  const json written = data_of(page_of());
+  fs::remove_all(folder_ / "out");
+  run_beam();
+  const json found = data_of(page_of());
+  // Frames have stress in float.
+  EXPECT_NEAR(found["fields"][3]["high"].get<double>(), written["fields"][2]["high"].get<double>(),
+              1e-5 * written["fields"][2]["high"].get<double>());
+  EXPECT_EQ(found["fields"][3]["name"], "stress (von Mises)");
+  EXPECT_EQ(data_of(page_of({"--no-stress"}))["fields"].size(), 2u);
+}
+
+TEST_F(Reports, WhatDoesNotFitIsLeftOutAndSaid) {
+  run_beam("[\"displacement\", \"velocity\"]", "1000");
+  const std::string whole = page_of();
+  EXPECT_EQ(data_of(whole)["frames"].size(), 101u);
+  EXPECT_GT(whole.size(), 1'000'000u);
+  const std::string page = page_of({"--max-megabytes", "1"});
+  EXPECT_LT(page.size(), 1'000'000u);
+  const json frames = data_of(page)["frames"];
+  EXPECT_GE(frames.size(), 50u);
+  EXPECT_EQ(frames.front(), data_of(whole)["frames"].front());
+  EXPECT_EQ(frames.back(), data_of(whole)["frames"].back());
+  EXPECT_THAT(page, HasSubstr("One phyxel in 4 is shown"));
+  const Outcome said =
+      run({"report", "out", "-o", "page.html", "--force", "--json", "--max-megabytes", "1"});
+  EXPECT_EQ(json::parse(said.out)["notes"].size(), 1u);
+  EXPECT_EQ(run({"report", "out", "-o", "other.html", "--max-megabytes", "0.5"}).code, 2);
+}
+
+TEST_F(Reports, AStoppedRunsSceneThatIsGoneIsNoObstacle) {
+  run_beam();
+  fs::remove(folder_ / "out" / "run.json");
+  const Outcome shown = run({"report", "out", "--json"});
+  ASSERT_EQ(shown.code, 0) << shown.err;
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "report.html"));
+  EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("No run.json"));
+  write("out/run.json", "{");
+  const Outcome broken = run({"report", "out", "--force"});
+  EXPECT_EQ(broken.code, 2);
+  EXPECT_THAT(broken.err, HasSubstr("run.json"));
+}
+
+TEST_F(Reports, OneFamilyAloneIsShown) {
+  run_beam();
+  ASSERT_EQ(run({"report", "out/surface.hdf.series", "-o", "surface.html"}).code, 0);
+  const json surface = data_of(text_of(folder_ / "surface.html"));
+  EXPECT_EQ(surface["phyxels"], 0);
+  EXPECT_EQ(surface["fields"].size(), 1u);
+  ASSERT_EQ(run({"report", "out/phyxels_000003.hdf"}).code, 0);
+  const json one = data_of(text_of(folder_ / "out" / "phyxels_000003.html"));
+  EXPECT_EQ(one["surfels"], 0);
+  EXPECT_EQ(one["frames"].size(), 1u);
+}
+
+TEST_F(Reports, MeasurementsBecomeTables) {
+  write("a.csv", "# program: phyxel\nn,error,seconds\n1,0.1,2\n2,inf,3\n");
+  write("b.csv", "way\n<b>\n");
+  const Outcome done = run({"report", "a.csv", "b.csv", "-o", "both.html", "--json"});
+  ASSERT_EQ(done.code, 0) << done.err;
+  EXPECT_EQ(json::parse(done.out)["tables"], 2);
+  const json data = data_of(text_of(folder_ / "both.html"));
+  EXPECT_EQ(data["tables"][0]["rows"][1][1], "inf");
+  EXPECT_EQ(data["tables"][1]["rows"][0][0], "<b>");
+  ASSERT_EQ(run({"report", folder_.string(), "-o", "folder.html"}).code, 0);  // all of it
+  EXPECT_EQ(data_of(text_of(folder_ / "folder.html"))["tables"].size(), 2u);
+}
+
+TEST_F(Reports, WrongRequestsAreRefused) {
+  run_beam();
+  write("a.csv", "n\n1\n");
+  write("kept.html", "mine");
+  const auto refused = [&](const std::vector<std::string>& words, const char* why) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+  };
+  refused({"report", "nowhere"}, "nowhere: no such file or folder");
+  refused({"report", "out", "a.csv"}, "one run, or any number of tables");
+  refused({"report", "out", "-o", "kept.html"}, "kept.html: exists and is kept");
+  refused({"report", "kept.html"}, "kept.html");
+  EXPECT_EQ(text_of(folder_ / "kept.html"), "mine");
+}
+
+TEST_F(Reports, ABrowserDrawsThem) {
+  run_beam();
+  page_of();
+  const std::string replay = seen_by_browser(folder_ / "page.html");
+  if (replay.empty()) GTEST_SKIP() << "no chromium";
+  EXPECT_THAT(replay, HasSubstr("data-state=\"drawn\""));
+  EXPECT_THAT(replay, HasSubstr("data-error=\"0\""));
+  // The beam, seen whole, covers some of the stage, not all of it.
+  const double drawn = std::stod(between(replay, "data-drawn=\"", "\""));
+  EXPECT_GT(drawn, 0.02);
+  EXPECT_LT(drawn, 0.7);
+  EXPECT_THAT(text_of(folder_ / "dom.html"), HasSubstr("kinetic"));
+  write("t.csv", "n,error,seconds\n1,0.1,2\n2,0.05,3\n3,0.2,4\n");
+  ASSERT_EQ(run({"report", "t.csv"}).code, 0);
+  const std::string results = seen_by_browser(folder_ / "t.html");
+  EXPECT_THAT(results, HasSubstr("data-state=\"drawn\""));
+  EXPECT_THAT(results, HasSubstr("data-circles=\"3\""));
+}
+
+}  // namespace
+}  // namespace phyxel
