@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Configures, builds and tests.
 #
-#   scripts/test.sh                   cpu, asan, fuzz, tsan and cuda (where nvcc is)
+#   scripts/test.sh                   cpu, tidy, asan, fuzz, tsan and cuda (where nvcc is)
 #   scripts/test.sh cpu asan          only these
 #
-# cpu runs every test; asan every one again under the sanitizers, with clang, of whose build fuzz
+# cpu runs every test; tidy looks at the sources by clang-format and clang-tidy, as cpu compiles them; asan every one again under the sanitizers, with clang, of whose build fuzz
 # takes the fuzzers; tsan those that have threads; cuda those that CUDA changes.
 # Every stage runs even if an earlier one failed; a summary comes last, and exit code 1 if any failed.
 # FUZZ_SECONDS (30) is the time for each fuzzer.
@@ -13,11 +13,11 @@ cd "$(dirname "$0")/.." || exit 1
 
 stages=("$@")
 if [[ ${#stages[@]} -eq 0 ]]; then
-  stages=(cpu asan fuzz tsan cuda)
+  stages=(cpu tidy asan fuzz tsan cuda)
 fi
 for stage in "${stages[@]}"; do
-  case $stage in cpu | asan | tsan | cuda | fuzz) ;; *)
-    echo "scripts/test.sh: unknown stage \"$stage\" (cpu, asan, tsan, cuda or fuzz)" >&2
+  case $stage in cpu | tidy | asan | tsan | cuda | fuzz) ;; *)
+    echo "scripts/test.sh: unknown stage \"$stage\" (cpu, tidy, asan, tsan, cuda or fuzz)" >&2
     exit 2 ;;
   esac
 done
@@ -84,6 +84,11 @@ fuzzed() {
   return $failed
 }
 
+looked_at() {
+  command -v clang-tidy >/dev/null && command -v clang-format >/dev/null || return 77
+  cmake --preset cpu "${generator[@]}" -DPHYXEL_TESTS=ON >/dev/null && scripts/format.sh --check && scripts/tidy.sh
+}
+
 have_nvcc() {
   command -v nvcc >/dev/null || [[ -n ${CUDACXX-} || -x /usr/local/cuda/bin/nvcc ]]
 }
@@ -96,6 +101,7 @@ for stage in "${stages[@]}"; do
   start=$SECONDS
   case $stage in
     cpu) (tested cpu) ;;
+    tidy) (looked_at) ;;
     asan) if have_clang; then (tested asan); else (exit 77); fi ;;
     fuzz) if have_clang; then (fuzzed); else (exit 77); fi ;;
     tsan) if have_clang; then (tested_with_tsan); else (exit 77); fi ;;

@@ -463,7 +463,7 @@ class Run {
   }
 
   static std::shared_ptr<Moment> moment_of(const std::shared_ptr<const GoodState>& good) {
-    const auto moment = std::make_shared<Moment>();
+    auto moment = std::make_shared<Moment>();
     moment->state = std::shared_ptr<const State>(good, &good->state);
     moment->frame.state = &good->state;
     moment->frame.diagnostics = good->diagnostics;

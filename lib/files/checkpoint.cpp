@@ -91,7 +91,7 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   write_later(out, {"/state/displacement", as_float, phyxels, {Quantity::displacement}}, values);
   write_later(out, {"/state/velocity", as_float, phyxels, {Quantity::velocity}}, values);
 
-  const fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
+  fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);
   // Only now may others go: those beyond the last two, and those of a future that this run left
   // behind when it went back to an earlier checkpoint.

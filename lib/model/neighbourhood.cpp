@@ -198,7 +198,7 @@ std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position
 
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached) {
-  const Csr reaching = phyxels_reaching(point, position, support);
+  Csr reaching = phyxels_reaching(point, position, support);
   std::vector<Index> nearest(point.size(), -1);
   Index lost = 0;
   if (!position.empty()) {
