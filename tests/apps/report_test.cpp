@@ -93,7 +93,9 @@ TEST(FramesThatFit, MotionComesBeforeDetail) {
   expect(app::plan_frames(500, 0, 100, 20000), 200, 1);
   expect(app::plan_frames(500, 0, 100, 2000), 80, 4);  // 50 frames of every phyxel would not fit
   expect(app::plan_frames(3, 0, 100, 300), 3, 1);
-  expect(app::plan_frames(500, 900, 100, 2000), 2, 4096);
+  expect(app::plan_frames(500, 900, 100, 1900), 2, 4);  // 950 of each frame but for the stride
+  expect(app::plan_frames(500, 900, 100, 2000), 2, 1);
+  expect(app::plan_frames(500, 0, 1e6, 2000), 8, 4096);
   EXPECT_THROW(app::plan_frames(500, 1001, 100, 2000), InputError);
   EXPECT_EQ(app::plan_frames(1, 1000, 0, 1000).frames, 1u);
 }

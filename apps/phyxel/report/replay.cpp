@@ -110,7 +110,7 @@ class Rebuilt {
 
 /// For each surfel the phyxels that colour it, and by how many 255ths, shape [surfels, carriers].
 struct Carriers {
-  static constexpr std::size_t each = 6;
+  static constexpr std::size_t each = 4;
   std::vector<std::uint32_t> phyxel;
   std::vector<std::uint8_t> weight;
 };
@@ -617,12 +617,18 @@ FramePlan plan_frames(std::size_t frames, double surface_bytes, double phyxel_by
   struct Compromise {
     std::size_t stride, least_frames;
   };
+  const auto fit = [&](std::size_t stride) {
+    const double of_frame = surface_bytes + phyxel_bytes / static_cast<double>(stride);
+    return std::min(static_cast<double>(frames),
+                    std::floor(std::max(0.0, bytes) / std::max(1.0, of_frame)));
+  };
   // Motion before detail, until it is no motion any more.
   for (const Compromise c : {Compromise{1, 50}, {4, 50}, {16, 50}, {16, 10}, {64, 10}, {4096, 2}}) {
-    const double of_frame = surface_bytes + phyxel_bytes / static_cast<double>(c.stride);
-    const double fit = std::floor(std::max(0.0, bytes) / std::max(1.0, of_frame));
-    if (fit < static_cast<double>(std::min(frames, c.least_frames))) continue;
-    return {static_cast<std::size_t>(std::min(fit, static_cast<double>(frames))), c.stride};
+    const double shown = fit(c.stride);
+    if (shown < static_cast<double>(std::min(frames, c.least_frames))) continue;
+    std::size_t stride = 1;  // none is left out for nothing
+    while (fit(stride) < 0.9 * shown) stride *= 4;
+    return {static_cast<std::size_t>(fit(stride)), stride};
   }
   throw InputError(
       fmt::format("--max-megabytes: {:.3g} MB are left for frames, of whose surface two take "
