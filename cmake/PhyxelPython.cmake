@@ -1,7 +1,11 @@
 # PHYXEL_HAVE_PYTHON: whether the Python module is built. AUTO: if an interpreter with its headers,
 # NumPy and pybind11 are there, and no sanitizers are wanted, which an interpreter would have to be
 # built with, too.
-set(PHYXEL_PYTHON AUTO CACHE STRING "The Python module: AUTO, ON or OFF")
+set(default_of_python OFF)
+if(PROJECT_IS_TOP_LEVEL)
+  set(default_of_python AUTO)
+endif()
+set(PHYXEL_PYTHON ${default_of_python} CACHE STRING "The Python module: AUTO, ON or OFF")
 set(PHYXEL_HAVE_PYTHON OFF)
 if(PHYXEL_PYTHON STREQUAL "OFF" OR PHYXEL_SANITIZE)
   return()

@@ -56,6 +56,7 @@ class Phyxel(CMakePackage, CudaPackage):
             self.define_from_variant("PHYXEL_PARALLEL_HDF5", "parallel_hdf5"),
             self.define_from_variant("BUILD_SHARED_LIBS", "shared"),
             self.define("PHYXEL_TESTS", False),
+            self.define("PHYXEL_PYTHON", "OFF"),  # pip's
             self.define("PHYXEL_MARCH", ""),  # Spack's compiler wrapper adds the target's
         ]
         if self.spec.satisfies("+cuda"):
