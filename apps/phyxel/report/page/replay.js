@@ -302,8 +302,8 @@ function play() {
   if (shown.frame === steps - 1) show(0);
   playing = {since: performance.now(), from: frames[shown.frame]};
   playButton.textContent = '❚❚ Pause';
-  const tick = now => {
-    const time = playing.from + (now - playing.since) / 1000 * Number(speed.value);
+  const tick = () => {
+    const time = playing.from + (performance.now() - playing.since) / 1000 * Number(speed.value);
     let k = shown.frame;
     while (k + 1 < steps && frames[k + 1] <= time) ++k;
     if (k !== shown.frame) show(k);
