@@ -1,5 +1,5 @@
 # PHYXEL_HAVE_PYTHON: whether the Python module is built. AUTO: if an interpreter with its headers,
-# NumPy and pybind11 are there, and no sanitizers are wanted, which an interpreter would have to be
+# NumPy, pytest and pybind11 are there, and no sanitizers are wanted, which an interpreter would have to be
 # built with, too.
 set(default_of_python OFF)
 if(PROJECT_IS_TOP_LEVEL)
@@ -7,7 +7,7 @@ if(PROJECT_IS_TOP_LEVEL)
 endif()
 set(PHYXEL_PYTHON ${default_of_python} CACHE STRING "The Python module: AUTO, ON or OFF")
 set(PHYXEL_HAVE_PYTHON OFF)
-if(PHYXEL_PYTHON STREQUAL "OFF" OR PHYXEL_SANITIZE)
+if(PHYXEL_SANITIZE OR NOT (PHYXEL_PYTHON STREQUAL "AUTO" OR PHYXEL_PYTHON))
   return()
 endif()
 
@@ -23,6 +23,9 @@ if(NOT DEFINED Python_EXECUTABLE)
       break()
     endif()
   endforeach()
+  if(NOT Python_EXECUTABLE AND PHYXEL_PYTHON STREQUAL "AUTO")
+    return()
+  endif()
 endif()
 find_package(Python COMPONENTS Interpreter Development.Module)
 set(PYBIND11_FINDPYTHON ON)
@@ -32,7 +35,7 @@ endif()
 if(Python_FOUND AND pybind11_FOUND)
   set(PHYXEL_HAVE_PYTHON ON)
   set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # of the libraries that go into the module
-elseif(PHYXEL_PYTHON STREQUAL "ON")
+elseif(NOT PHYXEL_PYTHON STREQUAL "AUTO")
   message(FATAL_ERROR "PHYXEL_PYTHON=ON, but Python's headers or pybind11 were not found. On Debian: "
                       "apt-get install python3-dev pybind11-dev python3-numpy")
 endif()

@@ -269,9 +269,12 @@ class Run {
     ranks().together([&] {
       if (!leads()) return;
       const nlohmann::ordered_json summary = summary_of(now, bytes, traffic);
-      recorder_->write_summary(summary.dump(2) + "\n");
+      // Names of files need not be UTF-8.
+      const std::string text =
+          summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+      recorder_->write_summary(text);
       if (options_.json) {
-        fmt::print("{}\n", summary.dump(2));
+        fmt::print("{}", text);
       } else {
         say_summary(now, bytes, traffic);
       }

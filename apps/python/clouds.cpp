@@ -11,11 +11,14 @@ namespace {
 
 std::vector<Triangle> triangles_from(const py::handle& object, std::size_t corners) {
   using Array = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
-  const auto array = Array::ensure(object);
-  if (!array || array.ndim() != 2 || array.shape(1) != 3) {
+  const auto any = py::array::ensure(object);
+  const char kind = any ? any.dtype().kind() : ' ';
+  const bool whole = any && (any.size() == 0 || kind == 'i' || kind == 'u');
+  const auto array = whole ? Array::ensure(object) : Array();
+  if (!whole || array.ndim() != 2 || array.shape(1) != 3) {
     PyErr_Clear();
     throw InputError(fmt::format("triangles: {} found; allowed: shape (n, 3), integers",
-                                 array ? "shape " + shape_words(array) : "no array"));
+                                 whole ? "shape " + shape_words(array) : "no array of integers"));
   }
   std::vector<Triangle> triangles(static_cast<std::size_t>(array.shape(0)));
   for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -37,6 +40,16 @@ Surface surface_from(const py::handle& points, const py::handle& triangles) {
   surface.triangle = triangles_from(triangles, surface.position.size());
   surface.normal = vertex_normals(surface.position, surface.triangle);
   return surface;
+}
+
+/// (points, triangles).
+Surface surface_from(const py::handle& pair, const char* what) {
+  if (!py::isinstance<py::sequence>(pair) || py::len(pair) != 2) {
+    throw InputError(fmt::format("{}: {} found; allowed: a pair, points and triangles", what,
+                                 py::repr(pair).cast<std::string>()));
+  }
+  const auto two = py::reinterpret_borrow<py::sequence>(pair);
+  return surface_from(py::object(two[0]), py::object(two[1]));
 }
 
 Cloud cloud_from(const py::object& position, const py::object& volume, const py::object& surface,
@@ -61,8 +74,7 @@ Cloud cloud_from(const py::object& position, const py::object& volume, const py:
     }
   }
   if (!surface.is_none()) {
-    const auto pair = surface.cast<std::pair<py::object, py::object>>();
-    cloud.surface = surface_from(pair.first, pair.second);
+    cloud.surface = surface_from(surface, "surface");
   }
   for (const auto& [name, phyxels] : regions) {
     std::vector<Index> sorted = phyxels;
@@ -108,11 +120,10 @@ Cloud make(const std::string& name, Vec3d size, double radius, double length, do
 
 /// A mesh file, or (points, triangles).
 Surface surface_of(const py::object& mesh) {
-  if (py::isinstance<py::tuple>(mesh)) {
-    const auto pair = mesh.cast<std::pair<py::object, py::object>>();
-    return surface_from(pair.first, pair.second);
+  if (py::isinstance<py::str>(mesh) || py::hasattr(mesh, "__fspath__")) {
+    return read_mesh(mesh.cast<std::filesystem::path>());
   }
-  return read_mesh(mesh.cast<std::filesystem::path>());
+  return surface_from(mesh, "mesh");
 }
 
 Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int relaxations,

@@ -1,6 +1,7 @@
 /// A scene that steps, under Python's control.
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 #include <optional>
 
 #include "arrays.hpp"
@@ -98,6 +99,7 @@ class Simulation {
 
   void step(std::int64_t count) {
     if (count < 0) throw InputError(fmt::format("steps: {} found; allowed: >= 0", count));
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     take(count);
   }
@@ -105,53 +107,51 @@ class Simulation {
   /// To the end of the scene, or until then.
   void run(std::optional<double> until) {
     if (until) check_positive("until", *until);
-    const std::int64_t last =
-        until ? static_cast<std::int64_t>(std::ceil(*until / plan_.dt - 1e-9)) : plan_.steps;
+    const double wanted = until ? std::ceil(*until / plan_.dt - 1e-9) : 0;
+    if (wanted > 1e15) {
+      throw InputError(fmt::format("until: {} found, which is {:.3g} steps; allowed: at most 1e15",
+                                   *until, wanted));
+    }
+    const std::int64_t last = until ? static_cast<std::int64_t>(wanted) : plan_.steps;
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     while (solver_->steps() < last) {
       const std::int64_t frame =
           (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
       take(std::min(last, frame) - solver_->steps());
-      if (recorder_ && (solver_->steps() == last || solver_->steps() == frame)) write_frame();
+      if (recorder_ && (solver_->steps() == last || solver_->steps() == frame)) write_one();
     }
     look();
   }
 
   void record(const std::filesystem::path& directory, bool force) {
+    const auto turn = my_turn();
     scene_.output.directory = directory;
     const py::gil_scoped_release others;
     recorder_ = std::make_unique<Recorder>(model_, scene_, force);
-    write_frame();
+    // As phyxel run: without a rate only the end is wanted.
+    if (scene_.output.frames_per_second > 0) write_one();
   }
 
   void write_frame() {
-    if (!recorder_) throw InputError("write_frame: nothing is recorded yet; needed first: record");
-    const State state = solver_->state();
-    Frame frame;
-    frame.state = &state;
-    frame.diagnostics = look();
-    SurfelState surfels;
-    if (scene_.output.surface && !model_.surfels.position.empty()) {
-      backend_->advect_surfels(surfels);
-      frame.surfels = &surfels;
-    }
-    const auto wants = [&](const char* field) {
-      const auto& fields = scene_.output.fields;
-      return std::find(fields.begin(), fields.end(), field) != fields.end();
-    };
-    stress_fields(model_, *backend_, wants("von_mises") ? &frame.von_mises : nullptr,
-                  wants("volume_ratio") ? &frame.volume_ratio : nullptr);
-    recorder_->write(frame);
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    write_one();
   }
 
   Diagnostics energies() {
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     return diagnose(model_, *backend_, solver_->now());
   }
 
-  State state() const { return solver_->state(); }
+  State state() const {
+    const auto turn = my_turn();
+    return solver_->state();
+  }
 
   void set_state(const py::object& displacement, const py::object& velocity) {
+    const auto turn = my_turn();
     State state = solver_->state();
     const auto n = static_cast<py::ssize_t>(model_.size());
     if (!displacement.is_none()) {
@@ -163,6 +163,7 @@ class Simulation {
   }
 
   void set_external_forces(const py::object& forces) {
+    const auto turn = my_turn();
     const auto n = static_cast<py::ssize_t>(model_.size());
     backend_->set_external_forces(forces.is_none() ? std::vector<Vec3d>{}
                                                    : vectors_from(forces, "external_forces", n));
@@ -170,24 +171,28 @@ class Simulation {
   }
 
   std::vector<Vec3d> internal_forces() {
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     std::vector<Vec3d> force;
     backend_->internal_forces(force);
     return force;
   }
   std::vector<Mat3d> gradients() {
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     std::vector<Mat3d> gradient;
     backend_->displacement_gradients(gradient);
     return gradient;
   }
   std::pair<std::vector<double>, std::vector<double>> stresses() {
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     std::pair<std::vector<double>, std::vector<double>> fields;
     stress_fields(model_, *backend_, &fields.first, &fields.second);
     return fields;
   }
   SurfelState surfels() {
+    const auto turn = my_turn();
     const py::gil_scoped_release others;
     SurfelState surfels;
     if (!model_.surfels.position.empty()) backend_->advect_surfels(surfels);
@@ -224,6 +229,35 @@ class Simulation {
 
  private:
   static constexpr std::int64_t watch_interval = 250;
+
+  /// Stepping leaves Python's lock to other threads, which then must leave this alone.
+  std::unique_lock<std::mutex> my_turn() const {
+    std::unique_lock lock(*busy_, std::try_to_lock);
+    if (!lock) {
+      throw InputError("this simulation is at work in another thread; allowed: one at a time");
+    }
+    return lock;
+  }
+
+  void write_one() {
+    if (!recorder_) throw InputError("write_frame: nothing is recorded yet; needed first: record");
+    const State state = solver_->state();
+    Frame frame;
+    frame.state = &state;
+    frame.diagnostics = look();
+    SurfelState surfels;
+    if (scene_.output.surface && !model_.surfels.position.empty()) {
+      backend_->advect_surfels(surfels);
+      frame.surfels = &surfels;
+    }
+    const auto wants = [&](const char* field) {
+      const auto& fields = scene_.output.fields;
+      return std::find(fields.begin(), fields.end(), field) != fields.end();
+    };
+    stress_fields(model_, *backend_, wants("von_mises") ? &frame.von_mises : nullptr,
+                  wants("volume_ratio") ? &frame.volume_ratio : nullptr);
+    recorder_->write(frame);
+  }
 
   void start(const State& state) {
     solver_ = std::make_unique<Solver>(model_, *backend_, state, scene_.solver.method);
@@ -269,6 +303,7 @@ class Simulation {
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::int64_t looked_ = 0;
+  std::unique_ptr<std::mutex> busy_ = std::make_unique<std::mutex>();
 };
 
 py::dict energies_of(const Diagnostics& now) {

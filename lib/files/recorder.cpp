@@ -236,6 +236,8 @@ void Recorder::continue_after(std::int64_t frames) {
     series.create(file, entries);
   };
   const std::string log = first_lines(directory_ / log_name, frames + 1);
+  std::error_code ignored;
+  fs::remove(directory_ / summary_name, ignored);  // of what is no longer the end
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
   write_whole_file(directory_ / log_name, log, Durable::no);

@@ -22,10 +22,18 @@ void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
                               ? std::min(1 / scene.output.frames_per_second, scene.time.end)
                               : scene.time.end;
   // The 1e-9 keeps a step that divides the interval from being split for a rounding error.
-  plan.steps_per_frame =
-      std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(interval / wanted - 1e-9)));
+  const auto whole = [&](double count) {
+    if (!(count < 1e15)) {
+      throw InputError(
+          fmt::format("time.end = {:g} s in steps of {:g} s: {:.3g} steps; allowed: "
+                      "below 1e15",
+                      scene.time.end, wanted, scene.time.end / wanted));
+    }
+    return static_cast<std::int64_t>(std::ceil(count - 1e-9));
+  };
+  plan.steps_per_frame = std::max<std::int64_t>(1, whole(interval / wanted));
   plan.dt = interval / static_cast<double>(plan.steps_per_frame);
-  plan.steps = static_cast<std::int64_t>(std::ceil(scene.time.end / plan.dt - 1e-9));
+  plan.steps = whole(scene.time.end / plan.dt);
 }
 
 StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& backend,

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -260,10 +261,41 @@ TEST_F(Reports, AStoppedRunsSceneThatIsGoneIsNoObstacle) {
   ASSERT_EQ(shown.code, 0) << shown.err;
   EXPECT_TRUE(fs::exists(folder_ / "out" / "report.html"));
   EXPECT_THAT(text_of(folder_ / "out" / "report.html"), HasSubstr("No run.json"));
-  write("out/run.json", "{");
-  const Outcome broken = run({"report", "out", "--force"});
-  EXPECT_EQ(broken.code, 2);
-  EXPECT_THAT(broken.err, HasSubstr("run.json"));
+  for (const char* wrong : {"{", "[1]", "{\"phyxel_steps_per_second\": \"fast\"}"}) {
+    write("out/run.json", wrong);
+    const Outcome broken = run({"report", "out", "--force"});
+    EXPECT_EQ(broken.code, 2);
+    EXPECT_THAT(broken.err, HasSubstr("run.json"));
+  }
+  write("out/run.json", "{\"phyxel_steps_per_second\": null}");
+  EXPECT_EQ(run({"report", "out", "--force"}).code, 0);
+}
+
+TEST_F(Reports, DisplacementIsFromRestOrSaysFromWhere) {
+  run_beam("[\"mass\"]");
+  const json whole = data_of(page_of());
+  ASSERT_EQ(run({"report", "out/phyxels_000005.hdf", "-o", "last.html"}).code, 0);
+  const json last = data_of(text_of(folder_ / "last.html"));
+  EXPECT_EQ(last["fields"][0]["name"], "displacement");
+  EXPECT_GT(last["fields"][0]["high"].get<double>(), 0.01);
+  EXPECT_LE(last["fields"][0]["high"].get<double>(), whole["fields"][0]["high"].get<double>());
+  ASSERT_EQ(run({"report", "out/surface_000005.hdf", "-o", "surface.html"}).code, 0);
+  EXPECT_EQ(data_of(text_of(folder_ / "surface.html"))["fields"][0]["name"],
+            "displacement since t = 0.1 s");
+}
+
+TEST_F(Reports, ARunsSummaryIsOfItsEnd) {
+  run_beam();
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "run.json"));
+  const Outcome odd = run({"run", "beam.toml", "--out", "\xe9", "--json"});  // no UTF-8
+  EXPECT_EQ(odd.code, 0) << odd.err;
+  EXPECT_TRUE(json::accept(odd.out));
+  // Killed on its way: what the folder had at the last end is not of this one.
+  const pid_t child = start({"run", "beam.toml", "--until", "5000", "--resume", "auto"});
+  for (int wait = 0; wait < 4000 && fs::exists(folder_ / "out" / "run.json"); ++wait) usleep(5000);
+  kill(child, SIGKILL);
+  finish(child);
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "run.json"));
 }
 
 TEST_F(Reports, OneFamilyAloneIsShown) {

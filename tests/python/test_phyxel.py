@@ -38,7 +38,9 @@ def test_a_mesh_of_numpy_is_filled_with_exactly_so_many():
     assert len(cloud) == 300
     assert cloud.volume.sum() == pytest.approx(8, rel=1e-9)  # shares of the enclosed volume
     assert cloud.position.min() >= 0 and cloud.position.max() <= 2
-    again = phyxel.sample(cube(2.0), phyxels=300, seed=3)
+    with pytest.raises(phyxel.InputError, match="mesh: None found"):
+        phyxel.sample(None, phyxels=5)
+    again = phyxel.sample(list(cube(2.0)), phyxels=300, seed=3)
     assert np.array_equal(cloud.position, again.position)
     assert phyxel.inspect(cube()) == phyxel.inspect(cube(3))
 
@@ -71,6 +73,8 @@ def test_meshes_are_read(tmp_path):
     (dict(position=[[0, 0, 0]], volume=[-1]), "volume: -1"),
     (dict(position=[[0, 0, 0]], regions={"end": [1]}), "end"),
     (dict(position=[[0, 0, 0]], surface=([[0, 0, 0]], [[0, 0, 1]])), "triangles: 1 found in row 0"),
+    (dict(position=[[0, 0, 0]], surface=([[0, 0, 0]], [[0.5, 0, 0]])), "no array of integers"),
+    (dict(position=[[0, 0, 0]], surface=5), "surface: 5 found"),
 ])
 def test_wrong_clouds_are_refused(arguments, words):
     with pytest.raises(phyxel.InputError, match=words):
@@ -228,6 +232,28 @@ def test_other_threads_run_while_it_steps():
     assert after > before
 
 
+def test_one_thread_at_a_time():
+    s = simulation()
+    refused = []
+
+    def meddle():
+        while not refused:
+            try:
+                s.set_state(displacement=np.zeros_like(s.rest))
+            except phyxel.InputError as error:
+                refused.append(str(error))
+    thread = threading.Thread(target=meddle)
+    thread.start()
+    while not refused:
+        try:
+            s.step(200)
+        except phyxel.InputError as error:  # the other was faster
+            refused.append(str(error))
+    thread.join()
+    assert "another thread" in refused[0]
+    s.step(10)
+
+
 def test_ctrl_c_stops_a_long_run():
     s = simulation()
     signal.setitimer(signal.ITIMER_REAL, 0.3)
@@ -260,6 +286,8 @@ def test_a_run_that_diverges_says_so():
     (dict(step=-1.0), "step: -1"),
     (dict(step=1.0), "unstable"),
     (dict(end=float("nan")), "end: nan"),
+    (dict(end=1e300), "steps; allowed: below 1e15"),
+    (dict(step=1e-300), "steps; allowed: below 1e15"),
     (dict(clouds={}), "body.cloud.*no clouds"),
     (dict(clouds={"bean": BEAM}), "did you mean \"bean\""),
 ])
@@ -283,6 +311,15 @@ def test_scenes_are_files_texts_and_dicts(tmp_path):
         phyxel.Simulation({**as_dict, "body": [{**as_dict["body"][0], "radios": 1}]})
     with pytest.raises(phyxel.InputError, match="no_such.toml"):
         phyxel.Simulation(tmp_path / "no_such.toml")
+    sweep = tmp_path / "young=1e7"
+    sweep.mkdir()
+    (sweep / "scene.toml").write_text(text)
+    assert len(phyxel.Simulation(str(sweep / "scene.toml"))) == len(made[0])
+    odd = phyxel.to_toml({"title": "\U0001f600\x7f\t", "gravity": np.zeros(3), "x": np.array(1.5)})
+    assert odd == '"title" = "\U0001f600\\u007f\\t"\n"gravity" = [0.0, 0.0, 0.0]\n"x" = 1.5\n'
+    phyxel.Simulation({**as_dict, "title": "\U0001f600"})
+    with pytest.raises(phyxel.InputError, match="steps; allowed: at most"):
+        made[0].run(1e300)
     with pytest.raises(phyxel.InputError, match="found; allowed: text"):
         phyxel.to_toml({"title": object()})
 

@@ -86,7 +86,7 @@ void report_command(const ReportOptions& options) {
                    {"colours", report.fields},
                    {"notes", report.notes}});
     }
-    fmt::print("{}\n", said.dump(2));
+    fmt::print("{}\n", said.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
     return;
   }
   const std::string holds =

@@ -100,7 +100,7 @@ class Rebuilt {
     if (!has("volume ratio")) fields.push_back({"volume ratio", "", std::move(volume_ratio)});
   }
 
-  const Scene& scene() const { return scene_; }
+  const std::vector<Vec3d>& rest() const { return model_.position; }
 
  private:
   Scene scene_;
@@ -296,6 +296,9 @@ class Replay {
     } catch (const Json::exception& error) {
       throw InputError(fmt::format("{}: is no JSON: {}", file.string(), error.what()));
     }
+    if (!summary_.is_object()) {
+      throw InputError(fmt::format("{}: is no summary of a run", file.string()));
+    }
   }
 
   void rebuild() {
@@ -380,8 +383,14 @@ class Replay {
     if (const auto* u = written("displacement")) {
       displacement.values = lengths(*u);
     } else {
+      // From the state at rest, if anyone knows it.
+      const bool known = phyxels && rebuilt_;
+      if (!known && first.time != 0) {
+        displacement.name += fmt::format(" since t = {:g} s", first.time);
+      }
+      const std::vector<Vec3d>& rest = known ? rebuilt_->rest() : first.point;
       for (std::size_t i = 0; i < frame.point.size(); ++i) {
-        displacement.values.push_back(length(frame.point[i] - first.point[i]));
+        displacement.values.push_back(length(frame.point[i] - rest[i]));
       }
     }
     fields.push_back(std::move(displacement));
@@ -567,7 +576,9 @@ class Replay {
   Facts facts() const {
     Facts facts;
     const auto add = [&](const char* name, const char* key, auto&& words) {
-      if (summary_.contains(key)) facts.emplace_back(name, words(summary_[key]));
+      if (summary_.contains(key) && !summary_[key].is_null()) {
+        facts.emplace_back(name, words(summary_[key]));
+      }
     };
     const auto text = [](const Json& value) {
       return value.is_string() ? value.get<std::string>() : value.dump();
@@ -583,7 +594,9 @@ class Replay {
     add("neighbours of a phyxel", "neighbours_per_phyxel", number(""));
     add("steps", "steps", text);
     add("time step", "time_step_s", number(" s"));
-    add("largest stable step", "largest_stable_step_s", number(" s"));
+    if (summary_.value("method", "") == method_name(Method::verlet)) {
+      add("largest stable step", "largest_stable_step_s", number(" s"));
+    }
     add("speed", "phyxel_steps_per_second", number(" phyxel-steps/s"));
     add("memory", "bytes",
         [](const Json& value) { return fmt::format("{:.4g} MB", value.get<double>() / 1e6); });
@@ -594,7 +607,8 @@ class Replay {
     add("their torques to", "internal_torque_balance", number(" of theirs"));
     if (summary_.empty()) {
       facts.emplace_back("program", any().program);
-      facts.emplace_back("", "No run.json: the run was stopped, or is under way.");
+      facts.emplace_back("",
+                         "No run.json: the run was stopped, is under way, or was not phyxel run.");
     }
     return facts;
   }
@@ -637,6 +651,13 @@ FramePlan plan_frames(std::size_t frames, double surface_bytes, double phyxel_by
                   std::max(0.0, bytes) / 1e6, 2 * surface_bytes / 1e6));
 }
 
-Report replay_page(const ReplayRequest& request) { return Replay(request).report(); }
+Report replay_page(const ReplayRequest& request) {
+  try {
+    return Replay(request).report();
+  } catch (const Json::exception& error) {  // numbers where words should be, or the like
+    throw InputError(fmt::format("{}: run.json is no summary of a run: {}", request.input.string(),
+                                 error.what()));
+  }
+}
 
 }  // namespace phyxel::app

@@ -33,18 +33,25 @@ __all__ = ["Cloud", "DeviceError", "DivergedError", "Error", "Frame", "InputErro
            "read_mesh", "sample", "shape", "to_toml", "version"]
 
 
+def _text(text):
+    """In quotes: TOML's escapes are JSON's, but for pairs of surrogates and the last of ASCII."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def _value(value):
     """As TOML writes it on one line."""
-    if isinstance(value, numpy.generic):
-        value = value.item()
+    if isinstance(value, (numpy.generic, numpy.ndarray)):
+        value = value.tolist()
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, (list, tuple, numpy.ndarray)):
+        return "{" + ", ".join(f"{_text(k)} = {_value(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_value(v) for v in value) + "]"
-    if isinstance(value, (bool, str)):
+    if isinstance(value, bool):
         return json.dumps(value)
+    if isinstance(value, str):
+        return _text(value)
     if isinstance(value, os.PathLike):
-        return json.dumps(os.fspath(value))
+        return _text(os.fspath(value))
     if isinstance(value, (int, float)):
         return repr(value)
     raise InputError(f"scene: {value!r} found; allowed: text, numbers, booleans, lists and dicts")
@@ -52,7 +59,7 @@ def _value(value):
 
 def to_toml(scene):
     """The text of a scene given as a dict: what `phyxel run` reads."""
-    return "".join(f"{json.dumps(key)} = {_value(value)}\n" for key, value in scene.items())
+    return "".join(f"{_text(key)} = {_value(value)}\n" for key, value in scene.items())
 
 
 class Simulation(SimulationBase):
@@ -69,12 +76,14 @@ class Simulation(SimulationBase):
         file, text = None, ""
         if isinstance(scene, dict):
             text = to_toml(scene)
-        elif isinstance(scene, str) and ("\n" in scene or "=" in scene):
+        elif isinstance(scene, str) and ("\n" in scene or "=" in scene and not scene.endswith(".toml")
+                                         and not os.path.exists(scene)):
             text = scene
         else:
             file = os.fspath(scene)
         super().__init__(file, text, dict(clouds or {}), device, precision, method, threads, step,
                          end, unsafe_step)
+        self._made = True
 
     @property
     def position(self):
@@ -82,6 +91,8 @@ class Simulation(SimulationBase):
         return self.rest + self.displacement
 
     def __repr__(self):
+        if not hasattr(self, "_made"):  # who looks at a traceback
+            return "<phyxel.Simulation: not made>"
         return (f"<phyxel.Simulation: {len(self)} phyxels, t = {self.time:g} s, "
                 f"dt = {self.dt:.3g} s, {self.device}>")
 

@@ -40,8 +40,8 @@ struct StepPlan {
 /// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
 /// digits are kept; slightly shortened so that frames and the end fall on whole steps. A search for
 /// equilibrium is one step. Uses the arrays of the backend.
-/// @throws InputError for a step above the largest stable one unless `unsafe_step`, and for
-///   implicit steps of no given size.
+/// @throws InputError for a step above the largest stable one unless `unsafe_step`, for implicit
+///   steps of no given size, and for more steps than can be counted.
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend,
                     bool unsafe_step = false);
 
