@@ -484,8 +484,7 @@ class Run {
       moment->optional.push_back(Quantity::surfel_position);
     }
     const auto wanted = [&](const char* field, Quantity quantity) {
-      const auto& fields = scene_.output.fields;
-      if (std::find(fields.begin(), fields.end(), field) == fields.end()) return false;
+      if (!scene_.output.wants(field)) return false;
       moment->optional.push_back(quantity);
       return true;
     };

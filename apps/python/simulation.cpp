@@ -119,7 +119,7 @@ class Simulation {
       const std::int64_t frame =
           (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
       take(std::min(last, frame) - solver_->steps());
-      if (recorder_ && (solver_->steps() == last || solver_->steps() == frame)) write_one();
+      if (recorder_) write_one();
     }
     look();
   }
@@ -250,12 +250,13 @@ class Simulation {
       backend_->advect_surfels(surfels);
       frame.surfels = &surfels;
     }
-    const auto wants = [&](const char* field) {
-      const auto& fields = scene_.output.fields;
-      return std::find(fields.begin(), fields.end(), field) != fields.end();
-    };
-    stress_fields(model_, *backend_, wants("von_mises") ? &frame.von_mises : nullptr,
-                  wants("volume_ratio") ? &frame.volume_ratio : nullptr);
+    // Asked for neither, it would find both for nothing.
+    const bool von_mises = scene_.output.wants("von_mises");
+    const bool volume_ratio = scene_.output.wants("volume_ratio");
+    if (von_mises || volume_ratio) {
+      stress_fields(model_, *backend_, von_mises ? &frame.von_mises : nullptr,
+                    volume_ratio ? &frame.volume_ratio : nullptr);
+    }
     recorder_->write(frame);
   }
 

@@ -15,11 +15,6 @@ namespace {
 constexpr std::uint8_t vtk_poly_vertex = 2, vtk_triangle = 5;
 constexpr std::int64_t version = 1;
 
-bool wants(const Scene& scene, const char* field) {
-  return std::find(scene.output.fields.begin(), scene.output.fields.end(), field) !=
-         scene.output.fields.end();
-}
-
 /// The run's own metadata, beside the VTKHDF group.
 void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diagnostics) {
   out.group("/phyxel");
@@ -167,13 +162,13 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
   const auto field = [&](const char* name, bool in_float, Quantity quantity) {
     write_later(out, {std::string("/VTKHDF/PointData/") + name, in_float, n, {quantity}}, values);
   };
-  if (wants(scene, "displacement")) field("displacement", as_float, Quantity::displacement);
-  if (wants(scene, "velocity")) field("velocity", as_float, Quantity::velocity);
+  if (scene.output.wants("displacement")) field("displacement", as_float, Quantity::displacement);
+  if (scene.output.wants("velocity")) field("velocity", as_float, Quantity::velocity);
   if (values.has(Quantity::von_mises)) field("von_mises", true, Quantity::von_mises);
   if (values.has(Quantity::volume_ratio)) field("volume_ratio", true, Quantity::volume_ratio);
-  if (wants(scene, "mass")) field("mass", true, Quantity::mass);
-  if (wants(scene, "volume")) field("volume", true, Quantity::volume);
-  if (cells > 1 || wants(scene, "body")) {
+  if (scene.output.wants("mass")) field("mass", true, Quantity::mass);
+  if (scene.output.wants("volume")) field("volume", true, Quantity::volume);
+  if (cells > 1 || scene.output.wants("body")) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.phyxels));
   }
   write_metadata(out, scene, diagnostics);
@@ -245,28 +240,19 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
     frame.body = in.array<Index>("/VTKHDF/PointData/body");
     fits("/VTKHDF/PointData/body", frame.body.size());
   }
-  const auto field = [&](const char* name, auto&& values_at) {
-    const std::string path = std::string("/VTKHDF/PointData/") + name;
-    if (!with_fields || !in.has(path)) return;
-    auto values = values_at(path);
-    fits(path.c_str(), values.size());
-    if constexpr (std::is_same_v<decltype(values), std::vector<Vec3d>>) {
-      std::vector<double>& flat = frame.field[name];
-      for (const Vec3d& v : values) flat.insert(flat.end(), {v.x, v.y, v.z});
-    } else {
-      frame.field[name] = std::move(values);
-    }
-  };
   if (with_fields) {
     frame.program = in.text_attribute("/phyxel", "program");
     frame.title = in.text_attribute("/phyxel", "title");
     frame.scene = in.text("/phyxel/scene");
-  }
-  for (const char* name : {"displacement", "velocity"}) {
-    field(name, [&](const std::string& path) { return in.vectors(path); });
-  }
-  for (const char* name : {"von_mises", "volume_ratio", "mass", "volume"}) {
-    field(name, [&](const std::string& path) { return in.array<double>(path); });
+    const auto field = [&](const char* name, std::size_t columns) {
+      const std::string path = std::string("/VTKHDF/PointData/") + name;
+      if (!in.has(path)) return;
+      std::vector<double> values = in.array<double>(path, columns);
+      fits(path.c_str(), values.size() / std::max<std::size_t>(1, columns));
+      frame.field[name] = std::move(values);
+    };
+    for (const char* name : {"displacement", "velocity"}) field(name, 3);
+    for (const char* name : {"von_mises", "volume_ratio", "mass", "volume"}) field(name, 0);
   }
   if (kind == surface_frame_kind) {
     const auto corners = in.array<std::int64_t>("/VTKHDF/Connectivity");

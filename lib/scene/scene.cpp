@@ -153,6 +153,10 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   return scene;
 }
 
+bool OutputRequest::wants(std::string_view field) const {
+  return std::find(fields.begin(), fields.end(), field) != fields.end();
+}
+
 Scene read_scene(const std::filesystem::path& file) { return parse_scene(read_text(file), file); }
 
 const char* precision_name(Precision precision) {

@@ -46,20 +46,15 @@ fs::path default_out(const fs::path& input) {
 
 void report_command(const ReportOptions& options) {
   std::vector<fs::path> tables;
+  bool only_tables = true;
   for (const fs::path& input : options.inputs) {
     if (!fs::exists(input)) {
       throw InputError(fmt::format("{}: no such file or folder", input.string()));
     }
-    if (is_table(input)) {
-      tables.push_back(input);
-    } else {
-      const auto found = tables_in(input);
-      tables.insert(tables.end(), found.begin(), found.end());
-    }
+    const std::vector<fs::path> found = is_table(input) ? std::vector{input} : tables_in(input);
+    only_tables = only_tables && !found.empty();
+    tables.insert(tables.end(), found.begin(), found.end());
   }
-  const bool only_tables = std::all_of(
-      options.inputs.begin(), options.inputs.end(),
-      [](const fs::path& input) { return is_table(input) || !tables_in(input).empty(); });
   if (!only_tables && options.inputs.size() > 1) {
     throw InputError(fmt::format("{} inputs: allowed: one run, or any number of tables (.csv)",
                                  options.inputs.size()));

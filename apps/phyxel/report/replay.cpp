@@ -14,6 +14,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/neighbourhood.hpp"
+#include "phyxel/physics/strain.hpp"
 #include "report/page.hpp"
 #include "report/report.hpp"
 #include "trajectory.hpp"
@@ -35,27 +36,12 @@ struct Field {
   std::vector<double> values;
 };
 
-double length(Vec3d v) { return std::sqrt(dot(v, v)); }
-
 /// sqrt(2/3 E':E') of Green's strain, E' its deviator.
-double equivalent_strain(const Mat3d& g) {
-  double e[3][3];
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      e[i][j] = g(i, j) + g(j, i);
-      for (int k = 0; k < 3; ++k) e[i][j] += g(k, i) * g(k, j);
-      e[i][j] /= 2;
-    }
-  }
-  const double mean = (e[0][0] + e[1][1] + e[2][2]) / 3;
-  double sum = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      const double d = e[i][j] - (i == j ? mean : 0);
-      sum += d * d;
-    }
-  }
-  return std::sqrt(2 * sum / 3);
+double equivalent_strain(const Mat3d& gradient) {
+  const Sym3d e = green_strain(gradient);
+  const double mean = (e.xx + e.yy + e.zz) / 3;
+  const double x = e.xx - mean, y = e.yy - mean, z = e.zz - mean;
+  return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)) / 3);
 }
 
 /// The scene of a trajectory, built anew to say what its frames do not.
@@ -126,8 +112,7 @@ Carriers carriers_of(const std::vector<Vec3d>& surfels, const std::vector<Vec3d>
     near.clear();
     for (const Index i : rows.row(s)) {
       near.emplace_back(
-          length(phyxels[static_cast<std::size_t>(i)] - surfels[static_cast<std::size_t>(s)]) /
-              reach,
+          norm(phyxels[static_cast<std::size_t>(i)] - surfels[static_cast<std::size_t>(s)]) / reach,
           i);
     }
     std::sort(near.begin(), near.end());
@@ -260,8 +245,8 @@ class Replay {
       : request_(request),
         trajectory_(find_trajectory(request.input, {})),
         folder_(fs::is_directory(request.input) ? request.input : request.input.parent_path()) {
-    first_surface_ = read(trajectory_.shots.front().surface);
-    first_phyxels_ = read(trajectory_.shots.front().phyxels);
+    first_surface_ = read(trajectory_.shots.front().surface, {});
+    first_phyxels_ = read(trajectory_.shots.front().phyxels, {});
     read_summary();
     rebuild();
   }
@@ -280,9 +265,16 @@ class Replay {
   }
 
  private:
-  static std::optional<FrameData> read(const fs::path& file) {
+  /// A frame of the family that begins with `first`; nothing if the shot has none.
+  static std::optional<FrameData> read(const fs::path& file,
+                                       const std::optional<FrameData>& first) {
     if (file.empty()) return std::nullopt;
-    return read_frame(file, true);
+    FrameData frame = read_frame(file, true);
+    if (first && frame.point.size() != first->point.size()) {
+      throw InputError(fmt::format("{}: has {} points, the first frame {}", file.string(),
+                                   frame.point.size(), first->point.size()));
+    }
+    return frame;
   }
 
   const FrameData& any() const { return first_phyxels_ ? *first_phyxels_ : *first_surface_; }
@@ -302,11 +294,11 @@ class Replay {
   }
 
   void rebuild() {
-    fs::path file = summary_.value("scene", std::string("scene.toml"));
+    std::string why;
     try {
-      scene_ = parse_scene(any().scene, file);
-    } catch (const InputError&) {
-      // Files that it names may be elsewhere by now.
+      scene_ = parse_scene(any().scene, summary_.value("scene", std::string("scene.toml")));
+    } catch (const InputError& error) {
+      why = error.what();  // files that it names may be elsewhere by now
     }
     if (!request_.stress || !first_phyxels_) return;
     const std::size_t phyxels = first_phyxels_->point.size();
@@ -318,17 +310,23 @@ class Replay {
       return;
     }
     try {
-      rebuilt_.emplace(parse_scene(any().scene, file), phyxels);
+      if (scene_) rebuilt_.emplace(*scene_, phyxels);
     } catch (const InputError& error) {
+      why = error.what();
+    }
+    if (!rebuilt_) {
       notes_.push_back(fmt::format(
           "No strain and no stress but those in the frames, as the scene cannot be built anew: {}",
-          error.what()));
+          why));
     }
   }
 
   /// Which frames are shown, and which phyxels.
   void choose() {
-    fields_of(0);  // tells how many there are
+    for (const Field& field : fields_of(any())) {
+      field_names_.push_back(field.name);
+      field_units_.push_back(field.unit);
+    }
     const std::size_t surfels = first_surface_ ? first_surface_->point.size() : 0;
     const std::size_t phyxels = first_phyxels_ ? first_phyxels_->point.size() : 0;
     const std::size_t triangles = first_surface_ ? first_surface_->triangle.size() : 0;
@@ -355,23 +353,13 @@ class Replay {
     }
   }
 
-  /// All fields of the phyxels of a shot; of the surfels, if there are no phyxels.
-  std::vector<Field> fields_of(std::size_t shot) {
-    const auto phyxels = read(trajectory_.shots[shot].phyxels);
-    const auto surface = phyxels ? std::nullopt : read(trajectory_.shots[shot].surface);
-    const FrameData& frame = phyxels ? *phyxels : *surface;
-    const FrameData& first = phyxels ? *first_phyxels_ : *first_surface_;
-    if (frame.point.size() != first.point.size()) {
-      throw InputError(fmt::format(
-          "{}: has {} points, the first frame {}",
-          (phyxels ? trajectory_.shots[shot].phyxels : trajectory_.shots[shot].surface).string(),
-          frame.point.size(), first.point.size()));
-    }
+  /// All fields of a frame: of phyxels, or of surfels where there are none.
+  std::vector<Field> fields_of(const FrameData& frame) {
     std::vector<Field> fields;
     const auto lengths = [](const std::vector<double>& vectors) {
       std::vector<double> values;
       for (std::size_t k = 0; k + 2 < vectors.size(); k += 3) {
-        values.push_back(length({vectors[k], vectors[k + 1], vectors[k + 2]}));
+        values.push_back(norm({vectors[k], vectors[k + 1], vectors[k + 2]}));
       }
       return values;
     };
@@ -384,27 +372,19 @@ class Replay {
       displacement.values = lengths(*u);
     } else {
       // From the state at rest, if anyone knows it.
-      const bool known = phyxels && rebuilt_;
-      if (!known && first.time != 0) {
-        displacement.name += fmt::format(" since t = {:g} s", first.time);
+      if (!rebuilt_ && any().time != 0) {
+        displacement.name += fmt::format(" since t = {:g} s", any().time);
       }
-      const std::vector<Vec3d>& rest = known ? rebuilt_->rest() : first.point;
+      const std::vector<Vec3d>& rest = rebuilt_ ? rebuilt_->rest() : any().point;
       for (std::size_t i = 0; i < frame.point.size(); ++i) {
-        displacement.values.push_back(length(frame.point[i] - rest[i]));
+        displacement.values.push_back(norm(frame.point[i] - rest[i]));
       }
     }
     fields.push_back(std::move(displacement));
     if (const auto* v = written("velocity")) fields.push_back({"speed", "m/s", lengths(*v)});
     if (const auto* s = written("von_mises")) fields.push_back({"stress (von Mises)", "Pa", *s});
     if (const auto* j = written("volume_ratio")) fields.push_back({"volume ratio", "", *j});
-    if (phyxels && rebuilt_) rebuilt_->add_fields(frame, fields);
-    if (field_names_.empty()) {
-      for (const Field& field : fields) {
-        field_names_.push_back(field.name);
-        field_units_.push_back(field.unit);
-      }
-    }
-    fields.resize(field_names_.size());
+    if (rebuilt_) rebuilt_->add_fields(frame, fields);
     return fields;
   }
 
@@ -413,18 +393,12 @@ class Replay {
     for (const std::size_t shot : chosen_) {
       Instance& instance = instances.emplace_back();
       instance.time = trajectory_.shots[shot].time;
-      const auto surface = read_if_any(trajectory_.shots[shot].surface);
-      const auto phyxels = read_if_any(trajectory_.shots[shot].phyxels);
-      const std::vector<Field> fields = fields_of(shot);
-      if (surface) {
-        if (surface->point.size() != first_surface_->point.size()) {
-          throw InputError(fmt::format("{}: has {} points, the first frame {}",
-                                       trajectory_.shots[shot].surface.string(),
-                                       surface->point.size(), first_surface_->point.size()));
-        }
-        instance.surfels = surface->point;
-      }
+      const auto surface = read(trajectory_.shots[shot].surface, first_surface_);
+      const auto phyxels = read(trajectory_.shots[shot].phyxels, first_phyxels_);
+      if (surface) instance.surfels = surface->point;
       if (phyxels) instance.phyxels = each(phyxels->point, stride_);
+      std::vector<Field> fields = fields_of(phyxels ? *phyxels : *surface);
+      fields.resize(field_names_.size());
       for (const Field& field : fields) {
         instance.fields.push_back(each(field.values, phyxels ? stride_ : 1));
       }

@@ -159,6 +159,8 @@ struct OutputRequest {
   /// "volume_ratio", "mass", "volume", "body".
   std::vector<std::string> fields = {"displacement", "velocity"};
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
+  /// Whether `fields` has it.
+  bool wants(std::string_view field) const;
 };
 
 /// Pictures at the end of a run.
