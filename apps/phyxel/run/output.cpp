@@ -1,0 +1,93 @@
+/// Frames and checkpoints of a run.
+#include <fmt/format.h>
+#include <omp.h>
+#include <unistd.h>
+
+#include "run/run.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+
+std::string Run::with_last_good_state(const char* error, Progress& progress) {
+  progress.finish();
+  try {
+    write_state();
+    writer_.finish();
+  } catch (const Error& writing) {
+    // What this rank alone knows of must end all.
+    if (ranks().size() > 1 && !dynamic_cast<const AgreedError*>(&writing)) throw;
+    return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
+  }
+  return fmt::format("{}; the last good state, at t = {:g} s, is {}", error, good_->state.time,
+                     checkpoint_.string());
+}
+
+std::shared_ptr<const GoodState> Run::good_state(const Diagnostics& now) const {
+  return std::make_shared<const GoodState>(GoodState{solver_.state(), now});
+}
+
+bool Run::core_is_left() const {
+  if (device_.gpu) return true;
+  const int threads = backend_->threads();  // of each rank alike
+  return threads < omp_get_num_procs() &&
+         threads * ranks().host_size() < sysconf(_SC_NPROCESSORS_ONLN);
+}
+
+void Run::hand_over(std::shared_ptr<const Moment> moment, FileWriter::Job job) {
+  writer_.submit(std::move(moment), std::move(job));
+  // The first rank's, which writes.
+  if (ranks().broadcast(std::vector<char>{core_is_left()}).front() == 0) writer_.finish();
+}
+
+std::shared_ptr<Moment> Run::moment_of(const std::shared_ptr<const GoodState>& good) {
+  auto moment = std::make_shared<Moment>();
+  moment->state = std::shared_ptr<const State>(good, &good->state);
+  moment->frame.state = &good->state;
+  moment->frame.diagnostics = good->diagnostics;
+  return moment;
+}
+
+void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
+  const Phase phase("frame");
+  const auto moment = moment_of(good);
+  Frame& frame = moment->frame;
+  if (scene_.output.surface && model().whole_surfels() > 0) {
+    backend_->advect_surfels(moment->surfels);
+    frame.surfels = &moment->surfels;
+    moment->optional.push_back(Quantity::surfel_position);
+  }
+  const auto wanted = [&](const char* field, Quantity quantity) {
+    if (!scene_.output.wants(field)) return false;
+    moment->optional.push_back(quantity);
+    return true;
+  };
+  const bool von_mises = wanted("von_mises", Quantity::von_mises);
+  const bool volume_ratio = wanted("volume_ratio", Quantity::volume_ratio);
+  if (von_mises || volume_ratio) {
+    stress_fields(model(), *backend_, von_mises ? &frame.von_mises : nullptr,
+                  volume_ratio ? &frame.volume_ratio : nullptr);
+  }
+  hand_over(moment, [this, diagnostics = good->diagnostics](Stretches& values) {
+    const Phase writing("writing a frame");
+    recorder_->write(diagnostics, values);
+  });
+}
+
+void Run::write_state() {
+  hand_over(moment_of(good_), [this, good = good_](Stretches& values) {
+    const Phase writing("writing a checkpoint");
+    CheckpointInfo info;
+    info.program = program_version();
+    info.precision = scene_.solver.precision;
+    info.method = scene_.solver.method;
+    info.scene_text = scene_.text;
+    info.model_digest = shared_.digest();
+    info.total_energy = good->diagnostics.total_energy();
+    info.initial_energy = initial_energy_;
+    info.frames_written = recorder_->frames_written();
+    checkpoint_ =
+        write_checkpoint(recorder_->directory(), good->state, info, model().whole_size(), values);
+  });
+}
+
+}  // namespace phyxel::app

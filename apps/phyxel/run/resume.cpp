@@ -1,0 +1,101 @@
+/// Checkpoints that a run goes on from.
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "run/run.hpp"
+#include "terminal.hpp"
+
+namespace phyxel::app {
+
+std::optional<CheckpointReader> Run::find_checkpoint() const {
+  if (!options_.dry_run) {
+    check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
+  }
+  if (options_.resume.empty()) return std::nullopt;
+  std::filesystem::path file = options_.resume;
+  if (options_.resume == "auto") {
+    std::string warning;
+    const auto latest = latest_checkpoint(scene_.output.directory, &warning);
+    if (!warning.empty()) fmt::print(stderr, "phyxel: {}{}\n", warning_word(), warning);
+    if (!latest) return std::nullopt;
+    file = *latest;
+  }
+  CheckpointReader checkpoint(file);
+  const Precision precision = checkpoint.info().precision;
+  if (precision != scene_.solver.precision) {
+    throw InputError(
+        fmt::format("{}: written by a run in {}, this one is in {}: allowed --precision {}",
+                    file.string(), precision_name(precision),
+                    precision_name(scene_.solver.precision), precision_name(precision)));
+  }
+  const Method method = checkpoint.info().method;
+  if (method != scene_.solver.method) {
+    throw InputError(
+        fmt::format("{}: written by the method \"{}\", this run's is \"{}\": allowed --method {}",
+                    file.string(), method_name(method), method_name(scene_.solver.method),
+                    method_name(method)));
+  }
+  return checkpoint;
+}
+
+std::optional<Checkpoint> Run::checkpoint_for_all() {
+  require_alike(std::hash<std::string>{}(scene_.text), "scenes");
+  std::optional<Checkpoint> found;
+  ranks().together([&] {
+    if (!leads()) return;
+    checkpoint_reader_ = find_checkpoint();
+    if (checkpoint_reader_) {
+      found = {checkpoint_reader_->state(0, 0), checkpoint_reader_->info()};
+    }
+  });
+  if (ranks().size() == 1) return found;
+  if (ranks().broadcast(std::vector<char>{found.has_value()}).front() == 0) return std::nullopt;
+  if (!found) found.emplace();
+  const auto share = [](auto& value) { value = ranks().broadcast(std::vector{value}).front(); };
+  share(found->info.model_digest);
+  share(found->info.initial_energy);
+  share(found->info.frames_written);
+  State& state = found->state;
+  share(state.step);
+  share(state.time);
+  share(state.dt);
+  return found;
+}
+
+State Run::first_state() {
+  if (!begin_) {
+    return ranks().agreed([&] { return initial_state(model(), scene_, plan_.dt); });
+  }
+  ranks().together([&] { check_resumed(); });
+  const CheckpointReader* const reader = checkpoint_reader_ ? &*checkpoint_reader_ : nullptr;
+  State state = shared_.state_of(reader, stretch_length());
+  checkpoint_reader_.reset();
+  return state;
+}
+
+Index Run::stretch_length() {
+  const char* said = std::getenv("PHYXEL_STRETCH");
+  const Index length = said ? std::max(1, std::atoi(said)) : Stretches::usual_length;
+  return ranks().broadcast(std::vector{length}).front();
+}
+
+void Run::check_resumed() const {
+  const bool as_many = !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().whole_size();
+  if (begin_->info.model_digest != shared_.digest() || !as_many) {
+    throw InputError(
+        fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
+                    "neighbourhoods, loads and "
+                    "fixed phyxels must be those of the run that wrote it",
+                    options_.resume));
+  }
+  if (begin_->state.dt != plan_.dt) {
+    throw InputError(
+        fmt::format("{}: the checkpoint was written with a time step of {:.17g} s, this run "
+                    "would take {:.17g} s; "
+                    "leave time.step, time.safety and output.frames_per_second as they were",
+                    options_.resume, begin_->state.dt, plan_.dt));
+  }
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,218 @@
+/// Set-up, the loop over steps, and the rehearsal.
+#include "run/run.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "mpi/watchdog.hpp"
+#include "picture.hpp"
+#include "stop_signal.hpp"
+
+namespace phyxel::app {
+
+Run::Run(const RunOptions& options)
+    : options_(options),
+      scene_(ranks().agreed([&] { return scene_with(options.overrides); })),
+      device_(choose_device(scene_.solver.device, "device")),
+      begin_(checkpoint_for_all()),
+      shared_(spent_.timed(
+          "model", [&] { return SharedModel(all_ranks(), scene_, device_, options_.cut); })),
+      backend_(spent_.timed("backend",
+                            [&] {
+                              return shared_.make_backend(scene_.solver.precision,
+                                                          scene_.solver.threads,
+                                                          options_.transport);
+                            })),
+      plan_(alike([&] {
+        return spent_.timed("time step", [&] {
+          return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
+        });
+      })),
+      solver_(model(), *backend_, first_state(), scene_.solver.method),
+      first_step_(solver_.steps()),
+      start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
+  // Last, because it replaces what an earlier run has left: all that could be refused, or find no
+  // memory, has been tried by now.
+  ranks().together([&] {
+    if (!leads() || options_.dry_run) return;
+    recorder_.emplace(model(), scene_, options.force,
+                      begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
+  });
+  if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
+  if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
+  const BoundarySize boundary = boundary_size(model());
+  boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
+  setup_seconds_ = seconds_since(start_);
+}
+
+void Run::rehearse() {
+  say_plan();
+  const std::vector<ArrayBytes> memory = backend_->memory();
+  std::int64_t bytes = 0;
+  for (const ArrayBytes& array : memory) bytes += static_cast<std::int64_t>(array.bytes);
+  bytes = ranks().sum(bytes);
+  const std::optional<double> seconds = forecast();
+  if (!leads()) return;
+  const double phyxels = std::max(1, model().whole_size());
+  if (options_.json) {
+    nlohmann::ordered_json j = identity();
+    j["time_step_s"] = plan_.dt;
+    j["largest_stable_step_s"] = plan_.limit.largest_step;
+    j["omega_max_rad_s"] = plan_.limit.omega_max;
+    j["end_s"] = end_time();
+    j["steps"] = plan_.steps;
+    j["steps_per_frame"] = plan_.steps_per_frame;
+    j["setup_seconds"] = setup_seconds_;
+    j["bytes"] = bytes;
+    if (seconds) j["forecast_seconds"] = *seconds;
+    j["warnings"] = model().warnings;
+    fmt::print("{}\n", j.dump(2));
+    return;
+  }
+  if (options_.quiet) return;
+  if (ranks().size() == 1) {
+    for (const ArrayBytes& array : memory) {
+      fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: {}\n", array.bytes,
+                 static_cast<double>(array.bytes) / phyxels, array.name);
+    }
+  } else {
+    fmt::print("  memory      {:>12} bytes, {:6.1f} per phyxel: all ranks'\n", bytes,
+               static_cast<double>(bytes) / phyxels);
+  }
+  if (seconds) fmt::print("  forecast    {:.3g} s for the steps alone\n", *seconds);
+}
+
+void Run::execute() {
+  Backend& backend = *backend_;
+  Solver& solver = solver_;
+  say_plan();
+  if (begin_ && solver.steps() >= plan_.steps) {
+    say_finished_already();
+    return;
+  }
+
+  Diagnostics now = start_diagnostics_;
+  initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
+  peak_energy_ = now.kinetic_energy + now.elastic_energy();
+  StabilityWatch watch = alike([&] { return StabilityWatch(model(), now); });
+  good_ = good_state(now);
+  // Without a rate only the last frame is wanted.
+  if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
+
+  StopSignal signals;
+  const Watchdog watchdog(ranks(), watchdog_seconds());
+  Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
+                    {.phyxels = model().whole_size()});
+  loop_start_ = Clock::now();
+  auto last_checkpoint = Clock::now();
+  try {
+    auto stepping_since = Clock::now();
+    double look_seconds = 0;
+    while (solver.steps() < plan_.steps) {
+      watchdog.beat(solver.steps());
+      solver.step();
+      const bool last = solver.steps() == plan_.steps;
+      const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
+      progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+      writer_.serve();
+      if (!frame && solver.steps() % agree_interval() != 0) continue;
+      const Phase agreeing("agreeing, looking, writing");
+      const bool stop = anyone(StopSignal::stop_requested() != 0);
+      const bool due = anyone(StopSignal::checkpoint_requested() ||
+                              (scene_.output.checkpoint_every > 0 &&
+                               seconds_since(last_checkpoint) > scene_.output.checkpoint_every));
+      const bool watched = solver.steps() % watch_interval == 0 &&
+                           anyone(seconds_since(stepping_since) > watch_share * look_seconds);
+      if (!frame && !stop && !due && !watched) continue;
+
+      backend.wait();
+      step_seconds_ += seconds_since(stepping_since);
+      if (frame) writer_.wait_for_room();
+      const auto look_start = Clock::now();
+      now = spent_.timed("energies", [&] { return diagnose(model(), backend, solver.now()); });
+      watch.check(now);
+      peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
+      auto good = good_state(now);
+      look_seconds = seconds_since(look_start);
+      if (frame) write_frame(good);
+      // Only now: a checkpoint of a state counts its frame as written, so that comes first.
+      good_ = std::move(good);
+      if (last || stop || due) {
+        write_state();
+        last_checkpoint = Clock::now();
+      }
+      if (stop && !last) {
+        writer_.finish();
+        progress.finish();
+        const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
+        throw AgreedError(ExitCode::stopped,
+                          fmt::format("stopped by signal {} at t = {:g} s (step {}); the "
+                                      "checkpoint is written, --resume auto continues",
+                                      signal, solver.time(), solver.steps()));
+      }
+      stepping_since = Clock::now();
+    }
+  } catch (const DivergedError& error) {  // on all ranks
+    throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
+  } catch (const DeviceError& error) {  // on this one
+    if (ranks().size() > 1) throw;
+    throw DeviceError(with_last_good_state(error.what(), progress));
+  } catch (const std::bad_alloc&) {
+    if (ranks().size() > 1) throw;
+    throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
+  }
+  writer_.finish();
+  progress.finish();
+  loop_seconds_ = seconds_since(loop_start_);
+  ranks().together([&] {
+    if (leads() && scene_.render.pictures && !options_.no_pictures) {
+      pictures_ = spent_.timed("pictures", [&] {
+        return render_directory(recorder_->directory(), scene_.render, true);
+      });
+    }
+  });
+  std::int64_t bytes = 0;
+  for (const ArrayBytes& array : backend_->memory())
+    bytes += static_cast<std::int64_t>(array.bytes);
+  bytes = ranks().sum(bytes);
+  const Traffic traffic = most_traffic(*backend_);
+  ranks().together([&] {
+    if (!leads()) return;
+    const nlohmann::ordered_json summary = summary_of(now, bytes, traffic);
+    // Names of files need not be UTF-8.
+    const std::string text =
+        summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    recorder_->write_summary(text);
+    if (options_.json) {
+      fmt::print("{}", text);
+    } else {
+      say_summary(now, bytes, traffic);
+    }
+  });
+}
+
+std::optional<double> Run::forecast() {
+  if (scene_.solver.method == Method::equilibrium) return std::nullopt;
+  const auto timed = [&](std::int64_t steps) {
+    const auto start = Clock::now();
+    for (std::int64_t k = 0; k < steps; ++k) solver_.step();
+    backend_->wait();
+    return std::max(1e-9, seconds_since(start)) / static_cast<double>(steps);
+  };
+  const double first = timed(2);
+  // As many on all ranks.
+  const auto more = ranks().largest(static_cast<std::int64_t>(std::min(1000.0, 0.2 / first)));
+  return (more > 2 ? timed(more) : first) * static_cast<double>(plan_.steps);
+}
+
+std::int64_t Run::agree_interval() { return ranks().size() > 1 ? 10 : 1; }
+
+bool Run::anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
+
+double Run::watchdog_seconds() {
+  const char* said = std::getenv("PHYXEL_WATCHDOG_SECONDS");
+  return said ? std::atof(said) : 60;
+}
+
+}  // namespace phyxel::app

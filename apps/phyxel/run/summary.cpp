@@ -1,0 +1,186 @@
+/// What a run says of itself: its plan and its summary.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "run/run.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+
+nlohmann::ordered_json Run::identity() const {
+  const Index phyxels = model().whole_size();
+  return {{"program", program_version()},
+          {"scene", scene_.file.string()},
+          {"title", scene_.title},
+          {"device", backend_->name()},
+          {"ranks", ranks().size()},
+          {"phyxels", phyxels},
+          {"surfels", model().whole_surfels()},
+          {"neighbours_per_phyxel", static_cast<double>(model().pairs()) / std::max(1, phyxels)},
+          {"method", method_name(scene_.solver.method)}};
+}
+
+void Run::say_plan() const {
+  if (options_.json || options_.quiet || !leads()) return;
+  fmt::print("{}: {}\n", program_version(),
+             scene_.title.empty() ? scene_.file.string() : scene_.title);
+  fmt::print("{}", describe_model(scene_, model(), boundary_));
+  fmt::print("  device      {}\n", backend_->name());
+  if (ranks().size() > 1) {
+    const SharedModel::Shares& shares = shared_.shares();
+    fmt::print(
+        "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
+        "exchanged through {}\n",
+        ranks().size(), shared_.partitioner(), shares.fewest, shares.most, shares.most_ghosts,
+        options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings",
+        transport_);
+    if (!gpus_.empty()) fmt::print("  gpus        {}, by rank\n", fmt::join(gpus_, ", "));
+  }
+  fmt::print("  time step   {}\n", plan_.why);
+  fmt::print("  plan        {} steps to t = {:g} s, a frame every {} steps; set-up took {:.2f} s\n",
+             plan_.steps, end_time(), plan_.steps_per_frame, setup_seconds_);
+  if (begin_) fmt::print("  resumed     at t = {:g} s (step {})\n", solver_.time(), first_step_);
+  std::fflush(stdout);
+}
+
+void Run::say_finished_already() const {
+  if (!leads()) return;
+  const std::string message =
+      fmt::format("the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
+                  solver_.time(), end_time());
+  if (options_.json) {
+    fmt::print(
+        "{}\n",
+        nlohmann::ordered_json{{"program", program_version()}, {"finished", message}}.dump(2));
+  } else {
+    fmt::print("  finished    {}\n", message);
+  }
+}
+
+nlohmann::ordered_json Run::timing() const {
+  nlohmann::ordered_json timing;
+  double energies = 0, pictures = 0, others = 0;
+  for (const auto& [what, seconds] : spent_.all()) {
+    if (what == "energies") {
+      energies = seconds;
+    } else if (what == "pictures") {
+      pictures = seconds;
+    } else {
+      timing[what] = seconds;
+      others += seconds;
+    }
+  }
+  timing["rest of the set-up"] = std::max(0.0, setup_seconds_ - others);
+  timing["steps"] = step_seconds_;
+  timing["energies"] = energies;
+  timing["frames and checkpoints"] = std::max(0.0, loop_seconds_ - step_seconds_ - energies);
+  if (!pictures_.empty()) timing["pictures"] = pictures;
+  return timing;
+}
+
+double Run::energy_drift(const Diagnostics& now) const {
+  return (now.total_energy() - initial_energy_) / std::max(peak_energy_, 1e-300);
+}
+
+double Run::force_balance(const Diagnostics& now) {
+  return norm(now.internal_force) / std::max(now.force_scale, 1e-300);
+}
+
+double Run::torque_balance(const Diagnostics& now) {
+  return norm(now.internal_torque) / std::max(now.torque_scale, 1e-300);
+}
+
+nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t bytes,
+                                       const Traffic& traffic) const {
+  const double steps = steps_taken();
+  const Index phyxels = model().whole_size();
+  nlohmann::ordered_json j = identity();
+  j.update({{"time_s", now.time},
+            {"steps", solver_.steps()},
+            {"time_step_s", plan_.dt},
+            {"largest_stable_step_s", plan_.limit.largest_step},
+            {"omega_max_rad_s", plan_.limit.omega_max},
+            {"force_evaluations", solver_.work().evaluations},
+            {"newton_steps", solver_.work().newton_steps},
+            {"newton_residual", solver_.work().residual},
+            {"setup_seconds", setup_seconds_},
+            {"loop_seconds", loop_seconds_},
+            {"step_seconds", step_seconds_},
+            {"seconds", timing()},
+            {"steps_per_second", steps / step_seconds_},
+            {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
+            {"bytes", bytes},
+            {"transport", transport_},
+            {"gpus", gpus_},
+            {"exchange_bytes", traffic.bytes_sent},
+            {"exchange_seconds", traffic.seconds},
+            {"energy_j", now.total_energy()},
+            {"energy_drift", energy_drift(now)},
+            {"conservative", is_conservative(model())},
+            {"internal_force_balance", force_balance(now)},
+            {"internal_torque_balance", torque_balance(now)},
+            {"inverted_phyxels", now.inverted},
+            {"warnings", model().warnings},
+            {"frames", recorder_->frames_written()},
+            {"directory", recorder_->directory().string()},
+            {"checkpoint", checkpoint_.string()}});
+  return j;
+}
+
+void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
+  const double steps = steps_taken();
+  const Index phyxels = model().whole_size();
+  fmt::print(
+      "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
+      "with "
+      "output; {:.0f} bytes per phyxel\n",
+      steps / step_seconds_, steps * phyxels / step_seconds_, step_seconds_, loop_seconds_,
+      static_cast<double>(bytes) / std::max(1, phyxels));
+  if (ranks().size() > 1) {
+    fmt::print(
+        "  exchange    at most {:.3g} kB a step and rank; {:.1f}% of the seconds above for "
+        "packing "
+        "and waiting\n",
+        1e-3 * static_cast<double>(traffic.bytes_sent) / steps,
+        100 * traffic.seconds / loop_seconds_);
+  }
+  if (!steps_explicitly()) {
+    const SolverWork work = solver_.work();
+    fmt::print(
+        "  newton      {} steps of Newton's method, {} evaluations of the forces; residual "
+        "{:.1e} "
+        "of what acts\n",
+        work.newton_steps, work.evaluations, work.residual);
+  }
+  if (scene_.solver.method == Method::equilibrium) {
+    fmt::print("  energy      {:.6g} J at rest, {:.4g} J of it elastic\n", now.total_energy(),
+               now.elastic_energy());
+  } else if (is_conservative(model())) {
+    fmt::print("  energy      drift {:+.2e} of the largest kinetic + elastic energy, {:.4g} J\n",
+               energy_drift(now), peak_energy_);
+  } else {
+    fmt::print(
+        "  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n",
+        now.total_energy());
+  }
+  fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
+             force_balance(now), torque_balance(now));
+  if (now.inverted > 0) {
+    fmt::print(
+        "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "
+        "not "
+        "cure that: volume_stiffness or a stiffer material may\n",
+        now.inverted);
+  }
+  fmt::print("  written     {} frames: ", recorder_->frames_written());
+  const auto files = recorder_->files();
+  for (std::size_t f = 0; f < files.size(); ++f)
+    fmt::print("{}{}", f ? ", " : "", files[f].string());
+  fmt::print("\n              {} (checkpoint)\n", checkpoint_.string());
+  if (!pictures_.empty()) {
+    fmt::print("              {} pictures: {} ... {}\n", pictures_.size(),
+               pictures_.front().string(), pictures_.back().string());
+  }
+}
+
+}  // namespace phyxel::app
