@@ -41,7 +41,9 @@ Colour dot_colour(Index body) { return oklch(0.36, 0.13, body_hue(body) + 130); 
 
 std::uint8_t encode(float linear) {
   static const auto table = make_encoding();
-  return table[static_cast<std::size_t>(std::clamp(linear, 0.0f, 1.0f) * 8192 + 0.5f)];
+  // Written so that NaN, which normals that are not finite lead to, is black.
+  const float clipped = linear > 0 ? std::min(linear, 1.0f) : 0.0f;
+  return table[static_cast<std::size_t>(clipped * 8192 + 0.5f)];
 }
 
 }  // namespace phyxel::app

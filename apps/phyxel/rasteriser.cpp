@@ -22,7 +22,8 @@ Colour times(Colour a, Colour b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
 Vec3f unit(Vec3f v) {
   const float length = std::sqrt(dot(v, v));
-  return length > 0 ? v / length : Vec3f{0, 0, 1};
+  // Of no direction, or of none that is finite: towards the viewer.
+  return length > 0 && std::isfinite(length) ? v / length : Vec3f{0, 0, 1};
 }
 
 /// Samples a pixel and axis: 3, or as many as keep the buffers within a gigabyte or so.
@@ -179,6 +180,7 @@ void Rasteriser::shade_hollows(double reach) {
   std::vector<float> darker(static_cast<std::size_t>(camera_.width) *
                             static_cast<std::size_t>(camera_.height));
   const float reach_in_samples = static_cast<float>(reach * camera_.focal * samples_);
+  const auto farthest = static_cast<float>(width_ + height_);
   const auto size = static_cast<float>(reach);
   std::size_t p = 0;
   for (int y = samples_ / 2; y < height_; y += samples_) {
@@ -194,7 +196,9 @@ void Rasteriser::shade_hollows(double reach) {
       };
       float sum = 0;
       for (int ring = 0; ring < rings; ++ring) {
-        const float radius = reach_in_samples * here * static_cast<float>(ring + 1) / rings;
+        // Written so that NaN is bounded, too.
+        const float wanted = reach_in_samples * here * static_cast<float>(ring + 1) / rings;
+        const float radius = wanted < farthest ? wanted : farthest;
         for (int k = 0; k < directions; ++k) {
           const float angle =
               3.14159265f * (static_cast<float>(k) + 0.25f * static_cast<float>(ring)) / directions;
@@ -225,7 +229,7 @@ Rasteriser::Disc Rasteriser::disc(Vec3d centre, const DotStyle& style) const {
   const Camera::Place place = camera_.project(centre);
   Disc d{};
   if (!(place.depth > 0 && std::abs(place.x) < farthest_sample &&
-        std::abs(place.y) < farthest_sample)) {
+        std::abs(place.y) < farthest_sample && std::isfinite(style.radius))) {
     return d;
   }
   d.x = static_cast<float>(place.x * samples_);

@@ -20,6 +20,10 @@ namespace fs = std::filesystem;
 constexpr const char* kind = "checkpoint";
 constexpr std::int64_t version = 2;
 constexpr std::size_t kept = 2;
+// Steps and frames beyond what double counts exactly are none that a run has made.
+constexpr std::int64_t most_counted = std::int64_t{1} << 53;
+// Phyxels whose values are looked at together.
+constexpr Index looked_at_together = 1 << 20;
 
 constexpr const char* prefix = "checkpoint_";
 constexpr const char* suffix = ".h5";
@@ -134,8 +138,11 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
   state_.step = in.integer_attribute("/state", "step");
   state_.time = in.number_attribute("/state", "time");
   state_.dt = in.number_attribute("/state", "dt");
-  if (state_.step < 0 || info_.frames_written < 0)
-    in.refuse("counts a negative number of steps or frames");
+  if (std::min(state_.step, info_.frames_written) < 0 ||
+      std::max(state_.step, info_.frames_written) > most_counted) {
+    in.refuse(fmt::format("counts {} steps and {} frames; allowed: 0 to {}", state_.step,
+                          info_.frames_written, most_counted));
+  }
   if (!(state_.dt > 0) || !std::isfinite(state_.dt) || !std::isfinite(state_.time)) {
     in.refuse(
         fmt::format("dt = {} s at t = {} s; allowed: dt > 0, both finite", state_.dt, state_.time));
@@ -175,7 +182,12 @@ Checkpoint read_checkpoint(const fs::path& file) {
 std::optional<fs::path> latest_checkpoint(const fs::path& directory, std::string* warning) {
   for (const auto& [step, file] : checkpoints_in(directory)) {
     try {
-      check_seal(file, kind);
+      const CheckpointReader reader(file);
+      for (Index begin = 0; begin < reader.phyxels();) {  // the values, too, which may be refused
+        const Index end = begin + std::min(looked_at_together, reader.phyxels() - begin);
+        reader.state(begin, end);
+        begin = end;
+      }
       return file;
     } catch (const InputError& error) {
       if (warning)

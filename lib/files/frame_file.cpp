@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
@@ -222,6 +224,12 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
   }
   FrameData frame;
   frame.time = in.number_attribute("/phyxel", "time");
+  if (!std::isfinite(frame.time)) in.refuse(fmt::format("is of t = {} s", frame.time));
+  const std::size_t points = in.shape("/VTKHDF/Points").rows;
+  if (points > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
+    in.refuse(fmt::format("/VTKHDF/Points has {} rows; allowed at most {}", points,
+                          std::numeric_limits<Index>::max()));
+  }
   frame.point = in.vectors("/VTKHDF/Points");
   for (std::size_t i = 0; i < frame.point.size(); ++i) {
     if (!is_finite(frame.point[i]))

@@ -6,12 +6,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "files/atomic_file.hpp"
+#include "files/hdf5_layout.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -87,14 +89,12 @@ class Hdf5Writer {
   std::vector<std::function<void(const std::filesystem::path&)>> together_;
 };
 
-/// Reads an HDF5 file whose seal has been checked. Every extent is compared with the file's size
-/// before memory is taken, and only plain things are followed: hard links, contiguous arrays
-/// without filters.
+/// Reads a sealed file of ours, by `read_hdf5_layout`: HDF5 itself reads none. Every extent is
+/// compared with the file's size before memory is taken.
 class Hdf5Reader {
  public:
-  /// @throws InputError.
+  /// @throws InputError for a file of another structure than Hdf5Writer makes.
   explicit Hdf5Reader(const std::filesystem::path& file);
-  ~Hdf5Reader();
   Hdf5Reader(const Hdf5Reader&) = delete;
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
 
@@ -128,12 +128,14 @@ class Hdf5Reader {
   [[noreturn]] void refuse(const std::string& why) const;
 
  private:
-  std::int64_t open_array(const std::string& path) const;
-  std::int64_t open_attribute(const std::string& path, const std::string& name) const;
+  const Hdf5Value& array_at(const std::string& path) const;
+  /// The attribute, which must be a single value of that kind, called `what` in messages.
+  const Hdf5Value& attribute_at(const std::string& path, const std::string& name,
+                                Hdf5Value::Kind kind, const char* what) const;
+  std::string text_of(const Hdf5Value& value) const;
 
-  std::filesystem::path path_;
-  std::uintmax_t size_ = 0;
-  std::int64_t file_ = -1;
+  FileBytes file_;
+  std::map<std::string, Hdf5Object> objects_;
 };
 
 /// Of the library that is linked, e.g. "1.10.8".

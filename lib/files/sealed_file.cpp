@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <cstring>
@@ -49,12 +50,16 @@ std::array<char, seal_size> seal_of(const std::string& kind, std::uint64_t bytes
   return seal;
 }
 
-/// Value of the line that begins with `key`, or "".
+/// Value of the line that begins with `key`, or "" if there is none, or none of printable letters.
 std::string line_of(const std::string& seal, const std::string& key) {
   const std::size_t at = seal.find('\n' + key + ' ');
   if (at == std::string::npos) return "";
-  const std::size_t begin = seal.find_first_not_of(' ', at + 1 + key.size());
-  return seal.substr(begin, seal.find('\n', begin) - begin);
+  const std::size_t end = std::min(seal.size(), seal.find('\n', at + 1));
+  const std::size_t begin = std::min(end, seal.find_first_not_of(' ', at + 1 + key.size()));
+  const std::string value = seal.substr(begin, end - begin);
+  const bool printable =
+      std::all_of(value.begin(), value.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return printable ? value : "";
 }
 
 /// Digest and count of all bytes behind the seal.
@@ -161,7 +166,11 @@ std::string check_seal(const fs::path& file) {
     throw InputError(fmt::format(
         "{}: altered since it was written: its digest does not fit its content", file.string()));
   }
-  return line_of(seal, "kind");
+  const std::string kind = line_of(seal, "kind");
+  if (kind.empty()) {
+    throw InputError(fmt::format("{}: its seal names no kind of file", file.string()));
+  }
+  return kind;
 }
 
 void check_seal(const fs::path& file, const std::string& kind) {

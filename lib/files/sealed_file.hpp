@@ -1,8 +1,9 @@
 /// The seal in front of every HDF5 file of ours.
 ///
-/// HDF5 1.10 crashes on some damaged files, so none is parsed before its digest has been compared.
-/// The digest sits in the file itself, as text in the first 512 bytes: HDF5 calls that a user block
-/// and skips it, so that ParaView, VTK and h5py read the file as any other.
+/// The digest finds what was damaged or cut short; it is no shield against content made on purpose,
+/// since anybody can compute one: `hdf5_layout` is. The digest sits in the file itself, as text in
+/// the first 512 bytes: HDF5 calls that a user block and skips it, so that ParaView, VTK and h5py
+/// read the file as any other.
 ///
 ///   phyxel sealed file 1
 ///   kind       checkpoint

@@ -48,8 +48,8 @@ class Hdf5Reader;
 /// A checkpoint whose arrays are read a stretch at a time.
 class CheckpointReader {
  public:
-  /// Compares the digest before HDF5 parses a single byte, and reads all but the arrays.
-  /// @throws InputError for a missing, truncated, altered or foreign file.
+  /// Compares the digest, and reads all but the arrays.
+  /// @throws InputError for a missing, truncated, altered or foreign file, or wrong content.
   explicit CheckpointReader(const std::filesystem::path& file);
   ~CheckpointReader();
   CheckpointReader(CheckpointReader&&) noexcept;
@@ -72,7 +72,8 @@ class CheckpointReader {
 /// Reads one checkpoint, whole. @throws InputError as `CheckpointReader`.
 Checkpoint read_checkpoint(const std::filesystem::path& file);
 
-/// The newest readable checkpoint in `directory`; a damaged one is skipped, and `warning` says so.
+/// The newest checkpoint in `directory` that can be read to its last value; one that cannot is
+/// skipped, and `warning` says so.
 std::optional<std::filesystem::path> latest_checkpoint(const std::filesystem::path& directory,
                                                        std::string* warning = nullptr);
 
