@@ -11,6 +11,7 @@
 #include "cantilever_page.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "plot.hpp"
 
@@ -65,7 +66,7 @@ class Page {
  private:
   void with(const char* name, const std::function<void(const CsvTable&)>& section) {
     if (!fs::exists(results_ / name)) return;
-    const CsvTable table = read_csv(results_ / name);
+    const CsvTable table = read_page_table(results_ / name);
     if (table.rows.empty()) {
       throw InputError(
           fmt::format("{}: has no rows; allowed: a table of a bench that ended, or none",
@@ -363,7 +364,7 @@ void write_bench_page(const fs::path& results, const fs::path& page) {
                     results.string()));
   }
   const fs::path folder = page.has_parent_path() ? page.parent_path() : fs::path(".");
-  const std::string link = fs::relative(results, folder).generic_string() + "/";
+  const std::string link = markdown_link(fs::relative(results, folder)) + "/";
   write_whole_file(page, Page(results, link).write(), Durable::no);
 }
 

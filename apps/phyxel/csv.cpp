@@ -33,10 +33,14 @@ std::vector<std::string> split(const std::string& line) {
   return cells;
 }
 
-std::string cell(std::string text) {
-  std::replace(text.begin(), text.end(), ',', ';');
+std::string on_one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
+}
+
+std::string cell(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ';');
+  return on_one_line(std::move(text));
 }
 
 }  // namespace
@@ -113,7 +117,8 @@ std::string CsvTable::fact(const std::string& name) const {
 
 std::string csv_text(const CsvTable& table) {
   std::string text;
-  for (const auto& [name, value] : table.facts) text += fmt::format("# {}: {}\n", name, value);
+  for (const auto& [name, value] : table.facts)
+    text += fmt::format("# {}: {}\n", name, on_one_line(value));
   text += fmt::format("{}\n", fmt::join(table.columns, ","));
   for (const auto& row : table.rows) text += csv_row(row) + '\n';
   return text;

@@ -1,13 +1,20 @@
 #include "plot.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <sstream>
 
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {
@@ -15,23 +22,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Between double quotes.
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c;
-  }
-  return out + "\"";
-}
-
 std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "?";
 }
 
 std::string head(const std::string& title, const std::string& y_label) {
-  return "set encoding utf8\nset title " + quoted(title) + " noenhanced\nset ylabel " +
-         quoted(y_label) +
+  return "set encoding utf8\nset title " + gnuplot_string(title) + " noenhanced\nset ylabel " +
+         gnuplot_string(y_label) +
          " noenhanced\nset grid ytics lc rgb '#d0d0d0'\nset border 3\nset tics nomirror\nset "
          "datafile missing '?'\n"
          "set key below noenhanced\n"
@@ -50,18 +47,49 @@ fs::path gnuplot() {
   return {};
 }
 
-std::string output_of(const std::string& command, int* status) {
-  std::string text;
-  FILE* pipe = popen(command.c_str(), "r");
-  if (!pipe) {
-    *status = -1;
-    return "no process could be started";
+/// A folder that only this user can look into, removed at the end.
+class PrivateFolder {
+ public:
+  PrivateFolder() {
+    std::string name = (fs::temp_directory_path() / "phyxel_plot_XXXXXX").string();
+    if (!mkdtemp(name.data())) {
+      throw OutputError(fmt::format("{}: cannot be made: {}", name, std::strerror(errno)));
+    }
+    path_ = name;
   }
-  char buffer[4096];
-  for (std::size_t got; (got = fread(buffer, 1, sizeof buffer, pipe)) > 0;)
-    text.append(buffer, got);
-  *status = pclose(pipe);
-  return text;
+  ~PrivateFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  PrivateFolder(const PrivateFolder&) = delete;
+  PrivateFolder& operator=(const PrivateFolder&) = delete;
+  fs::path file(const char* name) const { return path_ / name; }
+
+ private:
+  fs::path path_;
+};
+
+/// Has gnuplot execute a file, without a shell. @returns whether it did
+bool plot(const fs::path& program, const fs::path& script, const fs::path& drawing,
+          const fs::path& words) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  constexpr int flags = O_WRONLY | O_CREAT | O_TRUNC;
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, drawing.c_str(), flags, 0600);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, words.c_str(), flags, 0600);
+  std::string name = program.string(), no_settings = "-d", argument = script.string();
+  char* const arguments[] = {name.data(), no_settings.data(), argument.data(), nullptr};
+  pid_t child = 0;
+  const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0) {
+    throw OutputError(fmt::format("{}: cannot be started: {}", name, std::strerror(failed)));
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 }  // namespace
@@ -70,7 +98,7 @@ bool can_plot() { return !gnuplot().empty(); }
 
 std::string script_of(const LineChart& chart) {
   std::string script = head(chart.title, chart.y_label);
-  script += "set xlabel " + quoted(chart.x_label) + " offset 0,0.5 noenhanced\n";
+  script += "set xlabel " + gnuplot_string(chart.x_label) + " offset 0,0.5 noenhanced\n";
   if (chart.log_x) script += "set logscale x\nset format x '10^{%T}'\n";
   if (chart.log_y) script += "set logscale y\nset format y '10^{%T}'\n";
   std::string plots;
@@ -83,7 +111,7 @@ std::string script_of(const LineChart& chart) {
     script += "EOD\n";
     plots += fmt::format("{}$curve{} using 1:2 with linespoints lt {}{} title {}", c ? ", " : "", c,
                          curve.colour ? curve.colour : c + 1, curve.dashed ? " dt 2" : "",
-                         quoted(curve.label));
+                         gnuplot_string(curve.label));
   }
   return script + "plot " + plots + "\n";
 }
@@ -108,16 +136,19 @@ std::string script_of(const BarChart& chart) {
     script +=
         fmt::format("set logscale y\nset yrange [{}:*]\nset format y '10^{{%T}}'\n", number(floor));
   }
-  script += "$bars << EOD\n";
+  std::string tics;
   for (std::size_t g = 0; g < chart.groups.size(); ++g) {
-    script += quoted(chart.groups[g]);
-    for (const auto& series : chart.series) script += " " + number(series.values[g]);
+    tics += fmt::format("{}{} {}", g ? ", " : "", gnuplot_string(chart.groups[g]), g);
+  }
+  script += fmt::format("set xtics ({})\n$bars << EOD\n", tics);
+  for (std::size_t g = 0; g < chart.groups.size(); ++g) {
+    for (const auto& series : chart.series) script += number(series.values[g]) + " ";
     script += "\n";
   }
   script += "EOD\nplot ";
   for (std::size_t s = 0; s < chart.series.size(); ++s) {
-    script += fmt::format("{}$bars using {}{} lt {} title {}", s ? ", " : "", s + 2,
-                          s == 0 ? ":xtic(1)" : "", s + 1, quoted(chart.series[s].label));
+    script += fmt::format("{}$bars using {} lt {} title {}", s ? ", " : "", s + 1, s + 1,
+                          gnuplot_string(chart.series[s].label));
   }
   return script + "\n";
 }
@@ -125,25 +156,19 @@ std::string script_of(const BarChart& chart) {
 void draw_svg(const std::string& script, const fs::path& file) {
   const fs::path program = gnuplot();
   if (program.empty()) throw OutputError("gnuplot was not found (Debian: gnuplot-nox)");
-  fs::path source = file, drawing = file;
-  source += ".gp.tmp";
-  drawing += ".tmp";
+  // Names of ours alone: those of folders and files that a user chose stay out of scripts.
+  const PrivateFolder folder;
+  const fs::path source = folder.file("chart.gp"), drawing = folder.file("chart.svg"),
+                 words = folder.file("words.txt");
   write_whole_file(source,
-                   "set terminal svg size 800,450 font 'sans,14' background rgb 'white'\n"
-                   "set output " +
-                       quoted(drawing.string()) + "\n" + script,
+                   "set terminal svg size 800,450 font 'sans,14' background rgb 'white'\n" + script,
                    Durable::no);
-  std::string shell = "'";
-  for (const char c : source.string())
-    shell += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  int status = 0;
-  const std::string words = output_of(program.string() + " " + shell + "' 2>&1", &status);
-  fs::remove(source);
-  if (status != 0 || !fs::exists(drawing)) {
-    fs::remove(drawing);
-    throw OutputError(fmt::format("{}: gnuplot failed: {}", file.string(), words));
+  constexpr std::size_t most_read = std::size_t{1} << 26;
+  if (!plot(program, source, drawing, words) || fs::file_size(drawing) == 0) {
+    throw OutputError(
+        fmt::format("{}: gnuplot failed: {}", file.string(), read_text_file(words, most_read)));
   }
-  move_into_place(drawing, file, Durable::no);
+  write_whole_file(file, read_text_file(drawing, most_read), Durable::no);
 }
 
 }  // namespace phyxel::app

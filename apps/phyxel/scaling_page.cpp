@@ -9,6 +9,8 @@
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
+#include "outside_text.hpp"
+#include "phyxel/error.hpp"
 #include "scaling_model.hpp"
 
 namespace phyxel::app {
@@ -37,9 +39,13 @@ std::map<int, CsvTable> tables_in(const fs::path& results, const std::string& ki
   }
   std::sort(files.begin(), files.end());
   for (const fs::path& file : files) {
-    CsvTable table = read_csv(file);
+    CsvTable table = read_page_table(file);
     if (table.rows.empty()) continue;
-    CsvTable& of_ranks = tables[std::stoi(table.text(0, "ranks"))];
+    const double ranks = table.number(0, "ranks");
+    if (!(ranks >= 1 && ranks <= 1e6)) {
+      throw InputError(fmt::format("{}: of {} ranks; allowed: 1 to 1000000", file.string(), ranks));
+    }
+    CsvTable& of_ranks = tables[static_cast<int>(ranks)];
     if (of_ranks.rows.empty()) {
       of_ranks = std::move(table);
     } else {
@@ -153,7 +159,7 @@ std::string sections(const fs::path& results, const std::string& kind) {
     tables.push_back(table);
   }
   const fs::path sizes = results / (kind + "_sizes.csv");
-  if (fs::exists(sizes)) text += scaling_model(tables, read_csv(sizes));
+  if (fs::exists(sizes)) text += scaling_model(tables, read_page_table(sizes));
   return text;
 }
 

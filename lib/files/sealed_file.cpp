@@ -64,7 +64,7 @@ std::string line_of(const std::string& seal, const std::string& key) {
 
 /// Digest and count of all bytes behind the seal.
 std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
-  std::vector<char> buffer(1 << 20);
+  std::vector<char> buffer(1 << 16);
   Digest digest;
   *bytes = 0;
   while (in.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), in.gcount() > 0) {

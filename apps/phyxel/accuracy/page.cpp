@@ -13,6 +13,7 @@
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
+#include "outside_text.hpp"
 #include "plot.hpp"
 
 namespace phyxel::app {
@@ -89,8 +90,8 @@ class AccuracyPage {
  public:
   AccuracyPage(const fs::path& results, const fs::path& page)
       : results_(results),
-        link_(fs::relative(results, page.parent_path()) / ""),
-        table_(read_csv(results / "accuracy.csv")) {}
+        link_(markdown_link(fs::relative(results, page.parent_path()) / "")),
+        table_(read_page_table(results / "accuracy.csv")) {}
 
   std::string text() {
     text_ = fmt::format(
@@ -192,14 +193,14 @@ class AccuracyPage {
     for (const AccuracyPicture& picture : accuracy_pictures()) {
       if (!fs::exists(results_ / picture.file)) continue;
       names.push_back(picture.what);
-      shown.push_back(fmt::format("![{}]({}{})", picture.what, link_.string(), picture.file));
+      shown.push_back(fmt::format("![{}]({}{})", picture.what, link_, picture.file));
     }
     const std::pair<const char*, const char*> files[] = {{"CPU", "cpu_terms.csv"},
                                                          {"GPU", "gpu_terms.csv"}};
     std::vector<std::vector<std::string>> costs;
     for (const auto& [device, file] : files) {
       if (!fs::exists(results_ / file)) continue;
-      const CsvTable t = read_csv(results_ / file);
+      const CsvTable t = read_page_table(results_ / file);
       for (const char* precision : {"double", "mixed", "float"}) {
         const auto plain = t.find({{"terms", "green"}, {"precision", precision}});
         if (!plain) continue;
@@ -233,7 +234,7 @@ class AccuracyPage {
   void peers_section() {
     const fs::path file = results_ / "accuracy_lammps.csv";
     if (!fs::exists(file)) return;
-    const CsvTable t = read_csv(file);
+    const CsvTable t = read_page_table(file);
     LineChart chart{.title = "frequency of a bending bar",
                     .x_label = "time for ten periods [s]",
                     .y_label = "error",
@@ -263,7 +264,7 @@ class AccuracyPage {
   void study_section(const Study& study) {
     const fs::path file = results_ / fmt::format("accuracy_{}.csv", study.name);
     if (!fs::exists(file)) return;
-    const CsvTable t = read_csv(file);
+    const CsvTable t = read_page_table(file);
     text_ += fmt::format("## {}\n\n{} By `phyxel accuracy {}`: {} on {}; {}; {}.\n\n", study.name,
                          study.what, study.name, t.fact("program"), t.fact("hardware"),
                          t.fact("compiler"), t.fact("date"));
@@ -291,7 +292,7 @@ class AccuracyPage {
     const fs::path file = results_ / (name + ".svg");
     if (can_plot()) draw_svg(script_of(chart), file);
     if (fs::exists(file)) {
-      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_.string(), name);
+      text_ += fmt::format("![{}]({}{}.svg)\n\n", chart.title, link_, name);
     }
   }
 
@@ -322,7 +323,7 @@ class AccuracyPage {
     std::string measured;
     for (const auto& [device, file] : files) {
       if (!fs::exists(results_ / file)) continue;
-      const CsvTable& t = tables.emplace_back(read_csv(results_ / file));
+      const CsvTable& t = tables.emplace_back(read_page_table(results_ / file));
       columns.push_back(device);
       measured += fmt::format("{}: {} on {}; {}; {}. ", device, t.fact("program"),
                               t.fact("hardware"), t.fact("compiler"), t.fact("date"));
@@ -402,7 +403,8 @@ class AccuracyPage {
                             irregular ? "irregular" : "regular"));
   }
 
-  fs::path results_, link_;
+  fs::path results_;
+  std::string link_;
   CsvTable table_;
   std::string text_;
 };

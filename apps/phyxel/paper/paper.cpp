@@ -1,6 +1,8 @@
 /// What the measurements of `phyxel paper` share.
 #include "paper.hpp"
 
+#include "outside_text.hpp"
+
 namespace phyxel::app {
 
 namespace fs = std::filesystem;
@@ -12,7 +14,7 @@ fs::path table_file(const fs::path& folder, const std::string& table) {
 std::optional<CsvTable> read_table(const fs::path& folder, const std::string& table) {
   const fs::path file = table_file(folder, table);
   if (!fs::exists(file)) return std::nullopt;
-  return read_csv(file);
+  return read_page_table(file);
 }
 
 Facts paper_facts(const PaperRequest& request) {
