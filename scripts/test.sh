@@ -1,23 +1,26 @@
 #!/usr/bin/env bash
 # Configures, builds and tests.
 #
-#   scripts/test.sh                   cpu, tidy, asan, fuzz, tsan and cuda (where nvcc is)
+#   scripts/test.sh                   all stages: cpu, tidy, hdf5, asan, fuzz, tsan and cuda
 #   scripts/test.sh cpu asan          only these
 #
-# cpu runs every test; tidy looks at the sources by clang-format and clang-tidy, as cpu compiles them; asan every one again under the sanitizers, with clang, of whose build fuzz
-# takes the fuzzers; tsan those that have threads; cuda those that CUDA changes.
-# Every stage runs even if an earlier one failed; a summary comes last, and exit code 1 if any failed.
+# cpu runs every test; tidy looks at the sources by clang-format and clang-tidy, as cpu compiles them; hdf5 runs what writes
+# through an HDF5 that knows MPI; asan every test again under the sanitizers, with clang, but for those of numbers alone, and
+# fuzz takes the fuzzers of its build; tsan those that have threads; cuda those that CUDA changes.
+# Every stage runs even if an earlier one failed; a summary comes last, with the skipped cases of each stage by reason, and
+# exit code 1 if any failed. In CI (CI=1 or true) a missing tool is a failure, and so is a stage without its compiler;
+# without a GPU its cases are skipped there, too.
 # FUZZ_SECONDS (30) is the time for each fuzzer.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
 stages=("$@")
 if [[ ${#stages[@]} -eq 0 ]]; then
-  stages=(cpu tidy asan fuzz tsan cuda)
+  stages=(cpu tidy hdf5 asan fuzz tsan cuda)
 fi
 for stage in "${stages[@]}"; do
-  case $stage in cpu | tidy | asan | tsan | cuda | fuzz) ;; *)
-    echo "scripts/test.sh: unknown stage \"$stage\" (cpu, tidy, asan, tsan, cuda or fuzz)" >&2
+  case $stage in cpu | tidy | hdf5 | asan | tsan | cuda | fuzz) ;; *)
+    echo "scripts/test.sh: unknown stage \"$stage\" (cpu, tidy, hdf5, asan, fuzz, tsan or cuda)" >&2
     exit 2 ;;
   esac
 done
@@ -28,11 +31,30 @@ jobs=$(nproc)
 generator=()
 command -v ninja >/dev/null || generator=(-G "Unix Makefiles")
 
+in_ci() { [[ -n ${CI-} && $CI != 0 && $CI != false ]]; }
+
+# In CI the configuration insists on what it would otherwise do without.
+insist=()
+if in_ci; then
+  insist=(-DPHYXEL_MPI=ON)
+fi
+
+# Tools without which tests are not even registered, or skip: those that are missing.
+missing_tools() {
+  local tool module
+  for tool in chromium doxygen dpkg-shlibdeps fish gnuplot help2man mpirun pkg-config zsh; do
+    command -v "$tool" >/dev/null || echo "$tool"
+  done
+  for module in h5py matplotlib numpy pytest vtkmodules; do
+    python3 -c "import $module" 2>/dev/null || /usr/bin/python3 -c "import $module" 2>/dev/null || echo "Python's $module"
+  done
+}
+
 have_clang() { command -v clang++ >/dev/null; }
 
 # build <configure preset> <build preset>
 build() {
-  cmake --preset "$1" "${generator[@]}" -DPHYXEL_TESTS=ON && cmake --build --preset "$2" --parallel "$jobs"
+  cmake --preset "$1" "${generator[@]}" "${insist[@]}" -DPHYXEL_TESTS=ON && cmake --build --preset "$2" --parallel "$jobs"
 }
 
 # ctest keeps the names of what failed in a file, which the summary repeats: the list of a stage is
@@ -40,7 +62,8 @@ build() {
 # tested <configure preset> [<build and test preset>]
 tested() {
   local failed=build/$1/Testing/Temporary/LastTestsFailed.log
-  rm -f "$failed"
+  export PHYXEL_SKIPS=$PWD/build/$1/skips.txt  # where test programs tell what they skip
+  rm -f "$failed" "$PHYXEL_SKIPS"
   build "$1" "${2-$1}" && ctest --preset "${2-$1}" --parallel "$jobs"
 }
 
@@ -63,63 +86,108 @@ tested_with_tsan() {
   tested tsan
 }
 
+# fuzzed_by <fuzzer>: crashing inputs are kept under build/asan/fuzz/found, the whole log beside it.
+fuzzed_by() {
+  local fuzzer=$1 name corpus seeds code=0
+  name=$(basename "$fuzzer")
+  corpus=build/asan/fuzz/corpus/$name
+  seeds=fuzz/corpus/${name#fuzz_}
+  mkdir -p "$corpus" build/asan/fuzz/found
+  [[ -d $seeds ]] || seeds=
+  "$fuzzer" -max_total_time="${FUZZ_SECONDS:-30}" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
+    -artifact_prefix=build/asan/fuzz/found/"$name"- "$corpus" ${seeds:+"$seeds"} >build/asan/fuzz/"$name".log 2>&1 || code=1
+  echo "--- $name"
+  if [[ $code -ne 0 ]]; then
+    grep -vE '^(#[0-9]+[[:space:]]|[[:space:]]*NEW_FUNC)' build/asan/fuzz/"$name".log | tail -n 40
+  fi
+  grep -E 'number_of_executed_units|average_exec_per_sec' build/asan/fuzz/"$name".log
+  return $code
+}
+
+# One fuzzer a core.
 fuzzed() {
   build asan fuzz || return 1
-  local failed=0 fuzzer name corpus seeds
+  local failed=0 fuzzer
   for fuzzer in build/asan/bin/fuzz_*; do
-    name=$(basename "$fuzzer")
-    corpus=build/asan/fuzz/corpus/$name
-    seeds=fuzz/corpus/${name#fuzz_}
-    mkdir -p "$corpus" build/asan/fuzz/found
-    [[ -d $seeds ]] || seeds=
-    echo "--- $name"
-    # Crashing inputs are kept under build/asan/fuzz/found, the whole log beside it.
-    if ! "$fuzzer" -max_total_time="${FUZZ_SECONDS:-30}" -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 \
-      -artifact_prefix=build/asan/fuzz/found/"$name"- "$corpus" ${seeds:+"$seeds"} >build/asan/fuzz/"$name".log 2>&1; then
-      failed=1
-      grep -vE '^(#[0-9]+[[:space:]]|[[:space:]]*NEW_FUNC)' build/asan/fuzz/"$name".log | tail -n 40
-    fi
-    grep -E 'number_of_executed_units|average_exec_per_sec' build/asan/fuzz/"$name".log
+    while [[ $(jobs -pr | wc -l) -ge $jobs ]]; do wait -n || failed=1; done
+    fuzzed_by "$fuzzer" &
   done
+  while [[ $(jobs -p | wc -l) -gt 0 ]]; do wait -n || failed=1; done
   return $failed
 }
 
+have_tidy() { command -v clang-tidy >/dev/null && command -v clang-format >/dev/null; }
+
 looked_at() {
-  command -v clang-tidy >/dev/null && command -v clang-format >/dev/null || return 77
-  cmake --preset cpu "${generator[@]}" -DPHYXEL_TESTS=ON >/dev/null && scripts/format.sh --check && scripts/tidy.sh
+  cmake --preset cpu "${generator[@]}" "${insist[@]}" -DPHYXEL_TESTS=ON >/dev/null && scripts/format.sh --check && scripts/tidy.sh
 }
 
 have_nvcc() {
   command -v nvcc >/dev/null || [[ -n ${CUDACXX-} || -x /usr/local/cuda/bin/nvcc ]]
 }
 
+have_parallel_hdf5() {
+  command -v mpirun >/dev/null && [[ -n $(find /usr/include/hdf5/openmpi "${HDF5_ROOT-/nowhere}" -name hdf5.h 2>/dev/null) ]]
+}
+
+# without <tool>: the stage cannot run. Its name stands in $lacking for the summary; 77 is the exit code of a skip.
+lacking=$(mktemp)
+trap 'rm -f "$lacking"' EXIT
+without() {
+  echo "$1" >"$lacking"
+  return 77
+}
+
+# stage <name>
+stage() {
+  case $1 in
+    cpu) tested cpu ;;
+    tidy) if have_tidy; then looked_at; else without "clang-tidy or clang-format"; fi ;;
+    hdf5) if have_parallel_hdf5; then tested hdf5; else without "an HDF5 that knows MPI (Debian: libhdf5-openmpi-dev)"; fi ;;
+    asan) if have_clang; then tested asan; else without clang; fi ;;
+    fuzz) if have_clang; then fuzzed; else without clang; fi ;;
+    tsan) if have_clang; then tested_with_tsan; else without clang; fi ;;
+    cuda) if have_nvcc; then tested cuda cuda-tests; else without nvcc; fi ;;
+  esac
+}
+
 summary=()
 worst=0
-for stage in "${stages[@]}"; do
+mapfile -t missing < <(missing_tools)
+for name in "${stages[@]}"; do
   echo
-  echo "=== $stage"
+  echo "=== $name"
   start=$SECONDS
-  case $stage in
-    cpu) (tested cpu) ;;
-    tidy) (looked_at) ;;
-    asan) if have_clang; then (tested asan); else (exit 77); fi ;;
-    fuzz) if have_clang; then (fuzzed); else (exit 77); fi ;;
-    tsan) if have_clang; then (tested_with_tsan); else (exit 77); fi ;;
-    cuda) if have_nvcc; then (tested cuda cuda-tests); else (exit 77); fi ;;
-  esac
+  skips=build/$name/skips.txt
+  (stage "$name")
   code=$?
   result=passed
-  if [[ $code -eq 77 ]]; then
-    result="skipped: its compiler is not installed"
+  if [[ $code -eq 77 ]] && ! in_ci; then
+    result="SKIPPED: missing tool: $(cat "$lacking")"
+  elif [[ $code -eq 77 ]]; then
+    result="FAILED: missing tool: $(cat "$lacking") (CI is set)"
   elif [[ $code -ne 0 ]]; then
     result=FAILED
-    worst=1
   fi
-  summary+=("$(printf '  %-5s %5d s  %s' "$stage" $((SECONDS - start)) "$result")")
-  if [[ $result == FAILED ]]; then summary+=("$(failed_tests "$stage")"); fi
+  [[ $result != FAILED* ]] || worst=1
+  counted=0
+  if [[ $code -ne 77 && -f $skips && $name != fuzz && $name != tidy ]]; then
+    counted=$(wc -l <"$skips")
+    result+=", $counted cases skipped"
+  fi
+  summary+=("$(printf '  %-5s %5d s  %s' "$name" $((SECONDS - start)) "$result")")
+  if [[ $counted -gt 0 ]]; then summary+=("$(scripts/skips.py "$skips" | sed 's/^/          skipped /')"); fi
+  if [[ $result == FAILED* ]]; then summary+=("$(failed_tests "$name")"); fi
 done
 
 echo
 echo "Summary"
 printf '%s\n' "${summary[@]}"
+if [[ ${#missing[@]} -gt 0 ]]; then
+  for tool in "${missing[@]}"; do echo "  missing tool: $tool; its tests were left out"; done
+  if in_ci; then
+    echo "  FAILED: in CI (CI=$CI) no tool may be missing"
+    worst=1
+  fi
+fi
 exit $worst

@@ -216,7 +216,7 @@ TEST_P(HardCases, IsAnsweredOrRefused) {
   }
 }
 TEST_P(HardCases, IsAnsweredOrRefusedOnAGpu) {
-  if (cuda_devices().empty()) GTEST_SKIP() << "[  SKIPPED ] no CUDA device";
+  if (cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
   for (const Precision precision : {Precision::double_, Precision::single, Precision::mixed}) {
     expect_good({app::choose_device("cuda"), precision});
   }

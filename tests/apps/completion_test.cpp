@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "support/program.hpp"
+#include "support/skips.hpp"
 
 namespace phyxel {
 namespace {
@@ -52,7 +53,7 @@ TEST_F(Completion, BashOffersCommandsAndTheirOptions) {
 }
 
 TEST_F(Completion, FishOffersCommandsAndTheirOptions) {
-  if (!there_is("fish")) GTEST_SKIP() << "no fish";
+  PHYXEL_NEEDS_TOOL(there_is("fish"), "fish");
   write("complete.fish",
         "$argv[1] completion fish | source\n"
         "complete -C \"phyxel $argv[2..]\"\n");
@@ -61,7 +62,7 @@ TEST_F(Completion, FishOffersCommandsAndTheirOptions) {
 }
 
 TEST_F(Completion, ZshTakesTheScript) {
-  if (!there_is("zsh")) GTEST_SKIP() << "no zsh";
+  PHYXEL_NEEDS_TOOL(there_is("zsh"), "zsh");
   write("complete.zsh",
         "autoload -U compinit && compinit -u -D\n"
         "eval \"$($1 completion zsh)\"\n"

@@ -9,6 +9,7 @@
 #include "phyxel/error.hpp"
 #include "plot.hpp"
 #include "support/program.hpp"
+#include "support/skips.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -190,7 +191,7 @@ TEST(Median, OfAnyOrder) {
 class Charts : public test::Folder {};
 
 TEST_F(Charts, AreDrawnWithTheirLabels) {
-  if (!can_plot()) GTEST_SKIP() << "no gnuplot";
+  PHYXEL_NEEDS_TOOL(can_plot(), "gnuplot");
   const LineChart lines{"It's a \"title\"",
                         "x",
                         "frames_per_s",
@@ -207,7 +208,7 @@ TEST_F(Charts, AreDrawnWithTheirLabels) {
 }
 
 TEST_F(Charts, GnuplotsComplaintIsPassedOn) {
-  if (!can_plot()) GTEST_SKIP() << "no gnuplot";
+  PHYXEL_NEEDS_TOOL(can_plot(), "gnuplot");
   try {
     draw_svg("plot nonsense\n", folder_ / "a.svg");
     FAIL();

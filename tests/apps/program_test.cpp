@@ -225,39 +225,46 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
     std::vector<std::string> arguments;
     std::string message;
   } cases[] = {
-      {{}, ""},
-      {{"frobnicate"}, ""},
-      {{"run", "missing.toml"}, "missing.toml"},
-      {{"run", "."}, "."},
-      {{"run", "broken.toml"}, "broken.toml:"},
-      {{"run", "bad.toml"}, "dino"},
-      {{"run", "beam.toml", "--device", "gpu"}, "gpu"},
-      {{"run", "beam.toml", "--device", "cuda:x"}, "cuda:x"},
-      {{"run", "beam.toml", "--precision", "half"}, "half"},
-      {{"run", "beam.toml", "--until", "-1"}, "-1"},
-      {{"run", "beam.toml", "--threads", "0"}, "0"},
-      {{"run", "beam.toml", "--step", "nan"}, "nan"},
-      {{"run", "beam.toml", "--out", "/proc/phyxel"}, "/proc/phyxel"},
-      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5"},
-      {{"sample", "missing.obj", "--phyxels", "10", "--out", "a.h5"}, "missing.obj"},
-      {{"sample", "empty.obj", "--phyxels", "10", "--out", "a.h5"}, "empty.obj"},
-      {{"sample", "nan.obj", "--phyxels", "10", "--out", "a.h5"}, "nan.obj"},
-      {{"sample", "flat.obj", "--phyxels", "10", "--out", "a.h5"}, ""},
-      {{"sample", "ok.obj", "--phyxels", "0", "--out", "a.h5"}, "0"},
-      {{"sample", "ok.obj", "--phyxels", "-5", "--out", "a.h5"}, "-5"},
-      {{"sample", "ok.obj", "--phyxels", "2000000000", "--out", "a.h5"}, "2000000000"},
-      {{"sample", "ok.obj", "--phyxels", "10", "--out", "kept.h5"}, "kept.h5"},
-      {{"info", "kept.h5"}, "kept.h5"},
-      {{"render", "nowhere"}, "nowhere"},
-      {{"bench", "page", "--results", "nowhere"}, "nowhere"},
-      {{"bench", "step", "--shape", "cow"}, "cow"},
-      {{"export", "nowhere.hdf.series", "--single", "x.vtkhdf"}, "nowhere"},
+      {{}, "command"},
+      {{"frobnicate"}, "command"},
+      {{"run", "missing.toml"}, "missing.toml: cannot read the scene file: No such file"},
+      {{"run", "."}, "error: .: a folder found; allowed: a scene file"},
+      {{"run", "broken.toml"}, "broken.toml:1:6: not valid TOML"},
+      {{"run", "bad.toml"},
+       "bad.toml:4:9: key body.shape: \"dinno\" found (did you mean \"dino\"?)"},
+      {{"run", "beam.toml", "--device", "gpu"}, "--device gpu: unknown device"},
+      {{"run", "beam.toml", "--device", "cuda:x"}, "--device cuda:x: unknown device"},
+      {{"run", "beam.toml", "--precision", "half"}, "--precision half: unknown; allowed: float"},
+      {{"run", "beam.toml", "--until", "-1"}, "--until -1: out of range: allowed > 0"},
+      {{"run", "beam.toml", "--threads", "0"}, "--threads 0: out of range: allowed 1 to"},
+      {{"run", "beam.toml", "--step", "nan"}, "--step nan: out of range: allowed > 0"},
+      {{"run", "beam.toml", "--out", "/proc/phyxel"}, "/proc/phyxel: the output folder cannot"},
+      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5: the output folder cannot be made"},
+      {{"sample", "missing.obj", "--phyxels", "10", "--out", "a.h5"}, "missing.obj: no such file"},
+      {{"sample", "empty.obj", "--phyxels", "10", "--out", "a.h5"}, "empty.obj: the file is empty"},
+      {{"sample", "nan.obj", "--phyxels", "10", "--out", "a.h5"},
+       "nan.obj:1: the coordinate \"nan\""},
+      {{"sample", "flat.obj", "--phyxels", "10", "--out", "a.h5"},
+       "flat.obj: the surface encloses no"},
+      {{"sample", "ok.obj", "--phyxels", "0", "--out", "a.h5"}, "--phyxels 0: out of range"},
+      {{"sample", "ok.obj", "--phyxels", "-5", "--out", "a.h5"}, "--phyxels -5: out of range"},
+      {{"sample", "ok.obj", "--phyxels", "2000000000", "--out", "a.h5"},
+       "ok.obj: 2000000000 phyxels need about"},
+      {{"sample", "ok.obj", "--phyxels", "10", "--out", "kept.h5"},
+       "kept.h5: exists; allowed: another"},
+      {{"info", "kept.h5"}, "kept.h5: not a file written by phyxel"},
+      {{"render", "nowhere"}, "nowhere: no such file or folder"},
+      {{"bench", "page", "--results", "nowhere"}, "nowhere: no such folder"},
+      {{"bench", "step", "--shape", "cow"}, "cow not in"},
+      {{"export", "nowhere.hdf.series", "--single", "x.vtkhdf"},
+       "nowhere.hdf.series: no such file"},
   };
   for (const auto& c : cases) {
     std::string line;
     for (const std::string& a : c.arguments) line += a + " ";
     const Outcome outcome = run(c.arguments);
     EXPECT_EQ(outcome.code, 2) << line << outcome.out << outcome.err;
+    ASSERT_GE(c.message.size(), 7) << line << "would take any text";
     EXPECT_THAT(outcome.err, HasSubstr(c.message)) << line;
     EXPECT_FALSE(fs::exists(folder_ / "a.h5")) << line;
   }

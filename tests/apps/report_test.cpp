@@ -13,6 +13,7 @@
 #include "phyxel/recorder.hpp"
 #include "report/page.hpp"
 #include "support/program.hpp"
+#include "support/skips.hpp"
 
 namespace phyxel {
 namespace {
@@ -139,8 +140,8 @@ region = "x-"
     return text_of(folder_ / "page.html");
   }
   /// The attributes of a page's body, as a browser leaves it; "" if there is no browser.
+  /// The `<body ...>` that Chromium has after it ran the page's scripts.
   std::string seen_by_browser(const fs::path& page) const {
-    if (std::system("command -v chromium >/dev/null") != 0) return "";
     const std::string command =
         "HOME=" + folder_.string() +
         " timeout 60 chromium --headless=new --no-sandbox --use-angle=swiftshader "
@@ -340,10 +341,10 @@ TEST_F(Reports, WrongRequestsAreRefused) {
 }
 
 TEST_F(Reports, ABrowserDrawsThem) {
+  PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
   run_beam();
   page_of();
   const std::string replay = seen_by_browser(folder_ / "page.html");
-  if (replay.empty()) GTEST_SKIP() << "no chromium";
   EXPECT_THAT(replay, HasSubstr("data-state=\"drawn\""));
   EXPECT_THAT(replay, HasSubstr("data-error=\"0\""));
   // The beam, seen whole, covers some of the stage, not all of it.

@@ -461,8 +461,12 @@ TEST(PaperModel, SixteenBitsNameAtMost65535Phyxels) {
     EXPECT_THAT(error.what(), HasSubstr("65536 phyxels"));
     EXPECT_THAT(error.what(), HasSubstr("allowed at most 65535"));
   }
-  if (no_gpu()) GTEST_SKIP() << "no CUDA device for the largest body";
-  // The last phyxel can be named, and its forces are those of the first: the block is symmetric.
+}
+
+/// The last phyxel can be named, and its forces are those of the first: the block is symmetric.
+TEST(PaperGpu, TheLargestBodyGetsTheForcesOfTheSequentialProgram) {
+  if (no_gpu()) GTEST_SKIP() << "no CUDA device";
+  const Model most = block_of(65535);
   const auto backend = make_gpu_backend(most, {.store = ForceStore::csr});
   const auto reference = make_sequential_backend<double>(most);
   std::vector<Vec3d> force, exact;

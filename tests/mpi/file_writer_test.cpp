@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "../partition/bodies.hpp"
+#include "mpi/parallel_file.hpp"
 #include "mpi/stretch_exchange.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "ranks.hpp"
@@ -84,6 +85,11 @@ class SharedFiles : public phyxel::test::Folder {
   Scene scene_ = two_bodies(folder_ / "shared");
   SharedModel shared_{phyxel::test::all_ranks(), scene_, ChosenDevice{}};
 };
+
+/// Or else the tests of this program would say nothing of mpi/parallel_file.cpp.
+TEST_F(SharedFiles, AreWrittenByAllRanksWithAParallelHdf5) {
+  EXPECT_EQ(can_write_together(), PHYXEL_PARALLEL_HDF5 == 1);
+}
 
 TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
   constexpr Index length = 37;

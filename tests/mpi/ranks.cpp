@@ -6,6 +6,8 @@
 
 #include <optional>
 
+#include "support/skips.hpp"
+
 namespace phyxel::test {
 namespace {
 
@@ -46,8 +48,10 @@ int main(int argc, char** argv) {
     listeners.Append(new OnlyFailures);
   }
   if (world().size() > 1) listeners.Append(new EndsAllAtExceptions);
-  const int failed = RUN_ALL_TESTS();
-  const auto all_failed = world().largest(static_cast<std::int64_t>(failed));
+  const int failed = static_cast<int>(world().largest(static_cast<std::int64_t>(RUN_ALL_TESTS())));
+  const int own_code = exit_code_of(failed, world().rank() == 0);
+  // Skipped as a whole where no rank has run a case.
+  const int code = static_cast<int>(world().smallest(static_cast<std::int64_t>(own_code)));
   the_ranks.reset();
-  return static_cast<int>(all_failed);
+  return code;
 }

@@ -36,7 +36,7 @@ file(GLOB root ${WORK}/archive/*)
 check_program(${root})
 
 if(NOT DEBIAN)
-  message(STATUS "no dpkg-shlibdeps: Debian packages were not made")
+  without_tool(Install.Packages "dpkg-shlibdeps, for Debian packages")
   return()
 endif()
 run(${CMAKE_CPACK_COMMAND} --config ${BUILD}/CPackConfig.cmake -C ${CONFIG} -G DEB -B ${WORK})
@@ -77,7 +77,7 @@ run(bash -c "source ${WORK}/root/usr/share/bash-completion/completions/phyxel &&
 
 find_program(pkg_config NAMES pkg-config pkgconf)
 if(NOT pkg_config)
-  message(STATUS "no pkg-config: nothing was linked against ${development}")
+  without_tool(Install.Packages "pkg-config, to link against the development package")
   return()
 endif()
 file(GLOB_RECURSE pc ${WORK}/root/usr/phyxel.pc)

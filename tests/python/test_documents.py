@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from conftest import needs_module
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 
@@ -22,7 +23,7 @@ def test_the_page_runs_from_its_beginning(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("script", sorted(p.name for p in (SOURCE / "examples/python").glob("*.py")))
 def test_examples_run_and_draw(script, tmp_path):
-    pytest.importorskip("matplotlib")
+    needs_module("matplotlib")
     picture = tmp_path / "picture.png"
     done = subprocess.run([sys.executable, SOURCE / "examples/python" / script, picture],
                           capture_output=True, text=True, env={**os.environ, "MPLCONFIGDIR": str(tmp_path)})

@@ -24,11 +24,11 @@ inline std::unique_ptr<Backend> make_test_backend(const Model& model, Precision 
 }
 
 #if defined(PHYXEL_TEST_CUDA)
-/// CTest knows skipped tests by what GoogleTest prints for them.
+/// All tests of a program on the GPU are skipped where there is none.
 class NeedsDevice : public ::testing::Environment {
  public:
   void SetUp() override {
-    if (cuda_devices().empty()) GTEST_SKIP() << "[  SKIPPED ] no CUDA device";
+    if (cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
   }
 };
 inline const auto* const needs_device = ::testing::AddGlobalTestEnvironment(new NeedsDevice);

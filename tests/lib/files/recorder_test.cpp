@@ -13,6 +13,7 @@
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
 #include "support/folder.hpp"
+#include "support/skips.hpp"
 #include "support/two_bodies.hpp"
 
 namespace phyxel {
@@ -288,7 +289,7 @@ TEST_F(Recording, VtkAndH5pyReadTheSameNumbers) {
     Recorder recorder(model_, scene_, true);
     for (int k = 0; k < 3; ++k) record(recorder, k);
     const int code = read_back(folder_ / "out", "frames");
-    if (code == no_reader) GTEST_SKIP() << "python3-vtk9 or python3-h5py is missing";
+    PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");
     EXPECT_EQ(code, 0);
   }
 }
@@ -306,7 +307,7 @@ TEST_F(Recording, TheSingleFileHoldsEveryStep) {
     EXPECT_FALSE(fs::exists(out.string() + ".tmp"));
   }
   const int code = read_back(folder_ / "out", "single");
-  if (code == no_reader) GTEST_SKIP() << "python3-vtk9 or python3-h5py is missing";
+  PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");
   EXPECT_EQ(code, 0);
 }
 

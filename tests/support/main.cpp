@@ -1,0 +1,9 @@
+/// main() of the test programs: GoogleTest's, whose skips are counted.
+#include <gmock/gmock.h>
+
+#include "support/skips.hpp"
+
+int main(int argc, char** argv) {
+  ::testing::InitGoogleMock(&argc, argv);
+  return phyxel::test::exit_code_of(RUN_ALL_TESTS());
+}
