@@ -67,7 +67,9 @@ void say_files(const fs::path& folder) {
   std::vector<fs::path> tables{table_file(folder, paper_table::frames)}, figures;
   for (const std::string& table : all_tables) tables.push_back(table_file(folder, table));
   for (const std::string& body : paper::body_names()) {
-    figures.push_back(figure_1_file(folder, body));
+    for (const Pose pose : {Pose::rest, Pose::hanging}) {
+      figures.push_back(figure_1_file(folder, body, pose));
+    }
   }
   for (const fs::path& file : figure_files(folder)) figures.push_back(file);
   const Json said{{"page", (folder / paper_page_name).string()},
@@ -122,7 +124,9 @@ void paper_command(PaperOptions& options) {
     const bool pictures = contains(options.figures, 1);
     if (pictures) {
       for (const std::string& body : request.bodies) {
-        refuse_if_there(figure_1_file(request.out, body));
+        for (const Pose pose : {Pose::rest, Pose::hanging}) {
+          refuse_if_there(figure_1_file(request.out, body, pose));
+        }
       }
     }
     if (!rates.empty()) refuse_if_there(table_file(request.out, paper_table::frames));

@@ -11,6 +11,7 @@
 #include "paper.hpp"
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
+#include "phyxel/shapes.hpp"
 #include "phyxel/solver.hpp"
 #include "plot.hpp"
 #include "png_file.hpp"
@@ -20,8 +21,40 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Vec3d view_of(const std::string& body) {
-  return body == "alien_head" ? Vec3d{-1, -0.6, -0.2} : Vec3d{-1, 2, -0.6};
+constexpr double hanging_seconds = 0.6;
+
+/// Direction of sight: a head is seen from the front, the others from the side.
+Vec3d view_of(const std::string& body, Pose pose) {
+  if (body != "alien_head") return {-1, 2, -0.6};
+  return pose == Pose::rest ? Vec3d{-1, -0.15, -0.06} : Vec3d{-1, -0.15, 0.06};
+}
+
+void draw_body(const fs::path& file, Vec3d view, const FrameData& surface,
+               const FrameData& phyxels) {
+  CameraFit fit(640, 640, view, {0, 0, 1});
+  fit.include(surface.point);
+  Setting setting;
+  setting.camera = fit.camera();
+  setting.extent = fit.extent();
+  setting.spacing = typical_spacing(phyxels.point);
+  write_png(file, draw_picture(&surface, &phyxels, setting));
+}
+
+/// The body as the solver has it now.
+void draw_state(const fs::path& file, Vec3d view, const Model& model, paper::PaperBackend& backend,
+                const Solver& solver) {
+  const State state = solver.state();
+  SurfelState surfels;
+  backend.advect_surfels(surfels);
+  FrameData surface, phyxels;
+  surface.time = phyxels.time = state.time;
+  surface.point = surfels.position;
+  surface.normal = surfels.normal;
+  surface.triangle = model.surfels.triangle;
+  for (Index i = 0; i < model.size(); ++i) {
+    phyxels.point.push_back(model.position[i] + state.displacement[i]);
+  }
+  draw_body(file, view, surface, phyxels);
 }
 
 /// y against x of the rows that match.
@@ -150,41 +183,34 @@ LineChart stiffness_chart(const CsvTable& stiffness) {
 
 }  // namespace
 
-fs::path figure_1_file(const fs::path& folder, const std::string& body) {
-  return folder / fmt::format("figure1_{}.png", body);
+fs::path figure_1_file(const fs::path& folder, const std::string& body, Pose pose) {
+  return folder / fmt::format("figure1_{}{}.png", body, pose == Pose::rest ? "_rest" : "");
 }
 
 std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
   std::vector<fs::path> files;
   for (const std::string& name : request.bodies) {
+    const Cloud cloud = make_shape({.name = name});
+    FrameData surface, phyxels;
+    surface.point = cloud.surface.position;
+    surface.normal = cloud.surface.normal;
+    surface.triangle = cloud.surface.triangle;
+    phyxels.point = cloud.position;
+    files.push_back(figure_1_file(request.out, name, Pose::rest));
+    draw_body(files.back(), view_of(name, Pose::rest), surface, phyxels);
+    say(files.back().string() + " as it was made");
+
     const Scene scene = paper::body_scene(name);
     const Model model = paper::paper_model(scene);
     const auto backend = request.gpu
                              ? paper::make_gpu_backend(model, {.device = request.gpu->index})
                              : paper::make_sequential_backend<float>(model);
     Solver solver(*backend, initial_state(model, scene, 0.5 * step_limit(model).largest_step));
-    while (solver.time() < 0.6) solver.step();
-    const State state = solver.state();
-    SurfelState surfels;
-    backend->advect_surfels(surfels);
-
-    FrameData surface, phyxels;
-    surface.time = phyxels.time = state.time;
-    surface.point = surfels.position;
-    surface.normal = surfels.normal;
-    surface.triangle = model.surfels.triangle;
-    for (Index i = 0; i < model.size(); ++i) {
-      phyxels.point.push_back(model.position[i] + state.displacement[i]);
-    }
-    CameraFit fit(640, 640, view_of(name), {0, 0, 1});
-    fit.include(surface.point);
-    Setting setting;
-    setting.camera = fit.camera();
-    setting.extent = fit.extent();
-    setting.spacing = typical_spacing(phyxels.point);
-    files.push_back(figure_1_file(request.out, name));
-    write_png(files.back(), draw_picture(&surface, &phyxels, setting));
-    say(fmt::format("{} after {:.2f} s by {}", files.back().string(), state.time, backend->name()));
+    while (solver.time() < hanging_seconds) solver.step();
+    files.push_back(figure_1_file(request.out, name, Pose::hanging));
+    draw_state(files.back(), view_of(name, Pose::hanging), model, *backend, solver);
+    say(fmt::format("{} after {:.2f} s by {}", files.back().string(), solver.time(),
+                    backend->name()));
   }
   return files;
 }

@@ -185,18 +185,23 @@ class Page {
   }
 
   void pictures() {
-    std::vector<std::string> head, row;
-    for (const std::string& body : paper::body_names()) {
-      const std::string file = figure_1_file({}, body).string();
-      if (!fs::exists(folder_ / file)) continue;
-      head.push_back(body);
-      row.push_back(fmt::format("![{}]({})", body, file));
+    std::vector<std::string> head{""};
+    std::vector<std::vector<std::string>> rows;
+    for (const Pose pose : {Pose::rest, Pose::hanging}) {
+      std::vector<std::string> row{pose == Pose::rest ? "as made" : "after 0.6 s"};
+      for (const std::string& body : paper::body_names()) {
+        const std::string file = figure_1_file({}, body, pose).string();
+        if (!fs::exists(folder_ / file)) continue;
+        if (std::find(head.begin(), head.end(), body) == head.end()) head.push_back(body);
+        row.push_back(fmt::format("![{}]({})", body, file));
+      }
+      if (row.size() == head.size() && row.size() > 1) rows.push_back(row);
     }
-    if (head.empty()) return;
+    if (rows.empty()) return;
     text_ +=
-        "## Figure 1\n\nThe bodies hung by a leg, the neck and the mouth, after 0.6 s of "
-        "falling; dots are phyxels.\n\n" +
-        table_text(head, {row});
+        "## Figure 1\n\nThe bodies as they were made, and hung by a leg, the neck and the mouth, "
+        "after 0.6 s of falling; dots are phyxels.\n\n" +
+        table_text(head, rows);
   }
 
   void kernels(const CsvTable& t) {

@@ -58,10 +58,14 @@ CsvTable measure_trajectories(const PaperRequest& request);
 CsvTable measure_memory(const PaperRequest& request);
 CsvTable measure_stiffness(const PaperRequest& request);
 
-/// figure1_<body>.png
-std::filesystem::path figure_1_file(const std::filesystem::path& folder, const std::string& body);
+/// How Figure 1 shows a body: as it was made, or while it hangs.
+enum class Pose { rest, hanging };
 
-/// Figure 1: each body in motion, with its phyxels. @returns the files.
+/// figure1_<body>_rest.png or figure1_<body>.png
+std::filesystem::path figure_1_file(const std::filesystem::path& folder, const std::string& body,
+                                    Pose pose);
+
+/// Figure 1: each body in both poses, with its phyxels. @returns the files.
 std::vector<std::filesystem::path> draw_figure_1(const PaperRequest& request);
 
 /// Names that figures 2 to 6 and two more take in `folder`.
