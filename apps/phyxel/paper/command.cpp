@@ -32,7 +32,8 @@ struct PaperOptions {
 };
 
 const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
-                                          paper_table::memory, paper_table::stiffness};
+                                          paper_table::young, paper_table::memory,
+                                          paper_table::stiffness};
 
 template <class T, class U>
 bool contains(const std::vector<T>& list, const U& value) {
@@ -67,7 +68,7 @@ void say_files(const fs::path& folder) {
   std::vector<fs::path> tables{table_file(folder, paper_table::frames)}, figures;
   for (const std::string& table : all_tables) tables.push_back(table_file(folder, table));
   for (const std::string& body : paper::body_names()) {
-    for (const Pose pose : {Pose::rest, Pose::hanging}) {
+    for (const Pose pose : poses) {
       figures.push_back(figure_1_file(folder, body, pose));
     }
   }
@@ -124,7 +125,7 @@ void paper_command(PaperOptions& options) {
     const bool pictures = contains(options.figures, 1);
     if (pictures) {
       for (const std::string& body : request.bodies) {
-        for (const Pose pose : {Pose::rest, Pose::hanging}) {
+        for (const Pose pose : poses) {
           refuse_if_there(figure_1_file(request.out, body, pose));
         }
       }
@@ -157,6 +158,7 @@ void paper_command(PaperOptions& options) {
       bool needs_gpu;
     } measurements[] = {{paper_table::kernels, measure_kernels, false},
                         {paper_table::trajectory, measure_trajectories, false},
+                        {paper_table::young, measure_young, false},
                         {paper_table::memory, measure_memory, true},
                         {paper_table::stiffness, measure_stiffness, false}};
     for (const auto& m : measurements) {
@@ -194,7 +196,7 @@ void add_paper(CLI::App& program) {
       ->check(CLI::Range(1, 6));
   command
       ->add_option("--table", options->tables,
-                   "Only these tables: kernels, trajectory, memory, stiffness")
+                   "Only these tables: kernels, trajectory, young, memory, stiffness")
       ->delimiter(',');
   command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');

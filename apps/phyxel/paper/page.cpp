@@ -20,12 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* first_line = "# The 2008 paper, run again";
 
-/// What the paper prints: speedups of section 6.2 ("about 20 times").
-struct Printed {
-  const char* body;
-  double speedup;
-};
-constexpr Printed printed[] = {{"horn_bug", 10.05}, {"dino", 20.57}, {"alien_head", 24.76}};
 constexpr const char* printed_hardware =
     "Athlon 64 X2 4800+ (one core) and GeForce 8800 GTX (128 scalar processors, 768 MB)";
 
@@ -46,8 +40,10 @@ class Page {
     pictures();
     with(paper_table::kernels, [&](const CsvTable& t) { kernels(t); });
     with(paper_table::trajectory, [&](const CsvTable& t) { trajectories(t); });
+    with(paper_table::young, [&](const CsvTable& t) { young(t); });
     with(paper_table::memory, [&](const CsvTable& t) { memory(t); });
     with(paper_table::stiffness, [&](const CsvTable& t) { stiffness(t); });
+    with(paper_table::machine_code, [&](const CsvTable& t) { machine_code(t); });
     return text_;
   }
 
@@ -77,10 +73,59 @@ class Page {
         "ones follow each other without waiting. Float; medians over " +
         t.fact("repeats") + " repeats.\n\n";
     speedups(t);
+    figure("speedups.svg", "Speedups of one object");
+    real_time(t);
     for (int f = 2; f <= 6; ++f) {
       figure(fmt::format("figure{}.svg", f), fmt::format("Figure {}", f));
     }
     all_rates(t);
+  }
+
+  /// What real time asks for, and how many objects of each kind keep to it.
+  void real_time(const CsvTable& t) {
+    text_ += fmt::format(
+        "Real time: the paper names no frame rate but the {} Hz of video, which the grey lines of "
+        "Figures 2 to 5 show; every one of the paper's frames is a step. Motion at its own pace "
+        "asks for more: as many steps a second as a second of motion takes, 1/Δt, the dashed "
+        "lines of Figures 2 and 3. Objects of which so many keep to it, of as many as were "
+        "measured:\n\n",
+        real_time_rate);
+    std::vector<std::vector<std::string>> rows;
+    for (const std::string& body : t.values("body")) {
+      for (const std::string& surfels : t.values("with_surfels")) {
+        for (const std::string& program : t.values("program")) {
+          const std::vector<std::string> cores = t.values("cores", {{"program", program}});
+          const Match match{{"body", body},
+                            {"with_surfels", surfels},
+                            {"program", program},
+                            {"cores", cores.back()},
+                            {"frames", "shown"}};
+          const auto row = t.find(match);
+          if (!row) continue;
+          const double needed = t.has("step_s") ? 1 / t.number(*row, "step_s") : NAN;
+          rows.push_back({body, surfels, program, cores.back() == "0" ? "GPU" : cores.back(),
+                          keeping_up(t, match, real_time_rate),
+                          std::isnan(needed) ? "–" : fmt::format("{:.0f}", needed),
+                          std::isnan(needed) ? "–" : keeping_up(t, match, needed)});
+        }
+      }
+    }
+    text_ += table_text({"body", "surfels", "program", "cores",
+                         fmt::format("objects at {} frames/s", real_time_rate),
+                         "steps in a second of motion", "objects at that rate"},
+                        rows);
+  }
+
+  /// The most objects with frame rates of `rate` or more, and how many were measured.
+  static std::string keeping_up(const CsvTable& t, const Match& match, double rate) {
+    int most = 0, measured = 0;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      if (!t.matches(r, match)) continue;
+      const int objects = static_cast<int>(t.number(r, "objects"));
+      measured = std::max(measured, objects);
+      if (t.number(r, "frames_per_s") >= rate) most = std::max(most, objects);
+    }
+    return most == measured ? fmt::format("all {}", most) : std::to_string(most);
   }
 
   /// GPU over each CPU program, for one object and for as many as the CPU was given.
@@ -101,11 +146,13 @@ class Page {
     }
     std::vector<std::vector<std::string>> rows;
     bool any = false;
-    for (const Printed& printed_one : printed) {
+    for (const PrintedSpeedup& printed_one : printed_speedups) {
       const Match body{{"body", printed_one.body}, {"frames", "shown"}};
       Match on_cpu = body;
       on_cpu.emplace_back("program", "sequential of 2008");
-      for (const std::string& objects : t.values("objects", on_cpu)) {
+      const std::vector<std::string> counts = t.values("objects", on_cpu);
+      for (const std::string& objects : counts) {  // the figures have the others
+        if (objects != counts.front() && objects != counts.back()) continue;
         const auto rate = [&](const Program& program, const char* surfels) {
           Match match = body;
           match.insert(match.end(), {{"program", program.name},
@@ -187,8 +234,10 @@ class Page {
   void pictures() {
     std::vector<std::string> head{""};
     std::vector<std::vector<std::string>> rows;
-    for (const Pose pose : {Pose::rest, Pose::hanging}) {
-      std::vector<std::string> row{pose == Pose::rest ? "as made" : "after 0.6 s"};
+    const char* names[] = {"as made", "after 0.6 s", "after 0.6 s, E = 10⁴ Pa",
+                           "after 0.6 s, E = 10⁶ Pa"};
+    for (const Pose pose : poses) {
+      std::vector<std::string> row{names[static_cast<int>(pose)]};
       for (const std::string& body : paper::body_names()) {
         const std::string file = figure_1_file({}, body, pose).string();
         if (!fs::exists(folder_ / file)) continue;
@@ -200,7 +249,8 @@ class Page {
     if (rows.empty()) return;
     text_ +=
         "## Figure 1\n\nThe bodies as they were made, and hung by a leg, the neck and the mouth, "
-        "after 0.6 s of falling; dots are phyxels.\n\n" +
+        "after 0.6 s of falling: with their own Young's moduli, and with both ends of the range of "
+        "section 6.1. Dots are phyxels.\n\n" +
         table_text(head, rows);
   }
 
@@ -266,6 +316,52 @@ class Page {
       }
     }
     text_ += table_text(head, rows);
+  }
+
+  void young(const CsvTable& t) {
+    text_ += "## Both ends of Young's modulus\n\n";
+    measured_by(t);
+    text_ +=
+        "Section 6.1: E from 10⁴ N/m² (\"quasi-melting behavior\") to 10⁶ N/m² (\"high "
+        "stiffness\"). A second of motion at either end, at half of the largest stable step, "
+        "which shrinks as 1/√E; errors against long double with the same step.\n\n";
+    std::vector<std::vector<std::string>> rows;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      std::vector<std::string> row;
+      for (const char* column : {"body", "young_pa", "step_s", "steps", "program", "precision",
+                                 "relative_error", "largest_displacement_m", "inverted_phyxels"}) {
+        row.push_back(t.text(r, column));
+      }
+      rows.push_back(row);
+    }
+    text_ += table_text({"body", "E [Pa]", "step [s]", "steps", "program", "precision", "error",
+                         "largest displacement [m]", "inverted phyxels"},
+                        rows);
+  }
+
+  void machine_code(const CsvTable& t) {
+    text_ += fmt::format(
+        "## 24-bit multiplication\n\nCounted by `scripts/paper_machine_code.py` with {} for {}; "
+        "{}.\n\n",
+        t.fact("compiler"), t.fact("architecture"), t.fact("date"));
+    text_ +=
+        "The source asks for 24-bit products of indices, as the paper does. The compiler writes "
+        "none: it cuts the factors down to 24 bits, which takes instructions of its own where it "
+        "cannot tell that they are short, and multiplies in 32 bits (`IMAD`). The first two rows "
+        "are kernels of one line.\n\n";
+    std::vector<std::vector<std::string>> rows;
+    for (std::size_t r = 0; r < t.rows.size(); ++r) {
+      std::vector<std::string> row{"`" + t.text(r, "kernel") + "`"};
+      for (const char* column : {"precision", "in_source", "ptx_24_bit", "sass_24_bit",
+                                 "sass_32_bit", "ptx_truncations", "sass_instructions"}) {
+        row.push_back(t.text(r, column));
+      }
+      rows.push_back(row);
+    }
+    text_ += table_text(
+        {"kernel", "precision", "`__mul24` in the source", "24-bit in PTX",
+         "24-bit in machine code", "32-bit in machine code", "truncations in PTX", "instructions"},
+        rows);
   }
 
   void memory(const CsvTable& t) {
