@@ -249,11 +249,12 @@ std::vector<fs::path> draw_figure_1(const PaperRequest& request) {
     draw_body(files.back(), view_of(name, Pose::rest), surface, phyxels);
     say(files.back().string() + " as it was made");
 
+    const std::vector<Cloud> placed = make_clouds(paper::body_scene(name), {});
     for (const Pose pose : {Pose::hanging, Pose::soft, Pose::stiff}) {
       Scene scene = paper::body_scene(name);
       if (pose == Pose::soft) scene.bodies[0].material.young = softest;
       if (pose == Pose::stiff) scene.bodies[0].material.young = stiffest;
-      const Model model = paper::paper_model(scene);
+      const Model model = paper::paper_model(scene, placed);
       const auto backend = request.gpu
                                ? paper::make_gpu_backend(model, {.device = request.gpu->index})
                                : paper::make_sequential_backend<float>(model);

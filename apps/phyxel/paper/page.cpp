@@ -10,6 +10,7 @@
 
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
+#include "page_sections.hpp"
 #include "paper.hpp"
 #include "paper/paper_model.hpp"
 
@@ -40,10 +41,11 @@ class Page {
     pictures();
     with(paper_table::kernels, [&](const CsvTable& t) { kernels(t); });
     with(paper_table::trajectory, [&](const CsvTable& t) { trajectories(t); });
-    with(paper_table::young, [&](const CsvTable& t) { young(t); });
+    with(paper_table::young, [&](const CsvTable& t) { text_ += young_section(t); });
     with(paper_table::memory, [&](const CsvTable& t) { memory(t); });
     with(paper_table::stiffness, [&](const CsvTable& t) { stiffness(t); });
-    with(paper_table::machine_code, [&](const CsvTable& t) { machine_code(t); });
+    with(paper_table::exchange, [&](const CsvTable& t) { text_ += exchange_section(t); });
+    with(paper_table::machine_code, [&](const CsvTable& t) { text_ += machine_code_section(t); });
     return text_;
   }
 
@@ -53,19 +55,13 @@ class Page {
     if (table && !table->rows.empty()) section(*table);
   }
 
-  void measured_by(const CsvTable& t) {
-    text_ += fmt::format("Measured by {} on {}; GPU: {}; {}; {}; {}.\n\n", t.fact("program"),
-                         t.fact("hardware"), t.fact("gpu"), t.fact("cuda"), t.fact("compiler"),
-                         t.fact("date"));
-  }
-
   void figure(const std::string& name, const std::string& caption) {
     if (fs::exists(folder_ / name)) text_ += fmt::format("![{}]({})\n\n", caption, name);
   }
 
   void frames(const CsvTable& t) {
     text_ += "## Frame rates and speedups (Figures 2 to 6)\n\n";
-    measured_by(t);
+    text_ += measured_by(t);
     text_ +=
         "A frame is one time step of every object, each by its own launches of "
         "`calcStrainStressA`, `calcStrainStressB`, `integrate` and, with surfels, "
@@ -74,58 +70,11 @@ class Page {
         t.fact("repeats") + " repeats.\n\n";
     speedups(t);
     figure("speedups.svg", "Speedups of one object");
-    real_time(t);
+    text_ += real_time_section(t);
     for (int f = 2; f <= 6; ++f) {
       figure(fmt::format("figure{}.svg", f), fmt::format("Figure {}", f));
     }
     all_rates(t);
-  }
-
-  /// What real time asks for, and how many objects of each kind keep to it.
-  void real_time(const CsvTable& t) {
-    text_ += fmt::format(
-        "Real time: the paper names no frame rate but the {} Hz of video, which the grey lines of "
-        "Figures 2 to 5 show; every one of the paper's frames is a step. Motion at its own pace "
-        "asks for more: as many steps a second as a second of motion takes, 1/Δt, the dashed "
-        "lines of Figures 2 and 3. Objects of which so many keep to it, of as many as were "
-        "measured:\n\n",
-        real_time_rate);
-    std::vector<std::vector<std::string>> rows;
-    for (const std::string& body : t.values("body")) {
-      for (const std::string& surfels : t.values("with_surfels")) {
-        for (const std::string& program : t.values("program")) {
-          const std::vector<std::string> cores = t.values("cores", {{"program", program}});
-          const Match match{{"body", body},
-                            {"with_surfels", surfels},
-                            {"program", program},
-                            {"cores", cores.back()},
-                            {"frames", "shown"}};
-          const auto row = t.find(match);
-          if (!row) continue;
-          const double needed = t.has("step_s") ? 1 / t.number(*row, "step_s") : NAN;
-          rows.push_back({body, surfels, program, cores.back() == "0" ? "GPU" : cores.back(),
-                          keeping_up(t, match, real_time_rate),
-                          std::isnan(needed) ? "–" : fmt::format("{:.0f}", needed),
-                          std::isnan(needed) ? "–" : keeping_up(t, match, needed)});
-        }
-      }
-    }
-    text_ += table_text({"body", "surfels", "program", "cores",
-                         fmt::format("objects at {} frames/s", real_time_rate),
-                         "steps in a second of motion", "objects at that rate"},
-                        rows);
-  }
-
-  /// The most objects with frame rates of `rate` or more, and how many were measured.
-  static std::string keeping_up(const CsvTable& t, const Match& match, double rate) {
-    int most = 0, measured = 0;
-    for (std::size_t r = 0; r < t.rows.size(); ++r) {
-      if (!t.matches(r, match)) continue;
-      const int objects = static_cast<int>(t.number(r, "objects"));
-      measured = std::max(measured, objects);
-      if (t.number(r, "frames_per_s") >= rate) most = std::max(most, objects);
-    }
-    return most == measured ? fmt::format("all {}", most) : std::to_string(most);
   }
 
   /// GPU over each CPU program, for one object and for as many as the CPU was given.
@@ -256,7 +205,7 @@ class Page {
 
   void kernels(const CsvTable& t) {
     text_ += "## Errors of each kernel\n\n";
-    measured_by(t);
+    text_ += measured_by(t);
     text_ +=
         "Largest difference from the same equations in long double, over the largest value, for a "
         "bend and twist with strains of some 10%. The tests hold the same kernels against an "
@@ -289,7 +238,7 @@ class Page {
 
   void trajectories(const CsvTable& t) {
     text_ += "## A second of motion\n\n";
-    measured_by(t);
+    text_ += measured_by(t);
     text_ +=
         "Largest difference of a displacement from the trajectory in long double with the same "
         "step, over the largest displacement. From float to double the distance shrinks by about "
@@ -318,55 +267,9 @@ class Page {
     text_ += table_text(head, rows);
   }
 
-  void young(const CsvTable& t) {
-    text_ += "## Both ends of Young's modulus\n\n";
-    measured_by(t);
-    text_ +=
-        "Section 6.1: E from 10⁴ N/m² (\"quasi-melting behavior\") to 10⁶ N/m² (\"high "
-        "stiffness\"). A second of motion at either end, at half of the largest stable step, "
-        "which shrinks as 1/√E; errors against long double with the same step.\n\n";
-    std::vector<std::vector<std::string>> rows;
-    for (std::size_t r = 0; r < t.rows.size(); ++r) {
-      std::vector<std::string> row;
-      for (const char* column : {"body", "young_pa", "step_s", "steps", "program", "precision",
-                                 "relative_error", "largest_displacement_m", "inverted_phyxels"}) {
-        row.push_back(t.text(r, column));
-      }
-      rows.push_back(row);
-    }
-    text_ += table_text({"body", "E [Pa]", "step [s]", "steps", "program", "precision", "error",
-                         "largest displacement [m]", "inverted phyxels"},
-                        rows);
-  }
-
-  void machine_code(const CsvTable& t) {
-    text_ += fmt::format(
-        "## 24-bit multiplication\n\nCounted by `scripts/paper_machine_code.py` with {} for {}; "
-        "{}.\n\n",
-        t.fact("compiler"), t.fact("architecture"), t.fact("date"));
-    text_ +=
-        "The source asks for 24-bit products of indices, as the paper does. The compiler writes "
-        "none: it cuts the factors down to 24 bits, which takes instructions of its own where it "
-        "cannot tell that they are short, and multiplies in 32 bits (`IMAD`). The first two rows "
-        "are kernels of one line.\n\n";
-    std::vector<std::vector<std::string>> rows;
-    for (std::size_t r = 0; r < t.rows.size(); ++r) {
-      std::vector<std::string> row{"`" + t.text(r, "kernel") + "`"};
-      for (const char* column : {"precision", "in_source", "ptx_24_bit", "sass_24_bit",
-                                 "sass_32_bit", "ptx_truncations", "sass_instructions"}) {
-        row.push_back(t.text(r, column));
-      }
-      rows.push_back(row);
-    }
-    text_ += table_text(
-        {"kernel", "precision", "`__mul24` in the source", "24-bit in PTX",
-         "24-bit in machine code", "32-bit in machine code", "truncations in PTX", "instructions"},
-        rows);
-  }
-
   void memory(const CsvTable& t) {
     text_ += "## The n×n matrix\n\n";
-    measured_by(t);
+    text_ += measured_by(t);
     text_ +=
         "Section 5.2 gives 34.33 MB for 1,000 phyxels, which is nine floats a pair (36 bytes, in "
         "MiB); a force is three (11.44 MiB). Ours stores three. Measured: what the GPU's free "
@@ -404,7 +307,7 @@ class Page {
 
   void stiffness(const CsvTable& t) {
     text_ += "## Young's modulus and single precision\n\n";
-    measured_by(t);
+    text_ += measured_by(t);
     text_ +=
         "Section 6.1 warns that a large Young's modulus \"may cause unexpected results, due the "
         "single floating point precision\". A free bar of 54 phyxels spins at 10 rad/s for 0.1 s. "

@@ -33,6 +33,7 @@ inline constexpr const char* trajectory = "trajectory";  ///< Errors over a seco
 inline constexpr const char* memory = "memory";          ///< The n×n matrix.
 inline constexpr const char* stiffness = "stiffness";    ///< Young's modulus against error.
 inline constexpr const char* young = "young";            ///< Both ends of section 6.1's range.
+inline constexpr const char* exchange = "exchange";      ///< What ranks would send each other.
 /// Counted by scripts/paper_machine_code.py, not by this command.
 inline constexpr const char* machine_code = "machine_code";
 }  // namespace paper_table
@@ -76,6 +77,14 @@ CsvTable measure_trajectories(const PaperRequest& request);
 CsvTable measure_young(const PaperRequest& request);
 CsvTable measure_memory(const PaperRequest& request);
 CsvTable measure_stiffness(const PaperRequest& request);
+/// What ranks would send each other in a step, by three ways to exchange forces. Needs no GPU.
+CsvTable measure_exchange(const PaperRequest& request);
+
+/// A jittered block of exactly `n` phyxels, 0.1 m apart, without surfels.
+Model paper_block(Index n);
+
+/// A bend and a twist with strains of some 10%, exact in float.
+State bent_and_twisted(const Model& model);
 
 /// How Figure 1 shows a body: as it was made, or while it hangs; that with its own Young's modulus,
 /// or with one end of the range.
