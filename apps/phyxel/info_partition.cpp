@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "partition/exchange_size.hpp"
 #include "partition/halo_plan.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
@@ -85,6 +86,7 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
   for (const HaloPlan& plan : make_halo_plans(phyxels, chosen_parts, parts, 2)) {
     plans.push_back(plan_facts(plan));
   }
+  const ExchangeSize sent = exchange_size(model, chosen_parts);
   return {{"file", file.string()},
           {"phyxels", model.size()},
           {"tiles", tiles.count},
@@ -92,7 +94,11 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
           {"cuts", cuts},
           {"notes", notes},
           {"partitioner", partitioner_name(chosen)},
-          {"plans", plans}};
+          {"plans", plans},
+          {"numbers sent a step",
+           {{"pair stresses", sent.pair_stresses},
+            {"pair forces", sent.pair_forces},
+            {"summed forces", sent.summed_forces}}}};
 }
 
 std::string partition_tables(const Facts& facts) {
@@ -131,7 +137,17 @@ std::string partition_tables(const Facts& facts) {
                         plan["ghosts"][0].get<std::size_t>(), plan["ghosts"][1].get<std::size_t>(),
                         peers);
   }
-  return text;
+  const auto kilobytes = [&](const char* way) {
+    return 1e-3 * sizeof(float) * facts["numbers sent a step"][way].get<double>();
+  };
+  return text + fmt::format(
+                    "\n  Sent a step by all parts in float, displacements of ghosts and\n"
+                    "    their pair stresses, as phyxel does {:>12.1f} kB\n"
+                    "    the force of each pair              {:>12.1f} kB, to the same bits\n"
+                    "    forces summed over each part        {:>12.1f} kB, to bits that depend on "
+                    "the cut\n",
+                    kilobytes("pair stresses"), kilobytes("pair forces"),
+                    kilobytes("summed forces"));
 }
 
 }  // namespace phyxel::app

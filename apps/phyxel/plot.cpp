@@ -26,6 +26,15 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "?";
 }
 
+/// @param place of the curve in its chart, from 1
+std::string style_of(const Curve& curve, int place) {
+  if (curve.level) return "lines lt 1 lc rgb '#808080' dt 4";
+  return fmt::format("linespoints lt {}{}", curve.colour ? curve.colour : place,
+                     curve.dashed   ? " dt 2"
+                     : curve.dotted ? " dt 3"
+                                    : "");
+}
+
 std::string head(const std::string& title, const std::string& y_label) {
   return "set encoding utf8\nset title " + gnuplot_string(title) + " noenhanced\nset ylabel " +
          gnuplot_string(y_label) +
@@ -109,9 +118,8 @@ std::string script_of(const LineChart& chart) {
       script += number(curve.x[k]) + " " + number(curve.y[k]) + "\n";
     }
     script += "EOD\n";
-    plots += fmt::format("{}$curve{} using 1:2 with linespoints lt {}{} title {}", c ? ", " : "", c,
-                         curve.colour ? curve.colour : c + 1, curve.dashed ? " dt 2" : "",
-                         gnuplot_string(curve.label));
+    plots += fmt::format("{}$curve{} using 1:2 with {} title {}", c ? ", " : "", c,
+                         style_of(curve, static_cast<int>(c) + 1), gnuplot_string(curve.label));
   }
   return script + "plot " + plots + "\n";
 }

@@ -12,6 +12,8 @@ struct Curve {
   std::vector<double> x, y;  ///< Of one length.
   int colour = 0;            ///< 1 to 6; 0: by its place in the chart.
   bool dashed = false;
+  bool dotted = false;
+  bool level = false;  ///< A grey line without points: something that the others are held against.
 };
 
 struct LineChart {

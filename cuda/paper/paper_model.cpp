@@ -90,7 +90,11 @@ Model paper_model(const Scene& scene) {
 }
 
 Model paper_model(const Scene& scene, const Cloud& cloud) {
-  Model model = build_model(scene, std::span(&cloud, 1));
+  return paper_model(scene, std::span(&cloud, 1));
+}
+
+Model paper_model(const Scene& scene, std::span<const Cloud> clouds) {
+  Model model = build_model(scene, clouds);
   limit_carriers(model, max_neighbours);
   return model;
 }

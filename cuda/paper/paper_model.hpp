@@ -27,6 +27,8 @@ void use_paper_rules(BodyRequest& body);
 /// `build_model`, with at most `max_neighbours` carriers a surfel (the nearest).
 Model paper_model(const Scene& scene);
 Model paper_model(const Scene& scene, const Cloud& cloud);
+/// The same from clouds already in place, one for each body of the scene.
+Model paper_model(const Scene& scene, std::span<const Cloud> clouds);
 
 /// @throws InputError unless the model is one that the 2008 program could have run: a single body
 ///   of at most 65,535 phyxels, volumes by the kernel rule, phyxels held but not moved, gravity but

@@ -17,14 +17,20 @@ PaperBody alien_head() {
   using Limb = ImplicitBody::Limb;
   using Ellipsoid = ImplicitBody::Ellipsoid;
   ImplicitBody form;
-  form.add(Ellipsoid{{-0.04, 0, 0.20}, {0.35, 0.30, 0.30}}, 0);
-  form.add(Limb{{0.05, 0, 0.06}, 0.22, {0.14, 0, -0.24}, 0.10}, 0.1);
-  form.add(Limb{{-0.06, 0, -0.1}, 0.13, {-0.07, 0, -0.36}, 0.13}, 0.08);
-  form.add(Ellipsoid{{-0.07, 0, -0.42}, {0.17, 0.19, 0.08}}, 0.08);
-  // Large slanting eyes, nostrils, a thin mouth.
-  form.cut_pair(Limb{{0.31, 0.07, -0.04}, 0.06, {0.27, 0.20, 0.09}, 0.085}, 0.03);
-  form.cut_pair(Limb{{0.285, 0.022, -0.13}, 0.012, {0.285, 0.026, -0.115}, 0.012}, 0.01);
-  form.cut(Limb{{0.245, -0.05, -0.22}, 0.018, {0.245, 0.05, -0.22}, 0.018}, 0.015);
+  // A wide cranium that tapers to a small chin; a thin neck on the stump of the shoulders.
+  form.add(Ellipsoid{{-0.05, 0, 0.21}, {0.34, 0.33, 0.29}}, 0);
+  form.add(Limb{{0.07, 0, 0.06}, 0.23, {0.17, 0, -0.24}, 0.075}, 0.12);
+  form.add(Limb{{-0.07, 0, -0.05}, 0.16, {-0.08, 0, -0.37}, 0.135}, 0.08);
+  form.add(Ellipsoid{{-0.08, 0, -0.43}, {0.17, 0.21, 0.07}}, 0.08);
+  // Almond eyes that rise outwards, each a bulge in a deeper socket; nostrils, a thin mouth.
+  const Vec3d inner{0.315, 0.062, -0.08}, middle{0.30, 0.145, 0.0}, outer{0.22, 0.245, 0.115};
+  form.cut_pair(Limb{middle, 0.105, inner, 0.045}, 0.03);
+  form.cut_pair(Limb{middle, 0.105, outer, 0.045}, 0.03);
+  const Vec3d back{-0.045, -0.02, 0};
+  form.add_pair(Limb{middle + back, 0.085, inner + back, 0.025}, 0.03);
+  form.add_pair(Limb{middle + back, 0.085, outer + back, 0.025}, 0.03);
+  form.cut_pair(Limb{{0.285, 0.02, -0.145}, 0.014, {0.285, 0.026, -0.125}, 0.014}, 0.01);
+  form.cut(Limb{{0.25, -0.04, -0.22}, 0.016, {0.25, 0.04, -0.22}, 0.016}, 0.012);
   return {"alien_head", 238, 16000, form, "neck", {-0.07, 0, -0.5}, 12};
 }
 

@@ -32,7 +32,7 @@ class Paper : public test::Program {
 
 TEST_F(Paper, WithoutAGpuMeasuresTheCpuAndSaysWhatItLeftOut) {
   const Outcome outcome = paper({"--device", "cpu", "--body", "horn_bug,alien_head", "--figure",
-                                 "2,4,5", "--table", "memory", "--objects", "2", "--out", "p"});
+                                 "2,4,5", "--table", "memory", "--objects", "3", "--out", "p"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out,
               AllOf(HasSubstr("left out, for --device cpu"), HasSubstr("figure 2 (GPU"),
@@ -40,7 +40,12 @@ TEST_F(Paper, WithoutAGpuMeasuresTheCpuAndSaysWhatItLeftOut) {
   const CsvTable frames = read_csv(folder_ / "p" / "frames.csv");
   EXPECT_THAT(frames.values("body"), ElementsAre("horn_bug", "alien_head"));
   EXPECT_THAT(frames.values("program"), ElementsAre("sequential of 2008", "phyxel CPU"));
-  EXPECT_THAT(frames.values("objects"), ElementsAre("1", "2"));
+  for (const char* program : {"sequential of 2008", "phyxel CPU"}) {
+    for (const char* surfels : {"no", "yes"}) {
+      EXPECT_THAT(frames.values("objects", {{"program", program}, {"with_surfels", surfels}}),
+                  ElementsAre("1", "2", "3"));
+    }
+  }
   // The counts of section 6.
   EXPECT_THAT(frames.values("phyxels", {{"body", "horn_bug"}}), ElementsAre("666"));
   EXPECT_THAT(frames.values("surfels", {{"body", "alien_head"}}), ElementsAre("16000"));
@@ -54,8 +59,81 @@ TEST_F(Paper, WithoutAGpuMeasuresTheCpuAndSaysWhatItLeftOut) {
   EXPECT_FALSE(fs::exists(folder_ / "p" / "memory.csv"));
   EXPECT_EQ(fs::exists(folder_ / "p" / "figure4.svg"), can_plot());
   EXPECT_FALSE(fs::exists(folder_ / "p" / "figure2.svg"));
+  if (can_plot()) {
+    EXPECT_THAT(text_of(folder_ / "p" / "figure4.svg"), HasSubstr("real time, 30 frames/s"));
+  }
   const std::string page = text_of(folder_ / "p" / "paper.md");
   EXPECT_THAT(page, AllOf(HasSubstr("No GPU was measured"), HasSubstr("sequential of 2008")));
+}
+
+/// A table as a GPU would have given it.
+TEST_F(Paper, RealTimeIsCountedInObjectsAndDrawn) {
+  CsvTable frames{{{"repeats", "1"}},
+                  {"body", "phyxels", "surfels", "program", "cores", "threads", "objects",
+                   "with_surfels", "frames", "frames_per_s", "ms_per_frame", "spread", "step_s"},
+                  {}};
+  const auto add = [&](const char* program, const char* cores, int objects, const char* rate) {
+    frames.rows.push_back({"dino", "575", "53504", program, cores, cores, std::to_string(objects),
+                           "yes", "shown", rate, "1", "0", "0.002"});
+  };
+  add("kernels of 2008", "0", 1, "2000");
+  add("kernels of 2008", "0", 2, "501");
+  add("kernels of 2008", "0", 3, "300");
+  add("sequential of 2008", "1", 1, "31");
+  add("sequential of 2008", "1", 2, "29");
+  write("p/frames.csv", csv_text(frames));
+  const Outcome outcome = run({"paper", "--redraw", "--out", "p"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  // Video's 30 frames a second; 500 steps of 2 ms in a second of motion.
+  EXPECT_THAT(text_of(folder_ / "p" / "paper.md"),
+              AllOf(HasSubstr("| dino | yes | kernels of 2008 | GPU | all 3 | 500 | 2 |"),
+                    HasSubstr("| dino | yes | sequential of 2008 | 1 | 1 | 500 | 0 |")));
+  if (!can_plot()) return;
+  for (const char* figure : {"figure3.svg", "figure5.svg"}) {
+    EXPECT_THAT(text_of(folder_ / "p" / figure), HasSubstr("real time, 30 frames/s")) << figure;
+  }
+  EXPECT_THAT(text_of(folder_ / "p" / "figure3.svg"),
+              HasSubstr("dino, steps in a second of motion"));
+  EXPECT_THAT(text_of(folder_ / "p" / "speedups.svg"), HasSubstr("the paper prints"));
+}
+
+TEST_F(Paper, BothEndsOfYoungsModulusKeepToTheWaveSpeed) {
+  const Outcome outcome =
+      paper({"--device", "cpu", "--body", "alien_head", "--table", "young", "--out", "p"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const CsvTable young = read_csv(folder_ / "p" / "young.csv");
+  const auto of = [&](const char* modulus, const char* column) {
+    return young.number(young.find({{"young_pa", modulus}, {"precision", "double"}}).value(),
+                        column);
+  };
+  // Waves travel with √(E/ρ), a tenth as fast in the soft one; steps are printed with four digits.
+  EXPECT_NEAR(of("10000", "step_s") / of("1e+06", "step_s"), 10, 0.01);
+  EXPECT_GT(of("10000", "largest_displacement_m"), of("1e+06", "largest_displacement_m"));
+  for (std::size_t r = 0; r < young.rows.size(); ++r) {
+    // Roundings of a thousand steps or fewer, which grow as they are added up.
+    const double epsilon = young.text(r, "precision") == "float" ? 1.2e-7 : 2.3e-16;
+    EXPECT_LT(young.number(r, "relative_error"), 1e4 * epsilon);
+    EXPECT_GT(young.number(r, "relative_error"), 0);
+  }
+  EXPECT_THAT(text_of(folder_ / "p" / "paper.md"), HasSubstr("## Both ends of Young's modulus"));
+}
+
+TEST_F(Paper, ForcesSummedBeforeTheyAreSentAreFewerBytesAndOtherBits) {
+  const Outcome outcome =
+      paper({"--device", "cpu", "--body", "alien_head", "--table", "exchange", "--out", "p"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const CsvTable sent = read_csv(folder_ / "p" / "exchange.csv");
+  EXPECT_THAT(sent.values("partitioner"), ElementsAre("metis", "curve", "bisection"));
+  EXPECT_EQ(sent.rows.size(), 18U);  // two bodies, three numbers of parts
+  for (std::size_t r = 0; r < sent.rows.size(); ++r) {
+    const double stresses = sent.number(r, "pair_stress_bytes");
+    EXPECT_EQ(stresses, 48 * sent.number(r, "ghosts"));  // twelve floats
+    EXPECT_LT(stresses, sent.number(r, "pair_force_bytes"));
+    EXPECT_LT(sent.number(r, "summed_force_bytes"), stresses);
+    // Sums of float in another order; only phyxels that are pushed from elsewhere can differ.
+    EXPECT_GT(sent.number(r, "summed_other_bits"), 0);
+    EXPECT_LT(sent.number(r, "summed_other_bits"), sent.number(r, "phyxels"));
+  }
 }
 
 TEST_F(Paper, KernelErrorsOfTheSequentialProgramAreThoseOfItsPrecision) {
@@ -84,8 +162,15 @@ TEST_F(Paper, RedrawsFromTheTablesAlone) {
   fs::copy_file(folder_ / "p" / "frames.csv", folder_ / "q" / "frames.csv");
   const Outcome outcome = run({"paper", "--redraw", "--out", "q"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_EQ(text_of(folder_ / "q" / "paper.md"), text_of(folder_ / "p" / "paper.md"));
+  const std::string page = text_of(folder_ / "p" / "paper.md");
+  EXPECT_EQ(text_of(folder_ / "q" / "paper.md"), page);
   EXPECT_EQ(text_of(folder_ / "q" / "frames.csv"), text_of(folder_ / "p" / "frames.csv"));
+  // A table that a script writes beside the program's own.
+  fs::copy_file(fs::path(PHYXEL_SOURCE_DIR) / "docs/results/paper/machine_code.csv",
+                folder_ / "q" / "machine_code.csv");
+  ASSERT_EQ(run({"paper", "--redraw", "--out", "q"}).code, 0);
+  EXPECT_THAT(text_of(folder_ / "q" / "paper.md"),
+              AllOf(::testing::StartsWith(page), HasSubstr("| `with_mul24` |  | 1 | 0 | 0 | 1 |")));
 }
 
 TEST_F(Paper, RefusesToOverwriteAndChangesNothing) {
@@ -134,17 +219,18 @@ TEST_F(Paper, AGpuThatIsNotThereIsExitCode4) {
   EXPECT_THAT(automatic.out, HasSubstr("left out"));
 }
 
-TEST_F(Paper, Figure1ShowsTheBodies) {
-  const std::vector<std::string> arguments{"--device", "cpu", "--body", "horn_bug,alien_head",
+TEST_F(Paper, Figure1ShowsABodyAsMadeAndHungWithThreeModuli) {
+  const std::vector<std::string> arguments{"--device", "cpu", "--body", "alien_head",
                                            "--figure", "1",   "--out",  "p"};
   const Outcome outcome = paper(arguments);
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  for (const char* body : {"horn_bug", "alien_head"}) {  // an empty picture takes some 2 kB
-    EXPECT_GT(fs::file_size(folder_ / "p" / ("figure1_" + std::string(body) + ".png")), 10000u);
+  for (const char* pose : {"_rest", "", "_soft", "_stiff"}) {
+    const std::string file = "figure1_alien_head" + std::string(pose) + ".png";
+    EXPECT_GT(fs::file_size(folder_ / "p" / file), 10000u) << file;  // an empty one takes 2 kB
   }
   const Outcome again = paper(arguments);
   EXPECT_EQ(again.code, 2);
-  EXPECT_THAT(again.err, HasSubstr("figure1_horn_bug.png: exists"));
+  EXPECT_THAT(again.err, HasSubstr("figure1_alien_head_rest.png: exists"));
 }
 
 class Tables : public test::Folder {};

@@ -347,8 +347,13 @@ TEST_F(Program, InfoCutsAScene) {
     if (cut["cut"] != "tiles" || cut["partitioner"] != "metis") continue;
     EXPECT_EQ(ghosts, cut["ghosts"].get<std::size_t>());  // that of the plans shown
   }
+  // Three numbers of displacement and nine of stress for every ghost of the first ring.
+  const auto& sent = facts["numbers sent a step"];
+  EXPECT_EQ(sent["pair stresses"].get<std::size_t>(), 12 * ghosts);
+  EXPECT_GT(sent["pair forces"], sent["pair stresses"]);
+  EXPECT_LT(sent["summed forces"], sent["pair stresses"]);
   const Outcome table = run({"info", "beam.toml", "--partition", "3"});
-  EXPECT_THAT(table.out, HasSubstr("Tiles by metis"));
+  EXPECT_THAT(table.out, AllOf(HasSubstr("Tiles by metis"), HasSubstr("kB, to the same bits")));
 
   const Outcome unknown = run({"info", "beam.toml", "--partition", "3", "--partitioner", "rcb"});
   EXPECT_EQ(unknown.code, 2);

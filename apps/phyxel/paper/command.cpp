@@ -31,8 +31,9 @@ struct PaperOptions {
   bool force = false, redraw = false, json = false;
 };
 
-const std::vector<std::string> all_tables{paper_table::kernels, paper_table::trajectory,
-                                          paper_table::memory, paper_table::stiffness};
+const std::vector<std::string> all_tables{paper_table::kernels,   paper_table::trajectory,
+                                          paper_table::young,     paper_table::memory,
+                                          paper_table::stiffness, paper_table::exchange};
 
 template <class T, class U>
 bool contains(const std::vector<T>& list, const U& value) {
@@ -67,7 +68,9 @@ void say_files(const fs::path& folder) {
   std::vector<fs::path> tables{table_file(folder, paper_table::frames)}, figures;
   for (const std::string& table : all_tables) tables.push_back(table_file(folder, table));
   for (const std::string& body : paper::body_names()) {
-    figures.push_back(figure_1_file(folder, body));
+    for (const Pose pose : poses) {
+      figures.push_back(figure_1_file(folder, body, pose));
+    }
   }
   for (const fs::path& file : figure_files(folder)) figures.push_back(file);
   const Json said{{"page", (folder / paper_page_name).string()},
@@ -122,7 +125,9 @@ void paper_command(PaperOptions& options) {
     const bool pictures = contains(options.figures, 1);
     if (pictures) {
       for (const std::string& body : request.bodies) {
-        refuse_if_there(figure_1_file(request.out, body));
+        for (const Pose pose : poses) {
+          refuse_if_there(figure_1_file(request.out, body, pose));
+        }
       }
     }
     if (!rates.empty()) refuse_if_there(table_file(request.out, paper_table::frames));
@@ -136,6 +141,7 @@ void paper_command(PaperOptions& options) {
       if (has(3)) say("  figure 3 (GPU frame rates, surfels)");
       if (has(4) || has(5) || has(6)) say("  the GPU's part of figures 4, 5 and 6");
       for (const std::string& table : options.tables) {
+        if (table == paper_table::exchange) continue;  // which has no GPU's part
         say("  " + std::string(table == paper_table::memory ? "" : "the GPU's part of ") +
             "table " + table);
       }
@@ -153,8 +159,10 @@ void paper_command(PaperOptions& options) {
       bool needs_gpu;
     } measurements[] = {{paper_table::kernels, measure_kernels, false},
                         {paper_table::trajectory, measure_trajectories, false},
+                        {paper_table::young, measure_young, false},
                         {paper_table::memory, measure_memory, true},
-                        {paper_table::stiffness, measure_stiffness, false}};
+                        {paper_table::stiffness, measure_stiffness, false},
+                        {paper_table::exchange, measure_exchange, false}};
     for (const auto& m : measurements) {
       if (!contains(options.tables, m.name) || (m.needs_gpu && !request.gpu)) continue;
       write_csv(table_file(request.out, m.name), m.measure(request));
@@ -190,7 +198,7 @@ void add_paper(CLI::App& program) {
       ->check(CLI::Range(1, 6));
   command
       ->add_option("--table", options->tables,
-                   "Only these tables: kernels, trajectory, memory, stiffness")
+                   "Only these tables: kernels, trajectory, young, memory, stiffness, exchange")
       ->delimiter(',');
   command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');

@@ -22,9 +22,11 @@ struct Body {
   State start;
 };
 
-Body make_body(const std::string& name, int copies) {
+/// @param one a cloud of the body, in place
+Body make_body(const std::string& name, int copies, const Cloud& one) {
   Body body{name, paper::body_scene(name, copies), {}, {}};
-  body.model = paper::paper_model(body.scene);
+  const std::vector<Cloud> clouds(static_cast<std::size_t>(copies), one);
+  body.model = paper::paper_model(body.scene, clouds);
   body.start = initial_state(body.model, body.scene, 0.5 * step_limit(body.model).largest_step);
   return body;
 }
@@ -81,9 +83,9 @@ class FrameTable {
   explicit FrameTable(const PaperRequest& request) : request_(request) {
     table_.facts = paper_facts(request);
     table_.facts.emplace_back("repeats", std::to_string(request.repeat));
-    table_.columns = {"body",   "phyxels",      "surfels",      "program",
-                      "cores",  "threads",      "objects",      "with_surfels",
-                      "frames", "frames_per_s", "ms_per_frame", "spread"};
+    table_.columns = {"body",         "phyxels", "surfels",      "program", "cores",
+                      "threads",      "objects", "with_surfels", "frames",  "frames_per_s",
+                      "ms_per_frame", "spread",  "step_s"};
   }
   /// @param cores offered to a CPU program, which may leave some alone; 0: a GPU's
   void add(const Body& body, const char* program, int cores, int threads, int objects, bool surfels,
@@ -94,7 +96,8 @@ class FrameTable {
          std::to_string(body.model.surfels.position.size() / body.scene.bodies.size()), program,
          std::to_string(cores), std::to_string(threads), std::to_string(objects),
          surfels ? "yes" : "no", frames, fmt::format("{:.5g}", 1 / time.value),
-         fmt::format("{:.5g}", 1e3 * time.value), fmt::format("{:.3f}", time.spread)});
+         fmt::format("{:.5g}", 1e3 * time.value), fmt::format("{:.3f}", time.spread),
+         fmt::format("{:.4g}", body.start.dt)});
     say(fmt::format("{:10} x {:2} {:8} {:22} {:2} threads, {:6}: {:10.1f} frames/s", body.name,
                     objects, surfels ? "surfels" : "phyxels", program, threads, frames,
                     1 / time.value));
@@ -121,29 +124,26 @@ void measure_gpu(const PaperRequest& request, const Body& body, bool surfels, bo
 }
 
 /// The sequential program of 2008, and phyxel's own CPU solver on one core and on all.
-/// @param together the same objects in one model
+/// @param together as many objects in one model
 void measure_cpu(const Body& one, const Body& together, bool surfels, FrameTable& table) {
-  for (const Body* all : {&one, &together}) {
-    const int objects = static_cast<int>(all->scene.bodies.size());
-    if (all == &together && objects == 1) break;
-    Objects group(one, objects, surfels, paper::make_sequential_backend<float>);
-    table.add(one, "sequential of 2008", 1, 1, objects, surfels, "shown",
-              [&](int frames) { group.run(frames, true); });
+  const int objects = static_cast<int>(together.scene.bodies.size());
+  Objects group(one, objects, surfels, paper::make_sequential_backend<float>);
+  table.add(one, "sequential of 2008", 1, 1, objects, surfels, "shown",
+            [&](int frames) { group.run(frames, true); });
 
-    std::vector<int> cores{1};
-    if (omp_get_num_procs() > 1) cores.push_back(omp_get_num_procs());
-    for (const int c : cores) {
-      const auto backend = make_cpu_backend(all->model, Precision::single, c);
-      Solver solver(*backend, all->start);
-      SurfelState vertices;
-      table.add(*all, "phyxel CPU", c, surfels ? c : backend->threads(), objects, surfels, "shown",
-                [&](int frames) {
-                  for (int f = 0; f < frames; ++f) {
-                    solver.step();
-                    if (surfels) backend->advect_surfels(vertices);
-                  }
-                });
-    }
+  std::vector<int> cores{1};
+  if (omp_get_num_procs() > 1) cores.push_back(omp_get_num_procs());
+  for (const int c : cores) {
+    const auto backend = make_cpu_backend(together.model, Precision::single, c);
+    Solver solver(*backend, together.start);
+    SurfelState vertices;
+    table.add(together, "phyxel CPU", c, surfels ? c : backend->threads(), objects, surfels,
+              "shown", [&](int frames) {
+                for (int f = 0; f < frames; ++f) {
+                  solver.step();
+                  if (surfels) backend->advect_surfels(vertices);
+                }
+              });
   }
 }
 
@@ -156,15 +156,16 @@ CsvTable measure_frames(const PaperRequest& request, const std::vector<int>& fig
     });
   };
   FrameTable table(request);
-  const bool any_cpu = wanted({4, 5, 6});
   for (const std::string& name : request.bodies) {
-    const Body one = make_body(name, 1);
-    const Body together = make_body(name, any_cpu ? request.objects : 1);
+    const Cloud cloud = make_clouds(paper::body_scene(name), {}).front();
+    const Body one = make_body(name, 1, cloud);
     for (const bool surfels : {false, true}) {
       const bool gpu = surfels ? wanted({3, 5, 6}) : wanted({2, 4});
       const bool cpu = surfels ? wanted({5, 6}) : wanted({4});
       if (gpu && request.gpu) measure_gpu(request, one, surfels, surfels, table);
-      if (cpu) measure_cpu(one, together, surfels, table);
+      for (int objects = 1; cpu && objects <= request.objects; ++objects) {
+        measure_cpu(one, make_body(name, objects, cloud), surfels, table);
+      }
     }
   }
   return table.take();

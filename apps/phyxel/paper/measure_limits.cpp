@@ -17,28 +17,6 @@ namespace {
 
 using paper::PaperBackend;
 
-/// A jittered block of exactly `n` phyxels, 0.1 m apart, without surfels.
-Model block_of(Index n) {
-  const double side = std::ceil(std::cbrt(n)) * 0.1;
-  Cloud cloud = make_shape({.name = "block",
-                            .size = {side, side, side},
-                            .spacing = 0.1,
-                            .jitter = 0.1,
-                            .surface = false});
-  cloud.position.resize(static_cast<std::size_t>(n));
-  cloud.volume.clear();
-  cloud.regions.clear();
-  Scene scene;
-  scene.gravity = {0, 0, -9.81};
-  BodyRequest body;
-  body.name = fmt::format("block of {}", n);
-  body.where = "phyxel paper";
-  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000};
-  paper::use_paper_rules(body);
-  scene.bodies.push_back(body);
-  return paper::paper_model(scene, cloud);
-}
-
 double steps_per_second(PaperBackend& backend, const Model& model, const PaperRequest& request) {
   State state;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
@@ -84,7 +62,7 @@ CsvTable measure_memory(const PaperRequest& request) {
 
   const Index sizes[] = {238, 575, 666, 1000, 2000, 5000, 10000, 20000, 40000, paper::most_phyxels};
   for (const Index n : sizes) {
-    const Model model = block_of(n);
+    const Model model = paper_block(n);
     for (const auto store : {paper::ForceStore::dense, paper::ForceStore::csr}) {
       const bool dense = store == paper::ForceStore::dense;
       const int numbers = dense ? 3 : 0;
@@ -114,7 +92,7 @@ CsvTable measure_memory(const PaperRequest& request) {
   }
 
   // Several of the largest bodies, until the matrices no longer fit.
-  const Model largest = block_of(paper::most_phyxels);
+  const Model largest = paper_block(paper::most_phyxels);
   std::vector<std::unique_ptr<PaperBackend>> bodies;
   const std::size_t before = cuda_free_memory();
   std::string answer = "fits";
@@ -132,7 +110,7 @@ CsvTable measure_memory(const PaperRequest& request) {
   bodies.clear();
 
   // One more phyxel than 16 bits can name.
-  const Model more = block_of(paper::most_phyxels + 1);
+  const Model more = paper_block(paper::most_phyxels + 1);
   try {
     paper::make_gpu_backend(more, {.device = request.gpu->index});
   } catch (const InputError& error) {

@@ -1,7 +1,12 @@
 /// What the measurements of `phyxel paper` share.
 #include "paper.hpp"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
 #include "outside_text.hpp"
+#include "paper/paper_model.hpp"
 
 namespace phyxel::app {
 
@@ -40,6 +45,27 @@ std::vector<PaperProgram> paper_programs(const PaperRequest& request) {
     }
   }
   return list;
+}
+
+Model paper_block(Index n) {
+  const double side = std::ceil(std::cbrt(n)) * 0.1;
+  Cloud cloud = make_shape({.name = "block",
+                            .size = {side, side, side},
+                            .spacing = 0.1,
+                            .jitter = 0.1,
+                            .surface = false});
+  cloud.position.resize(static_cast<std::size_t>(n));
+  cloud.volume.clear();
+  cloud.regions.clear();
+  Scene scene;
+  scene.gravity = {0, 0, -9.81};
+  BodyRequest body;
+  body.name = fmt::format("block of {}", n);
+  body.where = "phyxel paper";
+  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000};
+  paper::use_paper_rules(body);
+  scene.bodies.push_back(body);
+  return paper::paper_model(scene, cloud);
 }
 
 }  // namespace phyxel::app

@@ -1,4 +1,6 @@
 /// The paper's three bodies: counts, surfaces, and phyxels that can carry the physics.
+#include "shapes/paper_bodies.hpp"
+
 #include <gtest/gtest.h>
 #include <omp.h>
 
@@ -161,6 +163,59 @@ TEST_P(PaperBodies, AreTheSameEveryTimeOnAnyNumberOfThreads) {
   EXPECT_EQ(again.volume, cloud_.volume);
   EXPECT_TRUE(again.surface.position == cloud_.surface.position);
   EXPECT_EQ(again.surface.triangle, cloud_.surface.triangle);
+}
+
+/// Where a line of sight along -x, from in front of the face, meets the body [m].
+double face_at(const ImplicitBody& form, double y, double z) {
+  double x = 1;
+  while (x > -1 && form.value({x, y, z}) > 0) x -= 1e-4;
+  return x;
+}
+
+/// Half the width of the body at a height, where it is widest [m].
+double half_width_at(const ImplicitBody& form, double z, double from_x) {
+  double widest = 0;
+  for (double x = from_x; x < 0.5; x += 0.01) {
+    for (double y = 0; y < 0.5; y += 0.005) {
+      if (form.value({x, y, z}) < 0) widest = std::max(widest, y);
+    }
+  }
+  return widest;
+}
+
+/// What everybody knows the head by, seen from the front.
+TEST(AlienHead, HasALargeCraniumASmallChinAndBulgingEyesThatSlant) {
+  const ImplicitBody& form = find_paper_body("alien_head")->form;
+  const double cranium = half_width_at(form, 0.2, -0.5), chin = half_width_at(form, -0.25, 0.1);
+  EXPECT_GT(cranium, 0.3);
+  EXPECT_GT(chin, 0.04);
+  EXPECT_GT(cranium, 3 * chin);
+  for (const double side : {-1, 1}) {
+    // From the bridge of the nose outwards: down into a crease, up onto the eye, which stands out
+    // by 1 cm or more of the 15 cm that it is wide. On a face without eyes x falls all the way.
+    double crease = 1, eye = -1, height_of_eye = 0;
+    for (double y = 0.03; y < 0.15; y += 0.005) {
+      const double x = face_at(form, side * y, 0);
+      if (x < crease) crease = x, eye = x;
+      if (x > eye) eye = x, height_of_eye = x - crease;
+    }
+    EXPECT_LT(crease, face_at(form, 0, 0));
+    EXPECT_GT(height_of_eye, 0.01);
+    // The upper rim rises outwards: above the inner corner there is forehead, above the outer one
+    // still eye, whose socket ends in a crease higher up.
+    const auto rim = [&](double y) {
+      double lowest = 1, height = 0;
+      for (double z = 0; z < 0.2; z += 0.005) {
+        // The crease is where the face lies deepest under the line from cheek to forehead.
+        const double chord =
+            std::lerp(face_at(form, side * y, 0), face_at(form, side * y, 0.2), z / 0.2);
+        const double depth = face_at(form, side * y, z) - chord;
+        if (depth < lowest) lowest = depth, height = z;
+      }
+      return height;
+    };
+    EXPECT_GT(rim(0.21), rim(0.09) + 0.02);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Paper, PaperBodies,
