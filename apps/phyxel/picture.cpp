@@ -49,10 +49,7 @@ std::vector<fs::path> render(const fs::path& input, const fs::path& folder,
   for (const std::size_t k : chosen) {
     files.push_back(folder / (trajectory.series ? fmt::format("frame_{:06d}.png", k)
                                                 : input.stem().string() + ".png"));
-    if (!overwrite && fs::exists(files.back())) {
-      throw InputError(fmt::format("{}: exists and is kept; allowed: another folder, or --force",
-                                   files.back().string()));
-    }
+    check_output_file(files.back(), overwrite, Output::file);
   }
   const Setting setting = set_stage(trajectory.shots, request);
   make_writable_folder(folder);

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {
@@ -29,8 +30,9 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
                            Facts more, int cores)
     : options_(std::move(options)), table_{machine_facts(cores), columns, {}} {
   table_.facts.insert(table_.facts.end(), more.begin(), more.end());
-  if (!options_.csv.empty() && std::filesystem::exists(options_.csv) && !options_.force) {
-    throw InputError(fmt::format("{}: exists; allowed: another --csv, or --force", options_.csv));
+  if (!options_.csv.empty()) {
+    check_output_file(options_.csv, options_.force, Output::file_or_stream);
+    stream_ = is_stream(options_.csv);
   }
   if (options_.json) {
     Json facts;
@@ -60,7 +62,12 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
 }
 
 void PrintedTable::write() const {
-  if (!options_.csv.empty()) write_csv(options_.csv, table_);
+  if (!options_.csv.empty() && !stream_) write_csv(options_.csv, table_);
+}
+
+void PrintedTable::finish() {
+  if (stream_) write_csv(options_.csv, table_);
+  stream_ = false;
 }
 
 }  // namespace phyxel::app

@@ -29,11 +29,15 @@ class PrintedTable {
   PrintedTable(const PrintedTable&) = delete;
   PrintedTable& operator=(const PrintedTable&) = delete;
   void row(const std::vector<std::string>& cells);
+  /// Writes the table to a FIFO or character device, which takes it once and whole. @throws
+  /// OutputError
+  void finish();
 
  private:
   void write() const;
 
   TableOptions options_;
+  bool stream_ = false;  ///< Whether the CSV goes to a FIFO or character device.
   CsvTable table_;
 };
 

@@ -51,10 +51,7 @@ std::string events_of_rank() {
 
 void start_profile(const std::string& file, bool force) {
   ranks().together([&] {
-    if (ranks().rank() == 0 && std::filesystem::exists(file) && !force) {
-      throw InputError(
-          fmt::format("--profile {}: exists; allowed: another file, or --force", file));
-    }
+    if (ranks().rank() == 0) check_output_file(file, force, Output::file_or_stream);
   });
   ranks().barrier();
   Timeline::start();

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "command.hpp"
+#include "files/atomic_file.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -49,17 +50,11 @@ void check_output(const SampleOptions& options) {
   namespace fs = std::filesystem;
   const fs::path& out = options.out;
   std::error_code ignored;
-  if (fs::is_directory(out, ignored)) {
-    throw InputError(fmt::format("--out {}: is a folder; allowed: a file in it", out.string()));
-  }
   if (fs::equivalent(out, options.mesh, ignored)) {
     throw InputError(
         fmt::format("--out {}: is the mesh itself; allowed: another file", out.string()));
   }
-  if (fs::exists(out, ignored) && !options.force) {
-    throw InputError(fmt::format(
-        "--out {}: exists; allowed: another file, or --force to replace it", out.string()));
-  }
+  check_output_file(out, options.force, Output::file);
   const fs::path folder = out.has_parent_path() ? out.parent_path() : fs::path(".");
   if (!fs::is_directory(folder, ignored)) {
     throw InputError(

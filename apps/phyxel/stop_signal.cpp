@@ -1,8 +1,13 @@
 #include "stop_signal.hpp"
 
+#include <unistd.h>
+
 #include <atomic>
 #include <csignal>
+#include <cstring>
 #include <initializer_list>
+
+#include "phyxel/error.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -10,10 +15,24 @@ namespace {
 // Atomic, because a signal may come to any thread of the program.
 std::atomic<int> stop = 0;
 std::atomic<bool> checkpoint = false;
+std::atomic<bool> at_work = false;  // whether a stop is for the loop over steps to see
+std::atomic<bool> says = true;
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
+constexpr auto to_stop = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGXCPU, SIGPIPE};
+
+/// Ends the program during set-up, when no file has been touched.
+[[noreturn]] void leave() {
+  constexpr const char* words =
+      "phyxel: error: stopped by a signal during set-up: nothing was written or changed\n";
+  if (says) [[maybe_unused]]
+    const ssize_t written = ::write(STDERR_FILENO, words, std::strlen(words));
+  ::_exit(static_cast<int>(ExitCode::stopped));
+}
+
 void ask_to_stop(int signal) {
-  if (stop != 0) {  // asked twice: do not wait for the end of the step
+  if (!at_work) leave();
+  if (stop != 0 && signal != SIGPIPE) {  // asked twice: do not wait for the end of the step
     std::signal(signal, SIG_DFL);
     std::raise(signal);
   }
@@ -30,18 +49,34 @@ void handle(int signal, void (*handler)(int)) {
   sigaction(signal, &action, nullptr);
 }
 
+/// Whether whoever started the program wants it to ignore a signal, as nohup does.
+bool is_ignored(int signal) {
+  struct sigaction action = {};
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
 }  // namespace
 
-StopSignal::StopSignal() {
+StopSignal::StopSignal(bool speaks) {
   stop = 0;
   checkpoint = false;
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR2}) handle(signal, ask_to_stop);
+  at_work = false;
+  says = speaks;
+  for (const int signal : to_stop) {
+    if (!is_ignored(signal)) handle(signal, ask_to_stop);
+  }
   handle(SIGUSR1, ask_for_checkpoint);
+  handle(SIGXFSZ, SIG_IGN);  // the write that hits the limit fails, which is told
 }
 
 StopSignal::~StopSignal() {
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR1, SIGUSR2}) handle(signal, SIG_DFL);
+  for (const int signal : to_stop) {
+    if (!is_ignored(signal)) handle(signal, SIG_DFL);
+  }
+  handle(SIGUSR1, SIG_DFL);
 }
+
+void StopSignal::work_begins() { at_work = true; }
 
 int StopSignal::stop_requested() { return stop; }
 

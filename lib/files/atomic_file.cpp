@@ -24,6 +24,46 @@ std::string reason(int error) { return std::error_code(error, std::generic_categ
   throw OutputError(fmt::format("{}: {}: {}", file.string(), what, reason(error)));
 }
 
+/// What a file is that is not a regular one, or null.
+const char* irregular(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISCHR(mode)) return "a character device";
+  if (S_ISBLK(mode)) return "a block device";
+  if (S_ISFIFO(mode)) return "a FIFO";
+  if (S_ISSOCK(mode)) return "a socket";
+  return S_ISREG(mode) ? nullptr : "no regular file";
+}
+
+/// Whether bytes can be written to a file one after another, but not kept in it.
+bool is_stream(mode_t mode) { return S_ISCHR(mode) || S_ISFIFO(mode); }
+
+/// The status of what a path leads to through links; false if nothing is there.
+/// @throws InputError for a link that leads nowhere
+bool found(const fs::path& file, struct stat* status) {
+  if (::stat(file.c_str(), status) == 0) return true;
+  const int error = errno;
+  if (::lstat(file.c_str(), status) != 0) return false;
+  throw InputError(
+      fmt::format("{}: is a link that leads nowhere ({}); allowed: a file or a new name",
+                  file.string(), reason(error)));
+}
+
+/// The regular file, there or not, that writing to `file` shall replace: behind any links, so that
+/// these stay. @throws InputError if something else is there
+fs::path replaced_file(const fs::path& file) {
+  struct stat status {};
+  if (!found(file, &status)) return file;
+  if (const char* what = irregular(status.st_mode)) {
+    throw InputError(
+        fmt::format("{}: is {}, which is not replaced; allowed: a regular file or a "
+                    "new name",
+                    file.string(), what));
+  }
+  std::error_code error;
+  const fs::path target = fs::canonical(file, error);
+  return error ? file : target;
+}
+
 /// A file descriptor that closes itself.
 class Descriptor {
  public:
@@ -60,6 +100,19 @@ int write_all(int fd, std::span<const std::byte> bytes, off_t at) {
   return 0;
 }
 
+/// Writes behind what was written before. @returns 0, or the error number
+int write_on(int fd, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return errno;
+    }
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
 std::span<const std::byte> bytes_of(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
@@ -74,8 +127,13 @@ void sync_folder(const fs::path& file) {
 }  // namespace
 
 NewFile::NewFile(const fs::path& file, std::uint64_t size)
-    : file_(file), temporary_(file.string() + ".tmp"), size_(size) {
-  fd_ = ::open(temporary_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    : file_(replaced_file(file)), temporary_(file_.string() + ".tmp"), size_(size) {
+  // What a killed program has left is removed first, so that a link of that name is not followed.
+  constexpr int flags = O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
+  fd_ = ::open(temporary_.c_str(), flags, 0666);
+  if (fd_ < 0 && errno == EEXIST && ::unlink(temporary_.c_str()) == 0) {
+    fd_ = ::open(temporary_.c_str(), flags, 0666);
+  }
   if (fd_ < 0) phyxel::fail(file_, "cannot be written", errno);
   if (size == 0) return;
   int failed = 0;
@@ -132,28 +190,49 @@ void NewFile::finish(Durable durable) {
   if (durable == Durable::yes && ::fsync(fd_) != 0) fail(errno);
   // Closing can report what writing did not (NFS, quotas).
   if (::close(std::exchange(fd_, -1)) != 0) fail(errno);
-  move_into_place(temporary_, file_, Durable::no);
+  if (::rename(temporary_.c_str(), file_.c_str()) != 0) {
+    const int error = errno;
+    ::unlink(temporary_.c_str());
+    phyxel::fail(file_, "cannot be written", error);
+  }
   if (durable == Durable::yes) sync_folder(file_);
 }
 
+bool is_stream(const fs::path& file) {
+  struct stat status {};
+  return ::stat(file.c_str(), &status) == 0 && is_stream(status.st_mode);
+}
+
+void check_output_file(const fs::path& file, bool overwrite, Output output) {
+  struct stat status {};
+  if (!found(file, &status)) return;
+  if (output == Output::file_or_stream && is_stream(status.st_mode)) return;
+  replaced_file(file);
+  if (overwrite) return;
+  throw InputError(fmt::format("{}: exists already and is kept; allowed: another file, or --force",
+                               file.string()));
+}
+
 void write_whole_file(const fs::path& file, std::string_view text, Durable durable) {
+  if (is_stream(file)) {
+    Descriptor stream(file, O_WRONLY | O_NOCTTY);
+    const int error = stream.get() < 0 ? errno : write_on(stream.get(), bytes_of(text));
+    if (error != 0) fail(file, "cannot be written", error);
+    if (stream.close() != 0) fail(file, "cannot be written", errno);
+    return;
+  }
   NewFile out(file, text.size());
   out.write(0, bytes_of(text));
   out.finish(durable);
 }
 
-void move_into_place(const fs::path& temporary, const fs::path& file, Durable durable) {
-  int error = 0;
-  if (durable == Durable::yes) {
-    const Descriptor descriptor(temporary, O_RDONLY);
-    if (descriptor.get() < 0 || ::fsync(descriptor.get()) != 0) error = errno;
+void sync_file(const fs::path& file) {
+  const Descriptor descriptor(file, O_RDONLY);
+  if (descriptor.get() < 0 || ::fsync(descriptor.get()) != 0) {
+    // Some file systems cannot sync a folder.
+    if (descriptor.get() >= 0 && errno == EINVAL) return;
+    fail(file, "cannot be brought to the disk", errno);
   }
-  if (error == 0 && ::rename(temporary.c_str(), file.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    fail(file, "cannot be written", error);
-  }
-  if (durable == Durable::yes) sync_folder(file);
 }
 
 void replace_tail(const fs::path& file, std::size_t keep, std::string_view text) {
@@ -187,13 +266,19 @@ void replace_tail(const fs::path& file, std::size_t keep, std::string_view text)
   if (descriptor.close() != 0) fail(file, "cannot be written", errno);
 }
 
+void require_regular_file(const fs::path& file, const char* wanted) {
+  struct stat status {};
+  if (!found(file, &status)) {
+    throw InputError(fmt::format("{}: no such file", file.string()));
+  }
+  if (const char* what = irregular(status.st_mode)) {
+    throw InputError(fmt::format("{}: is {}; allowed: {}", file.string(), what, wanted));
+  }
+}
+
 std::string read_text_file(const fs::path& file, std::size_t limit) {
-  std::error_code error;
-  const auto status = fs::status(file, error);
-  if (!fs::exists(status)) throw InputError(fmt::format("{}: no such file", file.string()));
-  if (fs::is_directory(status))
-    throw InputError(fmt::format("{}: is a folder, not a file", file.string()));
-  const Descriptor descriptor(file, O_RDONLY);
+  require_regular_file(file);
+  const Descriptor descriptor(file, O_RDONLY | O_NONBLOCK);
   if (descriptor.get() < 0) {
     throw InputError(fmt::format("{}: cannot be read: {}", file.string(), reason(errno)));
   }

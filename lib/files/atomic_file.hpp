@@ -16,10 +16,13 @@ namespace phyxel {
 enum class Durable { no, yes };
 
 /// A file on its way: written to `file`.tmp and renamed, so that `file` is the old content or the
-/// new, never a part. If it is not finished, the old file, if any, stays and no .tmp is left.
+/// new, never a part. If it is not finished, the old file, if any, stays and no .tmp is left. Where
+/// `file` is a link, the file that it leads to is replaced and the link stays; a link that is in
+/// the place of the .tmp is removed, never followed.
 class NewFile {
  public:
-  /// Takes `size` bytes of the disk. @throws OutputError, also if they are not there.
+  /// Takes `size` bytes of the disk. @throws OutputError, also if they are not there; InputError if
+  /// a folder, device, FIFO or socket has that name.
   NewFile(const std::filesystem::path& file, std::uint64_t size);
   ~NewFile();
   NewFile(const NewFile&) = delete;
@@ -58,12 +61,28 @@ struct Content {
   std::function<void(const std::filesystem::path& file)> write_together;
 };
 
-/// Writes a file, whole or not at all. @throws OutputError, as `NewFile`.
+/// What a program can write to: regular files only, or streams (FIFOs, character devices) as well.
+enum class Output { file, file_or_stream };
+
+/// True if a FIFO or a character device has that name, behind any links.
+bool is_stream(const std::filesystem::path& file);
+
+/// Checks before any work is done that a file may be written: an existing regular file only if
+/// `overwrite` is true. @throws InputError with the reason
+void check_output_file(const std::filesystem::path& file, bool overwrite, Output output);
+
+/// Writes a file, whole or not at all; a FIFO or character device is written to and stays what it
+/// is.
+/// @throws OutputError and InputError, as `NewFile`.
 void write_whole_file(const std::filesystem::path& file, std::string_view text, Durable durable);
 
-/// Renames a finished `.tmp` file into place, synced first if durable. @throws OutputError.
-void move_into_place(const std::filesystem::path& temporary, const std::filesystem::path& file,
-                     Durable durable);
+/// Refuses at once what a reader could wait on for ever, or would not end. Links are followed.
+/// @param wanted what is allowed, for the message
+/// @throws InputError unless the file is a regular one.
+void require_regular_file(const std::filesystem::path& file, const char* wanted = "a regular file");
+
+/// Brings a file or folder to the disk. @throws OutputError
+void sync_file(const std::filesystem::path& file);
 
 /// Replaces what follows the first `keep` bytes of `file` by `text`, in one write. If that fails
 /// the old tail is put back. @throws OutputError.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
@@ -60,10 +61,7 @@ Surface read_surface(const Hdf5Reader& in) {
 }  // namespace
 
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite) {
-  if (!overwrite && std::filesystem::exists(file)) {
-    throw InputError(
-        fmt::format("{}: exists already and is kept; --force replaces it", file.string()));
-  }
+  check_output_file(file, overwrite, Output::file);
   make_writable_folder(file.has_parent_path() ? file.parent_path() : ".");
   Hdf5Writer out;
   out.group("/phyxel");

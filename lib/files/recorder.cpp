@@ -8,47 +8,13 @@
 
 #include "files/atomic_file.hpp"
 #include "files/frame_file.hpp"
+#include "files/trajectory_folder.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* log_name = "energy.csv";
-constexpr const char* summary_name = "run.json";
-constexpr std::size_t largest_log = std::size_t{1} << 30;
-
-fs::path frame_file(const fs::path& directory, const char* family, std::int64_t number) {
-  return directory / fmt::format("{}_{:06d}.hdf", family, number);
-}
-
-/// Whether a name is one of ours, finished or temporary.
-bool is_trajectory_name(std::string_view name) {
-  if (name.ends_with(".tmp")) name.remove_suffix(4);
-  for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, summary_name}) {
-    if (name == one) return true;
-  }
-  const auto numbered = [name](std::string_view prefix, std::string_view suffix) {
-    if (!name.starts_with(prefix) || !name.ends_with(suffix)) return false;
-    if (name.size() <= prefix.size() + suffix.size()) return false;
-    const auto digits = name.substr(prefix.size(), name.size() - prefix.size() - suffix.size());
-    return digits.find_first_not_of("0123456789") == std::string_view::npos;
-  };
-  return numbered("phyxels_", ".hdf") || numbered("surface_", ".hdf") ||
-         numbered("checkpoint_", ".h5");
-}
-
-/// Everything in the folder that belongs to a trajectory.
-std::vector<fs::path> trajectory_files(const fs::path& directory) {
-  std::vector<fs::path> found;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(directory, error)) {
-    if (is_trajectory_name(entry.path().filename().string())) found.push_back(entry.path());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
 
 std::string log_header() {
   std::string header = "step";
@@ -66,40 +32,12 @@ std::string log_line(const Diagnostics& now) {
   return line + "\n";
 }
 
-/// The first `lines` lines of a text. @throws InputError if it has fewer.
-std::string first_lines(const fs::path& file, std::int64_t lines) {
-  const std::string text = read_text_file(file, largest_log);
-  std::size_t end = 0;
-  for (std::int64_t line = 0; line < lines; ++line) {
-    end = text.find('\n', end);
-    if (end == std::string::npos) {
-      throw InputError(fmt::format("{}: has {} lines where the checkpoint expects {}",
-                                   file.string(), line, lines));
-    }
-    ++end;
-  }
-  return text.substr(0, end);
-}
-
 std::string size_in_words(double bytes) {
   return bytes < 1e9 ? fmt::format("{:.3g} MB", bytes / 1e6)
                      : fmt::format("{:.3g} GB", bytes / 1e9);
 }
 
 }  // namespace
-
-void check_output_folder(const fs::path& directory, bool may_exist) {
-  if (!may_exist) {
-    const auto found = trajectory_files(directory);
-    if (!found.empty()) {
-      throw InputError(
-          fmt::format("{}: holds an earlier trajectory ({}), which is kept; --force replaces "
-                      "it, --resume auto continues it, --out names another folder",
-                      directory.string(), found.front().filename().string()));
-    }
-  }
-  make_writable_folder(directory);
-}
 
 std::span<const double> values_of(const Model& model, const Frame& frame, Quantity quantity) {
   const auto flat = [](const std::vector<Vec3d>& vectors) -> std::span<const double> {
@@ -143,17 +81,21 @@ std::span<const double> FrameStretches::values(Quantity quantity, Index begin, I
 }
 
 Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
-                   std::optional<std::int64_t> resume_after)
+                   const std::optional<Continuation>& point)
     : model_(model),
       scene_(scene),
       directory_(scene.output.directory),
       writes_phyxels_(scene.output.phyxels),
       writes_surface_(scene.output.surface && model.whole_surfels() > 0) {
-  check_output_folder(directory_, overwrite || resume_after);
-  if (resume_after) remove_unfinished();
-  check_space(resume_after.value_or(0));
-  if (resume_after) {
-    continue_after(*resume_after);
+  if (point) {
+    check_continuation(directory_, *point, overwrite);
+    remove_unfinished();
+  } else {
+    check_output_folder(directory_, overwrite);
+  }
+  check_space(point ? point->frames : 0);
+  if (point) {
+    continue_after(*point, overwrite);
   } else {
     begin_anew();
   }
@@ -206,43 +148,44 @@ void Recorder::begin_anew() {
       throw InputError(fmt::format("{}: cannot be replaced: {}", file.string(), error.message()));
     }
   }
+  create_files();
+}
+
+void Recorder::create_files() {
   if (writes_phyxels_) phyxels_.create(directory_ / "phyxels.hdf.series", {});
   if (writes_surface_) surface_.create(directory_ / "surface.hdf.series", {});
   write_whole_file(directory_ / log_name, log_header(), Durable::no);
   log_size_ = log_header().size();
 }
 
-void Recorder::continue_after(std::int64_t frames) {
-  if (!fs::exists(directory_ / log_name)) {  // resumed into a folder of its own
-    begin_anew();
-    frames_ = frames;
-    return;
+void Recorder::continue_after(const Continuation& point, bool overwrite) {
+  frames_ = point.frames;
+  if (!is_in_folder(point.checkpoint, directory_)) {
+    // The folder has no trajectory, or one that may be replaced: `check_continuation` has seen to
+    // it.
+    return overwrite ? begin_anew() : create_files();
   }
+  if (!has_frames(directory_)) return create_files();
+  const KeptLog log = kept_log(directory_ / log_name, point);
+  std::vector<std::pair<SeriesFile*, std::vector<SeriesEntry>>> kept;
+  std::vector<fs::path> later;
   const auto keep = [&](bool writes, const char* family, SeriesFile& series) {
     if (!writes) return;
-    const fs::path file = directory_ / fmt::format("{}.hdf.series", family);
-    std::vector<SeriesEntry> entries = read_series(file);
-    if (entries.size() < static_cast<std::size_t>(frames)) {
-      throw InputError(
-          fmt::format("{}: has {} frames where the checkpoint expects {}; allowed: another "
-                      "folder (--out), or an earlier checkpoint",
-                      file.string(), entries.size(), frames));
-    }
-    for (std::size_t e = static_cast<std::size_t>(frames); e < entries.size(); ++e) {
-      std::error_code ignored;
-      fs::remove(frame_file(directory_, family, static_cast<std::int64_t>(e)), ignored);
-    }
-    entries.resize(static_cast<std::size_t>(frames));
-    series.create(file, entries);
+    KeptSeries found = kept_series(directory_, family, point.frames, log.frames);
+    later.insert(later.end(), found.later.begin(), found.later.end());
+    kept.emplace_back(&series, std::move(found.entries));
   };
-  const std::string log = first_lines(directory_ / log_name, frames + 1);
-  std::error_code ignored;
-  fs::remove(directory_ / summary_name, ignored);  // of what is no longer the end
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
-  write_whole_file(directory_ / log_name, log, Durable::no);
-  log_size_ = log.size();
-  frames_ = frames;
+  // Nothing is refused from here on, so that the folder is cut back as a whole or not at all.
+  std::error_code ignored;
+  fs::remove(directory_ / summary_name, ignored);  // of what is no longer the end
+  for (const fs::path& file : later) fs::remove(file, ignored);
+  for (auto& [series, entries] : kept) {
+    series->create(directory_ / series_name(series == &phyxels_ ? "phyxels" : "surface"), entries);
+  }
+  write_whole_file(directory_ / log_name, log.text, Durable::no);
+  log_size_ = log.text.size();
 }
 
 void Recorder::write(const Frame& frame) {
@@ -255,17 +198,26 @@ void Recorder::write(const Diagnostics& diagnostics, Stretches& values) {
   if (writes_phyxels_) {
     const fs::path file = frame_file(directory_, "phyxels", frames_);
     write_phyxel_frame(file, model_, scene_, diagnostics, values);
+    unsynced_.push_back(file);
     phyxels_.append({file, time});
   }
   if (writes_surface_ && values.has(Quantity::surfel_position)) {
     const fs::path file = frame_file(directory_, "surface", frames_);
     write_surface_frame(file, model_, scene_, diagnostics, values);
+    unsynced_.push_back(file);
     surface_.append({file, time});
   }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
   ++frames_;
+}
+
+void Recorder::sync() {
+  for (const fs::path& file : unsynced_) sync_file(file);
+  unsynced_.clear();
+  for (const fs::path& file : files()) sync_file(file);
+  sync_file(directory_);
 }
 
 void Recorder::write_summary(const std::string& text) const {

@@ -12,6 +12,7 @@
 #include <memory>
 #include <vector>
 
+#include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
@@ -91,6 +92,35 @@ void write_together(NewFile& out, const Content& content) {
   content.write_together(out.temporary());
 }
 
+/// The seal of a file, whose stream then stands behind it.
+std::string read_seal(const fs::path& file, std::ifstream& in) {
+  require_regular_file(file);
+  in.open(file, std::ios::binary);
+  if (!in) throw InputError(fmt::format("{}: cannot be read", file.string()));
+  std::string seal(seal_size, '\0');
+  in.read(seal.data(), seal_size);
+  if (in.gcount() != static_cast<std::streamsize>(seal_size) || seal.rfind(first_line, 0) != 0) {
+    const std::string start = seal.substr(0, 18);
+    if (start == std::string(first_line).substr(0, 18) &&
+        in.gcount() == static_cast<std::streamsize>(seal_size)) {
+      throw InputError(
+          fmt::format("{}: written by another version of phyxel: its first line is not \"{}\"",
+                      file.string(), std::string(first_line).substr(0, 20)));
+    }
+    throw InputError(
+        fmt::format("{}: not a file written by phyxel (or cut short within its first {} bytes)",
+                    file.string(), seal_size));
+  }
+  return seal;
+}
+
+void check_bytes(const fs::path& file, const std::string& seal, std::uint64_t bytes) {
+  const std::string stated = line_of(seal, "bytes");
+  if (stated == std::to_string(bytes)) return;
+  throw InputError(fmt::format("{}: cut short or altered: {} bytes behind the seal, which says {}",
+                               file.string(), bytes, stated.empty() ? "nothing" : stated));
+}
+
 }  // namespace
 
 void write_sealed(const fs::path& file, const std::string& kind, const Content& content,
@@ -132,36 +162,18 @@ void seal_in_place(const fs::path& file, const std::string& kind) {
   if (!stream) throw OutputError(fmt::format("{}: cannot be written", file.string()));
 }
 
+void check_size(const fs::path& file) {
+  std::ifstream in;
+  const std::string seal = read_seal(file, in);
+  check_bytes(file, seal, fs::file_size(file) - seal_size);
+}
+
 std::string check_seal(const fs::path& file) {
-  std::error_code error;
-  const auto status = fs::status(file, error);
-  if (!fs::exists(status)) throw InputError(fmt::format("{}: no such file", file.string()));
-  if (fs::is_directory(status))
-    throw InputError(fmt::format("{}: is a folder, not a file", file.string()));
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(fmt::format("{}: cannot be read", file.string()));
-  std::string seal(seal_size, '\0');
-  in.read(seal.data(), seal_size);
-  if (in.gcount() != static_cast<std::streamsize>(seal_size) || seal.rfind(first_line, 0) != 0) {
-    const std::string start = seal.substr(0, 18);
-    if (start == std::string(first_line).substr(0, 18) &&
-        in.gcount() == static_cast<std::streamsize>(seal_size)) {
-      throw InputError(
-          fmt::format("{}: written by another version of phyxel: its first line is not \"{}\"",
-                      file.string(), std::string(first_line).substr(0, 20)));
-    }
-    throw InputError(
-        fmt::format("{}: not a file written by phyxel (or cut short within its first {} bytes)",
-                    file.string(), seal_size));
-  }
+  std::ifstream in;
+  const std::string seal = read_seal(file, in);
   std::uint64_t bytes = 0;
   const std::string digest = digest_rest(in, &bytes);
-  const std::string stated = line_of(seal, "bytes");
-  if (stated != std::to_string(bytes)) {
-    throw InputError(
-        fmt::format("{}: cut short or altered: {} bytes behind the seal, which says {}",
-                    file.string(), bytes, stated.empty() ? "nothing" : stated));
-  }
+  check_bytes(file, seal, bytes);
   if (line_of(seal, "xxh3-128") != digest) {
     throw InputError(fmt::format(
         "{}: altered since it was written: its digest does not fit its content", file.string()));

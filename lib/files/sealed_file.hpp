@@ -30,6 +30,10 @@ void write_sealed(const std::filesystem::path& file, const std::string& kind,
 /// Seals a file that was written with `seal_size` bytes left free in front. @throws OutputError.
 void seal_in_place(const std::filesystem::path& file, const std::string& kind);
 
+/// Compares the size with what the seal says, and reads nothing else.
+/// @throws InputError for a file that is missing, unreadable, cut short or not ours.
+void check_size(const std::filesystem::path& file);
+
 /// Compares the digest. @returns the kind of file.
 /// @throws InputError for a file that is missing, unreadable, cut short, altered or not ours.
 std::string check_seal(const std::filesystem::path& file);

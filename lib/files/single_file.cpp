@@ -1,7 +1,7 @@
 /// A whole trajectory in one temporal VTKHDF file.
 #include <fmt/format.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "files/atomic_file.hpp"
@@ -27,27 +27,20 @@ struct Field {
   std::size_t columns = 0;
 };
 
-/// Removes a half-written file unless told that it is finished.
-class Unfinished {
- public:
-  explicit Unfinished(fs::path file) : file_(std::move(file)) {}
-  ~Unfinished() {
-    std::error_code ignored;
-    if (!file_.empty()) fs::remove(file_, ignored);
-  }
-  void finished() { file_.clear(); }
-
- private:
-  fs::path file_;
-};
-
-void copy_field(const Hdf5Reader& in, const Field& field, Hdf5Writer& out, std::size_t first) {
-  const std::string path = point_data + field.name;
-  if (field.integer) {
-    out.rows<Index>(path, first, in.array<Index>(path, field.columns), field.columns);
-  } else {
-    out.rows<float>(path, first, in.array<float>(path, field.columns), field.columns);
-  }
+/// Adds an array that has one frame's rows behind another's. Each is read when it is written.
+template <class T>
+void gather(Hdf5Writer& out, const std::string& path, const std::vector<SeriesEntry>& entries,
+            std::size_t points, std::size_t columns) {
+  out.later<T>(
+      path, entries.size() * points, columns, points,
+      [=, &entries](std::size_t first, std::span<T> values) {
+        const SeriesEntry& entry = entries[first / points];
+        const std::vector<T> read = Hdf5Reader(entry.file).array<T>(path, columns);
+        if (read.size() != values.size()) {
+          throw InputError(fmt::format("{}: changed while it was read", entry.file.string()));
+        }
+        std::copy(read.begin(), read.end(), values.begin());
+      });
 }
 
 void put(Hdf5Writer& out, const std::string& path, const std::vector<std::int64_t>& values,
@@ -60,10 +53,7 @@ void put(Hdf5Writer& out, const std::string& path, const std::vector<std::int64_
 void export_single(const fs::path& series, const fs::path& out_file, bool overwrite) {
   const std::vector<SeriesEntry> entries = read_series(series);
   if (entries.empty()) throw InputError(fmt::format("{}: lists no frames", series.string()));
-  if (!overwrite && fs::exists(out_file)) {
-    throw InputError(
-        fmt::format("{}: exists already and is kept; --force replaces it", out_file.string()));
-  }
+  check_output_file(out_file, overwrite, Output::file);
   make_writable_folder(out_file.has_parent_path() ? out_file.parent_path() : ".");
 
   const std::string kind = check_seal(entries.front().file);
@@ -82,9 +72,21 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
         {name, first.is_integer(point_data + name), first.shape(point_data + name).columns});
   }
 
-  const fs::path temporary = out_file.string() + ".tmp";
-  Unfinished guard(temporary);
-  Hdf5Writer out(temporary);
+  std::vector<double> times;
+  std::vector<std::int64_t> point_offsets;
+  for (const SeriesEntry& entry : entries) {
+    check_seal(entry.file, kind);
+    const Hdf5Reader in(entry.file);
+    if (in.shape(grid + "Points").rows != points ||
+        in.array<std::int64_t>(grid + "Connectivity") != connectivity) {
+      in.refuse("has other points or cells than the first frame of its series");
+    }
+    point_offsets.push_back(static_cast<std::int64_t>(times.size() * points));
+    times.push_back(entry.time);
+  }
+
+  // In memory but for the arrays of all frames, so that a full disk never meets HDF5.
+  Hdf5Writer out;
   out.group("/VTKHDF");
   const std::int64_t version[] = {2, 0};
   out.attribute("/VTKHDF", "Version", std::span<const std::int64_t>(version));
@@ -95,12 +97,12 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.array<std::uint8_t>(grid + "Types", first.array<std::uint8_t>(grid + "Types"));
   put(out, grid + "Connectivity", connectivity, 0);
   put(out, grid + "Offsets", offsets, 0);
-  out.reserve<float>(grid + "Points", steps * points, 3);
+  gather<float>(out, grid + "Points", entries, points, 3);
   for (const Field& field : fields) {
     if (field.integer) {
-      out.reserve<Index>(point_data + field.name, steps * points, field.columns);
+      gather<Index>(out, point_data + field.name, entries, points, field.columns);
     } else {
-      out.reserve<float>(point_data + field.name, steps * points, field.columns);
+      gather<float>(out, point_data + field.name, entries, points, field.columns);
     }
   }
   out.group("/phyxel");
@@ -109,21 +111,6 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.attribute("/phyxel", "title", first.text_attribute("/phyxel", "title"));
   out.text("/phyxel/scene", first.text("/phyxel/scene"));
 
-  std::vector<double> times;
-  std::vector<std::int64_t> point_offsets;
-  for (const SeriesEntry& entry : entries) {
-    check_seal(entry.file, kind);
-    const Hdf5Reader in(entry.file);
-    if (in.shape(grid + "Points").rows != points ||
-        in.array<std::int64_t>(grid + "Connectivity") != connectivity) {
-      in.refuse("has other points or cells than the first frame of its series");
-    }
-    const std::size_t row = times.size() * points;
-    out.rows<float>(grid + "Points", row, in.array<float>(grid + "Points", 3), 3);
-    for (const Field& field : fields) copy_field(in, field, out, row);
-    point_offsets.push_back(static_cast<std::int64_t>(row));
-    times.push_back(entry.time);
-  }
   // Parts, cells and connectivity stay where they are in every step: stored once.
   const std::vector<std::int64_t> zeros(steps, 0), ones(steps, 1);
   out.group("/VTKHDF/Steps");
@@ -137,10 +124,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.group("/VTKHDF/Steps/PointDataOffsets");
   for (const Field& field : fields)
     put(out, grid + "Steps/PointDataOffsets/" + field.name, point_offsets, 0);
-  out.close();
-  seal_in_place(temporary, "trajectory");
-  move_into_place(temporary, out_file, Durable::yes);
-  guard.finished();
+  write_sealed(out_file, "trajectory", out.content(), Durable::yes);
 }
 
 }  // namespace phyxel

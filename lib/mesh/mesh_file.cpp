@@ -5,6 +5,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "files/atomic_file.hpp"
 #include "mesh/mesh_formats.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -13,17 +14,8 @@ namespace phyxel {
 namespace {
 
 std::string read_bytes(const std::filesystem::path& file) {
+  require_regular_file(file, "a mesh file");
   std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) {
-    throw InputError(fmt::format("{}: no such file", file.string()));
-  }
-  if (std::filesystem::is_directory(status)) {
-    throw InputError(fmt::format("{}: is a folder, not a mesh file", file.string()));
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(fmt::format("{}: is not a regular file", file.string()));
-  }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   const auto size = std::filesystem::file_size(file, error);

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 
+#include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 #include "scene/scene_body.hpp"
 #include "scene/scene_table.hpp"
@@ -111,11 +112,7 @@ std::vector<BodyRequest> read_bodies(const SceneTable& root) {
 }
 
 std::string read_text(const std::filesystem::path& file) {
-  std::error_code unknown;
-  if (std::filesystem::is_directory(file, unknown)) {
-    throw InputError(
-        fmt::format("{}: a folder found; allowed: a scene file (TOML)", file.string()));
-  }
+  require_regular_file(file, "a scene file (TOML)");
   std::ifstream stream(file, std::ios::binary);
   if (!stream) {
     throw InputError(

@@ -228,7 +228,7 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
       {{}, "command"},
       {{"frobnicate"}, "command"},
       {{"run", "missing.toml"}, "missing.toml: cannot read the scene file: No such file"},
-      {{"run", "."}, "error: .: a folder found; allowed: a scene file"},
+      {{"run", "."}, "error: .: is a folder; allowed: a scene file"},
       {{"run", "broken.toml"}, "broken.toml:1:6: not valid TOML"},
       {{"run", "bad.toml"},
        "bad.toml:4:9: key body.shape: \"dinno\" found (did you mean \"dino\"?)"},

@@ -60,10 +60,7 @@ void report_command(const ReportOptions& options) {
                                  options.inputs.size()));
   }
   const fs::path out = options.out.empty() ? default_out(options.inputs.front()) : options.out;
-  if (!options.force && fs::exists(out)) {
-    throw InputError(fmt::format("{}: exists and is kept; allowed: another file (-o), or --force",
-                                 out.string()));
-  }
+  check_output_file(out, options.force, Output::file_or_stream);
   const Report report = only_tables ? results_page(tables)
                                     : replay_page({.input = options.inputs.front(),
                                                    .megabytes = options.megabytes,

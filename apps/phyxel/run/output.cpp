@@ -85,6 +85,7 @@ void Run::write_state() {
     info.total_energy = good->diagnostics.total_energy();
     info.initial_energy = initial_energy_;
     info.frames_written = recorder_->frames_written();
+    recorder_->sync();  // the checkpoint counts the frames
     checkpoint_ =
         write_checkpoint(recorder_->directory(), good->state, info, model().whole_size(), values);
   });

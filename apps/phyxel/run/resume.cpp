@@ -3,25 +3,33 @@
 
 #include <cstdlib>
 
+#include "files/trajectory_folder.hpp"
 #include "run/run.hpp"
 #include "terminal.hpp"
 
 namespace phyxel::app {
 
-std::optional<CheckpointReader> Run::find_checkpoint() const {
-  if (!options_.dry_run) {
-    check_output_folder(scene_.output.directory, options_.force || !options_.resume.empty());
-  }
-  if (options_.resume.empty()) return std::nullopt;
+std::optional<CheckpointReader> Run::find_checkpoint() {
+  const std::filesystem::path& folder = scene_.output.directory;
   std::filesystem::path file = options_.resume;
   if (options_.resume == "auto") {
     std::string warning;
-    const auto latest = latest_checkpoint(scene_.output.directory, &warning);
+    const auto latest = latest_checkpoint(folder, &warning);
     if (!warning.empty()) fmt::print(stderr, "phyxel: {}{}\n", warning_word(), warning);
-    if (!latest) return std::nullopt;
-    file = *latest;
+    file = latest.value_or(std::filesystem::path());
   }
+  if (file.empty()) {
+    // A run that was ended before its first checkpoint begins again.
+    replace_ = options_.force || (options_.resume == "auto" && holds_only_a_start(folder, scene_));
+    if (!options_.dry_run) check_output_folder(folder, replace_);
+    return std::nullopt;
+  }
+  replace_ = options_.force;
   CheckpointReader checkpoint(file);
+  resumed_from_ = file;
+  continuation_ = {checkpoint.info().frames_written, checkpoint.state(0, 0).step,
+                   checkpoint.info().initial_energy, file};
+  if (!options_.dry_run) check_continuation(folder, *continuation_, options_.force);
   const Precision precision = checkpoint.info().precision;
   if (precision != scene_.solver.precision) {
     throw InputError(
@@ -41,6 +49,13 @@ std::optional<CheckpointReader> Run::find_checkpoint() const {
 
 std::optional<Checkpoint> Run::checkpoint_for_all() {
   require_alike(std::hash<std::string>{}(scene_.text), "scenes");
+  // Options change what the scene says.
+  require_alike(std::hash<std::string>{}(fmt::format(
+                    "{:a} {:a} {:a} {:a} {} {} {}", scene_.time.end, scene_.time.step.value_or(0),
+                    scene_.time.safety, scene_.output.frames_per_second,
+                    precision_name(scene_.solver.precision), method_name(scene_.solver.method),
+                    options_.resume)),
+                "options (--until, --step, --precision, --method, --resume)");
   std::optional<Checkpoint> found;
   ranks().together([&] {
     if (!leads()) return;

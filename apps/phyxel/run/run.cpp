@@ -5,11 +5,15 @@
 
 #include <cstdlib>
 
+#include "files/trajectory_folder.hpp"
 #include "mpi/watchdog.hpp"
+#include "outside_text.hpp"
 #include "picture.hpp"
 #include "stop_signal.hpp"
 
 namespace phyxel::app {
+
+namespace fs = std::filesystem;
 
 Run::Run(const RunOptions& options)
     : options_(options),
@@ -32,12 +36,15 @@ Run::Run(const RunOptions& options)
       solver_(model(), *backend_, first_state(), scene_.solver.method),
       first_step_(solver_.steps()),
       start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
+  StopSignal::work_begins();
   // Last, because it replaces what an earlier run has left: all that could be refused, or find no
   // memory, has been tried by now.
   ranks().together([&] {
     if (!leads() || options_.dry_run) return;
-    recorder_.emplace(model(), scene_, options.force,
-                      begin_ ? std::optional(begin_->info.frames_written) : std::nullopt);
+    const std::filesystem::path& folder = scene_.output.directory;
+    // What is done and summed up stays as it is.
+    if (begin_ && solver_.steps() >= plan_.steps && fs::exists(folder / summary_name)) return;
+    recorder_.emplace(model(), scene_, replace_, continuation_);
   });
   if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
   if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
@@ -84,75 +91,32 @@ void Run::rehearse() {
 }
 
 void Run::execute() {
-  Backend& backend = *backend_;
-  Solver& solver = solver_;
   say_plan();
-  if (begin_ && solver.steps() >= plan_.steps) {
-    say_finished_already();
-    return;
+  const bool finished = begin_ && solver_.steps() >= plan_.steps;
+  if (finished && !summary_is_missing()) return say_finished_already();
+  now_ = start_diagnostics_;
+  initial_energy_ = begin_ ? begin_->info.initial_energy : now_.total_energy();
+  peak_energy_ = now_.kinetic_energy + now_.elastic_energy();
+  if (finished) checkpoint_ = resumed_from_;
+  if (!finished) step_to_end();
+  draw_and_sum_up();
+}
+
+void Run::step_to_end() {
+  StabilityWatch watch = alike([&] { return StabilityWatch(model(), now_); });
+  good_ = good_state(now_);
+  if (!begin_) {
+    // Without a rate only the last frame is wanted.
+    if (scene_.output.frames_per_second > 0) write_frame(good_);
+    // However early a run ends, it can go on.
+    if (scene_.solver.method != Method::equilibrium) write_state();
   }
-
-  Diagnostics now = start_diagnostics_;
-  initial_energy_ = begin_ ? begin_->info.initial_energy : now.total_energy();
-  peak_energy_ = now.kinetic_energy + now.elastic_energy();
-  StabilityWatch watch = alike([&] { return StabilityWatch(model(), now); });
-  good_ = good_state(now);
-  // Without a rate only the last frame is wanted.
-  if (!begin_ && scene_.output.frames_per_second > 0) write_frame(good_);
-
-  StopSignal signals;
   const Watchdog watchdog(ranks(), watchdog_seconds());
   Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
                     {.phyxels = model().whole_size()});
   loop_start_ = Clock::now();
-  auto last_checkpoint = Clock::now();
   try {
-    auto stepping_since = Clock::now();
-    double look_seconds = 0;
-    while (solver.steps() < plan_.steps) {
-      watchdog.beat(solver.steps());
-      solver.step();
-      const bool last = solver.steps() == plan_.steps;
-      const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
-      progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
-      writer_.serve();
-      if (!frame && solver.steps() % agree_interval() != 0) continue;
-      const Phase agreeing("agreeing, looking, writing");
-      const bool stop = anyone(StopSignal::stop_requested() != 0);
-      const bool due = anyone(StopSignal::checkpoint_requested() ||
-                              (scene_.output.checkpoint_every > 0 &&
-                               seconds_since(last_checkpoint) > scene_.output.checkpoint_every));
-      const bool watched = solver.steps() % watch_interval == 0 &&
-                           anyone(seconds_since(stepping_since) > watch_share * look_seconds);
-      if (!frame && !stop && !due && !watched) continue;
-
-      backend.wait();
-      step_seconds_ += seconds_since(stepping_since);
-      if (frame) writer_.wait_for_room();
-      const auto look_start = Clock::now();
-      now = spent_.timed("energies", [&] { return diagnose(model(), backend, solver.now()); });
-      watch.check(now);
-      peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
-      auto good = good_state(now);
-      look_seconds = seconds_since(look_start);
-      if (frame) write_frame(good);
-      // Only now: a checkpoint of a state counts its frame as written, so that comes first.
-      good_ = std::move(good);
-      if (last || stop || due) {
-        write_state();
-        last_checkpoint = Clock::now();
-      }
-      if (stop && !last) {
-        writer_.finish();
-        progress.finish();
-        const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
-        throw AgreedError(ExitCode::stopped,
-                          fmt::format("stopped by signal {} at t = {:g} s (step {}); the "
-                                      "checkpoint is written, --resume auto continues",
-                                      signal, solver.time(), solver.steps()));
-      }
-      stepping_since = Clock::now();
-    }
+    take_steps(watch, watchdog, progress);
   } catch (const DivergedError& error) {  // on all ranks
     throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
   } catch (const DeviceError& error) {  // on this one
@@ -165,6 +129,63 @@ void Run::execute() {
   writer_.finish();
   progress.finish();
   loop_seconds_ = seconds_since(loop_start_);
+}
+
+void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& progress) {
+  auto last_checkpoint = Clock::now(), stepping_since = last_checkpoint;
+  double look_seconds = 0;
+  while (solver_.steps() < plan_.steps) {
+    watchdog.beat(solver_.steps());
+    solver_.step();
+    const bool last = solver_.steps() == plan_.steps;
+    const bool frame = last || solver_.steps() % plan_.steps_per_frame == 0;
+    progress.update(solver_.time(), solver_.steps(), speed(), now_.total_energy());
+    writer_.serve();
+    if (!frame && solver_.steps() % agree_interval() != 0) continue;
+    const Phase agreeing("agreeing, looking, writing");
+    const bool stop = anyone(StopSignal::stop_requested() != 0);
+    const bool due = anyone(StopSignal::checkpoint_requested() ||
+                            (scene_.output.checkpoint_every > 0 &&
+                             seconds_since(last_checkpoint) > scene_.output.checkpoint_every));
+    const bool watched = solver_.steps() % watch_interval == 0 &&
+                         anyone(seconds_since(stepping_since) > watch_share * look_seconds);
+    if (!frame && !stop && !due && !watched) continue;
+
+    backend_->wait();
+    step_seconds_ += seconds_since(stepping_since);
+    if (frame) writer_.wait_for_room();
+    const auto look_start = Clock::now();
+    now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
+    watch.check(now_);
+    peak_energy_ = std::max(peak_energy_, now_.kinetic_energy + now_.elastic_energy());
+    auto good = good_state(now_);
+    look_seconds = seconds_since(look_start);
+    if (frame) write_frame(good);
+    // Only now: a checkpoint of a state counts its frame as written, so that comes first.
+    good_ = std::move(good);
+    if (last || stop || due) {
+      write_state();
+      last_checkpoint = Clock::now();
+    }
+    if (stop && !last) {
+      writer_.finish();
+      progress.finish();
+      const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
+      throw AgreedError(ExitCode::stopped,
+                        fmt::format("stopped by signal {} at t = {:g} s (step {}); the "
+                                    "checkpoint is written, --resume auto continues",
+                                    signal, solver_.time(), solver_.steps()));
+    }
+    stepping_since = Clock::now();
+  }
+}
+
+bool Run::summary_is_missing() const {
+  const bool here = leads() && !std::filesystem::exists(scene_.output.directory / summary_name);
+  return anyone(here);
+}
+
+void Run::draw_and_sum_up() {
   ranks().together([&] {
     if (leads() && scene_.render.pictures && !options_.no_pictures) {
       pictures_ = spent_.timed("pictures", [&] {
@@ -179,15 +200,13 @@ void Run::execute() {
   const Traffic traffic = most_traffic(*backend_);
   ranks().together([&] {
     if (!leads()) return;
-    const nlohmann::ordered_json summary = summary_of(now, bytes, traffic);
-    // Names of files need not be UTF-8.
-    const std::string text =
-        summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    const nlohmann::ordered_json summary = summary_of(now_, bytes, traffic);
+    const std::string text = json_text(summary) + "\n";
     recorder_->write_summary(text);
     if (options_.json) {
       fmt::print("{}", text);
     } else {
-      say_summary(now, bytes, traffic);
+      say_summary(now_, bytes, traffic);
     }
   });
 }

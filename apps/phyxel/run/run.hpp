@@ -10,11 +10,13 @@
 
 #include "device_option.hpp"
 #include "file_writer.hpp"
+#include "mpi/watchdog.hpp"
 #include "phyxel/phyxel.hpp"
 #include "program_ranks.hpp"
 #include "progress.hpp"
 #include "run/time_spent.hpp"
 #include "setup.hpp"
+#include "stop_signal.hpp"
 
 namespace phyxel::app {
 
@@ -62,6 +64,7 @@ class Run {
   /// The plan, and how long it would take: a few steps tell. Writes nothing.
   void rehearse();
 
+  /// Steps to the end and writes everything; or what is missing of a run that was finished.
   void execute();
 
  private:
@@ -70,6 +73,12 @@ class Run {
   static constexpr double watch_share = 50;
 
   const Model& model() const { return shared_.here(); }
+
+  void step_to_end();
+  void take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& progress);
+  /// Whether the output folder lacks run.json, as after an end before it was written.
+  bool summary_is_missing() const;
+  void draw_and_sum_up();
 
   /// Of all steps [s]; none for a search for equilibrium, whose length nobody knows.
   std::optional<double> forecast();
@@ -97,7 +106,7 @@ class Run {
   }
 
   /// Before the model is built, so that a wrong --resume or output folder costs no time.
-  std::optional<CheckpointReader> find_checkpoint() const;
+  std::optional<CheckpointReader> find_checkpoint();
 
   /// What it says, without arrays; the first rank's, the others may not see its folder.
   std::optional<Checkpoint> checkpoint_for_all();
@@ -145,10 +154,16 @@ class Run {
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
 
   const RunOptions& options_;
+  StopSignal signals_{ranks().rank() == 0};  // first, to hear those that come during set-up
   Clock::time_point start_ = Clock::now();
   TimeSpent spent_;
   Scene scene_;
   ChosenDevice device_;
+  // Found with the checkpoint, on the first rank: its file, and whether an earlier trajectory may
+  // be replaced.
+  std::filesystem::path resumed_from_;
+  bool replace_ = false;
+  std::optional<Continuation> continuation_;
   std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until its state is read
   std::optional<Checkpoint> begin_;                    // without arrays
   SharedModel shared_;
@@ -157,7 +172,7 @@ class Run {
   BoundarySize boundary_;  // of the whole
   Solver solver_;
   std::int64_t first_step_ = 0;
-  Diagnostics start_diagnostics_;
+  Diagnostics start_diagnostics_, now_;
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // between ranks
   std::vector<int> gpus_;                  // of the ranks

@@ -107,8 +107,8 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"loop_seconds", loop_seconds_},
             {"step_seconds", step_seconds_},
             {"seconds", timing()},
-            {"steps_per_second", steps / step_seconds_},
-            {"phyxel_steps_per_second", steps * phyxels / step_seconds_},
+            {"steps_per_second", steps / std::max(step_seconds_, 1e-9)},
+            {"phyxel_steps_per_second", steps * phyxels / std::max(step_seconds_, 1e-9)},
             {"bytes", bytes},
             {"transport", transport_},
             {"gpus", gpus_},
@@ -134,15 +134,15 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
       "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
       "with "
       "output; {:.0f} bytes per phyxel\n",
-      steps / step_seconds_, steps * phyxels / step_seconds_, step_seconds_, loop_seconds_,
-      static_cast<double>(bytes) / std::max(1, phyxels));
+      steps / std::max(step_seconds_, 1e-9), steps * phyxels / std::max(step_seconds_, 1e-9),
+      step_seconds_, loop_seconds_, static_cast<double>(bytes) / std::max(1, phyxels));
   if (ranks().size() > 1) {
     fmt::print(
         "  exchange    at most {:.3g} kB a step and rank; {:.1f}% of the seconds above for "
         "packing "
         "and waiting\n",
-        1e-3 * static_cast<double>(traffic.bytes_sent) / steps,
-        100 * traffic.seconds / loop_seconds_);
+        1e-3 * static_cast<double>(traffic.bytes_sent) / std::max(steps, 1.0),
+        100 * traffic.seconds / std::max(loop_seconds_, 1e-9));
   }
   if (!steps_explicitly()) {
     const SolverWork work = solver_.work();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -72,6 +73,22 @@ class SeriesFile {
   bool empty_ = true;
 };
 
+/// The point at which a trajectory is continued, as a checkpoint tells it.
+struct Continuation {
+  std::int64_t frames = 0;  ///< Frames that were written up to it.
+  std::int64_t step = std::numeric_limits<std::int64_t>::max();  ///< Step of the checkpoint.
+  /// Total energy of the run's first state [J]; NaN: not compared.
+  double initial_energy = std::numeric_limits<double>::quiet_NaN();
+  /// The checkpoint. If it lies outside the output folder, that folder must hold no trajectory,
+  /// unless it may be replaced. Empty: in the output folder.
+  std::filesystem::path checkpoint = {};
+};
+
+/// True if a folder holds no more than the first frame of this very scene: a run that was ended
+/// before its first checkpoint, which may begin again.
+/// @throws InputError if its log cannot be read
+bool holds_only_a_start(const std::filesystem::path& directory, const Scene& scene);
+
 /// Writes frames into a folder:
 ///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
@@ -83,17 +100,23 @@ class Recorder {
  public:
   /// Checks the folder and the free space, then removes what the run replaces.
   /// @param model a rank's share of it will do, if all frames come in stretches
-  /// @param resume_after frames of an earlier part of this run, which are kept; later ones are
+  /// @param point where an earlier part of this run is continued: its frames are kept, later ones
   ///   removed. Unset: a new run.
-  /// @throws InputError if the folder holds an earlier trajectory and `overwrite` is false, if it
-  ///   cannot be written, or if the disk has no room for the frames to come.
+  /// @throws InputError, with nothing changed, if the folder holds an earlier trajectory and
+  ///   `overwrite` is false, if `point` belongs to another run than the folder's or frames or lines
+  ///   of the log are missing, if the folder cannot be written, or if the disk has no room for the
+  ///   frames to come.
   Recorder(const Model& model, const Scene& scene, bool overwrite,
-           std::optional<std::int64_t> resume_after = std::nullopt);
+           const std::optional<Continuation>& point = std::nullopt);
 
   /// @throws OutputError; frames already written stay intact.
   void write(const Frame& frame);
   /// A frame whose values are not all here, or not at once. @throws likewise
   void write(const Diagnostics& diagnostics, Stretches& values);
+
+  /// Brings all frames written so far to the disk, as a checkpoint that counts them must find them
+  /// after a power cut. @throws OutputError
+  void sync();
 
   /// What a program has to say of a run that is done, as run.json. @throws OutputError
   void write_summary(const std::string& text) const;
@@ -108,7 +131,8 @@ class Recorder {
   void remove_unfinished() const;  ///< What a killed run has left.
   void check_space(std::int64_t frames_before) const;
   void begin_anew();
-  void continue_after(std::int64_t frames);
+  void create_files();
+  void continue_after(const Continuation& point, bool overwrite);
 
   const Model& model_;
   const Scene& scene_;
@@ -116,7 +140,8 @@ class Recorder {
   bool writes_phyxels_, writes_surface_;
   std::int64_t frames_ = 0;
   SeriesFile phyxels_, surface_;
-  std::size_t log_size_ = 0;  // bytes of energy.csv
+  std::vector<std::filesystem::path> unsynced_;  // frames
+  std::size_t log_size_ = 0;                     // bytes of energy.csv
 };
 
 /// What a single frame holds, read back.

@@ -202,7 +202,7 @@ TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
   const std::string series = text_of(folder_ / "out" / "phyxels.hdf.series");
   const std::string log = text_of(folder_ / "out" / "energy.csv");
   const std::string last = text_of(folder_ / "out" / "surface_000004.hdf");
-  Recorder resumed(model_, scene_, false, 2);
+  Recorder resumed(model_, scene_, false, Continuation{2});
   EXPECT_EQ(resumed.frames_written(), 2);
   EXPECT_TRUE(fs::exists(folder_ / "out" / "phyxels_000001.hdf"));
   EXPECT_FALSE(fs::exists(folder_ / "out" / "phyxels_000002.hdf"));
@@ -214,7 +214,7 @@ TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
 }
 
 TEST_F(Recording, ResumingIntoAnotherFolderNumbersOn) {
-  Recorder resumed(model_, scene_, false, 7);
+  Recorder resumed(model_, scene_, false, Continuation{7});
   record(resumed, 7);
   EXPECT_TRUE(fs::exists(folder_ / "out" / "phyxels_000007.hdf"));
   EXPECT_EQ(read_series(folder_ / "out" / "phyxels.hdf.series").size(), 1u);
@@ -227,7 +227,7 @@ TEST_F(Recording, ATrajectoryThatIsThereIsKept) {
   }
   const std::string before = text_of(folder_ / "out" / "phyxels_000000.hdf");
   EXPECT_THROW(Recorder(model_, scene_, false), InputError);
-  EXPECT_THROW(Recorder(model_, scene_, false, 3), InputError);  // the checkpoint has seen more
+  EXPECT_THROW(Recorder(model_, scene_, false, Continuation{3}), InputError);  // the checkpoint has seen more
   EXPECT_EQ(text_of(folder_ / "out" / "phyxels_000000.hdf"), before);
   const std::string other = "notes";
   std::ofstream(folder_ / "out" / "notes.txt") << other;

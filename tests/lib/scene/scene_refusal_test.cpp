@@ -305,7 +305,7 @@ TEST_F(SceneFiles, UnreadableFilesAreNamed) {
   EXPECT_EQ(
       message(folder_ / "no.toml"),
       (folder_ / "no.toml").string() + ": cannot read the scene file: No such file or directory");
-  EXPECT_THAT(message(folder_), StartsWith(folder_.string() + ": a folder found"));
+  EXPECT_THAT(message(folder_), StartsWith(folder_.string() + ": is a folder"));
   EXPECT_THAT(message(folder_ / std::string(300, 'x')), HasSubstr("File name too long"));
   EXPECT_THAT(message(write("empty.toml")), HasSubstr("empty.toml:1:1: key body: missing"));
   EXPECT_THAT(message("/dev/zero"), StartsWith("/dev/zero: more than 2 MB found"));
