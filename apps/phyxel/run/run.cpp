@@ -30,6 +30,7 @@ Run::Run(const RunOptions& options)
         });
       })),
       solver_(model(), *backend_, first_state(), scene_.solver.method),
+      shortener_(model(), *backend_, plan_),
       first_step_(solver_.steps()),
       start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
   // Last, because it replaces what an earlier run has left: all that could be refused, or find no
@@ -104,6 +105,7 @@ void Run::execute() {
   const Watchdog watchdog(ranks(), watchdog_seconds());
   Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
                     {.phyxels = model().whole_size()});
+  watch_newton(progress);
   loop_start_ = Clock::now();
   auto last_checkpoint = Clock::now();
   try {
@@ -111,10 +113,10 @@ void Run::execute() {
     double look_seconds = 0;
     while (solver.steps() < plan_.steps) {
       watchdog.beat(solver.steps());
-      solver.step();
+      take_step(progress);
       const bool last = solver.steps() == plan_.steps;
       const bool frame = last || solver.steps() % plan_.steps_per_frame == 0;
-      progress.update(solver.time(), solver.steps(), speed(), now.total_energy());
+      if (scene_.solver.method != Method::equilibrium) show_progress(progress, now);
       writer_.serve();
       if (!frame && solver.steps() % agree_interval() != 0) continue;
       const Phase agreeing("agreeing, looking, writing");
@@ -131,7 +133,9 @@ void Run::execute() {
       if (frame) writer_.wait_for_room();
       const auto look_start = Clock::now();
       now = spent_.timed("energies", [&] { return diagnose(model(), backend, solver.now()); });
-      watch.check(now);
+      watch.check(now, &shortener_);
+      shortener_.see(solver);
+      show_progress(progress, now);
       peak_energy_ = std::max(peak_energy_, now.kinetic_energy + now.elastic_energy());
       auto good = good_state(now);
       look_seconds = seconds_since(look_start);
@@ -153,6 +157,8 @@ void Run::execute() {
       }
       stepping_since = Clock::now();
     }
+  } catch (const InterruptedError& error) {  // on all ranks
+    throw AgreedError(error.code(), stopped_in_search(error, progress));
   } catch (const DivergedError& error) {  // on all ranks
     throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
   } catch (const DeviceError& error) {  // on this one

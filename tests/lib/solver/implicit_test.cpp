@@ -209,5 +209,52 @@ TEST(Equilibrium, OnRollersIsPlaneStrain) {
   EXPECT_NEAR((top + bottom) / 0.4, 1e-5 * 0.3 / 0.7, 1e-4 * 1e-5);
 }
 
+/// Stopped within a step, a solver is where that step began, and takes it again to the same bits.
+TEST(Implicit, AStoppedStepLeavesTheLastWholeOne) {
+  Scene scene = clamped_bar();
+  scene.gravity = {0.5, 0, 0};
+  const Model model = bar_of(scene);
+  const auto backend = make_test_backend(model, Precision::double_);
+  Solver solver(model, *backend, initial_state(model, scene, 0.05), Method::implicit);
+  solver.step();
+  const State before = solver.state();
+  int left = 7;
+  solver.observe([&](const NewtonProgress&) { return --left > 0; });
+  EXPECT_THROW(solver.step(), InterruptedError);
+  EXPECT_EQ(left, 0);
+  const State after = solver.state();
+  EXPECT_EQ(after.step, 1);
+  EXPECT_TRUE(after.displacement == before.displacement);
+  EXPECT_TRUE(after.velocity == before.velocity);
+  solver.observe(nullptr);
+  solver.step();
+  const auto other = make_test_backend(model, Precision::double_);
+  Solver whole(model, *other, initial_state(model, scene, 0.05), Method::implicit);
+  whole.step();
+  whole.step();
+  EXPECT_TRUE(solver.state().displacement == whole.state().displacement);
+  EXPECT_TRUE(solver.state().velocity == whole.state().velocity);
+}
+
+/// Terms so stiff that steps could not be counted are refused by their key.
+TEST(Plan, OfAbsurdStiffnessIsRefusedByKey) {
+  const auto refusal = [](double volume_stiffness, double hourglass) {
+    Scene scene = one_body();
+    scene.bodies[0].material.volume_stiffness = volume_stiffness;
+    scene.bodies[0].material.hourglass = hourglass;
+    const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
+    const auto backend = make_test_backend(model, Precision::double_);
+    try {
+      plan_steps(scene, model, *backend);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("planned");
+  };
+  EXPECT_THAT(refusal(1e20, 0), ::testing::HasSubstr("body \"body\": volume_stiffness = 1e+20"));
+  EXPECT_THAT(refusal(0, 1e20), ::testing::HasSubstr("body \"body\": hourglass = 1e+20"));
+  EXPECT_EQ(refusal(1e8, 10), "planned");  // a thousand times the rubber, a hundred times usual
+}
+
 }  // namespace
 }  // namespace phyxel
