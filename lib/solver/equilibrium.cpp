@@ -141,6 +141,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     say_not_found(model, found, report, tolerance);
   }
   found.residual = report.residual;
+  vectors.refresh_ghosts(found.state.displacement);
   backend.upload(found.state);
   return found;
 }

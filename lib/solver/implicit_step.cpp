@@ -135,6 +135,7 @@ void ImplicitStep::take_both_stages(State& state) {
     const Vec3d along_path = (1 / dt) * (after[i] - before[i]);
     v2[i] = by_components(balance_.free[i], v2[i]) + along_path;
   });
+  vectors.refresh_ghosts(u2);
   ++state.step;
   state.time = end;
 }

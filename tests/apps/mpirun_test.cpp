@@ -154,6 +154,20 @@ region = "x-"
     return read_checkpoint(latest_checkpoint(folder_ / folder).value()).state.displacement;
   };
   EXPECT_TRUE(end_of("rest") == end_of("parts"));
+  // Energies count what lies across the cut, too.
+  EXPECT_EQ(text_of(folder_ / "rest" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
+
+  scene("implicit", "0.05");
+  const std::vector<std::string> few{"run", "soft.toml", "--step", "0.05", "--until", "0.1"};
+  const auto into = [&](const char* folder) {
+    std::vector<std::string> words = few;
+    words.insert(words.end(), {"--out", folder});
+    return words;
+  };
+  ASSERT_EQ(run_on(0, into("one")).code, 0);
+  ASSERT_EQ(run_on(2, into("two")).code, 0);
+  EXPECT_TRUE(end_of("one") == end_of("two"));
+  EXPECT_EQ(text_of(folder_ / "one" / "energy.csv"), text_of(folder_ / "two" / "energy.csv"));
 }
 
 TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {

@@ -118,7 +118,7 @@ class Solver {
 /// ranks halve at the same ones. Laws that cannot stiffen cost nothing.
 class StepShortener {
  public:
-  static constexpr std::int64_t interval = 32;  ///< Steps between two looks.
+  static constexpr std::int64_t interval = 16;  ///< Steps between two looks.
   static constexpr int most_halvings = 10;      ///< Of one run.
   /// Of (dt / limit at rest)² × stiffening; 1 is the limit itself.
   static constexpr double largest_share = 1;
