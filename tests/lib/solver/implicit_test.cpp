@@ -209,31 +209,37 @@ TEST(Equilibrium, OnRollersIsPlaneStrain) {
   EXPECT_NEAR((top + bottom) / 0.4, 1e-5 * 0.3 / 0.7, 1e-4 * 1e-5);
 }
 
-/// Stopped within a step, a solver is where that step began, and takes it again to the same bits.
+/// Stopped anywhere within a step, in either stage, a solver is where that step began, and takes it
+/// again to the same bits.
 TEST(Implicit, AStoppedStepLeavesTheLastWholeOne) {
   Scene scene = clamped_bar();
   scene.gravity = {0.5, 0, 0};
   const Model model = bar_of(scene);
   const auto backend = make_test_backend(model, Precision::double_);
-  Solver solver(model, *backend, initial_state(model, scene, 0.05), Method::implicit);
-  solver.step();
-  const State before = solver.state();
-  int left = 7;
-  solver.observe([&](const NewtonProgress&) { return --left > 0; });
-  EXPECT_THROW(solver.step(), InterruptedError);
-  EXPECT_EQ(left, 0);
-  const State after = solver.state();
-  EXPECT_EQ(after.step, 1);
-  EXPECT_TRUE(after.displacement == before.displacement);
-  EXPECT_TRUE(after.velocity == before.velocity);
-  solver.observe(nullptr);
-  solver.step();
-  const auto other = make_test_backend(model, Precision::double_);
-  Solver whole(model, *other, initial_state(model, scene, 0.05), Method::implicit);
+  Solver whole(model, *backend, initial_state(model, scene, 0.05), Method::implicit);
   whole.step();
+  const State before = whole.state();
+  int calls = 0;
+  whole.observe([&](const NewtonProgress&) { return ++calls > 0; });
   whole.step();
-  EXPECT_TRUE(solver.state().displacement == whole.state().displacement);
-  EXPECT_TRUE(solver.state().velocity == whole.state().velocity);
+  const State end = whole.state();
+  ASSERT_GT(calls, 20);
+  for (const double share : {0.1, 0.45, 0.7, 0.95}) {
+    const auto other = make_test_backend(model, Precision::double_);
+    Solver solver(model, *other, before, Method::implicit);
+    int left = static_cast<int>(share * calls);
+    solver.observe([&](const NewtonProgress&) { return --left > 0; });
+    EXPECT_THROW(solver.step(), InterruptedError);
+    EXPECT_EQ(left, 0);  // at once
+    const State after = solver.state();
+    EXPECT_EQ(after.step, 1);
+    EXPECT_TRUE(after.displacement == before.displacement) << share;
+    EXPECT_TRUE(after.velocity == before.velocity) << share;
+    solver.observe(nullptr);
+    solver.step();
+    EXPECT_TRUE(solver.state().displacement == end.displacement) << share;
+    EXPECT_TRUE(solver.state().velocity == end.velocity) << share;
+  }
 }
 
 /// Terms so stiff that steps could not be counted are refused by their key.
