@@ -57,6 +57,23 @@ void Progress::update(double time, std::int64_t step, double steps_per_second, d
   step_ = step;
   steps_per_second_ = steps_per_second;
   energy_ = energy;
+  given_.clear();
+  show_if_due();
+}
+
+void Progress::update(std::vector<std::string> parts) {
+  if (stream_ == nullptr) return;
+  given_ = std::move(parts);
+  show_if_due();
+}
+
+void Progress::say(const std::string& line) {
+  if (stream_ == nullptr) return;
+  std::fputs((terminal_ ? '\r' + line + "\x1b[K\n" : line + '\n').c_str(), stream_);
+  std::fflush(stream_);
+}
+
+void Progress::show_if_due() {
   pending_ = true;
   const double now = clock_();
   if (now - last_shown_ < (terminal_ ? redraw_interval : line_interval)) return;
@@ -74,6 +91,7 @@ void Progress::finish() {
 
 // The parts of a line, the most wanted first: a narrow terminal drops the last ones.
 std::vector<std::string> Progress::parts() const {
+  if (!given_.empty()) return given_;
   // The last step ends at end_time up to rounding.
   const bool done = time_ >= end_time_ * (1 - 1e-9);
   const double fraction = done ? 1 : std::clamp(time_ / end_time_, 0.0, 0.999);  // 100% is the end

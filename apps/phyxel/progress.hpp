@@ -33,12 +33,19 @@ class Progress {
   /// seconds elsewhere. @param time simulated [s]. @param energy total [J].
   void update(double time, std::int64_t step, double steps_per_second, double energy);
 
+  /// The same with parts of the caller's own, the most wanted first.
+  void update(std::vector<std::string> parts);
+
+  /// A line that stays, above what is redrawn.
+  void say(const std::string& line);
+
   /// Shows the last update and ends the line; later calls do nothing.
   void finish();
 
  private:
   std::vector<std::string> parts() const;
   void show();
+  void show_if_due();
 
   double end_time_;
   std::FILE* stream_;
@@ -51,6 +58,7 @@ class Progress {
   bool drawn_ = false;    // a line on the terminal is not yet ended
   double time_ = 0, steps_per_second_ = 0, energy_ = 0;
   std::int64_t step_ = 0;
+  std::vector<std::string> given_;  // of the caller's own, if the last update had them
 };
 
 }  // namespace phyxel::app

@@ -112,13 +112,15 @@ class Simulation {
       throw InputError(fmt::format("until: {} found, which is {:.3g} steps; allowed: at most 1e15",
                                    *until, wanted));
     }
-    const std::int64_t last = until ? static_cast<std::int64_t>(wanted) : plan_.steps;
+    std::int64_t last = until ? static_cast<std::int64_t>(wanted) : plan_.steps;
     const auto turn = my_turn();
     const py::gil_scoped_release others;
     while (solver_->steps() < last) {
       const std::int64_t frame =
           (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
+      const int halvings = plan_.halvings;
       take(std::min(last, frame) - solver_->steps());
+      last <<= plan_.halvings - halvings;
       if (recorder_) write_one();
     }
     look();
@@ -262,16 +264,32 @@ class Simulation {
 
   void start(const State& state) {
     solver_ = std::make_unique<Solver>(model_, *backend_, state, scene_.solver.method);
+    shortener_.emplace(model_, *backend_, plan_);
+    solver_->observe([last = std::chrono::steady_clock::now()](const NewtonProgress&) mutable {
+      if (std::chrono::steady_clock::now() - last < std::chrono::milliseconds(100)) return true;
+      last = std::chrono::steady_clock::now();
+      const py::gil_scoped_acquire here;
+      return PyErr_CheckSignals() == 0;  // Ctrl-C
+    });
     looked_ = solver_->steps();
     const Diagnostics now = diagnose(model_, *backend_, solver_->now());
     watch_.reset();
     if (backend_->external_forces().empty()) watch_.emplace(model_, now);
   }
 
+  /// So many steps of the present size: of twice as many, once they are halved.
   void take(std::int64_t count) {
     auto last = std::chrono::steady_clock::now();
     for (std::int64_t k = 0; k < count; ++k) {
-      solver_->step();
+      const int made = shortener_->look(*solver_, plan_.halvings);
+      plan_.halve(made);
+      count = k + ((count - k) << made);
+      try {
+        solver_->step();
+      } catch (const InterruptedError&) {
+        const py::gil_scoped_acquire here;
+        throw py::error_already_set();
+      }
       if (solver_->steps() - looked_ >= watch_interval) look();
       if (std::chrono::steady_clock::now() - last > std::chrono::milliseconds(100)) {
         const py::gil_scoped_acquire here;
@@ -287,7 +305,8 @@ class Simulation {
     const Diagnostics now = diagnose(model_, *backend_, solver_->now());
     looked_ = solver_->steps();
     if (watch_) {
-      watch_->check(now);
+      watch_->check(now, &*shortener_);
+      shortener_->see(*solver_);
     } else if (now.bad_phyxel >= 0) {
       throw DivergedError(fmt::format("step {}, t = {:g} s: the state of phyxel {} is not finite",
                                       now.step, now.time, now.bad_phyxel));
@@ -301,6 +320,7 @@ class Simulation {
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
   std::unique_ptr<Solver> solver_;
+  std::optional<StepShortener> shortener_;
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::int64_t looked_ = 0;

@@ -10,6 +10,7 @@
 #include "solver/passes.cuh"
 #include "solver/residence.cuh"
 #include "solver/step_graph.cuh"
+#include "solver/stiffening.cuh"
 #include "solver/surfels.cuh"
 #include "solver/vibration.cuh"
 #include "timeline.hpp"
@@ -130,6 +131,32 @@ class CudaBackend final : public Backend {
     return totals.values();
   }
 
+  std::optional<Stiffening> stiffening() override {
+    settle();
+    const Index tiles = m_.tiles();
+    // Kept for small bodies, for which an allocation costs as much as many steps.
+    DeviceArray<Real> gradients = std::move(stiffening_gradients_);
+    if (gradients.size() == 0) gradients = DeviceArray<Real>(9 * m_.places(), gradients_name());
+    if (stiffest_.size() == 0 && tiles > 0) {
+      stiffest_ = DeviceArray<TileStiffening>(static_cast<std::size_t>(tiles), gradients_name());
+    }
+    passes_.put_gradients({gradients.data(), m_.places(), nullptr}, tiles);
+    std::vector<TileStiffening> found(static_cast<std::size_t>(tiles));
+    if (tiles > 0) {
+      find_stiffest<<<tiles, diagnose_threads, 0, m_.stream()>>>(
+          m_.fields(), m_.materials(), gradients.data(), m_.number_at(), stiffest_.data());
+      m_.launched("find_stiffest", static_cast<unsigned>(tiles), diagnose_threads);
+    }
+    m_.wait();
+    stiffest_.download(found.data());
+    if (m_.places() <= most_kept) stiffening_gradients_ = std::move(gradients);
+    Stiffest all;
+    for (const TileStiffening& tile : found) {
+      if (tile.phyxel >= 0) all.look_at(tile.ratio, tile.stretch, tile.phyxel);
+    }
+    return all.values();
+  }
+
   void internal_forces(std::vector<Vec3d>& force) override {
     settle();
     const DeviceArray<Real> forces = passes_.forces();
@@ -202,6 +229,9 @@ class CudaBackend final : public Backend {
     if (residence_) list.push_back({"what stays in shared memory", residence_->bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
+    if (stiffest_.size() > 0) {
+      list.push_back({"looks at stiffening", stiffening_gradients_.bytes() + stiffest_.bytes()});
+    }
     const std::size_t rows = m_.fields().pull ? 13 : 12;
     list.push_back({"while energies are summed", rows * sizeof(Real) * m_.places()});
     return list;
@@ -218,6 +248,9 @@ class CudaBackend final : public Backend {
   /// phyxels takes longer than its launches.
   static constexpr int steps_together = 16;
   static constexpr Index most_recorded = 4'000'000;
+  /// Tile slots of which gradients stay allocated between two looks at how stiff they are.
+  static constexpr std::size_t most_kept = 1'000'000;
+  std::string gradients_name() const { return "displacement gradients of " + m_.subject(); }
   /// What follows a step, before the next.
   enum class Then { nothing, surfels };
 
@@ -297,7 +330,9 @@ class CudaBackend final : public Backend {
   mutable int pending_ = 0;
   mutable Then pending_then_ = Then::nothing;
   mutable bool open_ = false;
-  mutable StepGraph graphs_[2];  // by what follows
+  mutable StepGraph graphs_[2];             // by what follows
+  DeviceArray<Real> stiffening_gradients_;  // of small bodies, once they have been looked at
+  DeviceArray<TileStiffening> stiffest_;    // of each tile, likewise
   Event marks_[2];
   mutable int steps_since_mark_ = 0;
   mutable unsigned batches_ = 0;

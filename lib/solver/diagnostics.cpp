@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/stress.hpp"
+#include "phyxel/solver.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/totals.hpp"
 
@@ -160,27 +161,48 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start)
   check(start);
 }
 
-void StabilityWatch::check(const Diagnostics& now) {
-  const auto body_of = [&](Index i) {
-    Index begin = 0;
-    for (const Part& part : model_.parts) {
-      if (i >= begin && i < begin + part.size)
-        return fmt::format("phyxel {} of body \"{}\"", i - begin, part.name);
-      begin += part.size;
+std::string describe_phyxel(const Model& model, Index global_id) {
+  constexpr double nowhere = -std::numeric_limits<double>::infinity();
+  Vec3d at{nowhere, nowhere, nowhere};
+  for (const Part& part : model.parts) {
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      if (model.number(i) == global_id) at = model.position[i];
     }
-    return std::string("no phyxel");
-  };
+  }
+  if (model.share) {
+    const Others& others = *model.share->others;
+    at = {others.largest(at.x), others.largest(at.y), others.largest(at.z)};
+  }
+  Index begin = 0;
+  for (const Part& part : model.parts) {
+    if (global_id >= begin && global_id < begin + part.size) {
+      return fmt::format("phyxel {} of body \"{}\", at rest at ({:.6g}, {:.6g}, {:.6g}) m",
+                         global_id, part.name, at.x, at.y, at.z);
+    }
+    begin += part.size;
+  }
+  return "no phyxel";
+}
+
+void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortener) {
   const std::string when = fmt::format("at t = {:g} s (step {})", now.time, now.step);
+  const auto began = [&] {
+    if (shortener) return shortener->where_it_began();
+    if (!good_ || good_->fastest_phyxel < 0) return std::string("nothing moved before");
+    return fmt::format("fastest at t = {:g} s, the last good state, was {}, at {:g} m/s",
+                       good_->time, describe_phyxel(model_, good_->fastest_phyxel),
+                       good_->largest_speed);
+  };
   const char* advice = "; a smaller time.safety, damping, or a stiffer material may help";
   if (now.bad_phyxel >= 0) {
-    throw DivergedError(fmt::format("the simulation diverged: the state of {} is not finite {}{}",
-                                    body_of(now.bad_phyxel), when, advice));
+    throw DivergedError(fmt::format("the simulation diverged: the state is not finite {}; {}{}",
+                                    when, began(), advice));
   }
   if (now.largest_speed > speed_limit_) {
     throw DivergedError(fmt::format(
-        "the simulation diverged: {} moves at {:g} m/s {}, more than three times the wave speed "
-        "of its material{}",
-        body_of(now.fastest_phyxel), now.largest_speed, when, advice));
+        "the simulation diverged: {}, moves at {:g} m/s {}, more than three times the wave speed "
+        "of its material; {}{}",
+        describe_phyxel(model_, now.fastest_phyxel), now.largest_speed, when, began(), advice));
   }
   const double gained = now.total_energy() - start_energy_;
   const double turnover = std::max({exchanged_, std::abs(now.gravity_energy + now.load_energy)});
@@ -189,10 +211,11 @@ void StabilityWatch::check(const Diagnostics& now) {
   if (conservative_ && now.step > 0 && gained > turnover + 1e-6 * std::abs(start_energy_)) {
     throw DivergedError(fmt::format(
         "the simulation diverged: energy has run away, {:g} J gained {} where at most {:g} J were "
-        "in motion; fastest is {}{}",
-        gained, when, turnover, body_of(now.fastest_phyxel), advice));
+        "in motion; fastest is {}; {}{}",
+        gained, when, turnover, describe_phyxel(model_, now.fastest_phyxel), began(), advice));
   }
   exchanged_ = std::max(exchanged_, now.kinetic_energy + now.elastic_energy());
+  good_ = now;
 }
 
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,

@@ -8,6 +8,7 @@
 
 #include "phyxel/error.hpp"
 #include "solver/newton.hpp"
+#include "solver/rigid_support.hpp"
 
 namespace phyxel {
 namespace {
@@ -58,21 +59,51 @@ int stages_of(const Model& model) {
   return std::max(1, static_cast<int>(std::ceil(angle / (std::numbers::pi / 4) - 1e-9)));
 }
 
-/// Along an axis that nothing is held along, what is applied must cancel.
-void refuse_free_fall(const Balance& balance, const OwnedVectors& vectors) {
-  const double scale = vectors.sum([&](Index i) { return norm(balance.applied[i]); });
-  const auto refuse_along = [&](double Vec3d::*axis) {
-    if (vectors.largest([&](Index i) { return 1 - balance.free[i].*axis; }) > 0) return;
-    const double all = vectors.sum([&](Index i) { return balance.applied[i].*axis; });
-    if (std::abs(all) <= 1e-9 * scale) return;
-    throw InputError(fmt::format(
-        "nothing is held against a force of {:g} N, so that nothing comes to rest: allowed is a "
-        "scene with fixed phyxels, or with loads that cancel",
-        std::abs(all)));
-  };
-  refuse_along(&Vec3d::x);
-  refuse_along(&Vec3d::y);
-  refuse_along(&Vec3d::z);
+/// How far phyxels that are moved are from the straight ways between the targets of two stages, and
+/// how long those are [m²].
+struct Distance {
+  double off = 0, way = 0;
+};
+Distance distance_from_way(const OwnedVectors& vectors, const Balance& balance,
+                           const Newton::Vector& before, const Newton::Vector& u) {
+  const auto moved = [&](Index i, Vec3d v) { return v - by_components(balance.free[i], v); };
+  const double way = vectors.sum([&](Index i) {
+    const Vec3d step = moved(i, balance.target[i] - before[i]);
+    return dot(step, step);
+  });
+  const double along = vectors.sum([&](Index i) {
+    return dot(moved(i, u[i] - before[i]), moved(i, balance.target[i] - before[i]));
+  });
+  const double share = way > 0 ? std::clamp(along / way, 0.0, 1.0) : 0;
+  const double off = vectors.sum([&](Index i) {
+    const Vec3d rest = moved(i, u[i] - before[i] - share * (balance.target[i] - before[i]));
+    return dot(rest, rest);
+  });
+  return {off, way};
+}
+
+/// The stage that an interrupted search was in: the first one on whose way the moved phyxels are.
+int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, int stages,
+             const Newton::Vector& u) {
+  for (int stage = 1; stage < stages; ++stage) {
+    const Newton::Vector before = balance.target;
+    set_targets(model, static_cast<double>(stage) / stages, balance);
+    const Distance d = distance_from_way(vectors, balance, before, u);
+    if (d.off <= 1e-20 * d.way) return stage;  // rounding
+  }
+  return stages;
+}
+
+[[noreturn]] void say_not_found(const Model& model, const Equilibrium& found,
+                                const NewtonReport& report, double tolerance) {
+  const std::string why = fmt::format(
+      "no equilibrium was found in {} steps of Newton's method and {} evaluations of the forces "
+      "({}): the residual force is {:.2g} of what is applied, {:.2g} is asked; nothing may hold a "
+      "part of the body, or it buckles: allowed are more support, smaller loads, or a run in time "
+      "with damping",
+      found.steps, found.evaluations, report.why, report.residual, tolerance);
+  if (model.share) throw AgreedError(ExitCode::diverged, why);
+  throw DivergedError(why);
 }
 
 }  // namespace
@@ -80,33 +111,37 @@ void refuse_free_fall(const Balance& balance, const OwnedVectors& vectors) {
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
   Newton newton(model, backend, options.most_steps);
+  newton.observe(options.observer);
+  const OwnedVectors& vectors = newton.vectors();
   Balance balance = whole_balance(model, newton);
-  refuse_free_fall(balance, newton.vectors());
+  refuse_unsupported_bodies(model, balance);
   Equilibrium found;
-  found.state.displacement = newton.vectors().make();
-  found.state.velocity = newton.vectors().make();
+  found.state.displacement = options.start ? *options.start : vectors.make();
+  found.state.velocity = vectors.make();
   NewtonReport report;
   const int stages = stages_of(model);
-  for (int stage = 1; stage <= stages; ++stage) {
+  const int first =
+      options.start ? stage_of(model, vectors, balance, stages, found.state.displacement) : 1;
+  for (int stage = first; stage <= stages; ++stage) {
     set_targets(model, static_cast<double>(stage) / stages, balance);
     const bool last = stage == stages;
-    report =
-        newton.solve(balance, last ? options.tolerance : std::max(options.tolerance, on_the_way),
-                     found.state.displacement);
+    const double tolerance = last ? options.tolerance : std::max(options.tolerance, on_the_way);
+    report = newton.solve(balance, tolerance, found.state.displacement);
     found.steps += report.steps;
     found.evaluations += report.evaluations;
-    if (!report.found) break;
-  }
-  if (!report.found) {
-    const std::string why = fmt::format(
-        "no equilibrium was found in {} steps of Newton's method: the residual force is {:.2g} of "
-        "what is applied, {:.2g} is asked; nothing may hold a part of the body, or it buckles: "
-        "allowed are more support, smaller loads, or a run in time with damping",
-        report.steps, report.residual, options.tolerance);
-    if (model.share) throw AgreedError(ExitCode::diverged, why);
-    throw DivergedError(why);
+    if (report.found) continue;
+    vectors.refresh_ghosts(found.state.displacement);
+    backend.upload(found.state);
+    if (report.interrupted) {
+      throw InterruptedError(
+          fmt::format("the search for rest was stopped after {} steps of Newton's method, at a "
+                      "residual force of {:.2g} of what is applied, {:.2g} is asked",
+                      found.steps, report.residual, options.tolerance));
+    }
+    say_not_found(model, found, report, tolerance);
   }
   found.residual = report.residual;
+  vectors.refresh_ghosts(found.state.displacement);
   backend.upload(found.state);
   return found;
 }

@@ -80,11 +80,16 @@ void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector&
   work_.steps += report.steps;
   work_.evaluations += report.evaluations + 2;
   work_.residual = std::max(work_.residual, report.residual);
+  if (report.interrupted) {
+    throw InterruptedError(
+        fmt::format("the implicit step to t = {:g} s was stopped after {} steps of Newton's method",
+                    time, report.steps));
+  }
   if (!report.found) {
     const std::string why = fmt::format(
-        "the implicit step to t = {:g} s failed: after {} steps of Newton's method the residual "
-        "force is {:.2g} of what acts, {:.2g} is asked; allowed is a smaller time.step",
-        time, report.steps, report.residual, tolerance);
+        "the implicit step to t = {:g} s failed: after {} steps of Newton's method ({}) the "
+        "residual force is {:.2g} of what acts, {:.2g} is asked; allowed is a smaller time.step",
+        time, report.steps, report.why, report.residual, tolerance);
     if (model_.share) throw AgreedError(ExitCode::diverged, why);
     throw DivergedError(why);
   }
@@ -97,6 +102,16 @@ void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector&
 }
 
 void ImplicitStep::take(State& state) {
+  const State before = state;
+  try {
+    take_both_stages(state);
+  } catch (...) {
+    state = before;
+    throw;
+  }
+}
+
+void ImplicitStep::take_both_stages(State& state) {
   const OwnedVectors& vectors = newton_.vectors();
   const double dt = state.dt, s = share_of_step * dt, rest = dt - s;
   const double begin = static_cast<double>(state.step) * dt;
@@ -120,6 +135,7 @@ void ImplicitStep::take(State& state) {
     const Vec3d along_path = (1 / dt) * (after[i] - before[i]);
     v2[i] = by_components(balance_.free[i], v2[i]) + along_path;
   });
+  vectors.refresh_ghosts(u2);
   ++state.step;
   state.time = end;
 }

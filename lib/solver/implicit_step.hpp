@@ -14,9 +14,12 @@ class ImplicitStep {
   /// @param backend of the model, in double; both must outlive this
   ImplicitStep(const Model& model, Backend& backend);
 
+  void observe(NewtonObserver observer) { newton_.observe(std::move(observer)); }
+
   /// From `state`, whose velocities are of its time, over state.dt; it is uploaded after.
   /// Collective.
-  /// @throws DivergedError if Newton's method does not find a balance
+  /// @throws DivergedError if Newton's method does not find a balance, InterruptedError if the
+  ///   observer asks for it; `state` is then what it was
   void take(State& state);
 
   const NewtonReport& work() const { return work_; }  ///< Of all steps; the largest residual.
@@ -30,6 +33,7 @@ class ImplicitStep {
   /// @param from,v U and V; @param u where the search begins
   /// u and v are those after it.
   void take_stage(double time, double s, const Vector& from, Vector& u, Vector& v);
+  void take_both_stages(State& state);
 
   const Model& model_;
   Newton newton_;

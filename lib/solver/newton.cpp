@@ -1,7 +1,10 @@
 #include "solver/newton.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "phyxel/diagnostics.hpp"
 
@@ -12,6 +15,10 @@ constexpr double largest_strain = 0.3;  // of one step
 constexpr int most_cuts = 8;
 constexpr double inner_tolerance = 1e-3;
 constexpr int most_inner = 50'000;
+// Of conjugate gradients, in unknowns: as many would do without rounding.
+constexpr int most_inner_share = 10;
+constexpr int most_exhausted = 3;      // steps in a row whose linear equations stay unsolved
+constexpr int most_without_gain = 50;  // steps that leave the smallest residual about where it was
 constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
 
 Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
@@ -30,6 +37,9 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
 NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
   NewtonReport report;
   evaluations_ = 0;
+  progress_ = {.tolerance = tolerance};
+  double smallest = std::numeric_limits<double>::infinity();
+  int without_gain = 0, exhausted = 0;
   find_stiffness(balance);
   Vector force = forces(balance, u), step = vectors_.make(), next = vectors_.make();
   double energy = potential(balance, u);
@@ -39,12 +49,38 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
     report.found = report.residual <= tolerance && to_move == 0;
-    if (report.found || report.steps == most_steps_ || !std::isfinite(report.residual)) {
+    if (report.found) return report;
+    const bool gained = to_move > 0 || report.residual < 0.9 * smallest;
+    smallest = std::min(smallest, report.residual);
+    without_gain = gained ? 0 : without_gain + 1;
+    if (!std::isfinite(report.residual)) {
+      report.why = "forces are not finite";
+    } else if (report.steps == most_steps_) {
+      report.why = fmt::format("{} steps are all that is allowed", most_steps_);
+    } else if (without_gain == most_without_gain) {
+      report.why = fmt::format("{} steps in a row have gained nothing", without_gain);
+    } else if (exhausted == most_exhausted) {
+      report.why = fmt::format(
+          "the linear equations of {} steps in a row have no solution that conjugate gradients "
+          "find in {} iterations",
+          exhausted, most_inner_here());
+    }
+    if (!report.why.empty()) return report;
+    progress_.step = report.steps;
+    progress_.residual = report.residual;
+    progress_.energy = energy;
+    if (asked_to_stop(0, 1)) {
+      report.interrupted = true;
       return report;
     }
     ++report.steps;
 
-    find_step(balance, u, force, step);
+    const Inner inner = find_step(balance, u, force, step);
+    exhausted = inner == Inner::exhausted ? exhausted + 1 : 0;
+    if (inner == Inner::interrupted) {
+      report.interrupted = true;
+      return report;
+    }
     double length = std::min(1.0, largest_strain / steepest(step));
     for (int attempt = 0;; ++attempt, length *= 0.5) {
       vectors_.for_each([&](Index i) {
@@ -63,7 +99,14 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
         energy = now;
         break;
       }
-      if (attempt > 2 * most_cuts) return report;
+      if (attempt > 2 * most_cuts) {
+        report.why = "no part of a step leads to a state whose energy is finite";
+        return report;
+      }
+      if (asked_to_stop(progress_.iteration, progress_.inner_residual)) {
+        report.interrupted = true;
+        return report;
+      }
     }
     u.swap(next);
   }
@@ -171,9 +214,23 @@ void Newton::find_stiffness(const Balance& balance) {
   }
 }
 
+int Newton::most_inner_here() const {
+  const auto unknowns = 3 * static_cast<std::int64_t>(model_.whole_size());
+  return static_cast<int>(std::min<std::int64_t>(most_inner, most_inner_share * unknowns + 100));
+}
+
+bool Newton::asked_to_stop(int iteration, double inner_residual) {
+  if (!observer_) return false;
+  progress_.iteration = iteration;
+  progress_.inner_residual = inner_residual;
+  const double stop = observer_(progress_) ? 0 : 1;
+  return (model_.share ? model_.share->others->largest(stop) : stop) > 0;
+}
+
 /// The step of Newton's method, held phyxels all the way to their targets: conjugate gradients, by
 /// `stiffness_`. Where the stiffness has no definite sign, as far as it has.
-void Newton::find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step) {
+Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const Vector& force,
+                                Vector& step) {
   Vector rest = vectors_.make(), image = vectors_.make();
   vectors_.for_each([&](Index i) { step[i] = held_part(balance, i, balance.target[i] - u[i]); });
   const bool moves = vectors_.largest([&](Index i) { return norm(step[i]); }) > 0;
@@ -188,12 +245,15 @@ void Newton::find_step(const Balance& balance, const Vector& u, const Vector& fo
   vectors_.for_each([&](Index i) { way[i] = preconditioned(i); });
   double product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
   const double start = product;
-  for (int k = 0; k < most_inner && product > inner_tolerance * inner_tolerance * start; ++k) {
+  const int most = most_inner_here();
+  for (int k = 0; product > inner_tolerance * inner_tolerance * start; ++k) {
+    if (k == most) return Inner::exhausted;
     stiffness_times(balance, u, force, way, image);
+    if (asked_to_stop(k + 1, std::sqrt(product / start))) return Inner::interrupted;
     const double curvature = vectors_.product(way, image);
     if (!(curvature > 0)) {
       if (k == 0) vectors_.for_each([&](Index i) { step[i] += way[i]; });
-      break;
+      return Inner::indefinite;
     }
     const double length = product / curvature;
     vectors_.for_each([&](Index i) {
@@ -205,6 +265,7 @@ void Newton::find_step(const Balance& balance, const Vector& u, const Vector& fo
     const double share = product / before;
     vectors_.for_each([&](Index i) { way[i] = preconditioned(i) + share * way[i]; });
   }
+  return Inner::converged;
 }
 
 }  // namespace phyxel

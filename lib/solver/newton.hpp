@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
 #include "solver/owned_vectors.hpp"
@@ -31,6 +32,8 @@ struct NewtonReport {
   int steps = 0;                 ///< Newton's.
   std::int64_t evaluations = 0;  ///< Of the forces of all phyxels.
   bool found = false;            ///< The residual is below the tolerance, all held are in place.
+  bool interrupted = false;      ///< The observer asked to stop.
+  std::string why = "";          ///< Why nothing was found, in words.
 };
 
 /// Each step's linear equations are solved by conjugate gradients over differences of the backend's
@@ -43,7 +46,11 @@ class Newton {
   /// @param backend of the model, in double; both must outlive this
   Newton(const Model& model, Backend& backend, int most_steps);
 
+  /// Whom to tell of every evaluation, and who may stop the search; on all ranks or on none.
+  void observe(NewtonObserver observer) { observer_ = std::move(observer); }
+
   /// From u to the nearest balance downhill. The backend is left somewhere near. Collective.
+  /// Interrupted, u is that of the last accepted step, from which a second call goes on alike.
   /// @param tolerance of the residual
   NewtonReport solve(const Balance& balance, double tolerance, Vector& u);
 
@@ -62,7 +69,13 @@ class Newton {
   void stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                        const Vector& v, Vector& out);
   void find_stiffness(const Balance& balance);
-  void find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step);
+  /// How conjugate gradients ended.
+  enum class Inner { converged, indefinite, exhausted, interrupted };
+  Inner find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step);
+  /// Conjugate gradients' iterations of one step, at most.
+  int most_inner_here() const;
+  /// Tells the observer. @returns whether it, or another rank's, asks to stop
+  bool asked_to_stop(int iteration, double inner_residual);
 
   const Model& model_;
   Backend& backend_;
@@ -72,6 +85,8 @@ class Newton {
   std::vector<double> stiffness_;  ///< About that of each phyxel against its neighbours [N/m].
   State placed_;
   std::int64_t evaluations_ = 0;
+  NewtonObserver observer_;
+  NewtonProgress progress_;
 };
 
 }  // namespace phyxel

@@ -1,8 +1,12 @@
 #include "phyxel/solver.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "solver/implicit_step.hpp"
+#include "solver/owned_vectors.hpp"
 
 namespace phyxel {
 
@@ -14,6 +18,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
+  if (scene.solver.method == Method::equilibrium) return state;  // what moves has yet to go there
   for (const Part& part : model.parts) {
     const BodyRequest& body = scene.bodies[static_cast<std::size_t>(part.body)];
 #pragma omp parallel for schedule(static)
@@ -47,12 +52,21 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   model_ = &model;
   method_ = method;
+  if (method == Method::equilibrium && start.step == 0) {
+    const OwnedVectors vectors(model, std::max(1, backend.threads()));
+    begun_ = vectors.largest([&](Index i) { return norm(start.displacement[i]); }) > 0;
+  }
   if (method != Method::implicit) return;
   implicit_ = std::make_unique<ImplicitStep>(model, backend);
   implicit_state_ = start;
 }
 
 Solver::~Solver() = default;
+
+void Solver::observe(NewtonObserver observer) {
+  if (implicit_) implicit_->observe(observer);
+  observer_ = std::move(observer);
+}
 
 void Solver::step() {
   switch (method_) {
@@ -61,16 +75,65 @@ void Solver::step() {
       backend_.advance(time(), dt_);  // gather of Q -> f -> loads -> Verlet -> u⁺
       break;
     case Method::implicit:
-      implicit_->take(implicit_state_);
+      try {
+        implicit_->take(implicit_state_);
+      } catch (...) {
+        backend_.upload(implicit_state_);  // of the last whole step
+        throw;
+      }
       backend_.upload(implicit_state_);
       break;
     case Method::equilibrium: {
-      const Equilibrium found = find_equilibrium(*model_, backend_);
+      const State start = begun_ ? state() : State{};
+      const Equilibrium found = find_equilibrium(
+          *model_, backend_,
+          {.observer = observer_, .start = begun_ ? &start.displacement : nullptr});
       rest_ = {found.evaluations, found.steps, found.residual};
       break;
     }
   }
   ++steps_;
+}
+
+void Solver::halve_step() {
+  if (!model_ || method_ != Method::verlet) {
+    throw InputError("only Verlet's steps of a solver that knows its model can be halved");
+  }
+  const Model& model = *model_;
+  State state = this->state();
+  std::vector<Vec3d> force;
+  backend_.internal_forces(force);
+  const std::span<const Vec3d> external = backend_.external_forces();
+  for (std::size_t i = 0; i < external.size(); ++i) force[i] += external[i];
+  for (const Load& load : model.loads) {
+    const double scale = load.scale_at(time());
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      force[load.phyxels[k]] += scale * load.force[k];
+    }
+  }
+  std::vector<Vec3d> free(model.motions.empty() ? 0 : force.size(), {1, 1, 1});
+  for (const Motion& motion : model.motions) {
+    for (const Index i : motion.phyxels) free[i] = motion.along_axes({}, free[i]);
+  }
+  // A quarter of a step on, under constant force: v' = a - c v.
+  const double ahead = dt_ / 4;
+  for (const Part& part : model.parts) {
+    const double c = part.material.damping;
+    const double gain = c > 0 ? -std::expm1(-c * ahead) / c : ahead;
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const Vec3d acceleration =
+          (1 / model.mass[i]) * force[i] + model.gravity - c * state.velocity[i];
+      const Vec3d change = gain * acceleration;
+      state.velocity[i] += free.empty() ? change : by_components(free[i], change);
+    }
+  }
+  OwnedVectors(model, std::max(1, backend_.threads())).refresh_ghosts(state.displacement);
+  first_step_ += steps_;  // as many have been taken as before
+  steps_ *= 2;
+  dt_ /= 2;
+  state.step = steps_;
+  state.dt = dt_;
+  backend_.upload(state);
 }
 
 Instant Solver::now() const { return {steps_, time(), method_ == Method::verlet ? dt_ / 2 : 0}; }

@@ -16,6 +16,28 @@ double three_digits_below(double step) {
   return std::floor(step / unit) * unit;
 }
 
+/// Beyond these, double precision has lost the material itself, and a run would take for ever.
+constexpr double most_volume_stiffness = 1e8;  // times Young's modulus
+constexpr double most_hourglass = 1e4;         // of Young's modulus
+
+void refuse_absurd_stiffness(const Model& model) {
+  for (const Part& part : model.parts) {
+    const Material& m = part.material;
+    if (m.volume_stiffness > most_volume_stiffness * m.young) {
+      throw InputError(fmt::format(
+          "body \"{}\": volume_stiffness = {:g} Pa with young = {:g} Pa: allowed is at most {:g} "
+          "times young; stiffer bodies need steps too short to reach the end",
+          part.name, m.volume_stiffness, m.young, most_volume_stiffness));
+    }
+    if (m.hourglass > most_hourglass) {
+      throw InputError(
+          fmt::format("body \"{}\": hourglass = {:g}: allowed is at most {:g}; more of it needs "
+                      "steps too short to reach the end",
+                      part.name, m.hourglass, most_hourglass));
+    }
+  }
+}
+
 /// Steps of about `wanted` [s] that frames and the end fall on.
 void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
   const double interval = scene.output.frames_per_second > 0
@@ -40,6 +62,7 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
                            bool unsafe_step) {
   StepPlan plan;
   plan.limit = step_limit(model, backend);
+  plan.shortens = !unsafe_step;
   const double largest = plan.limit.largest_step;
   if (scene.time.step && *scene.time.step >= largest && !unsafe_step) {
     throw InputError(fmt::format(
@@ -62,7 +85,16 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
 
 }  // namespace
 
+void StepPlan::halve(int times) {
+  for (; times > 0; --times, ++halvings) {
+    dt /= 2;
+    steps *= 2;
+    steps_per_frame *= 2;
+  }
+}
+
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
+  refuse_absurd_stiffness(model);
   if (scene.solver.method == Method::verlet) {
     return plan_verlet_steps(scene, model, backend, unsafe_step);
   }

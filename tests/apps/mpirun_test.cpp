@@ -103,6 +103,73 @@ density = 1000
   }
 };
 
+/// A body that stiffens has its steps halved at the same ones on any number of ranks, and a search
+/// for rest comes to the same bits, also when all ranks were stopped by a signal that one has
+/// heard.
+TEST_F(Mpirun, HalvesStepsAndStopsSearchesAlikeOnAllRanks) {
+  const auto scene = [&](const std::string& method, const std::string& spacing) {
+    write("soft.toml",
+          "gravity = [30.0, 0.0, 0.0]\n[time]\nend = 0.6\n[solver]\nthreads = 1\n"
+          "device = \"cpu\"\nmethod = \"" +
+              method + R"("
+[output]
+frames_per_second = 20
+[[body]]
+name = "beam"
+shape = "beam"
+size = [0.6, 0.2, 0.2]
+jitter = 0.1
+spacing = )" + spacing +
+              R"(
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+law = "neo-hookean"
+[[body.fixed]]
+region = "x-"
+)");
+  };
+  scene("verlet", "0.05");
+  const Outcome alone = run_on(0, {"run", "soft.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(alone.err, HasSubstr("the time step is halved"));
+  const Outcome three = run_on(3, {"run", "soft.toml", "--out", "three"});
+  ASSERT_EQ(three.code, 0) << three.err;
+  expect_same_files("alone", "three");
+
+  scene("equilibrium", "0.02");
+  const Outcome rest = run_on(0, {"run", "soft.toml", "--out", "rest"});
+  ASSERT_EQ(rest.code, 0) << rest.err;
+  use_ranks(2);
+  const pid_t child = start({"run", "soft.toml", "--out", "parts"});
+  wait_for("parts/phyxels_000000.hdf");
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  kill(child, SIGUSR2);  // mpirun passes it on
+  const Outcome stopped = finish(child);
+  ASSERT_EQ(stopped.code, 75) << stopped.out << stopped.err;
+  const Outcome resumed = run_on(2, {"run", "soft.toml", "--out", "parts", "--resume", "auto"});
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  const auto end_of = [&](const char* folder) {
+    return read_checkpoint(latest_checkpoint(folder_ / folder).value()).state.displacement;
+  };
+  EXPECT_TRUE(end_of("rest") == end_of("parts"));
+  // Energies count what lies across the cut, too.
+  EXPECT_EQ(text_of(folder_ / "rest" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
+
+  scene("implicit", "0.05");
+  const std::vector<std::string> few{"run", "soft.toml", "--step", "0.05", "--until", "0.1"};
+  const auto into = [&](const char* folder) {
+    std::vector<std::string> words = few;
+    words.insert(words.end(), {"--out", folder});
+    return words;
+  };
+  ASSERT_EQ(run_on(0, into("one")).code, 0);
+  ASSERT_EQ(run_on(2, into("two")).code, 0);
+  EXPECT_TRUE(end_of("one") == end_of("two"));
+  EXPECT_EQ(text_of(folder_ / "one" / "energy.csv"), text_of(folder_ / "two" / "energy.csv"));
+}
+
 TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
   write_scene();
   const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});

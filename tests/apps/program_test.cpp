@@ -142,6 +142,71 @@ TEST_F(Program, StoppedByASignalAndResumedIsBitwiseTheWholeRun) {
   }
 }
 
+/// A search for rest, and a long implicit step, hear a signal while Newton's method is at work:
+/// they leave a checkpoint, end with 75, and go on to the same bits. Nothing on the way is called
+/// at rest.
+TEST_F(Program, StopsNewtonsMethodWithACheckpointAndGoesOn) {
+  for (const std::string method : {"equilibrium", "implicit"}) {
+    const std::string parts = "parts_" + method;
+    write_beam("2");
+    replace_in_beam("spacing = 0.05", "spacing = 0.016");  // seconds of work
+    replace_in_beam("[solver]", "[solver]\nmethod = \"" + method + "\"");
+    replace_in_beam("frames_per_second = 50", "frames_per_second = 1");
+    if (method == "implicit") replace_in_beam("end = 2", "end = 2\nstep = 1");
+    const pid_t child = start({"run", "beam.toml", "--out", parts});
+    wait_for(folder_ / parts / "phyxels_000000.hdf");
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    kill(child, SIGTERM);
+    const Outcome stopped = finish(child);
+    ASSERT_EQ(stopped.code, 75) << stopped.out << stopped.err;
+    EXPECT_THAT(stopped.err, HasSubstr("of Newton's method"));
+    EXPECT_THAT(stopped.err, HasSubstr("--resume auto continues"));
+    EXPECT_THAT(stopped.err, HasSubstr("residual "));
+    EXPECT_THAT(stopped.err, ::testing::Not(HasSubstr("at rest")));
+    const State middle = final_state(folder_ / parts);
+    EXPECT_EQ(middle.step, 0);
+    if (method == "implicit") continue;  // a second one takes minutes under sanitizers
+    const Outcome resumed = run({"run", "beam.toml", "--out", parts, "--resume", "auto"});
+    ASSERT_EQ(resumed.code, 0) << resumed.err;
+    const Outcome whole = run({"run", "beam.toml", "--out", "whole"});
+    ASSERT_EQ(whole.code, 0) << whole.err;
+    EXPECT_THAT(whole.err, HasSubstr("J at rest"));
+    EXPECT_THAT(whole.err, ::testing::Not(HasSubstr("E = 0 J")));
+    EXPECT_THAT(whole.err, ::testing::Not(HasSubstr("1.000/1 s")));
+    EXPECT_TRUE(final_state(folder_ / parts).displacement ==
+                final_state(folder_ / "whole").displacement);
+  }
+}
+
+/// A neo-Hookean beam that is far too soft stretches until the planned step would be unstable: it
+/// is halved, said so, written into run.json, and a run resumed after that gives the same bytes.
+TEST_F(Program, HalvesTheStepOfABodyThatStiffens) {
+  write_beam("0.6");
+  replace_in_beam("[0.0, 0.0, -9.81]", "[30.0, 0.0, 0.0]");  // pulls it to twice its length
+  replace_in_beam("young = 2e5", "young = 2e4\nlaw = \"neo-hookean\"");
+  const Outcome whole = run({"run", "beam.toml", "--out", "whole"});
+  ASSERT_EQ(whole.code, 0) << whole.err;
+  EXPECT_THAT(whole.err, HasSubstr("the time step is halved from"));
+  EXPECT_THAT(whole.err, HasSubstr("it began at phyxel "));
+  const auto summary = nlohmann::json::parse(text_of(folder_ / "whole" / "run.json"));
+  EXPECT_GE(summary["time_step_halvings"].get<int>(), 1);
+  EXPECT_NEAR(summary["time_s"].get<double>(), 0.6, 1e-9);
+  // Frames stay where they were: 0.6 s at 50 a second, first and last.
+  EXPECT_EQ(read_series(folder_ / "whole" / "phyxels.hdf.series").size(), 31u);
+  const pid_t child = start({"run", "beam.toml", "--out", "parts"});
+  wait_for(folder_ / "parts" / "phyxels_000020.hdf");
+  kill(child, SIGTERM);
+  const Outcome stopped = finish(child);
+  ASSERT_TRUE(stopped.code == 75 || stopped.code == 0) << stopped.err;
+  ASSERT_EQ(run({"run", "beam.toml", "--out", "parts", "--resume", "auto"}).code, 0);
+  const State one = final_state(folder_ / "whole"), two = final_state(folder_ / "parts");
+  EXPECT_EQ(one.dt, two.dt);
+  EXPECT_EQ(one.step, two.step);
+  EXPECT_TRUE(one.displacement == two.displacement);
+  EXPECT_TRUE(one.velocity == two.velocity);
+  EXPECT_EQ(text_of(folder_ / "whole" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
+}
+
 TEST_F(Program, ResumingAFinishedRunSaysSoAndChangesNothing) {
   write_beam("0.1");
   ASSERT_EQ(run({"run", "beam.toml"}).code, 0);

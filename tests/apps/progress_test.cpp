@@ -56,6 +56,23 @@ TEST_F(ProgressLines, ALineTellsShareTimeLeftAndSpeeds) {
             "E = -1.25 J\n");
 }
 
+/// A search by Newton's method has its own parts, at the same pace; a line that stays is said at
+/// once.
+TEST_F(ProgressLines, ShowsACallersOwnPartsAndLinesThatStay) {
+  Progress progress(2, stream_, style_);
+  progress.update({"residual 1e-03", "newton 2"});
+  EXPECT_EQ(text(), "");  // not yet due
+  progress.say("the step is halved");
+  EXPECT_EQ(text(), "the step is halved\n");
+  now_ += 10;
+  progress.update({"residual 1e-04", "newton 3"});
+  progress.update({"residual 1e-05", "newton 4"});
+  EXPECT_EQ(text(), "the step is halved\nresidual 1e-04  newton 3\n");
+  now_ += 10;
+  progress.update(0.5, 100, 50, -1.25);  // steps have theirs again
+  EXPECT_THAT(text(), HasSubstr("0.500/2 s"));
+}
+
 TEST_F(ProgressLines, LongTimesLeftAreGivenInHours) {
   Progress progress(2, stream_, style_);
   now_ += 10;

@@ -15,6 +15,7 @@
 #include "solver/cuda_backend.hpp"
 #include "solver/nccl.hpp"
 #include "support/laws.hpp"
+#include "support/oracle.hpp"
 
 namespace phyxel {
 namespace {
@@ -220,6 +221,118 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
               static_cast<std::int64_t>(p.position.size()));
     world().barrier();  // before memory that others store into goes
   }
+}
+
+/// A body of one of our laws, cut among the ranks, against the oracle, which is written from the
+/// papers and knows of no ranks: forces, and a few of the papers' steps.
+class AgainstTheOracle : public ::testing::TestWithParam<int> {};
+
+TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
+  Material material = testing::rubber();
+  material.law = Law::neo_hooke;
+  material.volume_stiffness = 3e4;
+  Scene scene = testing::one_body(material);
+  scene.gravity = {1, -2, -9.81};
+  const Model whole = testing::model_of(scene, testing::lattice(6, 4, 4, 0.1, 0.25));
+  oracle::Body body;
+  static_cast<oracle::Material&>(body) = {
+      material.young, material.poisson, material.volume_stiffness, true, true, false};
+  for (Index i = 0; i < whole.size(); ++i) {
+    body.x.push_back({whole.position[i].x, whole.position[i].y, whole.position[i].z});
+    body.v.push_back(whole.volume[i]);
+    body.h.push_back(whole.neighbourhood.support[i]);
+  }
+  oracle::find_neighbours(body);
+
+  const int rings = GetParam(), parts = world().size();
+  const Graph graph = phyxel_graph(whole);
+  const std::vector<int> part_of =
+      world().broadcast(make_partition(graph, parts, Partitioner::curve));
+  ModelShare cut =
+      share_of(whole, make_halo_plans(graph, part_of, parts, rings)[world().rank()], part_of);
+  cut.share.others = std::make_shared<Halo>(world(), cut);
+  cut.model.share = std::make_shared<Share>(std::move(cut.share));
+  const Model& here = cut.model;
+
+  const double dt = 0.4 * step_limit(whole, 1).largest_step;
+  const std::vector<Vec3d> start = testing::random_deformation(whole, 0.005);
+  const auto backend = make_cpu_backend(here, Precision::double_, 1);
+  Solver solver(*backend, testing::state_of(values_of(*here.share, start), dt));
+  // u⁻ = u: state_of starts with v(-dt/2) = 0.
+  std::vector<oracle::V3> now, before;
+  for (const Vec3d& u : start) now.push_back({u.x, u.y, u.z});
+  before = now;
+  double largest_difference = 0, largest_force = 0, off = 0, moved = 0;
+  for (int step = 0; step < 3; ++step) {
+    const std::vector<oracle::V3> expected = oracle::forces(body, now);
+    std::vector<Vec3d> force;
+    backend->internal_forces(force);
+    for (Index i = 0; i < here.size(); ++i) {
+      if (!here.owns(i)) continue;
+      const oracle::V3& e = expected[here.number(i)];
+      largest_difference = std::max(largest_difference, norm(force[i] - Vec3d{e[0], e[1], e[2]}));
+      largest_force = std::max(largest_force, e.norm());
+    }
+    std::vector<oracle::V3> next;
+    for (Index n = 0; n < whole.size(); ++n) {
+      const oracle::V3 g{scene.gravity.x, scene.gravity.y, scene.gravity.z};
+      next.push_back(2 * now[n] - before[n] + dt * dt * (expected[n] / whole.mass[n] + g));
+    }
+    before = now;
+    now = next;
+    solver.step();
+  }
+  const State end = solver.state();
+  Index owned = 0;
+  for (Index i = 0; i < here.size(); ++i) {
+    if (!here.owns(i)) continue;
+    const Index n = here.number(i);
+    off = std::max(off, norm(end.displacement[i] - Vec3d{now[n][0], now[n][1], now[n][2]}));
+    moved = std::max(moved, norm(end.displacement[i] - start[n]));
+    ++owned;
+  }
+  // Sums of thirty terms in another order; the oracle inverts moments by singular values.
+  EXPECT_LT(largest_difference, 1e-11 * largest_force);
+  EXPECT_LT(off, 1e-13);
+  EXPECT_GT(world().largest(moved), 1e-3);
+  EXPECT_EQ(world().sum(std::int64_t{owned}), whole.size());
+  world().barrier();
+}
+INSTANTIATE_TEST_SUITE_P(Rings, AgainstTheOracle, ::testing::Values(1, 2));
+
+/// The stiffest phyxel of all ranks is that of one, and a step is halved to the same bits.
+TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
+  const State start_of_whole = start(whole_), start_of_share = start(model_);
+  const auto alone = backend(whole_, Precision::double_),
+             here = backend(model_, Precision::double_);
+  Solver whole(whole_, *alone, start_of_whole, Method::verlet),
+      share(model_, *here, start_of_share, Method::verlet);
+  for (int s = 0; s < 10; ++s) {
+    if (s == 5) {
+      whole.halve_step();
+      share.halve_step();
+    }
+    whole.step();
+    share.step();
+  }
+  const Stiffening one = find_stiffening(whole_, *alone), all = find_stiffening(model_, *here);
+  const std::string in_words = describe_phyxel(model_, all.phyxel);
+  const State a = whole.state(), b = share.state();
+  std::vector<Index> different;
+  for (Index i = 0; i < model_.size(); ++i) {
+    const Index n = model_.number(i);
+    if (model_.owns(i) &&
+        !(a.displacement[n] == b.displacement[i] && a.velocity[n] == b.velocity[i])) {
+      different.push_back(n);
+    }
+  }
+  EXPECT_THAT(different, ::testing::IsEmpty());
+  EXPECT_EQ(one.ratio, all.ratio);
+  EXPECT_EQ(one.stretch, all.stretch);
+  EXPECT_EQ(one.phyxel, all.phyxel);
+  EXPECT_GE(one.phyxel, 0);
+  EXPECT_EQ(in_words, describe_phyxel(whole_, one.phyxel));
+  world().barrier();
 }
 
 /// Each step's surfels, and diagnostics between steps, change nothing: exchanges keep their order.

@@ -1,6 +1,7 @@
 /// Checkpoints that a run goes on from.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdlib>
 
 #include "files/trajectory_folder.hpp"
@@ -8,6 +9,18 @@
 #include "terminal.hpp"
 
 namespace phyxel::app {
+
+namespace {
+
+/// How often a run that planned one step had halved it to the other; nothing if it never does.
+std::optional<int> halvings_between(double planned, double step) {
+  for (int k = 0; k <= StepShortener::most_halvings; ++k) {
+    if (std::ldexp(planned, -k) == step) return k;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 std::optional<CheckpointReader> Run::find_checkpoint() {
   const std::filesystem::path& folder = scene_.output.directory;
@@ -83,6 +96,7 @@ State Run::first_state() {
     return ranks().agreed([&] { return initial_state(model(), scene_, plan_.dt); });
   }
   ranks().together([&] { check_resumed(); });
+  plan_.halve(*halvings_between(plan_.dt, begin_->state.dt));
   const CheckpointReader* const reader = checkpoint_reader_ ? &*checkpoint_reader_ : nullptr;
   State state = shared_.state_of(reader, stretch_length());
   checkpoint_reader_.reset();
@@ -104,7 +118,7 @@ void Run::check_resumed() const {
                     "fixed phyxels must be those of the run that wrote it",
                     options_.resume));
   }
-  if (begin_->state.dt != plan_.dt) {
+  if (!halvings_between(plan_.dt, begin_->state.dt)) {
     throw InputError(
         fmt::format("{}: the checkpoint was written with a time step of {:.17g} s, this run "
                     "would take {:.17g} s; "

@@ -34,6 +34,7 @@ Run::Run(const RunOptions& options)
         });
       })),
       solver_(model(), *backend_, first_state(), scene_.solver.method),
+      shortener_(model(), *backend_, plan_),
       first_step_(solver_.steps()),
       start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
   StopSignal::work_begins();
@@ -114,9 +115,12 @@ void Run::step_to_end() {
   const Watchdog watchdog(ranks(), watchdog_seconds());
   Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
                     {.phyxels = model().whole_size()});
+  watch_newton(progress);
   loop_start_ = Clock::now();
   try {
     take_steps(watch, watchdog, progress);
+  } catch (const InterruptedError& error) {  // on all ranks
+    throw AgreedError(error.code(), stopped_in_search(error, progress));
   } catch (const DivergedError& error) {  // on all ranks
     throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
   } catch (const DeviceError& error) {  // on this one
@@ -136,10 +140,10 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
   double look_seconds = 0;
   while (solver_.steps() < plan_.steps) {
     watchdog.beat(solver_.steps());
-    solver_.step();
+    take_step(progress);
     const bool last = solver_.steps() == plan_.steps;
     const bool frame = last || solver_.steps() % plan_.steps_per_frame == 0;
-    progress.update(solver_.time(), solver_.steps(), speed(), now_.total_energy());
+    if (scene_.solver.method != Method::equilibrium) show_progress(progress, now_);
     writer_.serve();
     if (!frame && solver_.steps() % agree_interval() != 0) continue;
     const Phase agreeing("agreeing, looking, writing");
@@ -156,7 +160,9 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     if (frame) writer_.wait_for_room();
     const auto look_start = Clock::now();
     now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
-    watch.check(now_);
+    watch.check(now_, &shortener_);
+    shortener_.see(solver_);
+    show_progress(progress, now_);
     peak_energy_ = std::max(peak_energy_, now_.kinetic_energy + now_.elastic_energy());
     auto good = good_state(now_);
     look_seconds = seconds_since(look_start);

@@ -97,6 +97,14 @@ class Run {
   /// How long a rank may stay where it is before it is named.
   static double watchdog_seconds();
 
+  /// One step, after a look at whether it has to be shorter.
+  void take_step(Progress& progress);
+  /// Has Newton's method show how far it has come, serve files, and hear signals.
+  void watch_newton(Progress& progress);
+  void show_progress(Progress& progress, const Diagnostics& now) const;
+  /// Writes the state that an interrupted search has left. @returns the message of the run's end
+  std::string stopped_in_search(const InterruptedError& error, Progress& progress);
+
   /// Writes it, and says so.
   std::string with_last_good_state(const char* error, Progress& progress);
 
@@ -171,6 +179,7 @@ class Run {
   StepPlan plan_;
   BoundarySize boundary_;  // of the whole
   Solver solver_;
+  StepShortener shortener_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_, now_;
   std::optional<Recorder> recorder_;       // on the first rank

@@ -118,6 +118,9 @@ class Backend {
   virtual std::optional<Diagnostics> diagnostics([[maybe_unused]] const Instant& now) {
     return std::nullopt;
   }
+  /// The stiffest phyxel of this rank at the present displacements; nothing where that is left to
+  /// the host (see `find_stiffening`).
+  virtual std::optional<Stiffening> stiffening() { return std::nullopt; }
   /// Passive surfel advection, equation (6): brings the surfels to the present displacements. They
   /// stay on the device, and may be under way when it returns.
   virtual void update_surfels() = 0;

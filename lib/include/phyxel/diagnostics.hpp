@@ -1,6 +1,9 @@
 /// Energies, momenta and the watch over them.
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
@@ -16,6 +19,16 @@ inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t s
   return diagnose(model, backend, {step, static_cast<double>(step) * dt, dt / 2});
 }
 
+/// The stiffest phyxel of a backend's present displacements, of all ranks: collective.
+Stiffening find_stiffening(const Model& model, Backend& backend);
+
+/// Whether a material can become stiffer than it is at rest: all can, but for Hooke's law in
+/// Cauchy's strain.
+bool stiffens(const Material& material);
+
+/// A phyxel in words: its global id, its body and where it is at rest [m]. Of a share: collective.
+std::string describe_phyxel(const Model& model, Index global_id);
+
 /// Von Mises equivalent of the Cauchy stress [Pa] and det F of every phyxel, shape [n]; either
 /// pointer may be null.
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
@@ -24,16 +37,20 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
 /// Speed of pressure waves, sqrt((λ + 2μ + k_v) / ρ) [m/s].
 double pressure_wave_speed(const Material& material);
 
+class StepShortener;
+
 /// Stops a run that has become unstable.
 class StabilityWatch {
  public:
   /// Both must outlive this. @param start of the state the run starts from. @throws as `check`
   StabilityWatch(const Model& model, const Diagnostics& start);
 
+  /// @param shortener whose looks tell where it began; null: the fastest phyxel of the last good
+  ///   state is named. Of a share: collective.
   /// @throws DivergedError, saying which phyxel and when, if the state is not finite, if a phyxel
   ///   moves faster than any wave in its material by far, or if a conservative scene has gained
   ///   more energy than it has exchanged so far.
-  void check(const Diagnostics& now);
+  void check(const Diagnostics& now, const StepShortener* shortener = nullptr);
 
  private:
   const Model& model_;
@@ -41,6 +58,7 @@ class StabilityWatch {
   double exchanged_ = 0;    // largest kinetic + elastic energy of a state found good [J]
   double speed_limit_ = 0;  // [m/s]
   bool conservative_;
+  std::optional<Diagnostics> good_;  // the last one found good
 };
 
 /// Whether total energy is a constant of this model: no damping, no motion and no growing load.

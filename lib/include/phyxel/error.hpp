@@ -61,6 +61,13 @@ class AgreedError : public Error {
   using Error::Error;
 };
 
+/// An observer asked a search by Newton's method to stop; all ranks throw it alike.
+class InterruptedError : public AgreedError {
+ public:
+  /// @param message what was under way
+  explicit InterruptedError(const std::string& message) : AgreedError(ExitCode::stopped, message) {}
+};
+
 /// The simulation became unstable.
 class DivergedError : public Error {
  public:

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
 
@@ -35,6 +37,11 @@ struct StepPlan {
   std::int64_t steps = 0;            ///< To the end of the run.
   std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it.
   std::string why;                   ///< One line for the summary.
+  bool shortens = false;  ///< Whether steps are halved where a law stiffens (`StepShortener`).
+  int halvings = 0;       ///< Of the step, so far.
+
+  /// Halves the step so many times; frames and the end stay where they are.
+  void halve(int times);
 };
 
 /// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
@@ -59,7 +66,7 @@ struct SolverWork {
 class ImplicitStep;
 
 /// Advances a state through a backend by steps of fixed size. Time is always step × dt, so that a
-/// restarted run sees the same times to the bit.
+/// restarted run sees the same times to the bit; `halve_step` doubles the number of steps taken.
 class Solver {
  public:
   /// By Verlet's steps. Uploads `start`, whose `dt` is the step size.
@@ -70,8 +77,19 @@ class Solver {
   Solver(const Model& model, Backend& backend, const State& start, Method method);
   ~Solver();
 
-  /// @throws DivergedError if Newton's method finds no balance
+  /// Whom Newton's method tells how far it has come, and who may stop it; Verlet's steps ask
+  /// nobody.
+  void observe(NewtonObserver observer);
+
+  /// @throws DivergedError if Newton's method finds no balance; InterruptedError if the observer
+  ///   stops it: the state is then that of the last whole step, or the last that a search for rest
+  ///   has accepted, from which a solver that starts there goes on to the bit
   void step();
+  /// Halves the step of Verlet's method: the present time stays, step and dt change by a factor of
+  /// two, and velocities move from t - dt/2 to t - dt/4 by the present forces. Exact in powers of
+  /// two, so that times after a restart are the same bits. Of a share: collective.
+  /// @throws InputError from a solver that was made without a model, or for another method
+  void halve_step();
   double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
   /// Taken since t = 0.
   std::int64_t steps() const { return steps_; }
@@ -90,7 +108,49 @@ class Solver {
   double dt_;
   std::unique_ptr<ImplicitStep> implicit_;
   State implicit_state_;
-  SolverWork rest_;  ///< Of the search for rest.
+  NewtonObserver observer_;
+  bool begun_ = false;  ///< The start is that of an interrupted search for rest.
+  SolverWork rest_;     ///< Of the search for rest.
+};
+
+/// Halves Verlet's steps where a law has become so stiff that they would be unstable: the stiffness
+/// is looked at again at fixed step numbers, so that runs, restarts and any number of threads and
+/// ranks halve at the same ones. Laws that cannot stiffen cost nothing.
+class StepShortener {
+ public:
+  static constexpr std::int64_t interval = 16;  ///< Steps between two looks.
+  static constexpr int most_halvings = 10;      ///< Of one run.
+  /// Of (dt / limit at rest)² × stiffening; 1 is the limit itself.
+  static constexpr double largest_share = 1;
+
+  /// All must outlive this.
+  StepShortener(const Model& model, Backend& backend, const StepPlan& plan);
+
+  /// Before a step: if its number is due, looks, and halves the solver's step as often as needed.
+  /// Collective.
+  /// @param halvings made before
+  /// @returns those made now
+  /// @throws DivergedError, saying which phyxel, its stretch and when, if `most_halvings` are not
+  ///   enough or a displacement is not finite
+  int look(Solver& solver, int halvings);
+  /// Whether any law can stiffen.
+  bool active() const { return active_; }
+  /// Looks without halving, so that messages know of models that cannot stiffen, too. Collective.
+  void see(const Solver& solver);
+  /// The first phyxel for which steps were halved, or else the stiffest of the last look: which,
+  /// its stretch, and when. Collective.
+  std::string where_it_began() const;
+
+ private:
+  struct Seen {
+    Stiffening what;
+    double time = 0;  ///< [s]
+  };
+  const Model& model_;
+  Backend& backend_;
+  double limit_;
+  bool active_ = false;
+  std::optional<Seen> seen_, first_;
 };
 
 }  // namespace phyxel

@@ -30,6 +30,15 @@ struct SurfelState {
   std::vector<Vec3d> normal;    ///< Unit, shape [n_surfels, 3].
 };
 
+/// The phyxel that is stiffest against its own state at rest.
+struct Stiffening {
+  /// Upper bound of the stiffness of plane waves over that at rest (physics/stiffening.hpp);
+  /// infinite if a displacement is not finite.
+  double ratio = 1;
+  double stretch = 1;  ///< Its largest principal stretch.
+  Index phyxel = -1;   ///< Its global id.
+};
+
 /// Energies and conserved quantities at one instant, all bodies together.
 struct Diagnostics {
   std::int64_t step = 0;

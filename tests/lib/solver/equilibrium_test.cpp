@@ -171,6 +171,121 @@ TEST(Equilibrium, IsRefusedWhereNothingHoldsTheBody) {
   }
 }
 
+std::string refusal_of(const Model& model) {
+  try {
+    rest_of(model);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "found";
+}
+
+/// Of two bodies one is held: the other one falls, which is said before a force is evaluated.
+TEST(Equilibrium, NamesTheOneBodyThatNothingHolds) {
+  Scene scene = clamped_bar(2);
+  scene.gravity = {0, 0, -1};
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[1].name = "other";
+  scene.bodies[1].fixed.clear();
+  EXPECT_THAT(refusal_of(build_model(scene)),
+              HasSubstr("body \"other\": nothing is held against a force of"));
+  // Held along z alone, it is held against its weight, but not against a push along x.
+  scene.bodies[1].fixed.push_back(
+      {.select = {.region = "x-"}, .axes = {.x = false, .y = false, .z = true}});
+  scene.bodies[1].fixed.push_back(
+      {.select = {.region = "x+"}, .axes = {.x = false, .y = false, .z = true}});
+  EXPECT_EQ(refusal_of(build_model(scene)), "found");
+  scene.bodies[1].loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
+  EXPECT_THAT(refusal_of(build_model(scene)), HasSubstr("against a force of 1 N along x"));
+}
+
+/// Held along a line, a bar can turn about it, and its weight turns it.
+TEST(Equilibrium, NamesTheAxisThatAHingeLetsABodyTurnAbout) {
+  Scene scene = clamped_bar(2);
+  scene.gravity = {0, 0, -1};
+  scene.bodies[0].fixed = {{.select = {.box = Selection::Box{{-1, -1, -0.11}, {0.01, 1, -0.09}}}}};
+  const Model model = build_model(scene);
+  const std::string why = refusal_of(model);
+  EXPECT_THAT(why, HasSubstr("body \"bar\": nothing is held against a torque of"));
+  EXPECT_THAT(why, ::testing::AnyOf(HasSubstr("along (0, 1, 0)"), HasSubstr("along (0, -1, 0)"),
+                                    HasSubstr("along (-0, 1, 0)"), HasSubstr("along (-0, -1, -0)"),
+                                    HasSubstr("along (0, -1, -0)"), HasSubstr("along (-0, 1, -0)"),
+                                    HasSubstr("along (0, 1, -0)"), HasSubstr("along (-0, -1, 0)")));
+}
+
+/// Loads that cancel need no support: a free bar is stretched, and one without loads stays.
+TEST(Equilibrium, OfAFreeBodyIsFoundWhereItsLoadsCancel) {
+  Scene scene = clamped_bar(2);
+  scene.bodies[0].fixed.clear();
+  EXPECT_EQ(rest_of(build_model(scene)).steps, 0);
+  scene.bodies[0].loads.push_back({.select = {.region = "x-"}, .force = {-20, 0, 0}});
+  scene.bodies[0].loads.push_back({.select = {.region = "x+"}, .force = {20, 0, 0}});
+  const Model model = build_model(scene);
+  const Equilibrium found = rest_of(model);
+  EXPECT_LE(found.residual, 1e-8);
+  double longer = 0;
+  for (const Vec3d& u : found.state.displacement) longer = std::max(longer, 2 * u.x);
+  // σ L / E = 20 N / 0.04 m² / 1 MPa; two phyxels across: a fifth.
+  EXPECT_NEAR(longer, 5e-4, 1e-4);
+}
+
+/// A part of a body out of reach of the rest falls for ever, which no look at bodies shows: the
+/// search ends, and says what it was doing and how far it had come.
+TEST(Equilibrium, OfABodyInTwoPiecesEndsWithItsResidual) {
+  Scene scene = one_body();
+  scene.gravity = {0, 0, -1};
+  scene.bodies[0].material.hourglass = 0.1;
+  scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {0.1, 1, 1}}}});
+  Cloud cloud = lattice(4, 3, 3, 0.1);
+  for (const Vec3d& x : lattice(3, 3, 3, 0.1).position) {
+    cloud.position.push_back(x + Vec3d{5, 0, 0});
+    cloud.volume.push_back(1e-3);
+  }
+  scene.bodies[0].neighbourhood.radius = 0.18;
+  const Model model = model_of(scene, cloud);
+  try {
+    rest_of(model);
+    FAIL() << "a falling piece was called at rest";
+  } catch (const DivergedError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("steps of Newton's method"));
+    EXPECT_THAT(error.what(), HasSubstr("evaluations of the forces"));
+    EXPECT_THAT(error.what(), HasSubstr("1e-08 is asked"));
+  }
+}
+
+/// Stopped at any iteration, a search goes on from the last accepted step to the same bits; the
+/// observer has seen the residual fall below the tolerance that it was told of.
+TEST(Equilibrium, GoesOnToTheBitAfterItWasStopped) {
+  Scene scene = clamped_bar(2);
+  scene.gravity = {0, 0, -2};
+  scene.bodies[0].motions.push_back(
+      {.select = {.region = "x+"}, .rotation = {120, 0, 0}, .about = {1, 0, 0}, .duration = 1});
+  const Model model = build_model(scene);
+  const Equilibrium whole = rest_of(model);
+  int calls = 0;
+  const auto backend = make_test_backend(model, Precision::double_);
+  find_equilibrium(model, *backend, {.observer = [&](const NewtonProgress& now) {
+                     EXPECT_TRUE(now.tolerance == 1e-8 || now.tolerance == 1e-2);
+                     EXPECT_GE(now.residual, 0);
+                     ++calls;
+                     return true;
+                   }});
+  ASSERT_GT(calls, 100);
+  EXPECT_LE(calls, whole.evaluations);
+  for (const double share : {0.01, 0.3, 0.5, 0.8, 0.99}) {
+    const auto stopped = make_test_backend(model, Precision::double_);
+    int left = static_cast<int>(share * calls);
+    EXPECT_THROW(find_equilibrium(model, *stopped,
+                                  {.observer = [&](const NewtonProgress&) { return --left > 0; }}),
+                 InterruptedError);
+    EXPECT_EQ(left, 0);  // at once
+    State middle;
+    stopped->download(middle);
+    const Equilibrium rest = find_equilibrium(model, *stopped, {.start = &middle.displacement});
+    EXPECT_TRUE(rest.state.displacement == whole.state.displacement) << share;
+  }
+}
+
 TEST(Equilibrium, OfAMotionThatNeverEndsIsRefused) {
   Scene scene = clamped_bar(2);
   scene.bodies[0].motions.push_back({.select = {.region = "x+"}, .velocity = {1, 0, 0}});

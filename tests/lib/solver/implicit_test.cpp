@@ -209,5 +209,58 @@ TEST(Equilibrium, OnRollersIsPlaneStrain) {
   EXPECT_NEAR((top + bottom) / 0.4, 1e-5 * 0.3 / 0.7, 1e-4 * 1e-5);
 }
 
+/// Stopped anywhere within a step, in either stage, a solver is where that step began, and takes it
+/// again to the same bits.
+TEST(Implicit, AStoppedStepLeavesTheLastWholeOne) {
+  Scene scene = clamped_bar();
+  scene.gravity = {0.5, 0, 0};
+  const Model model = bar_of(scene);
+  const auto backend = make_test_backend(model, Precision::double_);
+  Solver whole(model, *backend, initial_state(model, scene, 0.05), Method::implicit);
+  whole.step();
+  const State before = whole.state();
+  int calls = 0;
+  whole.observe([&](const NewtonProgress&) { return ++calls > 0; });
+  whole.step();
+  const State end = whole.state();
+  ASSERT_GT(calls, 20);
+  for (const double share : {0.1, 0.45, 0.7, 0.95}) {
+    const auto other = make_test_backend(model, Precision::double_);
+    Solver solver(model, *other, before, Method::implicit);
+    int left = static_cast<int>(share * calls);
+    solver.observe([&](const NewtonProgress&) { return --left > 0; });
+    EXPECT_THROW(solver.step(), InterruptedError);
+    EXPECT_EQ(left, 0);  // at once
+    const State after = solver.state();
+    EXPECT_EQ(after.step, 1);
+    EXPECT_TRUE(after.displacement == before.displacement) << share;
+    EXPECT_TRUE(after.velocity == before.velocity) << share;
+    solver.observe(nullptr);
+    solver.step();
+    EXPECT_TRUE(solver.state().displacement == end.displacement) << share;
+    EXPECT_TRUE(solver.state().velocity == end.velocity) << share;
+  }
+}
+
+/// Terms so stiff that steps could not be counted are refused by their key.
+TEST(Plan, OfAbsurdStiffnessIsRefusedByKey) {
+  const auto refusal = [](double volume_stiffness, double hourglass) {
+    Scene scene = one_body();
+    scene.bodies[0].material.volume_stiffness = volume_stiffness;
+    scene.bodies[0].material.hourglass = hourglass;
+    const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
+    const auto backend = make_test_backend(model, Precision::double_);
+    try {
+      plan_steps(scene, model, *backend);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("planned");
+  };
+  EXPECT_THAT(refusal(1e20, 0), ::testing::HasSubstr("body \"body\": volume_stiffness = 1e+20"));
+  EXPECT_THAT(refusal(0, 1e20), ::testing::HasSubstr("body \"body\": hourglass = 1e+20"));
+  EXPECT_EQ(refusal(1e8, 10), "planned");  // a thousand times the rubber, a hundred times usual
+}
+
 }  // namespace
 }  // namespace phyxel

@@ -118,10 +118,12 @@ struct NeoHooke {
     }
     return fused(bulk() * volume_change(grad_u), cofactor(f), p);
   }
+  /// μ' [Pa].
+  PHYXEL_HD Real shear() const { return Real(4.0 / 3.0) * hooke.mu; }
+  /// λ' [Pa].
+  PHYXEL_HD Real bulk() const { return fused(Real(5.0 / 6.0), hooke.mu, hooke.lambda); }
 
  private:
-  PHYXEL_HD Real shear() const { return Real(4.0 / 3.0) * hooke.mu; }
-  PHYXEL_HD Real bulk() const { return fused(Real(5.0 / 6.0), hooke.mu, hooke.lambda); }
   /// I - 3.
   PHYXEL_HD static Real excess(const Mat3<Real>& g) {
     return fused(Real(2), g(0, 0) + g(1, 1) + g(2, 2), detail::squares(g));

@@ -1,0 +1,69 @@
+/// A run's steps: shortened where a law stiffens, and watched while Newton's method is at work.
+#include <fmt/format.h>
+
+#include "run/run.hpp"
+#include "stop_signal.hpp"
+
+namespace phyxel::app {
+
+void Run::take_step(Progress& progress) {
+  const double before = solver_.dt();
+  const std::int64_t steps = solver_.steps();
+  const int halvings = shortener_.look(solver_, plan_.halvings);
+  if (halvings > 0) {
+    plan_.halve(halvings);
+    first_step_ += solver_.steps() - steps;  // as many have been taken as before
+    if (!options_.json && !options_.quiet) {
+      const std::string where = shortener_.where_it_began();
+      progress.say(
+          fmt::format("the time step is halved from {:.4g} to {:.4g} s at t = {:g} s: a body "
+                      "stiffens; {}",
+                      before, solver_.dt(), solver_.time(), where));
+    }
+  }
+  solver_.step();
+}
+
+void Run::watch_newton(Progress& progress) {
+  if (steps_explicitly()) return;
+  solver_.observe([this, &progress](const NewtonProgress& now) {
+    const std::string newton = fmt::format("newton {}", now.step + 1),
+                      iteration = fmt::format("iteration {}", now.iteration),
+                      residual = fmt::format("residual {:.1e} ({:.0e} asked)", now.residual,
+                                             now.tolerance),
+                      energy = fmt::format("E = {:.4g} J", now.energy);
+    if (scene_.solver.method == Method::equilibrium) {
+      progress.update({residual, newton, iteration, energy});
+    } else {
+      const double share = solver_.time() / end_time();
+      progress.update({fmt::format("{:5.1f}%", 100 * share),
+                       fmt::format("{:.3f}/{:g} s", solver_.time(), end_time()), residual, newton,
+                       iteration});
+    }
+    writer_.serve();
+    return StopSignal::stop_requested() == 0;
+  });
+}
+
+void Run::show_progress(Progress& progress, const Diagnostics& now) const {
+  if (scene_.solver.method != Method::equilibrium) {
+    progress.update(solver_.time(), solver_.steps(), speed(), now.total_energy());
+    return;
+  }
+  const SolverWork work = solver_.work();
+  progress.update({fmt::format("residual {:.1e}", work.residual),
+                   fmt::format("{} steps of Newton's method", work.newton_steps),
+                   fmt::format("E = {:.4g} J at rest", now.total_energy())});
+}
+
+std::string Run::stopped_in_search(const InterruptedError& error, Progress& progress) {
+  good_ = good_state(diagnose(model(), *backend_, solver_.now()));
+  write_state();
+  writer_.finish();
+  progress.finish();
+  const auto signal = ranks().largest(std::int64_t{StopSignal::stop_requested()});
+  return fmt::format("stopped by signal {}: {}; the checkpoint is written, --resume auto continues",
+                     signal, error.what());
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,155 @@
+/// How much stiffer than at rest a deformed model is, and steps that follow from it.
+#include "phyxel/physics/stiffening.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "phyxel/custom_law.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/solver.hpp"
+#include "solver/stiffest.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Phyxels at a surface have neighbours on one side, so that their gradients are not quite those of
+/// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
+constexpr double at_surfaces = 1.1;
+
+/// Largest stiffness of plane waves [Pa] of a law that is known by its stresses only: forward
+/// differences give ∂P/∂F, and directions and polarisations are improved in turn.
+double wave_stiffness_of(const CustomLaw& law, const Mat3d& grad_u) {
+  constexpr double step = 1e-6;  // rounding 1e-10 of the stiffness, curvature 1e-6
+  const Mat3d stress = law.first_piola_stress(grad_u);
+  Mat3d tangent[9];  // of P by entry e of ∇u
+  for (int e = 0; e < 9; ++e) {
+    Mat3d changed = grad_u;
+    changed(e / 3, e % 3) += step;
+    tangent[e] = (1 / step) * (law.first_piola_stress(changed) - stress);
+  }
+  const auto traction = [&](Vec3d a, Vec3d b) {  // ∂P/∂F : a bᵀ
+    const double left[] = {a.x, a.y, a.z}, right[] = {b.x, b.y, b.z};
+    Mat3d sum;
+    for (int e = 0; e < 9; ++e) sum += (left[e / 3] * right[e % 3]) * tangent[e];
+    return sum;
+  };
+  const auto unit = [](Vec3d v) { return norm(v) > 0 ? (1 / norm(v)) * v : v; };
+  double largest = 0;
+  for (const Vec3d start : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}}) {
+    Vec3d a = start, b = start;
+    for (int k = 0; k < 8; ++k) {
+      a = unit(traction(a, b) * b);
+      b = unit(transpose(traction(a, b)) * a);
+    }
+    largest = std::max(largest, dot(a, traction(a, b) * b));
+  }
+  return largest;
+}
+
+double stiffening_of(const Material& material, const Mat3d& grad_u,
+                     const PrincipalStretches<double>& stretches) {
+  const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
+  if (!material.custom_law) {
+    return stiffening(material.elasticity(), hooke, material.volume_stiffness, stretches);
+  }
+  const VolumeConservation<double> volume{material.volume_stiffness};
+  return (wave_stiffness_of(*material.custom_law, grad_u) + wave_stiffness(volume, stretches)) /
+         (wave_stiffness_at_rest(hooke) + material.volume_stiffness);
+}
+
+/// Largest over the phyxels of this rank.
+Stiffest stiffest_here(const Model& model, Backend& backend) {
+  std::vector<Mat3d> gradient;
+  backend.displacement_gradients(gradient);
+  Stiffest all;
+#pragma omp parallel num_threads(std::max(1, backend.threads()))
+  {
+    Stiffest own;
+    for (const Part& part : model.parts) {
+#pragma omp for schedule(static) nowait
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        const PrincipalStretches<double> s = principal_stretches(gradient[i]);
+        own.look_at(stiffening_of(part.material, gradient[i], s), s.largest, model.number(i));
+      }
+    }
+#pragma omp critical
+    all.look_at(own);
+  }
+  return all;
+}
+
+}  // namespace
+
+bool stiffens(const Material& material) {
+  return material.custom_law || material.elasticity() != Elasticity::cauchy_hooke ||
+         material.volume_stiffness > 0;
+}
+
+Stiffening find_stiffening(const Model& model, Backend& backend) {
+  Stiffest found;
+  if (const auto on_device = backend.stiffening()) {
+    found = Stiffest{*on_device};
+  } else {
+    found = stiffest_here(model, backend);
+  }
+  if (model.share) found.look_at_others(*model.share->others);
+  return found.values();
+}
+
+StepShortener::StepShortener(const Model& model, Backend& backend, const StepPlan& plan)
+    : model_(model), backend_(backend), limit_(plan.limit.largest_step) {
+  if (!plan.shortens) return;
+  for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
+  // Ranks look together; one of them may have nothing that stiffens.
+  if (model.share) active_ = model.share->others->largest(active_) > 0;
+}
+
+int StepShortener::look(Solver& solver, int halvings) {
+  if (!active_ || solver.steps() % interval != 0) return 0;
+  const Stiffening now = find_stiffening(model_, backend_);
+  if (std::isfinite(now.ratio)) seen_ = {now, solver.time()};
+  int made = 0;
+  const auto too_long = [&] {
+    const double share = solver.dt() / limit_;
+    return !(share * share * at_surfaces * now.ratio <= largest_share);
+  };
+  while (too_long()) {
+    if (halvings + made == most_halvings || !std::isfinite(now.ratio)) {
+      const std::string why = fmt::format(
+          "the simulation diverged: {} at t = {:g} s (step {}); {}; a stiffer material, damping, "
+          "smaller loads or a smaller time.step may help",
+          std::isfinite(now.ratio)
+              ? fmt::format("a body is {:.3g} times as stiff as at rest, for which steps would "
+                            "have to be shorter than {:g} s, 1/{} of those planned,",
+                            now.ratio, solver.dt(), std::int64_t{1} << most_halvings)
+              : "the state is not finite",
+          solver.time(), solver.steps(), where_it_began());
+      throw DivergedError(why);  // on all ranks
+    }
+    if (!first_) first_ = seen_;
+    solver.halve_step();
+    ++made;
+  }
+  return made;
+}
+
+void StepShortener::see(const Solver& solver) {
+  const Stiffening now = find_stiffening(model_, backend_);
+  if (std::isfinite(now.ratio)) seen_ = {now, solver.time()};
+}
+
+std::string StepShortener::where_it_began() const {
+  const std::optional<Seen>& began = first_ ? first_ : seen_;
+  if (!began || began->what.phyxel < 0) return "nobody has looked at it before";
+  if (!(began->what.stretch > 1 + 1e-6)) {
+    return fmt::format("at t = {:g} s, the last look, nothing was stretched", began->time);
+  }
+  return fmt::format("it began at {}, stretched to {:.3g} times its length at t = {:g} s",
+                     describe_phyxel(model_, began->what.phyxel), began->what.stretch, began->time);
+}
+
+}  // namespace phyxel

@@ -1,0 +1,51 @@
+/// The largest `Stiffening` of phyxels, in whatever order they are looked at.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "phyxel/share.hpp"
+#include "phyxel/state.hpp"
+
+namespace phyxel {
+
+/// Of equal ratios the larger stretch counts, of equal stretches the smaller global id. A ratio
+/// that is not a number counts as infinite.
+class Stiffest {
+ public:
+  Stiffest() = default;
+  explicit Stiffest(const Stiffening& found) : found_(found) {}
+
+  void look_at(double ratio, double stretch, Index phyxel) {
+    if (!(ratio < infinity)) ratio = infinity;
+    if (!(stretch < infinity)) stretch = infinity;
+    const bool equal = ratio == found_.ratio && stretch == found_.stretch;
+    if (found_.phyxel >= 0 &&
+        (ratio < found_.ratio || (ratio == found_.ratio && stretch < found_.stretch) ||
+         (equal && phyxel > found_.phyxel))) {
+      return;
+    }
+    found_ = {ratio, stretch, phyxel};
+  }
+  void look_at(const Stiffest& other) {
+    const Stiffening& o = other.found_;
+    if (o.phyxel >= 0) look_at(o.ratio, o.stretch, o.phyxel);
+  }
+  /// Collective.
+  void look_at_others(const Others& others) {
+    const bool any = found_.phyxel >= 0;
+    const double ratio = others.largest(any ? found_.ratio : 0);
+    bool mine = any && found_.ratio == ratio;
+    const double stretch = others.largest(mine ? found_.stretch : 0);
+    mine = mine && found_.stretch == stretch;
+    const double who = others.smallest(mine ? static_cast<double>(found_.phyxel) : infinity);
+    found_ = {ratio, stretch, who < infinity ? static_cast<Index>(who) : -1};
+  }
+  const Stiffening& values() const { return found_; }
+
+ private:
+  static constexpr double infinity = std::numeric_limits<double>::infinity();
+  Stiffening found_{0, 0, -1};
+};
+
+}  // namespace phyxel
