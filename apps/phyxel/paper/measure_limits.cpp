@@ -33,7 +33,7 @@ Model block_of(Index n) {
   BodyRequest body;
   body.name = fmt::format("block of {}", n);
   body.where = "phyxel paper";
-  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000};
+  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000, .hourglass = 0};
   paper::use_paper_rules(body);
   scene.bodies.push_back(body);
   return paper::paper_model(scene, cloud);
@@ -160,7 +160,7 @@ struct Spinning {
                          .jitter = 0.1,
                          .surface = false};
     body.spin = {0, spin, 0};
-    body.material = {.young = young, .poisson = 0.34, .density = density};
+    body.material = {.young = young, .poisson = 0.34, .density = density, .hourglass = 0};
     paper::use_paper_rules(body);
     scene.bodies.push_back(body);
     model = paper::paper_model(scene);
