@@ -226,6 +226,63 @@ TEST_F(Parameters, NamesOfBodiesCannotBreakLines) {
   }
 }
 
+/// Each of these alone makes another model, whose checkpoints fit no other.
+TEST(ModelDigest, TellsModelsApartByEveryValueTheyHave) {
+  const auto digest_with = [](auto&& change) {
+    Scene scene = testing::one_body();
+    BodyRequest& body = scene.bodies[0];
+    body.motions.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}}},
+                            .displacement = {1, 0, 0},
+                            .rotation = {0, 0, 9},
+                            .about = {0, 1, 0},
+                            .duration = 1,
+                            .velocity = {1, 0, 0},
+                            .amplitude = {1, 0, 0},
+                            .frequency = 1});
+    body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}, .ramp = 1});
+    change(body);
+    return model_digest(testing::model_of(scene, testing::lattice(3, 3, 3, 0.1)));
+  };
+  using Body = BodyRequest;
+  const std::map<std::string, std::uint64_t> digests = {
+      {"nothing", digest_with([](Body&) {})},
+      {"young", digest_with([](Body& b) { b.material.young *= 2; })},
+      {"poisson", digest_with([](Body& b) { b.material.poisson = 0.2; })},
+      {"density", digest_with([](Body& b) { b.material.density *= 2; })},
+      {"strain", digest_with([](Body& b) { b.material.strain = Strain::cauchy; })},
+      {"neo-hookean", digest_with([](Body& b) { b.material.law = Law::neo_hooke; })},
+      {"corotated", digest_with([](Body& b) { b.material.law = Law::corotated; })},
+      {"volume", digest_with([](Body& b) { b.material.volume_stiffness = 1; })},
+      {"damping", digest_with([](Body& b) { b.material.damping = 1; })},
+      {"hourglass", digest_with([](Body& b) { b.material.hourglass = 0.3; })},
+      {"factor", digest_with([](Body& b) { b.neighbourhood.factor = 1.9; })},
+      {"nearest", digest_with([](Body& b) { b.neighbourhood.nearest = 11; })},
+      {"radius", digest_with([](Body& b) { b.neighbourhood.radius = 0.2; })},
+      {"most", digest_with([](Body& b) { b.neighbourhood.max_neighbours = 20; })},
+      {"displacement", digest_with([](Body& b) { b.motions[0].displacement.y = 1; })},
+      {"rotation", digest_with([](Body& b) { b.motions[0].rotation.y = 1; })},
+      {"about", digest_with([](Body& b) { b.motions[0].about.z = 1; })},
+      {"duration", digest_with([](Body& b) { b.motions[0].duration = 2; })},
+      {"velocity", digest_with([](Body& b) { b.motions[0].velocity.z = 1; })},
+      {"amplitude", digest_with([](Body& b) { b.motions[0].amplitude.y = 1; })},
+      {"frequency", digest_with([](Body& b) { b.motions[0].frequency = 2; })},
+      {"axes x", digest_with([](Body& b) { b.motions[0].axes.x = false; })},
+      {"axes y", digest_with([](Body& b) { b.motions[0].axes.y = false; })},
+      {"axes z", digest_with([](Body& b) { b.motions[0].axes.z = false; })},
+      {"moved", digest_with([](Body& b) { b.motions[0].select = {.all = true}; })},
+      {"force", digest_with([](Body& b) { b.loads[0].force.z = 1; })},
+      {"density of force", digest_with([](Body& b) { b.loads[0].force_density.x = 1; })},
+      {"ramp", digest_with([](Body& b) { b.loads[0].ramp = 2; })},
+      {"loaded", digest_with([](Body& b) {
+         b.loads[0].select = {.indices = std::vector<Index>{1, 2}};
+       })}};
+  std::map<std::uint64_t, std::string> names;
+  for (const auto& [name, digest] : digests) {
+    const auto [other, is_new] = names.emplace(digest, name);
+    EXPECT_TRUE(is_new) << name << " and " << other->second << " have one digest";
+  }
+}
+
 std::string refusal_of(const Scene& scene) {
   const Cloud cloud = testing::lattice(3, 3, 3, 0.1);
   try {
