@@ -102,9 +102,11 @@ class Builder {
     std::vector<Origin> origins;
     std::uint64_t digest = 0;  // of what each rank has made or read for itself
     ranks_.together([&] {
+      validate(scene_);
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
         CloudPiece made = piece(b, digest);
         Cloud& cloud = made.cloud;
+        if (!cloud.position.empty()) check_cloud(scene_.bodies[b], cloud);
         Body& body = bodies_[b];
         body.size = made.whole;
         with_volumes[b] = !cloud.volume.empty();
@@ -692,6 +694,7 @@ class Builder {
       Part& part = m.parts[b];
       part.name = request.name;
       part.material = request.material;
+      part.material.hourglass = hourglass_of(request);
       part.neighbourhood = in_words(request.neighbourhood);
       part.kernel_volumes = bodies_[b].kernel_volumes;
       part.size = bodies_[b].size;

@@ -97,7 +97,8 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
   scene.gravity = {0, 0, -9.81};
   BodyRequest body;
   body.name = "cube";
-  body.material = {.young = 1e6, .poisson = 0.3, .density = 1000, .strain = Strain::green};
+  body.material = {
+      .young = 1e6, .poisson = 0.3, .density = 1000, .strain = Strain::green, .hourglass = 0};
   if (terms == "neo-hookean") body.material.law = Law::neo_hooke;
   if (terms == "corotated") body.material.law = Law::corotated;
   if (terms == "cauchy") body.material.strain = Strain::cauchy;

@@ -12,7 +12,7 @@ namespace phyxel::app {
 namespace {
 
 constexpr double L = cantilever_length, A = cantilever_height * cantilever_height, I = A * A / 12;
-constexpr const Material& m = cantilever_material;
+const Material& m = cantilever_material;
 
 /// Frames until the scene ends: four times what a beam twice as soft as Timoshenko's takes.
 constexpr double most_frames = 200;

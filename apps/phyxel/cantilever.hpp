@@ -11,7 +11,8 @@ namespace phyxel::app {
 inline constexpr double cantilever_length = 1;     ///< From the held layer to the loaded one [m].
 inline constexpr double cantilever_height = 0.1;   ///< And width [m].
 inline constexpr double cantilever_shear = 0.025;  ///< [N]: bends it by a thousandth of its length.
-inline const Material cantilever_material{.young = 1e6, .poisson = 0.3, .density = 1000};
+inline const Material cantilever_material{
+    .young = 1e6, .poisson = 0.3, .density = 1000, .hourglass = 0};
 
 /// Change of the deflection from frame to frame, as a share of it, at which it has settled.
 inline constexpr double cantilever_settled = 1e-6;

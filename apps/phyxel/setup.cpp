@@ -19,7 +19,9 @@ std::string terms_of(const Part& part) {
                                                   : "Cauchy strain";
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
-  if (m.hourglass > 0) terms += fmt::format(", hourglass control ({:g} E)", m.hourglass);
+  if (m.hourglass.value_or(0) > 0) {
+    terms += fmt::format(", hourglass control ({:g} E)", *m.hourglass);
+  }
   if (part.closure > 0) terms += fmt::format(", closed gradients (to {:g})", part.closure);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
   return terms;

@@ -95,6 +95,7 @@ class GpuBackend final : public PaperBackend {
   int threads() const override { return 0; }
 
   void upload(const State& state) override {
+    check_sizes(state, n_);
     wait();
     dt_ = state.dt;
     const std::vector<char> held = held_phyxels(model_);

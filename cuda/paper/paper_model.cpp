@@ -75,7 +75,7 @@ Scene body_scene(const std::string& name, int copies) {
     body.where = "phyxel paper";
     body.source.shape.name = name;
     body.rotation = hanging->rotation;
-    body.material = {.young = hanging->young, .poisson = poisson, .density = 1000};
+    body.material = {.young = hanging->young, .poisson = poisson, .density = 1000, .hourglass = 0};
     use_paper_rules(body);
     body.fixed.push_back({.select = {.region = hanging->region, .where = "phyxel paper"}});
     scene.bodies.push_back(body);
@@ -119,7 +119,7 @@ void check_paper_model(const Model& model) {
         fmt::format("body \"{}\" has geometric volumes; allowed: volumes = \"kernel\"", part.name));
   }
   if (part.material.damping > 0 || part.material.volume_stiffness > 0 ||
-      part.material.hourglass > 0) {
+      part.material.hourglass.value_or(0) > 0) {
     refuse(
         fmt::format("body \"{}\" has damping, volume conservation or hourglass control; allowed: "
                     "none of them",

@@ -59,6 +59,7 @@ class SequentialBackend final : public PaperBackend {
   int threads() const override { return 1; }
 
   void upload(const State& state) override {
+    check_sizes(state, size());
     dt_ = state.dt;
     for (Index i = 0; i < size(); ++i) {
       displacement_[i] = to<Real>(state.displacement[i]);

@@ -54,6 +54,7 @@ class CudaBackend final : public Backend {
   int threads() const override { return 0; }
 
   void upload(const State& state) override {
+    check_sizes(state, size());
     settle();
     passes_.receive_displacements();
     m_.wait();
@@ -119,8 +120,8 @@ class CudaBackend final : public Backend {
     const DeviceArray<ExactTotals> all = sent(std::vector{none}, "sums");
     if (tiles > 0) {
       diagnose_tiles<<<tiles, diagnose_threads, 0, m_.stream()>>>(
-          m_.fields(), m_.materials(), boundary_.moved(), forces.data(), gradients.data(),
-          m_.number_at(), now.lag, each.data());
+          m_.fields(), m_.materials(now.lag), boundary_.moved(), forces.data(), gradients.data(),
+          m_.number_at(), each.data());
       m_.launched("diagnose_tiles", static_cast<unsigned>(tiles), diagnose_threads);
       m_.launch_each("add_tiles", add_tiles, tiles, each.data(), tiles, all.data());
       m_.launch_each("find_fastest", find_fastest, tiles, each.data(), tiles, all.data());

@@ -97,7 +97,20 @@ class DeviceModel {
   const AllFields& fields() const { return fields_; }
   const DeviceLists& lists() const { return lists_; }
   const DeviceLists& second_lists() const { return second_lists_; }
-  const TileMaterial* materials() const { return materials_.data(); }
+  /// What sums need of each tile's body. @param lag of the velocities, as `Instant` [s]
+  const TileMaterial* materials(double lag) {
+    if (lag == materials_lag_) return materials_.data();
+    std::vector<TileMaterial> materials;
+    for (const Index part : tiling_.part) {
+      const Material& m = model_.parts[part].material;
+      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness,
+                           hourglass_stiffness(model_, model_.parts[part]),
+                           damped_flow(m.damping, lag), origin_of(part), m.elasticity()});
+    }
+    materials_.upload(materials.data());
+    materials_lag_ = lag;
+    return materials_.data();
+  }
   /// Of each place, the number of its phyxel in the whole model; -1: nobody.
   const Index* number_at() const { return share() ? number_at_.data() : tiling_.phyxel_at.data(); }
   /// What `Fields::points` and `stresses` lie in (see `Points::in`).
@@ -311,15 +324,7 @@ class DeviceModel {
       fields_.closing_stresses = ClosingStresses<Real>::in(closing_stresses_.data(), places());
     }
     tiles_ = {tiling_.part.size(), "tiles" + of};
-    std::vector<TileMaterial> materials;
-    for (const Index part : tiling_.part) {
-      const Material& m = model_.parts[part].material;
-      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness,
-                           hourglass_stiffness(model_, model_.parts[part]), m.damping,
-                           origin_of(part), m.elasticity()});
-    }
-    materials_ = {materials.size(), "tiles" + of};
-    materials_.upload(materials.data());
+    materials_ = {tiling_.part.size(), "tiles" + of};
 
     fields_.inverse_h_squared = supports_.data();
     fields_.moment_constants = moment_constants_.data();
@@ -380,15 +385,15 @@ class DeviceModel {
 
   BodyConstants constants_of(const Part& part, double dt) const {
     const Material& m = part.material;
-    const double half = m.damping * dt / 2;
+    const DampedFlow flow = damped_flow(m.damping, dt);
     const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
     return {static_cast<Real>(m.lame_lambda()),
             static_cast<Real>(m.lame_mu()),
             static_cast<Real>(m.volume_stiffness),
             static_cast<Real>(hourglass_stiffness(model_, part)),
             static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
-            static_cast<StateReal>((1 - half) / (1 + half)),
-            static_cast<StateReal>(dt / (1 + half)),
+            static_cast<StateReal>(flow.keep),
+            static_cast<StateReal>(flow.gain),
             m.damping > 0,
             m.elasticity()};
   }
@@ -410,7 +415,8 @@ class DeviceModel {
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, pull_, closing_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
-  DeviceArray<TileMaterial> materials_;
+  DeviceArray<TileMaterial> materials_;  // with the damped flow over that lag [s]
+  double materials_lag_ = -1;
   DeviceArray<Index> number_at_;  // of shares
 };
 

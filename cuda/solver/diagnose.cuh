@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "exact_sum.hpp"
+#include "phyxel/physics/verlet.hpp"
 #include "solver/kernels.cuh"
 #include "solver/totals.hpp"
 
@@ -13,7 +14,8 @@ namespace phyxel::cuda {
 
 /// What the sums need of a tile's body.
 struct TileMaterial {
-  double lambda, mu, volume_stiffness, hourglass, damping;
+  double lambda, mu, volume_stiffness, hourglass;
+  DampedFlow flow;         ///< From the time of the velocities to that of the displacements.
   Vec3<double> origin;  ///< What positions are taken from [m].
   Elasticity elasticity;
 };
@@ -96,7 +98,7 @@ inline constexpr int diagnose_threads = 128;
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
                                const TileMaterial* materials, const char* moved, const Real* force,
-                               const Real* gradient, const Index* number_at, double lag,
+                               const Real* gradient, const Index* number_at,
                                TileTotals* totals) {
   __shared__ TileTotals shared[diagnose_threads];
   TileTotals both{};
@@ -130,13 +132,14 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
                             half_step_velocity.x + half_step_velocity.y + half_step_velocity.z;
       if (!isfinite(finite)) t.first_bad = number_at[place];
 
-      const Vec3<double> acceleration =
-          (1 / mass) * (internal + load) + gravity - m.damping * half_step_velocity;
+      const Vec3<double> acceleration = (1 / mass) * (internal + load) + gravity;
+      const Vec3<double> change =
+          m.flow.gain * acceleration - (1 - m.flow.keep) * half_step_velocity;
       const int moves = held ? 7 : moved ? moved[place] : 0;
       Vec3<double> v = half_step_velocity;
-      if (!(moves & 1)) v.x += lag * acceleration.x;
-      if (!(moves & 2)) v.y += lag * acceleration.y;
-      if (!(moves & 4)) v.z += lag * acceleration.z;
+      if (!(moves & 1)) v.x += change.x;
+      if (!(moves & 2)) v.y += change.y;
+      if (!(moves & 4)) v.z += change.z;
       const Vec3<double> p = mass * v;
       t.sum[kinetic_energy] = 0.5 * dot(p, v);
       put3(t.sum + momentum, p);

@@ -18,7 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t version = 2;
+constexpr std::int64_t version = 3;
+constexpr std::int64_t oldest_version = 2;  // without parameters
 constexpr std::size_t kept = 2;
 // Steps and frames beyond what double counts exactly are none that a run has made.
 constexpr std::int64_t most_counted = std::int64_t{1} << 53;
@@ -50,6 +51,27 @@ std::vector<std::pair<std::int64_t, fs::path>> checkpoints_in(const fs::path& di
   }
   std::sort(found.rbegin(), found.rend());
   return found;
+}
+
+/// One line for each, the name and the value with a tab between: neither has such characters.
+std::string text_of(const std::vector<Parameter>& parameters) {
+  std::string text;
+  for (const Parameter& p : parameters) text += p.name + '\t' + p.value + '\n';
+  return text;
+}
+
+std::vector<Parameter> parameters_in(const Hdf5Reader& in, const std::string& text) {
+  std::vector<Parameter> parameters;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = text.find('\n', begin), tab = text.find('\t', begin);
+    if (end == std::string::npos || tab == std::string::npos || tab > end) {
+      in.refuse(fmt::format("line {} of /phyxel/parameters is no name, tab and value",
+                            parameters.size() + 1));
+    }
+    parameters.push_back({text.substr(begin, tab - begin), text.substr(tab + 1, end - tab - 1)});
+    begin = end + 1;
+  }
+  return parameters;
 }
 
 void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3d>& values,
@@ -87,6 +109,7 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   out.attribute("/phyxel", "frames_written", info.frames_written);
   out.attribute("/phyxel", "units", std::string("m, m/s, s, J"));
   out.text("/phyxel/scene", info.scene_text);
+  out.text("/phyxel/parameters", text_of(info.parameters));
   out.group("/state");
   out.attribute("/state", "step", state.step);
   out.attribute("/state", "time", state.time);
@@ -112,9 +135,9 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
   file_ = std::make_unique<const Hdf5Reader>(file);
   const Hdf5Reader& in = *file_;
   info_.version = static_cast<int>(in.integer_attribute("/phyxel", "version"));
-  if (info_.version != version) {
-    in.refuse(
-        fmt::format("format version {}; this program reads version {}", info_.version, version));
+  if (info_.version < oldest_version || info_.version > version) {
+    in.refuse(fmt::format("format version {}; this program reads versions {} to {}", info_.version,
+                          oldest_version, version));
   }
   info_.program = in.text_attribute("/phyxel", "program");
   const std::string precision = in.text_attribute("/phyxel", "precision");
@@ -134,6 +157,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
   info_.initial_energy = in.number_attribute("/phyxel", "initial_energy");
   info_.frames_written = in.integer_attribute("/phyxel", "frames_written");
   info_.scene_text = in.text("/phyxel/scene");
+  if (info_.version > 2) info_.parameters = parameters_in(in, in.text("/phyxel/parameters"));
 
   state_.step = in.integer_attribute("/state", "step");
   state_.time = in.number_attribute("/state", "time");

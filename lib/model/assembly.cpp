@@ -16,6 +16,7 @@ namespace phyxel {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
+constexpr double longest_length = 1e12;  // [m], as lengths of scenes (scene/scene_keys.cpp)
 
 }  // namespace
 
@@ -40,6 +41,10 @@ void place(Cloud& cloud, const BodyRequest& request) {
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
 }
 
+double hourglass_of(const BodyRequest& request) {
+  return request.material.hourglass.value_or(default_hourglass(request));
+}
+
 void check_terms(const BodyRequest& request) {
   const auto check_law = [](const Material& material) {
     if (material.custom_law) check_custom_law(*material.custom_law, material.young);
@@ -54,8 +59,37 @@ void check_terms(const BodyRequest& request) {
         "neighbours.support = \"uniform\" without max_neighbours, or {} = 0",
         request.where, request.name, term, value, key));
   };
-  refuse_if(request.material.hourglass, "hourglass control", "hourglass");
+  refuse_if(hourglass_of(request), "hourglass control", "hourglass");
   refuse_if(request.closure, "closed gradients", "closure");
+}
+
+void check_cloud(const BodyRequest& request, const Cloud& cloud) {
+  const auto refuse = [&](std::size_t i, const std::string& problem) {
+    throw InputError(
+        fmt::format("{}: phyxel {} of body \"{}\" {}", request.where, i, request.name, problem));
+  };
+  if (cloud.position.empty()) {
+    throw InputError(fmt::format("{}: body \"{}\" has no phyxel; allowed: at least one",
+                                 request.where, request.name));
+  }
+  if (!cloud.volume.empty() && cloud.volume.size() != cloud.position.size()) {
+    throw InputError(
+        fmt::format("{}: body \"{}\" has {} volumes for {} phyxels; allowed: as many, or none",
+                    request.where, request.name, cloud.volume.size(), cloud.position.size()));
+  }
+  const auto within = [](double x) { return std::abs(x) <= longest_length; };
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const Vec3d p = cloud.position[i];
+    if (!(within(p.x) && within(p.y) && within(p.z))) {
+      refuse(i,
+             fmt::format("lies at [{:g}, {:g}, {:g}] m; allowed: coordinates from {:g} to {:g} m",
+                         p.x, p.y, p.z, -longest_length, longest_length));
+    }
+    if (!cloud.volume.empty() && !(cloud.volume[i] > 0 && std::isfinite(cloud.volume[i]))) {
+      refuse(i, fmt::format("has a volume of {:g} m^3 (is the body flat?); allowed: > 0, finite",
+                            cloud.volume[i]));
+    }
+  }
 }
 
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {
@@ -106,6 +140,17 @@ Masses kernel_masses(const std::vector<double>& spacing, const std::vector<doubl
     result.volume[i] = result.mass[i] / (kernel_sum[i] / mean * density);
   }
   return result;
+}
+
+void check_masses(const BodyRequest& request, const Masses& masses) {
+  for (std::size_t i = 0; i < masses.mass.size(); ++i) {
+    const double m = masses.mass[i], v = masses.volume[i];
+    if (m > 0 && v > 0 && std::isfinite(m) && std::isfinite(v)) continue;
+    throw InputError(fmt::format(
+        "{}: phyxel {} of body \"{}\" has a mass of {:g} kg and a volume of {:g} m^3 (does it lie "
+        "where others lie?); allowed: both > 0, finite",
+        request.where, i, request.name, m, v));
+  }
 }
 
 Masses geometric_masses(const std::vector<double>& volume, double density) {

@@ -24,8 +24,16 @@ Mat3d rotation_by(Vec3d radians);
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);
 
+/// Strength of a body's hourglass control: what it asks for, or the default.
+double hourglass_of(const BodyRequest& request);
+
 /// @throws InputError if a body asks for terms that do not go together
 void check_terms(const BodyRequest& request);
+
+/// Makes sure that a placed cloud can carry the physics: places that are finite and within the
+/// lengths of a scene, volumes that are finite and not zero. @throws InputError with the first
+/// phyxel that is not so
+void check_cloud(const BodyRequest& request, const Cloud& cloud);
 
 /// Whether the volumes of a body follow from the kernel.
 /// @throws InputError if it can have none as asked
@@ -43,6 +51,9 @@ struct Masses {
 /// @param kernel_sum kernel density over ρ, for s = 1. @param mean of those of the body
 Masses kernel_masses(const std::vector<double>& spacing, const std::vector<double>& kernel_sum,
                      double mean, double density);
+/// Phyxels that lie all in one place have no volume by the kernel rule, and so no mass.
+/// @throws InputError with the first phyxel whose mass or volume is zero or not finite
+void check_masses(const BodyRequest& request, const Masses& masses);
 Masses geometric_masses(const std::vector<double>& volume, double density);
 
 /// "uniform support, 1.8 x the mean distance to the 10 nearest"

@@ -10,6 +10,15 @@
 
 namespace phyxel {
 
+/// A coordinate counted in cells, cut to what 62 bits hold; 0 for no number. Clouds of models are
+/// finite (`check_cloud`), but a cast of anything else would be undefined.
+PHYXEL_HD std::int64_t whole_cells(double value) {
+  using std::floor;
+  constexpr double most = 4611686018427387904.0;  // 2^62
+  if (!(value > -most)) return value <= -most ? -(std::int64_t{1} << 62) : 0;
+  return value < most ? static_cast<std::int64_t>(floor(value)) : std::int64_t{1} << 62;
+}
+
 struct CellGrid {
   struct Cell {
     std::int64_t x, y, z;
@@ -20,10 +29,9 @@ struct CellGrid {
   std::uint64_t table_mask = 0;  ///< Buckets are a power of two; this is one less.
 
   PHYXEL_HD Cell cell_of(Vec3d p) const {
-    using std::floor;
-    return {static_cast<std::int64_t>(floor((p.x - low.x) * inverse_cell_size)),
-            static_cast<std::int64_t>(floor((p.y - low.y) * inverse_cell_size)),
-            static_cast<std::int64_t>(floor((p.z - low.z) * inverse_cell_size))};
+    return {whole_cells((p.x - low.x) * inverse_cell_size),
+            whole_cells((p.y - low.y) * inverse_cell_size),
+            whole_cells((p.z - low.z) * inverse_cell_size)};
   }
   /// A cell's name: 21 bits a coordinate. Cells outside the cloud may share the name of one
   /// inside only if they are two million cells away, and then the distance tells.
@@ -43,13 +51,14 @@ struct CellGrid {
   /// Rings of cells around `place` beyond which there is no point of a cloud from `low` to `high`.
   PHYXEL_HD int farthest_ring(Vec3d place, Vec3d high) const {
     const Cell c = cell_of(place), a = cell_of(low), b = cell_of(high);
+    constexpr std::int64_t int_max = 0x7fffffff;
     std::int64_t most = 0;
     const std::int64_t apart[] = {c.x - a.x, b.x - c.x, c.y - a.y, b.y - c.y, c.z - a.z, b.z - c.z};
     for (const std::int64_t d : apart) {
       if (d > most) most = d;
       if (-d > most) most = -d;
     }
-    return static_cast<int>(most);
+    return static_cast<int>(most < int_max ? most : int_max);
   }
 };
 
@@ -59,7 +68,10 @@ inline constexpr double cell_rounding = 5e-10;
 /// How many cells away points nearer than `reach` may be.
 PHYXEL_HD int rings_within(double reach, double cell_size) {
   using std::ceil;
-  return static_cast<int>(ceil(reach * (1 + cell_rounding) / cell_size));
+  const double rings = ceil(reach * (1 + cell_rounding) / cell_size);
+  constexpr double most = 1 << 30;
+  if (!(rings < most)) return rings >= most ? 1 << 30 : 0;
+  return static_cast<int>(rings);
 }
 
 /// The smallest cell that 21 bits a coordinate allow for a cloud that wide, or `wanted`: a little

@@ -71,6 +71,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   check_terms(request);
+  check_cloud(request, cloud);
   if (surveyor && request.closure > 0) {
     throw InputError(fmt::format(
         "{}: body \"{}\" has closed gradients (closure = {:g}), which are found from lists of "
@@ -113,6 +114,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
       masses.mass[i] = masses.volume[i] * groups[g].material.density;
     }
   }
+  check_masses(request, masses);
   append(model.neighbourhood.support, survey.support);
   append(model.position, cloud.position);
   append(model.mass, masses.mass);
@@ -155,6 +157,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
             .kernel_volumes = kernel_volumes,
             .size = group.end - group.begin,
             .surfels = surfel_end - (first ? surfel_shift : surfel_end)};
+    part.material.hourglass = hourglass_of(request);
     if (shift < model.size()) part.origin = model.position[shift];
     BodySums sums;
     sums.add(model, part.begin, part.end);
@@ -286,6 +289,7 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
 }
 
 Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
+  validate(scene);
   Model model;
   model.gravity = scene.gravity;
   for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
@@ -304,6 +308,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
     throw InputError(fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
                                  clouds.size(), scene.bodies.size()));
   }
+  validate(scene);
   Model model;
   model.gravity = scene.gravity;
   for (std::size_t b = 0; b < clouds.size(); ++b) {

@@ -123,15 +123,8 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   if (thinnest > 0.999 * spacing) shape.placement = ShapeRequest::Placement::nodes;
 }
 
-/// Of hourglass control where a scene says nothing: what is most accurate (docs/accuracy.md), but
-/// the paper's bodies are as in the paper, and where supports vary there is no such control.
-double default_hourglass(const BodyRequest& body) {
-  return is_paper_shape(body.source.shape.name) || body.neighbourhood.one_sided() ? 0 : 0.1;
-}
-
-Material read_material(const SceneTable& table, double hourglass) {
+Material read_material(const SceneTable& table) {
   Material material;
-  material.hourglass = hourglass;
   table.read("young", material.young);
   table.read("poisson", material.poisson);
   table.read("density", material.density);
@@ -269,7 +262,8 @@ BodyRequest read_body_request(const SceneTable& table) {
   choose_placement(table, body);
   table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
-  body.material = read_material(table.table("material"), default_hourglass(body));
+  body.material = read_material(table.table("material"));
+  if (!body.material.hourglass) body.material.hourglass = default_hourglass(body);
   for (const SceneTable& inclusion : table.tables("inclusion")) {
     body.inclusions.push_back(read_inclusion(inclusion, body.material));
   }
@@ -331,6 +325,10 @@ std::vector<BodyRequest> copies(const BodyRequest& body, const SceneTable& array
 }
 
 }  // namespace
+
+double default_hourglass(const BodyRequest& body) {
+  return is_paper_shape(body.source.shape.name) || body.neighbourhood.one_sided() ? 0 : 0.1;
+}
 
 std::vector<BodyRequest> body_requests(const SceneTable& table) {
   const BodyRequest body = read_body_request(table);

@@ -12,10 +12,21 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double largest_index = std::numeric_limits<std::int32_t>::max();
 
-Range above(double low) { return {low, infinity, true}; }
+// What a scene may hold, so that products of its values (energies, volumes, moments) stay numbers
+// in double precision: far beyond anything that bends.
+constexpr double longest = 1e12;      // lengths [m], and how far from the origin
+constexpr double shortest = 1e-12;    // [m]
+constexpr double stiffest = 1e18;     // moduli [Pa]
+constexpr double fastest = 1e9;       // speeds [m/s] and spins [rad/s]
+constexpr double largest_angle = 1e9; // [degrees]
+constexpr double largest_force = 1e24;  // [N], [N/m^3]
+
 Range at_least(double low) { return {low, infinity, false}; }
 Range between(double low, double high) { return {low, high, false}; }
 Range strictly_between(double low, double high) { return {low, high, true}; }
+Range within(double size) { return {-size, size, false}; }
+Range length() { return {shortest, longest, false}; }
+Range time_span() { return {1e-18, 1e9, false}; }
 
 std::vector<SceneSection> make_sections() {
   return {
@@ -74,7 +85,7 @@ std::vector<SceneKey> top_keys() {
       {.name = "title", .type = KeyType::text, .otherwise = "none",
        .meaning = "Shown in summaries and kept in the output."},
       {.name = "gravity", .type = KeyType::vector, .unit = "m/s^2", .fallback = "[0, 0, 0]",
-       .meaning = "Acceleration of every free phyxel. The Earth's is [0, 0, -9.81]."},
+       .range = within(1e12), .meaning = "Acceleration of every free phyxel. The Earth's is [0, 0, -9.81]."},
       {.name = "time", .type = KeyType::table, .otherwise = "see meaning",
        .meaning = "Duration and steps. Required, but for the method \"equilibrium\"."},
       {.name = "solver", .type = KeyType::table, .otherwise = "its defaults",
@@ -93,7 +104,7 @@ std::vector<SceneKey> run_keys() {
       {.section = "time", .name = "end", .unit = "s", .required = true, .range = {0, 1e9, true},
        .meaning = "Simulated time."},
       {.section = "time", .name = "step", .type = KeyType::number_or_auto, .unit = "s",
-       .fallback = "\"auto\"", .range = above(0),
+       .fallback = "\"auto\"", .range = time_span(),
        .meaning = "Time step. \"auto\": `safety` times the largest stable step, which is found "
            "from the stiffness of the bodies; three digits of it. A given step above the largest "
            "is refused. The method \"implicit\" needs one, of any size."},
@@ -145,9 +156,9 @@ std::vector<SceneKey> run_keys() {
       {.section = "render", .name = "height", .type = KeyType::integer, .unit = "pixels",
        .fallback = "720", .range = between(16, 8192), .meaning = "Height of a picture."},
       {.section = "render", .name = "view", .type = KeyType::vector, .fallback = "[-1, 2, -0.6]",
-       .meaning = "Direction the camera looks along."},
+       .range = within(longest), .meaning = "Direction the camera looks along."},
       {.section = "render", .name = "up", .type = KeyType::vector, .fallback = "[0, 0, 1]",
-       .meaning = "Direction that points up in the picture; not parallel to `view`."},
+       .range = within(longest), .meaning = "Direction that points up in the picture; not parallel to `view`."},
   };
 }
 
@@ -169,13 +180,13 @@ std::vector<SceneKey> body_keys() {
        .range = between(1, largest_index),
        .meaning = "How many: exactly for a mesh, about for a shape."},
       {.section = "body", .name = "spacing", .unit = "m", .otherwise = "from `phyxels`",
-       .range = above(0), .meaning = "Distance between the phyxels of a shape's lattice."},
+       .range = length(), .meaning = "Distance between the phyxels of a shape's lattice."},
       {.section = "body", .name = "size", .type = KeyType::vector, .unit = "m",
-       .otherwise = "none", .range = above(0),
+       .otherwise = "none", .range = length(),
        .meaning = "Extents along x, y and z of a beam or block."},
-      {.section = "body", .name = "radius", .unit = "m", .otherwise = "none", .range = above(0),
+      {.section = "body", .name = "radius", .unit = "m", .otherwise = "none", .range = length(),
        .meaning = "Of a cylinder or sphere."},
-      {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = above(0),
+      {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = length(),
        .meaning = "Of a cylinder."},
       {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells where those cannot be, in what is thinner than a spacing, and with `volumes = \"kernel\"`",
        .words = {"cells", "nodes"},
@@ -193,18 +204,18 @@ std::vector<SceneKey> body_keys() {
            "mesh that does not overlap itself, and enough phyxels."},
       {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Whether a built-in shape gets its surfels."},
-      {.section = "body", .name = "scale", .fallback = "1", .range = above(0),
+      {.section = "body", .name = "scale", .fallback = "1", .range = length(),
        .meaning = "Applied first, about the origin."},
       {.section = "body", .name = "rotation", .type = KeyType::vector, .unit = "degrees",
        .fallback = "[0, 0, 0]",
-       .meaning = "Axis times angle, applied second: [0, 0, 90] turns x towards y."},
+       .range = within(largest_angle), .meaning = "Axis times angle, applied second: [0, 0, 90] turns x towards y."},
       {.section = "body", .name = "translation", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .meaning = "Applied last."},
+       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Applied last."},
       {.section = "body", .name = "velocity", .type = KeyType::vector, .unit = "m/s",
-       .fallback = "[0, 0, 0]", .meaning = "At the start."},
+       .fallback = "[0, 0, 0]", .range = within(fastest), .meaning = "At the start."},
       {.section = "body", .name = "spin", .type = KeyType::vector, .unit = "rad/s",
        .fallback = "[0, 0, 0]",
-       .meaning = "Angular velocity about the centre of mass at the start."},
+       .range = within(fastest), .meaning = "Angular velocity about the centre of mass at the start."},
       {.section = "body", .name = "volumes", .type = KeyType::choice, .fallback = "\"automatic\"",
        .words = {"automatic", "geometry", "kernel"},
        .meaning = "Phyxel volumes: \"geometry\" takes those the body carries, \"kernel\" the rule "
@@ -231,12 +242,12 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Forces on phyxels."},
 
       {.section = "body.material", .name = "young", .unit = "Pa", .required = true,
-       .range = above(0), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
+       .range = between(1e-12, stiffest), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
       {.section = "body.material", .name = "poisson", .required = true,
        .range = strictly_between(-1, 0.5),
        .meaning = "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."},
       {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
-       .range = above(0), .meaning = "Mass density at rest: water 1000."},
+       .range = between(1e-12, stiffest), .meaning = "Mass density at rest: water 1000."},
       {.section = "body.material", .name = "law", .type = KeyType::choice,
        .fallback = "\"hooke\"", .words = {"hooke", "neo-hookean", "corotated"},
        .meaning = "\"hooke\": stress in proportion to `strain`, which gives way under strong "
@@ -247,30 +258,30 @@ std::vector<SceneKey> body_keys() {
        .meaning = "\"green\" is right under any rotation; \"cauchy\" is cheaper, and only right "
            "for small rotations."},
       {.section = "body.material", .name = "volume_stiffness", .unit = "Pa", .fallback = "0",
-       .range = at_least(0),
+       .range = between(0, stiffest),
        .meaning = "Extra resistance to a change of volume (Müller et al. 2004); 0: none."},
       {.section = "body.material", .name = "damping", .unit = "1/s", .fallback = "0",
-       .range = at_least(0),
+       .range = between(0, 1e12),
        .meaning = "Slows every velocity v by damping * v each second; 0: none."},
-      {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = at_least(0),
+      {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = between(0, 1e6),
        .meaning = "Strength of hourglass control, as a share of young: energy of what does not "
            "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
            "see; 0: none. Needs one support for the body. With inclusions, a share of the smallest "
            "`young`."},
 
       {.section = "body.inclusion", .name = "young", .unit = "Pa", .otherwise = "the body's",
-       .range = above(0), .meaning = "Young's modulus E."},
+       .range = between(1e-12, stiffest), .meaning = "Young's modulus E."},
       {.section = "body.inclusion", .name = "poisson", .otherwise = "the body's",
        .range = strictly_between(-1, 0.5), .meaning = "Poisson's ratio."},
       {.section = "body.inclusion", .name = "density", .unit = "kg/m^3", .otherwise = "the body's",
-       .range = above(0), .meaning = "Mass density at rest."},
+       .range = between(1e-12, stiffest), .meaning = "Mass density at rest."},
       {.section = "body.inclusion", .name = "law", .type = KeyType::choice,
        .otherwise = "the body's", .words = {"hooke", "neo-hookean", "corotated"},
        .meaning = "As in `[body.material]`."},
       {.section = "body.inclusion", .name = "volume_stiffness", .unit = "Pa",
-       .otherwise = "the body's", .range = at_least(0), .meaning = "As in `[body.material]`."},
+       .otherwise = "the body's", .range = between(0, stiffest), .meaning = "As in `[body.material]`."},
       {.section = "body.inclusion", .name = "damping", .unit = "1/s", .otherwise = "the body's",
-       .range = at_least(0), .meaning = "As in `[body.material]`."},
+       .range = between(0, 1e12), .meaning = "As in `[body.material]`."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
        .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},
@@ -283,7 +294,7 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Support radius over that mean distance. 1.8 gives about 32 neighbours; not "
            "with `radius`."},
       {.section = "body.neighbours", .name = "radius", .unit = "m",
-       .otherwise = "from `factor` and `nearest`", .range = above(0),
+       .otherwise = "from `factor` and `nearest`", .range = length(),
        .meaning = "The support radius itself."},
       {.section = "body.neighbours", .name = "max_neighbours", .type = KeyType::integer,
        .otherwise = "no limit", .range = between(1, 1000000),
@@ -292,7 +303,7 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.array", .name = "count", .type = KeyType::counts, .required = true,
        .range = between(1, 10000), .meaning = "Copies along x, y and z."},
       {.section = "body.array", .name = "spacing", .type = KeyType::vector, .unit = "m",
-       .required = true, .meaning = "Distance from copy to copy along x, y and z; not 0 where "
+       .required = true, .range = within(longest), .meaning = "Distance from copy to copy along x, y and z; not 0 where "
            "there is more than one."},
   };
 }
@@ -305,30 +316,30 @@ std::vector<SceneKey> boundary_keys() {
        .meaning = "Along which axes they are held; along the others they are free, as on rollers."},
 
       {.section = "body.motion", .name = "displacement", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .meaning = "Reached after `duration`, then kept."},
+       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Reached after `duration`, then kept."},
       {.section = "body.motion", .name = "rotation", .type = KeyType::vector, .unit = "degrees",
        .fallback = "[0, 0, 0]",
-       .meaning = "Axis times angle, reached after `duration`, then kept: [1080, 0, 0] is three "
+       .range = within(largest_angle), .meaning = "Axis times angle, reached after `duration`, then kept: [1080, 0, 0] is three "
            "turns about x."},
       {.section = "body.motion", .name = "about", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .meaning = "A point of the axis of `rotation`."},
+       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "A point of the axis of `rotation`."},
       {.section = "body.motion", .name = "duration", .unit = "s", .otherwise = "none",
-       .range = above(0), .meaning = "Time to reach `displacement` and `rotation`."},
+       .range = time_span(), .meaning = "Time to reach `displacement` and `rotation`."},
       {.section = "body.motion", .name = "velocity", .type = KeyType::vector, .unit = "m/s",
-       .fallback = "[0, 0, 0]", .meaning = "Of a steady motion."},
+       .fallback = "[0, 0, 0]", .range = within(fastest), .meaning = "Of a steady motion."},
       {.section = "body.motion", .name = "amplitude", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .meaning = "Of an oscillation."},
+       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Of an oscillation."},
       {.section = "body.motion", .name = "frequency", .unit = "Hz", .otherwise = "none",
-       .range = above(0), .meaning = "Of the oscillation."},
+       .range = between(1e-9, 1e18), .meaning = "Of the oscillation."},
       {.section = "body.motion", .name = "axes", .type = KeyType::choice, .fallback = "\"xyz\"",
        .words = axes,
        .meaning = "Along which axes they are moved; along the others they are free."},
 
       {.section = "body.load", .name = "force", .type = KeyType::vector, .unit = "N",
-       .fallback = "[0, 0, 0]", .meaning = "Total, shared among the phyxels by mass."},
+       .fallback = "[0, 0, 0]", .range = within(largest_force), .meaning = "Total, shared among the phyxels by mass."},
       {.section = "body.load", .name = "force_density", .type = KeyType::vector, .unit = "N/m^3",
-       .fallback = "[0, 0, 0]", .meaning = "Force per volume at rest."},
-      {.section = "body.load", .name = "ramp", .unit = "s", .fallback = "0", .range = at_least(0),
+       .fallback = "[0, 0, 0]", .range = within(largest_force), .meaning = "Force per volume at rest."},
+      {.section = "body.load", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
 
       {.section = "selection", .name = "region", .type = KeyType::text, .otherwise = "none",
@@ -339,16 +350,16 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "selection", .name = "indices", .type = KeyType::indices, .otherwise = "none",
        .range = between(0, largest_index), .meaning = "Phyxels of the body, counted from 0."},
       {.section = "selection", .name = "box", .type = KeyType::box, .unit = "m",
-       .otherwise = "none", .meaning = "Lowest and highest corner."},
+       .otherwise = "none", .range = within(10 * longest), .meaning = "Lowest and highest corner."},
       {.section = "selection", .name = "ball", .type = KeyType::table, .otherwise = "none",
        .meaning = "Centre and radius."},
       {.section = "selection", .name = "all", .type = KeyType::boolean, .otherwise = "none",
        .meaning = "Only `true`: the whole body."},
 
       {.section = "selection.ball", .name = "centre", .type = KeyType::vector, .unit = "m",
-       .required = true, .meaning = "Of the ball."},
+       .required = true, .range = within(10 * longest), .meaning = "Of the ball."},
       {.section = "selection.ball", .name = "radius", .unit = "m", .required = true,
-       .range = above(0), .meaning = "Of the ball."},
+       .range = between(shortest, 10 * longest), .meaning = "Of the ball."},
   };
 }
 

@@ -1,11 +1,22 @@
 #include "phyxel/backend.hpp"
 
+#include <fmt/format.h>
+
 #include "phyxel/error.hpp"
 
 namespace phyxel {
 
 void Backend::fit_residuals(std::vector<double>&) {
   throw InputError(name() + ": no hourglass control here; allowed is hourglass = 0");
+}
+
+void check_sizes(const State& state, Index phyxels) {
+  const auto n = static_cast<std::size_t>(phyxels);
+  if (state.displacement.size() == n && state.velocity.size() == n) return;
+  throw InputError(fmt::format(
+      "a state of {} displacements and {} velocities for a model of {} phyxels: allowed "
+      "are {} of each",
+      state.displacement.size(), state.velocity.size(), n, n));
 }
 
 void Backend::set_external_forces(std::span<const Vec3d> force) {

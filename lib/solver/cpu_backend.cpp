@@ -24,6 +24,7 @@
 #include "phyxel/physics/weight.hpp"
 #include "solver/cpu_layout.hpp"
 #include "solver/cpu_surfels.hpp"
+#include "solver/first_error.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/pack.hpp"
 #include "timeline.hpp"
@@ -42,10 +43,12 @@ struct StressRecord {
   enum { pair_stress = 0, closing_stress = 9, position = 12, inverse_h_squared = 15 };
 };
 
-/// A caller's law for the phyxels of a pack, one by one.
+/// A caller's law for the phyxels of a pack, one by one. What it throws is kept until the threads
+/// have met.
 template <class P>
 struct LaneByLane {
   const CustomLaw& law;
+  FirstError& error;
 
   Mat3<P> first_piola_stress(const Mat3<P>& grad_u) const {
     constexpr int width = sizeof(P) / sizeof(grad_u(0, 0)[0]);
@@ -53,7 +56,7 @@ struct LaneByLane {
     for (int l = 0; l < width; ++l) {
       Mat3d of_lane;
       for (int e = 0; e < 9; ++e) of_lane(e / 3, e % 3) = grad_u(e / 3, e % 3)[l];
-      of_lane = law.first_piola_stress(of_lane);
+      of_lane = error.caught([&] { return law.first_piola_stress(of_lane); });
       for (int e = 0; e < 9; ++e) {
         auto& lanes = stress(e / 3, e % 3).lanes;
         lanes[l] = static_cast<std::decay_t<decltype(lanes[0])>>(of_lane(e / 3, e % 3));
@@ -110,6 +113,7 @@ class CpuBackend final : public Backend {
   Index size() const override { return model_.size(); }
 
   void upload(const State& state) override {
+    check_sizes(state, model_.size());
     for (Index i = 0; i < model_.size(); ++i)
       set_state(i, state.displacement[i], state.velocity[i]);
   }
@@ -385,8 +389,8 @@ class CpuBackend final : public Backend {
   /// Force, gravity and the Verlet step; with `More` what the scene has of loads and pulls.
   template <bool Damped, bool More, bool Closed = false>
   void advance_run(const Run& run, double dt) {
-    const double half_damping = run.material.damping * dt / 2;
-    const S keep((1 - half_damping) / (1 + half_damping)), gain(dt / (1 + half_damping)), step(dt);
+    const DampedFlow flow = damped_flow(run.material.damping, dt);
+    const S keep(flow.keep), gain(flow.gain), step(dt);
     const Vec3<S> gravity{S(model_.gravity.x), S(model_.gravity.y), S(model_.gravity.z)};
     const PackRange range = run.range;
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
@@ -473,8 +477,13 @@ class CpuBackend final : public Backend {
         m.volume_stiffness > 0 ? apply(SumOf<Law, VolumeConservation<P>>{law, volume}, run)
                                : apply(law, run);
       };
-      m.custom_law ? apply_to(LaneByLane<P>{*m.custom_law})
-                   : with_law(m.elasticity(), hooke, apply_to);
+      if (!m.custom_law) {
+        with_law(m.elasticity(), hooke, apply_to);
+        continue;
+      }
+      FirstError error;
+      apply_to(LaneByLane<P>{*m.custom_law, error});
+      error.rethrow();
     }
   }
 

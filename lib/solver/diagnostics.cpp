@@ -10,7 +10,9 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/first_error.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/totals.hpp"
 
@@ -45,9 +47,15 @@ double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
   Mat3d sigma = (1 / determinant(f)) * (piola * transpose(f));
   const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
   for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
+  double largest = 0;  // squares of shares of it neither overflow nor vanish
+  for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
+  if (!(largest > 0) || !std::isfinite(largest)) return largest;
   double squares = 0;
-  for (int e = 0; e < 9; ++e) squares += sigma(e / 3, e % 3) * sigma(e / 3, e % 3);
-  return std::sqrt(1.5 * squares);
+  for (int e = 0; e < 9; ++e) {
+    const double share = sigma(e / 3, e % 3) / largest;
+    squares += share * share;
+  }
+  return largest * std::sqrt(1.5 * squares);
 }
 
 }  // namespace
@@ -89,6 +97,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     for (const Index i : motion.phyxels) free[i] = motion.along_axes({}, free[i]);
   }
 
+  FirstError error;  // of a caller's law
 #pragma omp parallel num_threads(std::max(1, backend.threads()))
   {
     Totals own;
@@ -96,6 +105,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
       const Material& m = part.material;
       const VolumeConservation<double> volume_law{m.volume_stiffness};
       const double kappa = hourglass_stiffness(model, part);
+      const DampedFlow half = damped_flow(m.damping, now.lag);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const Vec3d u = state.displacement[i], x = model.position[i] + u;
@@ -105,17 +115,18 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         }
         Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
         if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
-        acceleration -= m.damping * state.velocity[i];
-        if (!free.empty()) acceleration = by_components(free[i], acceleration);
-        const Vec3d v = state.velocity[i] + now.lag * acceleration;
+        Vec3d change = half.gain * acceleration - (1 - half.keep) * state.velocity[i];
+        if (!free.empty()) change = by_components(free[i], change);
+        const Vec3d v = state.velocity[i] + change;
         const Vec3d p = model.mass[i] * v;
         own.kinetic_energy.add(0.5 * dot(p, v));
         own.momentum.add(p);
         own.angular_momentum.add(cross(x, p));
         own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
-        own.strain_energy.add(model.volume[i] * with_law_of(m, [&](const auto& law) {
-                                return law.energy(gradient[i]);
-                              }));
+        const auto energy = [&] {
+          return with_law_of(m, [&](const auto& law) { return law.energy(gradient[i]); });
+        };
+        own.strain_energy.add(model.volume[i] * (m.custom_law ? error.caught(energy) : energy()));
         if (m.volume_stiffness > 0) {
           own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
         }
@@ -132,6 +143,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
 #pragma omp critical
     all.add(own);
   }
+  error.rethrow();
   if (model.share) all.add_others(*model.share->others);
   Diagnostics d = all.values();
   d.step = now.step;

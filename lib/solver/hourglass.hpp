@@ -11,7 +11,7 @@ namespace phyxel {
 /// κ of the body of a part [N/m]; 0: none. The same on every rank that has phyxels of it, and for
 /// all of its parts, whose pairs share it: by the softest. @param part of the model
 inline double hourglass_stiffness(const Model& model, const Part& part) {
-  const double strength = part.material.hourglass;
+  const double strength = part.material.hourglass.value_or(0);
   if (!(strength > 0) || part.begin == part.end) return 0;
   double young = part.material.young, volume = 0, size = 0;
   for (const Part& other : model.parts_of_body(part)) {
@@ -25,7 +25,7 @@ inline double hourglass_stiffness(const Model& model, const Part& part) {
 
 inline bool has_hourglass_control(const Model& model) {
   for (const Part& part : model.parts) {
-    if (part.material.hourglass > 0) return true;
+    if (part.material.hourglass.value_or(0) > 0) return true;
   }
   return false;
 }

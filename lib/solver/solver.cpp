@@ -5,32 +5,35 @@
 
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/verlet.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/owned_vectors.hpp"
 
 namespace phyxel {
 
 State initial_state(const Model& model, const Scene& scene, double dt) {
-  // Verlet's velocity is that of half a step earlier: v(-dt/2) = v(0) - dt/2 a(0). At rest there
-  // are no internal forces.
+  // Verlet's velocity is that of half a step earlier, from which half a step under a(0) and damping
+  // leads to v(0). At rest there are no internal forces.
   const double lag = scene.solver.method == Method::verlet ? dt / 2 : 0;
   State state;
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
   if (scene.solver.method == Method::equilibrium) return state;  // what moves has yet to go there
+  std::vector<Vec3d> loaded(model.loads.empty() ? 0 : state.displacement.size());  // [N]
+  for (const Load& load : model.loads) {
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      loaded[load.phyxels[k]] += load.scale_at(0) * load.force[k];
+    }
+  }
   for (const Part& part : model.parts) {
     const BodyRequest& body = scene.bodies[static_cast<std::size_t>(part.body)];
 #pragma omp parallel for schedule(static)
     for (Index i = part.begin; i < part.end; ++i) {
-      state.velocity[i] = body.velocity + cross(body.spin, model.position[i] - part.centre);
-      state.velocity[i] -= lag * model.gravity;
-    }
-  }
-  for (const Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      const Index i = load.phyxels[k];
-      state.velocity[i] -= (lag * load.scale_at(0) / model.mass[i]) * load.force[k];
+      const Vec3d start = body.velocity + cross(body.spin, model.position[i] - part.centre);
+      const Vec3d acceleration =
+          loaded.empty() ? model.gravity : model.gravity + (1 / model.mass[i]) * loaded[i];
+      state.velocity[i] = velocity_before(start, acceleration, part.material.damping, lag);
     }
   }
   for (const Motion& motion : model.motions) {
@@ -119,7 +122,7 @@ void Solver::halve_step() {
   const double ahead = dt_ / 4;
   for (const Part& part : model.parts) {
     const double c = part.material.damping;
-    const double gain = c > 0 ? -std::expm1(-c * ahead) / c : ahead;
+    const double gain = damped_flow(c, ahead).gain;
     for (Index i = part.begin; i < part.owned_end(); ++i) {
       const Vec3d acceleration =
           (1 / model.mass[i]) * force[i] + model.gravity - c * state.velocity[i];

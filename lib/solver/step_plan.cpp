@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
@@ -58,6 +59,85 @@ void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
   plan.steps = whole(scene.time.end / plan.dt);
 }
 
+/// The longest step [s] that resolves one thing, and what that is.
+struct Resolution {
+  double step = std::numeric_limits<double>::infinity();
+  std::string what;  ///< "body.motion.frequency = 50 Hz of body "beam""
+  std::string where;
+};
+
+/// Steps that each period, duration, turn or ramp of a motion or load is taken in at the least. A
+/// leapfrog or second-order implicit step follows a sine in twenty steps to within 1%.
+constexpr double steps_per_period = 20;
+
+/// What is fastest of all motions and loads of a scene. Ramps of 0 are loads that act at once, on
+/// purpose.
+Resolution finest_resolution(const Scene& scene) {
+  Resolution finest;
+  for (const BodyRequest& body : scene.bodies) {
+    const auto add = [&](double period, const Selection& select, const std::string& what) {
+      if (!(period / steps_per_period < finest.step)) return;
+      const std::string& where = select.where.empty() ? body.where : select.where;
+      finest = {period / steps_per_period, fmt::format("{} of body \"{}\"", what, body.name),
+                where.empty() ? "" : where + ": "};
+    };
+    for (const MotionRequest& motion : body.motions) {
+      if (motion.amplitude != Vec3d{} && motion.frequency > 0) {
+        add(1 / motion.frequency, motion.select,
+            fmt::format("body.motion.frequency = {:g} Hz", motion.frequency));
+      }
+      if (!(motion.duration > 0)) continue;
+      if (motion.displacement != Vec3d{} || motion.rotation != Vec3d{}) {
+        add(motion.duration, motion.select,
+            fmt::format("body.motion.duration = {:g} s", motion.duration));
+      }
+      // Halfway it turns 1.5 times as fast as on average.
+      const double turns = 1.5 * norm(motion.rotation) / 360;
+      if (turns > 1) {
+        add(motion.duration / turns, motion.select,
+            fmt::format("body.motion.rotation, {:g} degrees in {:g} s,", norm(motion.rotation),
+                        motion.duration));
+      }
+    }
+    for (const LoadRequest& load : body.loads) {
+      if (load.ramp > 0) {
+        add(load.ramp, load.select, fmt::format("body.load.ramp = {:g} s", load.ramp));
+      }
+    }
+  }
+  return finest;
+}
+
+/// @throws InputError if the scene's own step leaves out what moves
+void check_resolves(const Scene& scene, const Resolution& finest) {
+  if (!scene.time.step || *scene.time.step <= finest.step * (1 + 1e-9)) return;
+  throw InputError(fmt::format(
+      "{}time.step = {:g} s does not resolve {}: allowed at most {:g} s there, {:g} steps to a "
+      "period, turn, duration or ramp",
+      finest.where, *scene.time.step, finest.what, finest.step, steps_per_period));
+}
+
+/// The strongest damping of all bodies [1/s].
+double strongest_damping(const Model& model) {
+  double damping = 0;
+  for (const Part& part : model.parts) damping = std::max(damping, part.material.damping);
+  return damping;
+}
+
+/// Steps under damping: distances are off by a share of (c dt)²/24, so 1% at 0.5 / c.
+constexpr double damped_share = 0.5;
+
+/// @throws InputError if the scene's own step is too long for its damping
+void check_damped(const Scene& scene, double damping) {
+  if (!scene.time.step || !(*scene.time.step * damping > 1)) return;
+  throw InputError(fmt::format(
+      "time.step = {:g} s is too long for body.material.damping = {:g} 1/s: distances would be "
+      "more "
+      "than 4% off; allowed at most {:g} s (1 / damping), or \"auto\", or --unsafe-step to try it "
+      "all the same",
+      *scene.time.step, damping, 1 / damping));
+}
+
 StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& backend,
                            bool unsafe_step) {
   StepPlan plan;
@@ -71,15 +151,30 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
         "all the same",
         *scene.time.step, largest, plan.limit.omega_max));
   }
+  const Resolution finest = finest_resolution(scene);
+  const double damping = strongest_damping(model);
+  check_resolves(scene, finest);
+  if (!unsafe_step) check_damped(scene, damping);
+  const double stable = scene.time.safety * largest;
+  const double damped = damping > 0 ? damped_share / damping : stable;
   divide_time(scene,
-              scene.time.step ? *scene.time.step : three_digits_below(scene.time.safety * largest),
+              scene.time.step ? *scene.time.step
+                              : three_digits_below(std::min({stable, damped, finest.step})),
               plan);
   const std::string limit_words = fmt::format(
       "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations",
       largest, plan.limit.omega_max, plan.limit.iterations);
-  plan.why = scene.time.step ? fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words)
-                             : fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest,
-                                           limit_words);
+  if (scene.time.step) {
+    plan.why = fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words);
+  } else if (finest.step < std::min(stable, damped)) {
+    plan.why = fmt::format("{:.6g} s, {:g} steps for {} ({})", plan.dt, steps_per_period,
+                           finest.what, limit_words);
+  } else if (damped < stable) {
+    plan.why = fmt::format("{:.6g} s, {:g} / damping of {:g} 1/s ({})", plan.dt, damped_share,
+                           damping, limit_words);
+  } else {
+    plan.why = fmt::format("{:.6g} s = {:.3g} x the {}", plan.dt, plan.dt / largest, limit_words);
+  }
   return plan;
 }
 
@@ -110,6 +205,7 @@ StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bo
         "time.step = \"auto\": implicit steps are stable at any size: needed is one [s], short "
         "against the motions to be seen");
   }
+  check_resolves(scene, finest_resolution(scene));
   divide_time(scene, *scene.time.step, plan);
   plan.why = fmt::format("{:.6g} s, implicit", plan.dt);
   return plan;

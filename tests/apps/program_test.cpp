@@ -247,6 +247,26 @@ TEST_F(Program, RefusesToResumeWhatDoesNotFit) {
   outcome = run({"run", "stiffer.toml", "--resume", checkpoint->string()});
   EXPECT_EQ(outcome.code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("another model"));
+  EXPECT_THAT(outcome.err, HasSubstr("body.material.young of body 1 (\"beam\"): 200000 then, "
+                                     "300000 now"));
+  // What no model knows: gravity, velocities, what frames have.
+  const std::string scene = text_of(folder_ / "beam.toml");
+  const std::pair<std::string, std::string> flips[] = {
+      {"gravity = [0.0, 0.0, -9.81]", "gravity = [0.0, 0.0, 9.81]"},
+      {"jitter = 0.1", "jitter = 0.1\nvelocity = [1, 0, 0]"},
+      {"frames_per_second = 50", "frames_per_second = 50\nfields = [\"displacement\"]"}};
+  const char* const names[] = {"gravity: [0, 0, -9.81] then, [0, 0, 9.81] now",
+                               "body.velocity of body 1 (\"beam\"): [0, 0, 0] then, [1, 0, 0] now",
+                               "output.fields: [\"displacement\", \"velocity\"] then, "
+                               "[\"displacement\"] now"};
+  for (int k = 0; k < 3; ++k) {
+    std::string other = scene;
+    other.replace(other.find(flips[k].first), flips[k].first.size(), flips[k].second);
+    write("other.toml", other);
+    outcome = run({"run", "other.toml", "--resume", checkpoint->string(), "--until", "0.1"});
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(names[k]));
+  }
   // Cut short, and foreign.
   fs::copy_file(*checkpoint, folder_ / "cut.h5");
   fs::resize_file(folder_ / "cut.h5", fs::file_size(*checkpoint) / 2);

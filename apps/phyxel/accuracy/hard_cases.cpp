@@ -102,7 +102,7 @@ Scene scene_of(const Cloud&, Law law = Law::hooke) {
   BodyRequest body;
   body.name = "body";
   body.where = "phyxel accuracy";
-  body.material = {.young = E, .poisson = nu, .density = rho, .law = law};
+  body.material = {.young = E, .poisson = nu, .density = rho, .law = law, .hourglass = 0};
   Scene scene;
   scene.bodies.push_back(body);
   return scene;

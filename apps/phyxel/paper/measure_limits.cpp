@@ -138,7 +138,7 @@ struct Spinning {
                          .jitter = 0.1,
                          .surface = false};
     body.spin = {0, spin, 0};
-    body.material = {.young = young, .poisson = 0.34, .density = density};
+    body.material = {.young = young, .poisson = 0.34, .density = density, .hourglass = 0};
     paper::use_paper_rules(body);
     scene.bodies.push_back(body);
     model = paper::paper_model(scene);

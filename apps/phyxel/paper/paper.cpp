@@ -62,7 +62,7 @@ Model paper_block(Index n) {
   BodyRequest body;
   body.name = fmt::format("block of {}", n);
   body.where = "phyxel paper";
-  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000};
+  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000, .hourglass = 0};
   paper::use_paper_rules(body);
   scene.bodies.push_back(body);
   return paper::paper_model(scene, cloud);

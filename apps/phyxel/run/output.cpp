@@ -82,6 +82,7 @@ void Run::write_state() {
     info.method = scene_.solver.method;
     info.scene_text = scene_.text;
     info.model_digest = shared_.digest();
+    info.parameters = scene_parameters(scene_);
     info.total_energy = good->diagnostics.total_energy();
     info.initial_energy = initial_energy_;
     info.frames_written = recorder_->frames_written();

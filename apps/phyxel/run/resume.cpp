@@ -110,11 +110,22 @@ Index Run::stretch_length() {
 }
 
 void Run::check_resumed() const {
+  // On the first rank, which has read the checkpoint; one of version 2 has no parameters.
+  if (checkpoint_reader_ && checkpoint_reader_->info().version > 2) {
+    const std::string differences =
+        parameter_differences(checkpoint_reader_->info().parameters, scene_parameters(scene_));
+    if (!differences.empty()) {
+      throw InputError(fmt::format(
+          "{}: the checkpoint belongs to another model or run: allowed are the values of the "
+          "run that wrote it\n{}",
+          options_.resume, differences));
+    }
+  }
   const bool as_many = !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().whole_size();
   if (begin_->info.model_digest != shared_.digest() || !as_many) {
     throw InputError(
-        fmt::format("{}: the checkpoint belongs to another model: bodies, materials, "
-                    "neighbourhoods, loads and "
+        fmt::format("{}: the checkpoint belongs to another model: bodies (what body.mesh, "
+                    "body.file and body.cloud hold, too), materials, neighbourhoods, loads and "
                     "fixed phyxels must be those of the run that wrote it",
                     options_.resume));
   }

@@ -79,6 +79,7 @@ class Backend {
   /// Threads of the CPU that share the work; 0: it is another device's.
   virtual int threads() const = 0;
   /// Copies a state in: shapes [n, 3], in the order of the model's phyxels.
+  /// @throws InputError for another number of phyxels
   virtual void upload(const State& state) = 0;
   /// Copies the present displacements and velocities out, in that order.
   virtual void download(State& state) const = 0;
@@ -139,6 +140,10 @@ class Backend {
   /// Bytes one step must move at the least: each array once for every pass that reads or writes it.
   virtual std::size_t step_traffic() const = 0;
 };
+
+/// Makes sure that a state has a displacement and a velocity for each phyxel; every backend asks
+/// this of what is uploaded. @throws InputError with both counts and the one that is allowed
+void check_sizes(const State& state, Index phyxels);
 
 /// The CPU backend: OpenMP over SIMD packs of phyxels. The model must outlive it.
 /// @param threads 0: OpenMP's choice.

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
@@ -14,12 +15,14 @@ namespace phyxel {
 
 /// What a checkpoint holds beside the state.
 struct CheckpointInfo {
-  int version = 0;      ///< Of the format.
+  int version = 0;      ///< Of the format; 2 has no parameters.
   std::string program;  ///< "phyxel 0.1.0 (commit)".
   Precision precision = Precision::single;
   Method method = Method::verlet;  ///< Which tells when velocities are.
   std::string scene_text;
-  std::uint64_t model_digest = 0;   ///< Of rest positions, masses and neighbour lists.
+  std::uint64_t model_digest = 0;  ///< Of rest positions, masses and neighbour lists.
+  /// Values of the scene by name (`scene_parameters`), which a resumed run must have, too.
+  std::vector<Parameter> parameters;
   double total_energy = 0;          ///< [J], for the drift of the continued run.
   double initial_energy = 0;        ///< [J], at t = 0.
   std::int64_t frames_written = 0;  ///< Frames on disk at that time.

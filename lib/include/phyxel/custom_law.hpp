@@ -10,7 +10,8 @@ namespace phyxel {
 /// A hyperelastic law that the library does not have, for `Material::custom_law`: the CPU backend
 /// asks it for each phyxel's stress in every step, in double, whatever its precision, from all of
 /// its threads at once. The step limit, energies, searches for rest and implicit steps follow from
-/// it as from any other law. GPUs refuse it.
+/// it as from any other law. GPUs refuse it. What it throws reaches whoever asked for the step, the
+/// forces or the energies; the state is then that before the step.
 class CustomLaw {
  public:
   virtual ~CustomLaw();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace phyxel {
@@ -33,8 +34,9 @@ struct Material {
       0;               ///< Volume conservation k_v [Pa] of Mueller et al. 2004; 0: no such term.
   double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
-  /// support for the body. Scene files that say nothing have 0.1, but for the paper's bodies.
-  double hourglass = 0;
+  /// support for the body. Unset: `default_hourglass`, in scene files and in code alike; the parts
+  /// of a model have it set.
+  std::optional<double> hourglass = std::nullopt;
   /// A law of the caller's own, in place of `law` and `strain`, on the CPU (phyxel/custom_law.hpp);
   /// null: none. `young` and `poisson` are then its own at small strains: speeds of waves and
   /// hourglass control follow from them.

@@ -170,8 +170,9 @@ Cloud make_cloud(const BodyRequest& request);
 std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named);
 
 /// Builds the model: clouds, neighbours, masses, volumes, moments, selections.
-/// @throws InputError naming the scene's line for selections that match nothing, and for clouds
-///   that cannot carry the physics.
+/// @throws InputError for a scene that `validate` refuses, naming the scene's line for selections
+///   that match nothing, and for clouds that cannot carry the physics: places or volumes that are
+///   not finite, volumes of nothing, phyxels farther from the origin than a scene's lengths may be.
 Model build_model(const Scene& scene);
 
 /// The same from clouds already in place, one for each body of the scene (whose source, scale,

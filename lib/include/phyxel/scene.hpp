@@ -185,6 +185,35 @@ struct Scene {
   std::vector<BodyRequest> bodies;
 };
 
+/// Strength of hourglass control of a body that says nothing of it: 0.1, which is most accurate
+/// (docs/accuracy.md); 0 for the bodies of Farias et al. 2008, which are as in the paper, and where
+/// supports vary, where there is no such control.
+double default_hourglass(const BodyRequest& body);
+
+/// Checks every value of a scene against the table of scene keys (docs/scenes.md): ranges, which
+/// are what double precision survives, finiteness, and one choice in each selection. `build_model`
+/// asks this of every scene, read from a file or made in code.
+/// @throws InputError naming the body, the key, its value and what is allowed
+void validate(const Scene& scene);
+
+/// A value of a scene by name, as text.
+struct Parameter {
+  std::string name;   ///< e.g. "body.material.young of body 2 (\"beam\")"
+  std::string value;  ///< As TOML writes it; lists of more than 16 indices as a hash.
+  bool operator==(const Parameter&) const = default;
+};
+
+/// Every value of a scene that changes what a run computes or writes, in the scene's order. Keys
+/// that a resumed run may change (`free_on_resume` of lib/scene/scene_parameters.cpp) are not among
+/// them, nor are those that are left at nothing. Bodies beyond the first 64 share one value, a
+/// hash.
+std::vector<Parameter> scene_parameters(const Scene& scene);
+
+/// What differs between the parameters of two scenes, in words: "gravity: [0, 0, -9.81] then,
+/// [0, 0, 9.81] now", a line each, the first few; empty if nothing does.
+std::string parameter_differences(const std::vector<Parameter>& then,
+                                  const std::vector<Parameter>& now);
+
 /// Reads and validates a scene file (TOML). Relative paths are resolved from its folder.
 /// @throws InputError with file, line and column for anything missing, unknown or out of range.
 Scene read_scene(const std::filesystem::path& file);

@@ -22,7 +22,8 @@ struct StepLimit {
 
 /// Largest eigenvalue of M⁻¹K at the reference state, by Lanczos iteration on the force function
 /// itself, so that every term in use counts. Fixed phyxels are taken as free, which can only lower
-/// the limit; damping does not change it. On the CPU, in double.
+/// the limit, and damping is left out, which raises it (`verlet_velocity_damped`). On the CPU, in
+/// double.
 /// @throws InputError if nothing in the model resists deformation.
 StepLimit step_limit(const Model& model, int threads = 0);
 
@@ -45,10 +46,13 @@ struct StepPlan {
 };
 
 /// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
-/// digits are kept; slightly shortened so that frames and the end fall on whole steps. A search for
+/// digits are kept; slightly shortened so that frames and the end fall on whole steps. A step that
+/// the scene leaves open is at most a twentieth of every period, duration, turn and ramp of the
+/// scene's motions and loads, and 0.5 / c under damping c, where distances are 1% off. A search for
 /// equilibrium is one step. Uses the arrays of the backend.
-/// @throws InputError for a step above the largest stable one unless `unsafe_step`, for implicit
-///   steps of no given size, and for more steps than can be counted.
+/// @throws InputError for a step above the largest stable one or above 1 / c unless `unsafe_step`,
+///   for one that leaves a motion or a ramp fewer than twenty steps, for implicit steps of no given
+///   size, and for more steps than can be counted.
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend,
                     bool unsafe_step = false);
 

@@ -100,6 +100,7 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     info.total_energy = 1.0 / 3;
     info.initial_energy = -2e-200;
     info.frames_written = 17;
+    info.parameters = {{"gravity", "[0, 0, -9.81]"}, {"body.name of body 1 (\"ü\")", "\"ü\""}};
     const fs::path file = write_checkpoint(folder_, state, info);
     const Checkpoint back = read_checkpoint(file);
     EXPECT_TRUE(back.state.displacement == state.displacement);
@@ -114,7 +115,8 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     EXPECT_EQ(back.info.total_energy, info.total_energy);
     EXPECT_EQ(back.info.initial_energy, info.initial_energy);
     EXPECT_EQ(back.info.frames_written, info.frames_written);
-    EXPECT_EQ(back.info.version, 2);
+    EXPECT_EQ(back.info.parameters, info.parameters);
+    EXPECT_EQ(back.info.version, 3);
   }
 }
 

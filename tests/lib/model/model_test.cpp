@@ -77,6 +77,20 @@ TEST(Degenerate, IsolatedCollinearCoplanarAndCoincidentAreNamed) {
   EXPECT_THAT(model.warnings[0], HasSubstr("9 with coplanar neighbours (30, 31, 32, 33, 34, ...)"));
 }
 
+/// Closer than 1e-10 of the support, a phyxel counts as on top of another.
+TEST(Degenerate, CoincidentMeansCloserThanATenBillionthOfTheSupport) {
+  for (const double apart : {0.0, 0.9e-10, 1.1e-10, 1e-8}) {
+    Cloud cloud = lattice(3, 3, 3, 1);
+    for (Vec3d& p : cloud.position) p -= Vec3d{0.5, 0.5, 0.5};  // the first one at 0, exactly
+    cloud.position.push_back({2 * apart, 0, 0});
+    cloud.volume.assign(cloud.position.size(), 1);
+    Scene scene = one_body();
+    scene.bodies[0].neighbourhood.radius = 2;
+    EXPECT_EQ(model_of(scene, cloud).degenerate.coincident.size(), apart < 1e-10 ? 2u : 0u)
+        << apart;
+  }
+}
+
 std::string message_of(const Selection& selection) {
   Scene scene = one_body();
   FixRequest fix{selection};

@@ -87,6 +87,22 @@ TEST(PseudoInverse, OfNothingIsNothing) {
   EXPECT_EQ(contract(none.matrix, none.matrix), 0);
 }
 
+/// A neighbourhood thinner than a thousandth of its width is a sheet, a thicker one is not: squares
+/// of extents stand in the moments, so that the limit is at a millionth.
+TEST(PseudoInverse, TakesAThousandthOfTheWidthForFlat) {
+  EXPECT_EQ(moment_cutoff, 1e-6);
+  for (const double thickness : {0.9e-3, 1.1e-3}) {
+    const Sym3d a{1, 0, 0, 0.5, 0, thickness * thickness};
+    const PseudoInverse<double> p = pseudo_inverse(a);
+    EXPECT_EQ(p.rank, thickness < 1e-3 ? 2 : 3);
+    // The thin direction counts in full or not at all.
+    EXPECT_NEAR(p.matrix.zz * thickness * thickness, thickness < 1e-3 ? 0 : 1, 1e-14);
+    const PseudoInverse<float> single =
+        pseudo_inverse(Sym3<float>{1, 0, 0, 0.5F, 0, static_cast<float>(thickness * thickness)});
+    EXPECT_EQ(single.rank, p.rank);
+  }
+}
+
 TEST(PseudoInverse, SatisfiesPenroseOnASheet) {
   // Neighbours in the plane z = 0: the inverse acts in the plane and ignores its normal.
   Sym3d a;

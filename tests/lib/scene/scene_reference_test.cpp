@@ -35,9 +35,9 @@ std::string digest(const Scene& s) {
     for (const Vec3d v : {b.rotation, b.translation, b.velocity, b.spin}) vector(v);
     text << static_cast<int>(b.volume_rule) << ' ' << b.closure << ' '
          << static_cast<int>(b.material.strain) << ' ' << static_cast<int>(b.material.law) << ' '
-         << b.material.volume_stiffness << ' ' << b.material.damping << ' ' << b.material.hourglass
-         << ' ' << static_cast<int>(b.neighbourhood.support) << ' ' << b.neighbourhood.nearest
-         << ' ' << b.neighbourhood.factor << '\n';
+         << b.material.volume_stiffness << ' ' << b.material.damping << ' '
+         << b.material.hourglass.value_or(-1) << ' ' << static_cast<int>(b.neighbourhood.support)
+         << ' ' << b.neighbourhood.nearest << ' ' << b.neighbourhood.factor << '\n';
     for (const MotionRequest& m : b.motions) {
       for (const Vec3d v : {m.displacement, m.velocity, m.amplitude}) vector(v);
     }

@@ -68,7 +68,8 @@ const std::vector<Malformed>& malformed() {
       {on_top("title = 3"), "1:9", "key title: 3 found; allowed: text"},
       {on_top("title = ''"), "1:9", "\"\" found"},
       {on_top("title = 'a\tb'"), "1:9", "\"a\\x09b\" found"},
-      {on_top("gravity = -9.81"), "1:11", "-9.81 found; allowed: [x, y, z] [m/s^2]"},
+      {on_top("gravity = -9.81"), "1:11",
+       "-9.81 found; allowed: [x, y, z], -1e+12 <= each <= 1e+12 [m/s^2]"},
       {on_top("gravity = [0, 0]"), "1:11", "[0, 0] found"},
       {on_top("gravity = [0, 0, 'down']"), "1:18", "\"down\" found"},
       {on_top("gravity = [0, 0, nan]"), "1:18", "nan found"},
@@ -83,7 +84,8 @@ const std::vector<Malformed>& malformed() {
       {"[time]\nend = -1.5\n" + dino, "2:7", "-1.5 found"},
       {"[time]\nend = '1'\n" + dino, "2:7", "\"1\" found"},
       {"[time]\nend = 1\nstep = 'fast'\n" + dino, "3:8", "\"fast\" found"},
-      {"[time]\nend = 1\nstep = 0\n" + dino, "3:8", "\"auto\" or a number, step > 0 [s]"},
+      {"[time]\nend = 1\nstep = 0\n" + dino, "3:8",
+       "\"auto\" or a number, 1e-18 <= step <= 1e+09 [s]"},
       {"[time]\nend = 1\nsafety = 1\n" + dino, "3:10", "0 < safety < 1"},
       {"[time]\nend = 1\nsafety = 0.5\nstep = 0.1\n" + dino, "3:10", "found together with step"},
       {"[time]\nends = 1\n" + dino, "2:1", "key time.ends: unknown (did you mean \"end\"?)"},
@@ -114,8 +116,10 @@ const std::vector<Malformed>& malformed() {
       {body_of("shape = 'beam'\nsize = [1, 1, 1]"), "3:1", "exactly one of: spacing, phyxels"},
       {body_of("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.1\nphyxels = 9"), "7:11",
        "found together with spacing"},
-      {body_of("shape = 'beam'\nsize = [1, 0, 1]\nspacing = 0.1"), "5:12", "each > 0 [m]"},
-      {body_of("shape = 'beam'\nsize = [1, 1, 1]\nspacing = -0.1"), "6:11", "spacing > 0 [m]"},
+      {body_of("shape = 'beam'\nsize = [1, 0, 1]\nspacing = 0.1"), "5:12",
+       "1e-12 <= each <= 1e+12 [m]"},
+      {body_of("shape = 'beam'\nsize = [1, 1, 1]\nspacing = -0.1"), "6:11",
+       "1e-12 <= spacing <= 1e+12 [m]"},
       {body_of("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 0"), "6:11", "0 found"},
       {body_of("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 3000000000"), "6:11", "2147483647"},
       {body_of("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.1\njitter = 0.6"), "7:10", "0.5"},
@@ -131,9 +135,10 @@ const std::vector<Malformed>& malformed() {
       {body_of("mesh = 'a\\u0000b'\nphyxels = 5"), "4:8", "there is no such file"},
       {body_of("mesh = \"a\\u0000b\"\nphyxels = 5"), "4:8", "\"a\\x00b\" found; allowed: a path"},
       // [[body]]: the rest
-      {body_of("shape = 'dino'\nscale = 0"), "5:9", "scale > 0"},
+      {body_of("shape = 'dino'\nscale = 0"), "5:9", "1e-12 <= scale <= 1e+12"},
       {body_of("shape = 'dino'\nvolumes = 'mass'"), "5:11", "\"automatic\", \"geometry\""},
-      {body_of("shape = 'dino'\nspin = 3"), "5:8", "3 found; allowed: [x, y, z] [rad/s]"},
+      {body_of("shape = 'dino'\nspin = 3"), "5:8",
+       "3 found; allowed: [x, y, z], -1e+09 <= each <= 1e+09 [rad/s]"},
       {time_section + dino + dino, "9:1", "\"dino\" found, the name of the body at scene.toml:3:1"},
       {time_section + dino + "[body.array]\ncount = [2, 1, 1]\nspacing = [1, 0, 0]\n" +
            "[[body]]\nname = 'dino 2'\nshape = 'dino'\n" + material,
@@ -142,12 +147,14 @@ const std::vector<Malformed>& malformed() {
       // [body.material]
       {of_material("poisson = 0.3\ndensity = 1\n"), "5:1", "key body.material.young: missing"},
       {of_material("young = 0\npoisson = 0.3\ndensity = 1\n"), "6:9",
-       "0 found; allowed: a number, young > 0 [Pa]"},
+       "0 found; allowed: a number, 1e-12 <= young <= 1e+18 [Pa]"},
       {of_material("young = 1\npoisson = 0.5\ndensity = 1\n"), "7:11", "-1 < poisson < 0.5"},
       {of_material("young = 1\npoisson = -1\ndensity = 1\n"), "7:11", "-1 < poisson < 0.5"},
-      {of_material("young = 1\npoisson = 0\ndensity = -1\n"), "8:11", "density > 0 [kg/m^3]"},
+      {of_material("young = 1\npoisson = 0\ndensity = -1\n"), "8:11",
+       "1e-12 <= density <= 1e+18 [kg/m^3]"},
       {of_material("young = 1\npoisson = 0\ndensity = 1\nstrain = 'gren'\n"), "9:10", "\"green\"?"},
-      {of_material("young = 1\npoisson = 0\ndensity = 1\ndamping = -1\n"), "9:11", "damping >= 0"},
+      {of_material("young = 1\npoisson = 0\ndensity = 1\ndamping = -1\n"), "9:11",
+       "0 <= damping <= 1e+12"},
       // [body.neighbours], [body.array]
       {in_section("body.neighbours", "factor = 0.5"), "10:10", "1 <= factor <= 20"},
       {in_section("body.neighbours", "max_neighbours = 0"), "10:18", "0 found"},
@@ -184,12 +191,12 @@ const std::vector<Malformed>& malformed() {
       {after_beam("[[body.motion]]\nall = true\nvelocity = [1, 0, 0]\nfrequency = 3\n"), "15:13",
        "found without amplitude"},
       {after_beam("[[body.motion]]\nall = true\ndisplacement = [1, 0, 0]\nduration = 0\n"), "15:12",
-       "duration > 0 [s]"},
+       "1e-18 <= duration <= 1e+09 [s]"},
       {after_beam("[[body.load]]\nall = true\n"), "12:1", "exactly one of: force, force_density"},
       {after_beam("[[body.load]]\nall = true\nforce = [0, 0, 1]\nforce_density = [0, 0, 1]\n"),
        "15:17", "found together with force"},
       {after_beam("[[body.load]]\nall = true\nforce = [0, 0, 1]\nramp = -1\n"), "15:8",
-       "ramp >= 0"},
+       "0 <= ramp <= 1e+09"},
   };
   return table;
 }
@@ -239,8 +246,9 @@ TEST(SceneRefusal, EveryRangeRefusesWhatLiesJustOutside) {
     const bool whole = list || key.type == KeyType::integer || key.type == KeyType::counts;
     for (const double bound : {key.range.low, key.range.high}) {
       if (!std::isfinite(bound)) continue;
-      const double out = key.range.open ? bound : bound + (bound == key.range.low ? -1 : 1);
-      std::string text = fmt::format("{:.{}f}", out, whole ? 0 : 2);
+      const double away = std::max(1.0, std::abs(bound) / 2);  // more than rounding
+      const double out = key.range.open ? bound : bound + (bound == key.range.low ? -away : away);
+      std::string text = whole ? fmt::format("{:.0f}", out) : fmt::format("{:.6e}", out);
       if (vector || key.type == KeyType::counts) text = "[1, 1, " + text + "]";
       if (list) text = "[" + text + "]";
       const std::string message = message_of(scene_with(key, text));

@@ -263,6 +263,60 @@ TEST(Scene, ArrayMakesNamedAndMovedCopies) {
   }
 }
 
+TEST(Scene, ArrayMovesAxesOfMotionsAndInclusionsAlong) {
+  const Scene scene = parse_scene(
+      time_section + beam + material +
+          "[body.array]\ncount = [1, 3, 1]\nspacing = [0, 4, 0]\n"
+          "[[body.inclusion]]\nbox = [[0, -1, -1], [0.35, 1, 1]]\nyoung = 2e5\n"
+          "[[body.inclusion]]\nball = {centre = [1, 0, 0], radius = 0.23}\ndensity = 2000\n"
+          "[[body.motion]]\nbox = [[0.85, -1, -1], [1, 1, 1]]\nrotation = [90, 0, 0]\n"
+          "about = [0, 0.25, 0.5]\nduration = 1\n",
+      "scene.toml");
+  ASSERT_EQ(scene.bodies.size(), 3u);
+  for (std::size_t b = 0; b < 3; ++b) {
+    const BodyRequest& body = scene.bodies[b];
+    const Vec3d by{0, 4.0 * static_cast<double>(b), 0};
+    expect_vector(body.motions.at(0).about, Vec3d{0, 0.25, 0.5} + by);
+    expect_vector(body.motions.at(0).select.box->low, Vec3d{0.85, -1, -1} + by);
+    expect_vector(body.inclusions.at(0).select.box->low, Vec3d{0, -1, -1} + by);
+    expect_vector(body.inclusions.at(0).select.box->high, Vec3d{0.35, 1, 1} + by);
+    expect_vector(body.inclusions.at(1).select.ball->centre, Vec3d{1, 0, 0} + by);
+  }
+  // And so the same phyxels of each copy are of the same material, and turn about the same line.
+  const Model model = build_model(scene);
+  ASSERT_EQ(model.parts.size(), 9u);
+  for (std::size_t p = 3; p < 9; ++p) {
+    EXPECT_EQ(model.parts[p].size, model.parts[p - 3].size);
+    EXPECT_NEAR(model.parts[p].mass, model.parts[p - 3].mass, 1e-9);
+  }
+  for (std::size_t m = 1; m < 3; ++m) {
+    const Motion &first = model.motions[0], &copy = model.motions[m];
+    ASSERT_EQ(copy.phyxels.size(), first.phyxels.size());
+    for (std::size_t k = 0; k < copy.phyxels.size(); ++k) {
+      const Vec3d one = first.path_at(1).at(model.position[first.phyxels[k]]);
+      const Vec3d other = copy.path_at(1).at(model.position[copy.phyxels[k]]);
+      EXPECT_NEAR(norm(one - other), 0, 1e-12);  // rounding of places 8 m off
+    }
+  }
+}
+
+TEST(Scene, InclusionsSayAllThatTheyDifferIn) {
+  const Scene scene = parse_scene(
+      time_section + beam + material + "damping = 2\nvolume_stiffness = 100\n" +
+          "[[body.inclusion]]\nregion = 'x-'\n"
+          "[[body.inclusion]]\nregion = 'x+'\nyoung = 3e5\npoisson = 0.1\ndensity = 500\n"
+          "law = 'corotated'\nvolume_stiffness = 200\ndamping = 7\n",
+      "scene.toml");
+  EXPECT_TRUE(scene.bodies[0].inclusions.at(0).material == scene.bodies[0].material);
+  const Material& m = scene.bodies[0].inclusions.at(1).material;
+  EXPECT_EQ(m.young, 3e5);
+  EXPECT_EQ(m.poisson, 0.1);
+  EXPECT_EQ(m.density, 500);
+  EXPECT_EQ(m.law, Law::corotated);
+  EXPECT_EQ(m.volume_stiffness, 200);
+  EXPECT_EQ(m.damping, 7);
+}
+
 TEST_F(SceneFiles, PathsStartAtTheSceneFile) {
   const fs::path mesh = write("meshes/a.obj"), body = write("deep/b.h5");
   const fs::path file = write(

@@ -179,6 +179,73 @@ TEST(CustomLaw, ThatCannotBeSteppedIsRefused) {
   EXPECT_THAT(message_of(0, NAN), HasSubstr("law \"wrong\": its stress (0, 0) at rest is nan"));
 }
 
+/// Fails once it is stretched by more than it knows, on whichever thread.
+class Limited final : public CustomLaw {
+ public:
+  std::string name() const override { return "limited"; }
+  double energy(const Mat3d& grad_u) const override {
+    check(grad_u);
+    return Repeated(rubber()).energy(grad_u);
+  }
+  Mat3d first_piola_stress(const Mat3d& grad_u) const override {
+    check(grad_u);
+    return Repeated(rubber()).first_piola_stress(grad_u);
+  }
+
+ private:
+  static void check(const Mat3d& grad_u) {
+    if (grad_u(0, 0) > 0.2) throw std::range_error("stretched too far");
+  }
+};
+
+TEST(CustomLaw, WhatItThrowsReachesTheCallerAndTheStateStays) {
+  const Model model = irregular_model(with_law(std::make_shared<Limited>()));
+  std::vector<Vec3d> stretched;
+  for (const Vec3d& x : model.position) stretched.push_back({0.3 * x.x, 0, 0});
+  for (const Precision precision : all_precisions) {
+    const auto backend = make_cpu_backend(model, precision, 2);
+    Solver solver(*backend, state_of(stretched, 1e-4));
+    EXPECT_THROW(solver.step(), std::range_error);
+    EXPECT_EQ(solver.steps(), 0);
+    EXPECT_NEAR(solver.state().displacement[1].x, stretched[1].x, 1e-7);
+    std::vector<Vec3d> force;
+    EXPECT_THROW(backend->internal_forces(force), std::range_error);
+    std::vector<double> von_mises;
+    EXPECT_THROW(stress_fields(model, *backend, &von_mises, nullptr), std::range_error);
+    // And it goes on from a state that the law knows.
+    backend->upload(state_of(std::vector<Vec3d>(stretched.size()), 1e-4));
+    EXPECT_NO_THROW(backend->stress());
+    EXPECT_NO_THROW(diagnose(model, *backend, solver.now()));
+  }
+}
+
+/// Energies alone may fail, too.
+TEST(CustomLaw, WhatItsEnergyThrowsReachesTheCaller) {
+  class NoEnergy final : public CustomLaw {
+   public:
+    explicit NoEnergy(const bool& fails) : fails_(fails) {}
+    std::string name() const override { return "no energy"; }
+    double energy(const Mat3d& grad_u) const override {
+      if (fails_) throw std::domain_error("no energy");
+      return Repeated(rubber()).energy(grad_u);
+    }
+    Mat3d first_piola_stress(const Mat3d& grad_u) const override {
+      return Repeated(rubber()).first_piola_stress(grad_u);
+    }
+
+   private:
+    const bool& fails_;
+  };
+  bool fails = false;
+  const Model model = irregular_model(with_law(std::make_shared<NoEnergy>(fails)));
+  const auto backend = make_cpu_backend(model, Precision::double_, 2);
+  backend->upload(state_of(std::vector<Vec3d>(model.position.size())));
+  fails = true;
+  EXPECT_THROW(diagnose(model, *backend, 0, 1e-3), std::domain_error);
+  fails = false;
+  EXPECT_NO_THROW(diagnose(model, *backend, 0, 1e-3));
+}
+
 TEST(CustomLaw, IsOfTheModelsDigest) {
   const auto digest_of = [](double factor) {
     return model_digest(irregular_model(with_law(std::make_shared<Repeated>(rubber(), factor))));

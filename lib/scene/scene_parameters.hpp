@@ -1,0 +1,188 @@
+/// Every value of a scene by its key: the one list behind checks of scenes made in code and behind
+/// what checkpoints compare.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "phyxel/custom_law.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel {
+
+/// Which body of a scene a value belongs to, and which entry of one of its lists.
+struct ParameterOwner {
+  const BodyRequest* body = nullptr;   ///< Null: the scene itself.
+  std::size_t number = 0;              ///< Of the body, counted from 1.
+  const char* list = "";               ///< "motion", "load", ...; "": the body itself.
+  std::size_t entry = 0;               ///< In that list, counted from 1.
+  const std::string* where = nullptr;  ///< The place in the scene file, for messages.
+};
+
+/// The word of a choice: its index in the key's list of words.
+struct Word {
+  std::size_t index;
+};
+template <class Enum>
+Word word(Enum value) {
+  return {static_cast<std::size_t>(value)};
+}
+
+/// Why a resumed run may have another value for a key, or null if it may not.
+const char* free_on_resume(std::string_view section, std::string_view key);
+
+/// "x", "xz", "xyz": axes as scenes write them.
+std::string axes_in_words(const Axes& axes);
+
+namespace detail {
+
+/// `visit(section, key, value)` for the keys of a selection that are set.
+template <class Visit>
+void visit_selection(const Selection& select, Visit&& visit) {
+  if (select.region) visit("selection", "region", *select.region);
+  if (select.indices) visit("selection", "indices", *select.indices);
+  if (select.box) {
+    visit("selection", "box", select.box->low);
+    visit("selection", "box", select.box->high);
+  }
+  if (select.ball) {
+    visit("selection.ball", "centre", select.ball->centre);
+    visit("selection.ball", "radius", select.ball->radius);
+  }
+  if (select.all) visit("selection", "all", true);
+}
+
+template <class Visit>
+void visit_source(const BodySource& source, Visit&& visit) {
+  const ShapeRequest& shape = source.shape;
+  const auto if_set = [&](const char* key, const auto& value) {
+    if (value != std::decay_t<decltype(value)>{}) visit("body", key, value);
+  };
+  if_set("shape", shape.name);
+  if_set("mesh", source.mesh.string());
+  if_set("file", source.file.string());
+  if_set("cloud", source.cloud);
+  if_set("phyxels", source.phyxels);
+  if_set("spacing", shape.spacing);
+  if_set("size", shape.size);
+  if_set("radius", shape.radius);
+  if_set("length", shape.length);
+  visit("body", "lattice", word(shape.placement));
+  visit("body", "jitter", shape.jitter);
+  visit("body", "seed", source.seed);
+  visit("body", "relaxations", source.relaxations);
+  if (source.on_surface) visit("body", "on_surface", *source.on_surface);
+  visit("body", "surfels", shape.surface);
+}
+
+template <class Visit>
+void visit_material(const char* section, const Material& m, Visit&& visit) {
+  visit(section, "young", m.young);
+  visit(section, "poisson", m.poisson);
+  visit(section, "density", m.density);
+  visit(section, "law", word(m.law));
+  visit("body.material", "strain", word(m.strain));
+  visit(section, "volume_stiffness", m.volume_stiffness);
+  visit(section, "damping", m.damping);
+}
+
+template <class Visit>
+void visit_motion(const MotionRequest& motion, Visit&& visit) {
+  visit("body.motion", "displacement", motion.displacement);
+  visit("body.motion", "rotation", motion.rotation);
+  visit("body.motion", "about", motion.about);
+  if (motion.duration != 0) visit("body.motion", "duration", motion.duration);
+  visit("body.motion", "velocity", motion.velocity);
+  visit("body.motion", "amplitude", motion.amplitude);
+  if (motion.frequency != 0) visit("body.motion", "frequency", motion.frequency);
+  visit("body.motion", "axes", axes_in_words(motion.axes));
+}
+
+template <class Visit>
+void visit_body(const BodyRequest& body, Visit&& visit) {
+  visit("body", "name", body.name);
+  visit_source(body.source, visit);
+  visit("body", "scale", body.scale);
+  visit("body", "rotation", body.rotation);
+  visit("body", "translation", body.translation);
+  visit("body", "velocity", body.velocity);
+  visit("body", "spin", body.spin);
+  visit("body", "volumes", word(body.volume_rule));
+  visit("body", "closure", body.closure);
+  visit_material("body.material", body.material, visit);
+  visit("body.material", "hourglass", body.material.hourglass.value_or(default_hourglass(body)));
+  const NeighbourhoodRule& rule = body.neighbourhood;
+  visit("body.neighbours", "support", word(rule.support));
+  visit("body.neighbours", "nearest", rule.nearest);
+  visit("body.neighbours", "factor", rule.factor);
+  if (rule.radius) visit("body.neighbours", "radius", *rule.radius);
+  if (rule.max_neighbours) visit("body.neighbours", "max_neighbours", *rule.max_neighbours);
+}
+
+/// `visit(entry, list, select, values)` for each entry of a body's lists, where `values(visit)`
+/// visits what the entry has beside its selection.
+template <class Visit>
+void visit_lists(const BodyRequest& body, Visit&& visit) {
+  const auto each = [&](const auto& list, const char* name, auto&& values) {
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      visit(k + 1, name, list[k].select, [&](auto&& inner) { values(list[k], inner); });
+    }
+  };
+  each(body.inclusions, "inclusion", [](const InclusionRequest& inclusion, auto&& inner) {
+    visit_material("body.inclusion", inclusion.material, inner);
+  });
+  each(body.fixed, "fixed", [](const FixRequest& fix, auto&& inner) {
+    inner("body.fixed", "axes", axes_in_words(fix.axes));
+  });
+  each(body.motions, "motion",
+       [](const MotionRequest& motion, auto&& inner) { visit_motion(motion, inner); });
+  each(body.loads, "load", [](const LoadRequest& load, auto&& inner) {
+    inner("body.load", "force", load.force);
+    inner("body.load", "force_density", load.force_density);
+    inner("body.load", "ramp", load.ramp);
+  });
+}
+
+template <class Visit>
+void visit_run(const Scene& scene, Visit&& visit) {
+  visit("", "gravity", scene.gravity);
+  if (scene.time.end != 0) visit("time", "end", scene.time.end);
+  if (scene.time.step) visit("time", "step", *scene.time.step);
+  visit("time", "safety", scene.time.safety);
+  visit("solver", "method", word(scene.solver.method));
+  visit("solver", "precision", word(scene.solver.precision));
+  visit("solver", "threads", scene.solver.threads);
+  visit("output", "frames_per_second", scene.output.frames_per_second);
+  visit("output", "phyxels", scene.output.phyxels);
+  visit("output", "surface", scene.output.surface);
+  visit("output", "fields", scene.output.fields);
+  visit("output", "checkpoint_every", scene.output.checkpoint_every);
+}
+
+}  // namespace detail
+
+/// Calls `visit(owner, section, key, value)` for every value of a scene that is set. Values are
+/// numbers, `Vec3d`, text, lists or a `Word`.
+template <class Visit>
+void for_each_parameter(const Scene& scene, Visit&& visit) {
+  const auto of = [&](ParameterOwner owner) {
+    return [&visit, owner](const char* section, const char* key, const auto& value) {
+      visit(owner, section, key, value);
+    };
+  };
+  detail::visit_run(scene, of({}));
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyRequest& body = scene.bodies[b];
+    detail::visit_body(body, of({&body, b + 1, "", 0, &body.where}));
+    detail::visit_lists(
+        body, [&](std::size_t entry, const char* list, const Selection& select, auto&& values) {
+          const auto inner = of({&body, b + 1, list, entry, &select.where});
+          detail::visit_selection(select, inner);
+          values(inner);
+        });
+  }
+}
+
+}  // namespace phyxel

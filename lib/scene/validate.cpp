@@ -1,0 +1,76 @@
+/// One check of scenes, read from files or made in code, against the table of keys.
+#include <fmt/format.h>
+
+#include <map>
+#include <string>
+#include <type_traits>
+
+#include "phyxel/error.hpp"
+#include "scene/scene_parameters.hpp"
+#include "scene/scene_schema.hpp"
+
+namespace phyxel {
+namespace {
+
+const SceneKey& key_of(std::string_view section, std::string_view name) {
+  using Table = std::map<std::pair<std::string_view, std::string_view>, const SceneKey*>;
+  static const Table table = [] {
+    Table all;
+    for (const SceneKey& key : scene_keys()) all[{key.section, key.name}] = &key;
+    return all;
+  }();
+  return *table.at({section, name});
+}
+
+/// "scene.toml:7:1: key body.material.young of body "beam""
+std::string place_of(const ParameterOwner& owner, const SceneKey& key) {
+  const std::string path = key.section.empty() ? key.name : key.section + "." + key.name;
+  const std::string where =
+      owner.where && !owner.where->empty() ? *owner.where + ": " : std::string();
+  return owner.body ? fmt::format("{}key {} of body \"{}\"", where, path, owner.body->name)
+                    : fmt::format("{}key {}", where, path);
+}
+
+void check_number(const ParameterOwner& owner, const SceneKey& key, double value) {
+  if (key.range.contains(value)) return;
+  throw InputError(
+      fmt::format("{}: {} found; allowed: {}", place_of(owner, key), value, allowed_words(key)));
+}
+
+void check_one_choice(const BodyRequest& body, const Selection& select) {
+  const int set = static_cast<int>(select.region.has_value()) +
+                  static_cast<int>(select.indices.has_value()) +
+                  static_cast<int>(select.box.has_value()) +
+                  static_cast<int>(select.ball.has_value()) + static_cast<int>(select.all);
+  if (set == 1) return;
+  throw InputError(fmt::format(
+      "{}: a selection of body \"{}\" has {} of region, indices, box, ball and all; allowed: "
+      "exactly one",
+      select.where.empty() ? body.where : select.where, body.name, set));
+}
+
+}  // namespace
+
+void validate(const Scene& scene) {
+  if (scene.bodies.empty()) {
+    throw InputError("the scene has no bodies; needed: at least one");
+  }
+  for_each_parameter(scene, [](const ParameterOwner& owner, const char* section, const char* name,
+                               const auto& value) {
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, Vec3d>) {
+      for (const double x : {value.x, value.y, value.z}) {
+        check_number(owner, key_of(section, name), x);
+      }
+    } else if constexpr (std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>) {
+      check_number(owner, key_of(section, name), static_cast<double>(value));
+    }
+  });
+  for (const BodyRequest& body : scene.bodies) {
+    detail::visit_lists(body, [&](std::size_t, const char*, const Selection& select, auto&&) {
+      check_one_choice(body, select);
+    });
+  }
+}
+
+}  // namespace phyxel

@@ -1,0 +1,78 @@
+/// Checkpoints that earlier versions wrote, and later ones will.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "files/hdf5_file.hpp"
+#include "files/sealed_file.hpp"
+#include "phyxel/checkpoint.hpp"
+#include "phyxel/error.hpp"
+#include "support/folder.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::HasSubstr;
+
+class CheckpointVersions : public test::Folder {
+ protected:
+  /// A checkpoint as version 2 wrote it, one phyxel; or with another number, or with parameters.
+  std::filesystem::path written(std::int64_t version, const std::string& parameters = "") const {
+    Hdf5Writer out;
+    out.group("/phyxel");
+    out.attribute("/phyxel", "version", version);
+    out.attribute("/phyxel", "program", std::string("phyxel 0"));
+    out.attribute("/phyxel", "precision", std::string("double"));
+    out.attribute("/phyxel", "method", std::string("verlet"));
+    out.attribute("/phyxel", "model_digest", std::string("00000000000000ff"));
+    out.attribute("/phyxel", "total_energy", 1.5);
+    out.attribute("/phyxel", "initial_energy", 2.5);
+    out.attribute("/phyxel", "frames_written", std::int64_t{3});
+    out.text("/phyxel/scene", "title = \"x\"");
+    out.text("/phyxel/parameters", parameters);
+    out.group("/state");
+    out.attribute("/state", "step", std::int64_t{7});
+    out.attribute("/state", "time", 0.7);
+    out.attribute("/state", "dt", 0.1);
+    const std::vector<Vec3d> values{{1, 2, 3}};
+    out.vectors("/state/displacement", values, false);
+    out.vectors("/state/velocity", values, false);
+    std::filesystem::path file = folder_ / "checkpoint_000000007.h5";
+    write_sealed(file, "checkpoint", out.content(), Durable::yes);
+    return file;
+  }
+  static std::string refusal_of(const std::filesystem::path& file) {
+    try {
+      read_checkpoint(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "read";
+  }
+};
+
+TEST_F(CheckpointVersions, TwoIsReadWithoutParameters) {
+  const Checkpoint old = read_checkpoint(written(2));
+  EXPECT_EQ(old.info.version, 2);
+  EXPECT_TRUE(old.info.parameters.empty());
+  EXPECT_EQ(old.info.model_digest, 0xffu);
+  EXPECT_EQ(old.state.step, 7);
+  EXPECT_EQ(old.state.displacement.at(0).y, 2);
+}
+
+TEST_F(CheckpointVersions, OthersAreRefusedByNumber) {
+  EXPECT_THAT(refusal_of(written(1)),
+              HasSubstr("format version 1; this program reads versions 2 to 3"));
+  EXPECT_THAT(refusal_of(written(4)), HasSubstr("format version 4"));
+}
+
+TEST_F(CheckpointVersions, ParametersAreNamesAndValues) {
+  const Checkpoint now = read_checkpoint(written(3, "a\t1\nb c\t\n"));
+  const std::vector<Parameter> expected{{"a", "1"}, {"b c", ""}};
+  EXPECT_EQ(now.info.parameters, expected);
+  for (const char* broken : {"a", "a\t1", "a\n", "a\t1\nb\n"}) {
+    EXPECT_THAT(refusal_of(written(3, broken)), HasSubstr("/phyxel/parameters")) << broken;
+  }
+}
+
+}  // namespace
+}  // namespace phyxel

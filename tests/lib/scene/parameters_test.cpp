@@ -1,0 +1,416 @@
+/// Parameters that checkpoints compare, and the one check of scenes from files and from code.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <sstream>
+
+#include "phyxel/model.hpp"
+#include "scene/scene_parameters.hpp"
+#include "scene/scene_schema.hpp"
+#include "support/clouds.hpp"
+#include "support/scene_text.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Every key of the table once: a line, which of its keys to change, and the line with another
+// value.
+const std::string every_key = R"(# title => title = 'other'
+gravity = [0, 0, -9.81] # gravity => gravity = [0, 0, 9.81]
+[time]
+end = 2 # time.end => end = 3
+# time.step => step = 1e-4
+# time.safety => safety = 0.5
+[solver]
+method = 'verlet' # solver.method => method = 'implicit'
+device = 'cpu' # solver.device => device = 'auto'
+precision = 'double' # solver.precision => precision = 'mixed'
+threads = 1 # solver.threads => threads = 2
+[output]
+directory = 'a' # output.directory => directory = 'b'
+frames_per_second = 10 # output.frames_per_second => frames_per_second = 20
+phyxels = true # output.phyxels => phyxels = false
+surface = true # output.surface => surface = false
+fields = ['displacement'] # output.fields => fields = ['displacement', 'mass']
+checkpoint_every = 10 # output.checkpoint_every => checkpoint_every = 20
+[render]
+pictures = true # render.pictures => pictures = false
+count = 2 # render.count => count = 3
+width = 100 # render.width => width = 200
+height = 100 # render.height => height = 200
+view = [1, 0, 0] # render.view => view = [0, 1, 0]
+up = [0, 0, 1] # render.up => up = [0, 0.1, 1]
+[[body]]
+name = 'first' # body.name => name = 'other'
+shape = 'block' # body.shape => shape = 'beam'
+size = [1, 1, 1] # body.size => size = [1, 1, 2]
+spacing = 0.1 # body.spacing => spacing = 0.2
+lattice = 'nodes' # body.lattice => lattice = 'cells'
+jitter = 0.1 # body.jitter => jitter = 0.2
+seed = 3 # body.seed => seed = 4
+surfels = true # body.surfels => surfels = false
+scale = 2 # body.scale => scale = 3
+rotation = [0, 0, 90] # body.rotation => rotation = [0, 90, 0]
+translation = [1, 0, 0] # body.translation => translation = [2, 0, 0]
+velocity = [1, 0, 0] # body.velocity => velocity = [1, 0, 1]
+spin = [0, 1, 0] # body.spin => spin = [0, 2, 0]
+volumes = 'geometry' # body.volumes => volumes = 'kernel'
+closure = 0.1 # body.closure => closure = 0.2
+[body.material]
+young = 1e5 # body.material.young => young = 2e5
+poisson = 0.3 # body.material.poisson => poisson = 0.2
+density = 1000 # body.material.density => density = 1001
+law = 'hooke' # body.material.law => law = 'corotated'
+volume_stiffness = 10 # body.material.volume_stiffness => volume_stiffness = 20
+damping = 1 # body.material.damping => damping = 2
+# body.material.strain => strain = 'cauchy'
+hourglass = 0.1 # body.material.hourglass => hourglass = 0.2
+[body.neighbours]
+support = 'adaptive' # body.neighbours.support => support = 'uniform'
+nearest = 10 # body.neighbours.nearest => nearest = 11
+factor = 1.8 # body.neighbours.factor => factor = 1.9
+max_neighbours = 40 # body.neighbours.max_neighbours => max_neighbours = 41
+[[body.inclusion]]
+region = 'x-' # selection.region => region = 'x+'
+young = 1e5 # body.inclusion.young => young = 2e5
+poisson = 0.3 # body.inclusion.poisson => poisson = 0.2
+density = 1000 # body.inclusion.density => density = 1001
+law = 'hooke' # body.inclusion.law => law = 'neo-hookean'
+volume_stiffness = 10 # body.inclusion.volume_stiffness => volume_stiffness = 20
+damping = 1 # body.inclusion.damping => damping = 2
+[[body.fixed]]
+indices = [1, 2] # selection.indices => indices = [1, 3]
+axes = 'x' # body.fixed.axes => axes = 'xz'
+[[body.motion]]
+box = [[0, 0, 0], [1, 1, 1]] # selection.box => box = [[0, 0, 0], [1, 1, 2]]
+displacement = [1, 0, 0] # body.motion.displacement => displacement = [2, 0, 0]
+rotation = [0, 0, 9] # body.motion.rotation => rotation = [0, 0, 8]
+about = [0, 1, 0] # body.motion.about => about = [0, 2, 0]
+duration = 1 # body.motion.duration => duration = 2
+velocity = [1, 0, 0] # body.motion.velocity => velocity = [2, 0, 0]
+amplitude = [1, 0, 0] # body.motion.amplitude => amplitude = [2, 0, 0]
+frequency = 1 # body.motion.frequency => frequency = 2
+axes = 'y' # body.motion.axes => axes = 'yz'
+[[body.load]]
+ball = {centre = [0, 0, 0], radius = 1} # selection.ball.centre => ball = {centre = [1, 0, 0], radius = 1}
+force = [1, 0, 0] # body.load.force => force = [2, 0, 0]
+ramp = 1 # body.load.ramp => ramp = 2
+[[body.load]]
+ball = {centre = [0, 0, 0], radius = 1} # selection.ball.radius => ball = {centre = [0, 0, 0], radius = 2}
+force_density = [1, 0, 0] # body.load.force_density => force_density = [2, 0, 0]
+[[body]]
+name = 'second'
+mesh = 'a.obj' # body.mesh => mesh = 'b.obj'
+phyxels = 100 # body.phyxels => phyxels = 200
+relaxations = 10 # body.relaxations => relaxations = 20
+on_surface = true # body.on_surface => on_surface = false
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[body.neighbours]
+radius = 0.3 # body.neighbours.radius => radius = 0.4
+[[body.fixed]]
+all = true # selection.all => region = 'x-'
+[body.array]
+count = [2, 1, 1] # body.array.count => count = [3, 1, 1]
+spacing = [5, 0, 0] # body.array.spacing => spacing = [6, 0, 0]
+[[body]]
+name = 'third'
+shape = 'cylinder'
+radius = 1 # body.radius => radius = 2
+length = 3 # body.length => length = 4
+spacing = 0.2
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body]]
+name = 'fourth'
+file = 'a.h5' # body.file => file = 'b.h5'
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body]]
+name = 'fifth'
+cloud = 'a' # body.cloud => cloud = 'b'
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)";
+
+/// The text with the value of one key changed, or of none.
+std::string with_other(const std::string& wanted, int* changed = nullptr) {
+  std::istringstream lines(every_key);
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t mark = line.find("# "), arrow = line.find(" => ");
+    if (mark == std::string::npos) {
+      text += line + '\n';
+      continue;
+    }
+    const bool this_one = line.substr(mark + 2, arrow - mark - 2) == wanted;
+    if (this_one && changed) ++*changed;
+    text += (this_one ? line.substr(arrow + 4) : line.substr(0, mark)) + '\n';
+  }
+  return text;
+}
+
+class Parameters : public SceneFiles {
+ protected:
+  Parameters() {
+    for (const char* file : {"a.obj", "b.obj", "a.h5", "b.h5"}) write(file);
+  }
+  std::vector<Parameter> of(const std::string& text) const {
+    return scene_parameters(parse_scene(text, folder_ / "scene.toml"));
+  }
+};
+
+/// A key that is new in the table fails here until it says what a resumed run makes of it.
+TEST_F(Parameters, EveryKeyIsComparedByNameOrFreeForAReason) {
+  // Keys that become something else.
+  const std::map<std::string, std::string> known_as = {
+      {"body.array.count", "bodies: 6 then, 7 now"},
+      {"body.array.spacing",
+       "body.translation of body 3 (\"second 2\"): [5, 0, 0] then, "
+       "[6, 0, 0] now"}};
+  const std::vector<Parameter> base = of(with_other(""));
+  EXPECT_EQ(parameter_differences(base, base), "");
+  int compared = 0, free = 0;
+  for (const SceneKey& key : scene_keys()) {
+    if (key.type == KeyType::table || key.type == KeyType::tables) continue;
+    const std::string path = key.section.empty() ? key.name : key.section + "." + key.name;
+    int changed = 0;
+    const std::string text = with_other(path, &changed);
+    ASSERT_EQ(changed, 1) << path << " is not changed by this test";
+    const std::string differences = parameter_differences(base, of(text));
+    if (const char* why = free_on_resume(key.section, key.name)) {
+      EXPECT_EQ(differences, "") << path << ", " << why;
+      ++free;
+      continue;
+    }
+    const auto known = known_as.find(path);
+    EXPECT_THAT(differences, HasSubstr(known == known_as.end() ? path : known->second));
+    EXPECT_THAT(differences, HasSubstr(" then, ")) << path;
+    ++compared;
+  }
+  EXPECT_EQ(free, 17);  // all of the table of free keys are keys
+  EXPECT_GT(compared, 60);
+}
+
+TEST_F(Parameters, OfManyBodiesAreAFewNamesAndAHash) {
+  Scene scene = parse_scene(time_section + dino, "scene.toml");
+  scene.bodies.resize(5000, scene.bodies[0]);
+  const std::vector<Parameter> base = scene_parameters(scene);
+  EXPECT_LT(base.size(), 3000u);
+  scene.bodies[4321].velocity.y = 1e-9;
+  EXPECT_THAT(parameter_differences(base, scene_parameters(scene)),
+              HasSubstr("bodies 65 to 5000: hash"));
+  scene.bodies[63].velocity.y = 1e-9;
+  EXPECT_THAT(parameter_differences(base, scene_parameters(scene)),
+              HasSubstr("body.velocity of body 64"));
+}
+
+TEST_F(Parameters, NamesOfBodiesCannotBreakLines) {
+  Scene scene = testing::one_body();
+  scene.bodies[0].name = "a\tb\n\"c\"";
+  for (const Parameter& p : scene_parameters(scene)) {
+    EXPECT_EQ((p.name + p.value).find_first_of("\t\n"), std::string::npos) << p.name;
+  }
+}
+
+/// Each of these alone makes another model, whose checkpoints fit no other.
+TEST(ModelDigest, TellsModelsApartByEveryValueTheyHave) {
+  const auto digest_with = [](auto&& change) {
+    Scene scene = testing::one_body();
+    BodyRequest& body = scene.bodies[0];
+    body.motions.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}}},
+                            .displacement = {1, 0, 0},
+                            .rotation = {0, 0, 9},
+                            .about = {0, 1, 0},
+                            .duration = 1,
+                            .velocity = {1, 0, 0},
+                            .amplitude = {1, 0, 0},
+                            .frequency = 1});
+    body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}, .ramp = 1});
+    change(body);
+    return model_digest(testing::model_of(scene, testing::lattice(3, 3, 3, 0.1)));
+  };
+  using Body = BodyRequest;
+  const std::map<std::string, std::uint64_t> digests = {
+      {"nothing", digest_with([](Body&) {})},
+      {"young", digest_with([](Body& b) { b.material.young *= 2; })},
+      {"poisson", digest_with([](Body& b) { b.material.poisson = 0.2; })},
+      {"density", digest_with([](Body& b) { b.material.density *= 2; })},
+      {"strain", digest_with([](Body& b) { b.material.strain = Strain::cauchy; })},
+      {"neo-hookean", digest_with([](Body& b) { b.material.law = Law::neo_hooke; })},
+      {"corotated", digest_with([](Body& b) { b.material.law = Law::corotated; })},
+      {"volume", digest_with([](Body& b) { b.material.volume_stiffness = 1; })},
+      {"damping", digest_with([](Body& b) { b.material.damping = 1; })},
+      {"hourglass", digest_with([](Body& b) { b.material.hourglass = 0.3; })},
+      {"factor", digest_with([](Body& b) { b.neighbourhood.factor = 1.9; })},
+      {"nearest", digest_with([](Body& b) { b.neighbourhood.nearest = 11; })},
+      {"radius", digest_with([](Body& b) { b.neighbourhood.radius = 0.2; })},
+      {"most", digest_with([](Body& b) { b.neighbourhood.max_neighbours = 20; })},
+      {"displacement", digest_with([](Body& b) { b.motions[0].displacement.y = 1; })},
+      {"rotation", digest_with([](Body& b) { b.motions[0].rotation.y = 1; })},
+      {"about", digest_with([](Body& b) { b.motions[0].about.z = 1; })},
+      {"duration", digest_with([](Body& b) { b.motions[0].duration = 2; })},
+      {"velocity", digest_with([](Body& b) { b.motions[0].velocity.z = 1; })},
+      {"amplitude", digest_with([](Body& b) { b.motions[0].amplitude.y = 1; })},
+      {"frequency", digest_with([](Body& b) { b.motions[0].frequency = 2; })},
+      {"axes x", digest_with([](Body& b) { b.motions[0].axes.x = false; })},
+      {"axes y", digest_with([](Body& b) { b.motions[0].axes.y = false; })},
+      {"axes z", digest_with([](Body& b) { b.motions[0].axes.z = false; })},
+      {"moved", digest_with([](Body& b) { b.motions[0].select = {.all = true}; })},
+      {"force", digest_with([](Body& b) { b.loads[0].force.z = 1; })},
+      {"density of force", digest_with([](Body& b) { b.loads[0].force_density.x = 1; })},
+      {"ramp", digest_with([](Body& b) { b.loads[0].ramp = 2; })},
+      {"loaded", digest_with([](Body& b) {
+         b.loads[0].select = {.indices = std::vector<Index>{1, 2}};
+       })}};
+  std::map<std::uint64_t, std::string> names;
+  for (const auto& [name, digest] : digests) {
+    const auto [other, is_new] = names.emplace(digest, name);
+    EXPECT_TRUE(is_new) << name << " and " << other->second << " have one digest";
+  }
+}
+
+std::string refusal_of(const Scene& scene) {
+  const Cloud cloud = testing::lattice(3, 3, 3, 0.1);
+  try {
+    build_model(scene, std::vector<Cloud>(scene.bodies.size(), cloud));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Validate, RefusesInCodeWhatScenesRefuse) {
+  const auto with = [](auto&& change) {
+    Scene scene = testing::one_body();
+    change(scene.bodies[0]);
+    return refusal_of(scene);
+  };
+  EXPECT_EQ(with([](BodyRequest&) {}), "accepted");
+  EXPECT_EQ(with([](BodyRequest& b) { b.material.young = 0; }),
+            "test.toml:1:1: key body.material.young of body \"body\": 0 found; allowed: a number, "
+            "1e-12 <= young <= 1e+18 [Pa]");
+  const double nan = std::nan(""), infinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {nan, infinity, -infinity, 1e300}) {
+    EXPECT_THAT(with([&](BodyRequest& b) { b.material.young = bad; }), HasSubstr("body.material."));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.material.density = bad; }), HasSubstr("density"));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.material.damping = bad; }), HasSubstr("damping"));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.material.hourglass = bad; }), HasSubstr("hourglass"));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.velocity.z = bad; }), HasSubstr("body.velocity"));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.spin.x = bad; }), HasSubstr("body.spin"));
+    EXPECT_THAT(with([&](BodyRequest& b) { b.rotation.x = bad; }), HasSubstr("body.rotation"));
+    EXPECT_THAT(with([&](BodyRequest& b) {
+                  b.motions.push_back({.select = {.all = true}, .velocity = {bad, 0, 0}});
+                }),
+                HasSubstr("body.motion.velocity"));
+    EXPECT_THAT(with([&](BodyRequest& b) {
+                  b.loads.push_back({.select = {.all = true}, .force = {bad, 0, 0}});
+                }),
+                HasSubstr("body.load.force"));
+    Scene falls = testing::one_body();
+    falls.gravity.y = bad;
+    EXPECT_THAT(refusal_of(falls), HasSubstr("key gravity: "));
+  }
+  for (const double bad : {0.5, -1.0, 0.7, nan}) {
+    EXPECT_THAT(with([&](BodyRequest& b) { b.material.poisson = bad; }),
+                HasSubstr("-1 < poisson < 0.5"));
+  }
+  EXPECT_THAT(
+      with([](BodyRequest& b) {
+        Material soft = b.material;
+        soft.young = -1;
+        b.inclusions.push_back({.select = {.indices = std::vector<Index>{0}}, .material = soft});
+      }),
+      HasSubstr("body.inclusion.young"));
+}
+
+TEST(Validate, AsksForOneMemberOfEachSelection) {
+  Scene scene = testing::one_body();
+  scene.bodies[0].fixed.push_back({.select = {.all = true, .where = "code:3"}});
+  EXPECT_EQ(refusal_of(scene), "accepted");
+  scene.bodies[0].fixed[0].select.box = Selection::Box{{0, 0, 0}, {1, 1, 1}};
+  EXPECT_EQ(refusal_of(scene),
+            "code:3: a selection of body \"body\" has 2 of region, indices, box, ball and all; "
+            "allowed: exactly one");
+  scene.bodies[0].fixed[0].select = {};
+  EXPECT_THAT(refusal_of(scene), HasSubstr("has 0 of region"));
+  scene.bodies[0].fixed[0].select = {.indices = std::vector<Index>{27}};
+  EXPECT_THAT(refusal_of(scene), HasSubstr("phyxel 27 is not in body \"body\": allowed 0 to 26"));
+}
+
+TEST(Validate, AsksForABody) {
+  EXPECT_EQ(refusal_of(Scene{}), "the scene has no bodies; needed: at least one");
+  EXPECT_THROW(build_model(Scene{}), InputError);
+}
+
+TEST(Validate, AsksForCloudsThatCarryThePhysics) {
+  const Scene scene = testing::one_body();
+  const auto with = [&](auto&& change) -> std::string {
+    Cloud cloud = testing::lattice(3, 3, 3, 0.1);
+    change(cloud);
+    try {
+      testing::model_of(scene, cloud);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(with([](Cloud& c) { c.position[5].y = std::nan(""); }),
+              HasSubstr("phyxel 5 of body \"body\" lies at"));
+  EXPECT_THAT(with([](Cloud& c) { c.position[5].y = 1e13; }), HasSubstr("allowed: coordinates"));
+  EXPECT_THAT(with([](Cloud& c) { c.volume[7] = 0; }),
+              HasSubstr("phyxel 7 of body \"body\" has a volume of 0 m^3 (is the body flat?)"));
+  EXPECT_THAT(with([](Cloud& c) { c.volume[7] = INFINITY; }), HasSubstr("volume of inf"));
+  EXPECT_THAT(with([](Cloud& c) { c.volume.pop_back(); }), HasSubstr("26 volumes for 27"));
+  EXPECT_THAT(with([](Cloud& c) { c = {}; }), HasSubstr("has no phyxel"));
+  EXPECT_THAT(with([](Cloud& c) {  // no volume, by the kernel
+                c.volume.clear();
+                c.position.assign(20, Vec3d{1, 1, 1});
+              }),
+              HasSubstr("phyxel 0 of body \"body\" has a mass of "));
+}
+
+/// No number of a scene file may be so large that it overflows in what follows from it.
+TEST(Validate, EveryNumberOfASceneIsBounded) {
+  for (const SceneKey& key : scene_keys()) {
+    const bool number = key.type == KeyType::number || key.type == KeyType::number_or_auto ||
+                        key.type == KeyType::vector || key.type == KeyType::box;
+    if (!number) continue;
+    EXPECT_TRUE(std::isfinite(key.range.low) && std::isfinite(key.range.high))
+        << key.section << '.' << key.name;
+    EXPECT_FALSE(key.range.contains(std::nan("")));
+  }
+}
+
+TEST(Validate, CodeAndScenesHaveOneDefaultOfHourglassControl) {
+  const Cloud cloud = testing::lattice(3, 3, 3, 0.1);
+  const auto strength = [&](auto&& change) {
+    Scene scene = testing::one_body();
+    scene.bodies[0].material.hourglass = std::nullopt;
+    change(scene.bodies[0]);
+    return testing::model_of(scene, cloud).parts[0].material.hourglass;
+  };
+  EXPECT_EQ(strength([](BodyRequest&) {}), 0.1);
+  EXPECT_EQ(strength([](BodyRequest& b) { b.material.hourglass = 0; }), 0.0);
+  EXPECT_EQ(strength([](BodyRequest& b) { b.source.shape.name = "dino"; }), 0.0);
+  EXPECT_EQ(strength([](BodyRequest& b) { b.neighbourhood.max_neighbours = 20; }), 0.0);
+  EXPECT_EQ(parse_scene(time_section + beam + material, "s.toml").bodies[0].material.hourglass,
+            0.1);
+  EXPECT_EQ(parse_scene(time_section + dino, "s.toml").bodies[0].material.hourglass, 0.0);
+}
+
+}  // namespace
+}  // namespace phyxel
