@@ -35,11 +35,11 @@ std::string measured_by(const CsvTable& t) {
 std::string real_time_section(const CsvTable& t) {
   std::string text;
   text += fmt::format(
-      "Real time: the paper names no frame rate but the {} Hz of video, which the grey lines of "
-      "Figures 2 to 5 show; every one of the paper's frames is a step. Motion at its own pace "
-      "asks for more: as many steps a second as a second of motion takes, 1/Δt, the dashed "
-      "lines of Figures 2 and 3. Objects of which so many keep to it, of as many as were "
-      "measured:\n\n",
+      "Real time: the only frame rate that the paper names is the {} Hz of video, the grey lines "
+      "of "
+      "Figures 2 to 5; each of its frames is a step. Motion at its own pace asks for more: as many "
+      "steps a second as a second of motion takes, 1/Δt, the dashed lines of Figures 2 and 3. The "
+      "table has the largest number of objects that keep to either rate, of those measured:\n\n",
       real_time_rate);
   std::vector<std::vector<std::string>> rows;
   for (const std::string& body : t.values("body")) {
