@@ -133,6 +133,8 @@ TEST_F(Paper, ForcesSummedBeforeTheyAreSentAreFewerBytesAndOtherBits) {
     // Sums of float in another order; only phyxels that are pushed from elsewhere can differ.
     EXPECT_GT(sent.number(r, "summed_other_bits"), 0);
     EXPECT_LT(sent.number(r, "summed_other_bits"), sent.number(r, "phyxels"));
+    // The same sum but for roundings of some 64 terms, none larger than a few of the largest sum.
+    EXPECT_LT(sent.number(r, "summed_difference"), 64 * 1.2e-7);
   }
 }
 

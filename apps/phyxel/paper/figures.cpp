@@ -90,7 +90,7 @@ void add_real_time(LineChart& chart, const CsvTable& frames) {
 /// Figures 2 and 3. A frame is a step; dashed: as many as a second of motion takes.
 LineChart rates(const CsvTable& frames, const std::string& title, const std::string& with_surfels) {
   LineChart chart{title, "objects", "frames per second", false, true, {}};
-  const std::vector<std::string> bodies = paper::body_names();
+  const std::vector<std::string>& bodies = paper::body_names();
   for (const bool needed : {false, true}) {
     if (needed && !frames.has("step_s")) break;  // a table of before
     for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -128,7 +128,7 @@ LineChart comparison(const CsvTable& frames, const std::string& title,
     ways.push_back(
         {"phyxel CPU", most, fmt::format("phyxel CPU, {} core{}", most, most == "1" ? "" : "s")});
   }
-  const std::vector<std::string> bodies = paper::body_names();
+  const std::vector<std::string>& bodies = paper::body_names();
   for (std::size_t w = 0; w < ways.size(); ++w) {
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       Curve curve = curve_of(frames, bodies[b] + ", " + ways[w].label, "objects", "frames_per_s",

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "paper.hpp"
 #include "paper/paper_backend.hpp"
@@ -20,6 +21,8 @@ constexpr Index block_phyxels = 30'000;
 Vec3f to_float(Vec3d v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
+
+float length_of(Vec3f v) { return std::sqrt(dot(v, v)); }
 
 /// Forces on phyxels of a body that several ranks step, from the same pair forces in float.
 class SummedForces {
@@ -81,8 +84,13 @@ void add_cuts(const std::string& name, const Model& model, CsvTable& table) {
       const PartitionQuality quality = quality_of(graph, part_of, parts);
       const ExchangeSize sent = exchange_size(model, part_of);
       Index other_bits = 0;
+      float apart = 0, largest = 0;
       for (Index j = 0; j < model.size(); ++j) {
-        other_bits += forces.summed_by_part(j, part_of, parts) != forces.summed_by_phyxel(j);
+        const Vec3f whole = forces.summed_by_phyxel(j);
+        const Vec3f by_part = forces.summed_by_part(j, part_of, parts);
+        other_bits += by_part != whole;
+        apart = std::max(apart, length_of(by_part - whole));
+        largest = std::max(largest, length_of(whole));
       }
       const auto bytes = [](std::int64_t numbers) {
         return std::to_string(numbers * static_cast<std::int64_t>(sizeof(float)));
@@ -91,7 +99,7 @@ void add_cuts(const std::string& name, const Model& model, CsvTable& table) {
                             std::to_string(quality.cut), std::to_string(quality.ghosts),
                             fmt::format("{:.3f}", quality.slowest), bytes(sent.pair_stresses),
                             bytes(sent.pair_forces), bytes(sent.summed_forces),
-                            std::to_string(other_bits)});
+                            std::to_string(other_bits), fmt::format("{:.1e}", apart / largest)});
       say(
           fmt::format("{:10} {} parts by {:10}: pair stresses {:.1f} kB, pair forces {:.1f} kB, "
                       "summed forces {:.1f} kB a step, the last with other bits in {} phyxels",
@@ -117,7 +125,8 @@ CsvTable measure_exchange(const PaperRequest& request) {
                    "pair_stress_bytes",
                    "pair_force_bytes",
                    "summed_force_bytes",
-                   "summed_other_bits"};
+                   "summed_other_bits",
+                   "summed_difference"};
   for (const std::string& name : request.bodies) {
     add_cuts(name, paper::paper_model(paper::body_scene(name)), table);
   }

@@ -35,11 +35,11 @@ std::string measured_by(const CsvTable& t) {
 std::string real_time_section(const CsvTable& t) {
   std::string text;
   text += fmt::format(
-      "Real time: the paper names no frame rate but the {} Hz of video, which the grey lines of "
-      "Figures 2 to 5 show; every one of the paper's frames is a step. Motion at its own pace "
-      "asks for more: as many steps a second as a second of motion takes, 1/Δt, the dashed "
-      "lines of Figures 2 and 3. Objects of which so many keep to it, of as many as were "
-      "measured:\n\n",
+      "Real time: the only frame rate that the paper names is the {} Hz of video, the grey lines "
+      "of "
+      "Figures 2 to 5; each of its frames is a step. Motion at its own pace asks for more: as many "
+      "steps a second as a second of motion takes, 1/Δt, the dashed lines of Figures 2 and 3. The "
+      "table has the largest number of objects that keep to either rate, of those measured:\n\n",
       real_time_rate);
   std::vector<std::vector<std::string>> rows;
   for (const std::string& body : t.values("body")) {
@@ -100,8 +100,9 @@ std::string exchange_section(const CsvTable& t) {
       "with them their pair stresses, as phyxel does, or the force of each pair, or forces that "
       "each part has summed for each ghost. The first two give the owner all forces one by one, "
       "so that it sums them in one order, and the bits are those of one rank. With the third the "
-      "order of the sum is the cut's: the last column has the phyxels whose force, from the same "
-      "pair forces in float, has other bits than on one rank. *Slowest*: what the part with most "
+      "order of the sum is the cut's: the last columns have the phyxels whose force, from the same "
+      "pair forces in float, has other bits than on one rank, and the largest such difference. "
+      "*Slowest*: what the part with most "
       "to do has to do, ghosts counted, over the mean. METIS depends on its version.\n\n";
   std::vector<std::vector<std::string>> rows;
   for (std::size_t r = 0; r < t.rows.size(); ++r) {
@@ -114,11 +115,12 @@ std::string exchange_section(const CsvTable& t) {
       row.push_back(fmt::format("{:.1f}", 1e-3 * t.number(r, column)));
     }
     row.push_back(t.text(r, "summed_other_bits"));
+    row.push_back(t.text(r, "summed_difference"));
     rows.push_back(row);
   }
   text += table_text(
       {"body", "phyxels", "parts", "cut by", "cut pairs", "ghosts", "slowest", "pair stresses [kB]",
-       "pair forces [kB]", "summed forces [kB]", "summed: other bits"},
+       "pair forces [kB]", "summed forces [kB]", "summed: other bits", "by, of the largest force"},
       rows);
   return text;
 }
