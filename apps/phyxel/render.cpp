@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "picture.hpp"
 
@@ -46,7 +47,7 @@ void render_command(const RenderOptions& options) {
   if (options.json) {
     nlohmann::ordered_json pictures = nlohmann::ordered_json::array();
     for (const auto& file : files) pictures.push_back(file.string());
-    fmt::print("{}\n", nlohmann::ordered_json{{"pictures", pictures}}.dump(2));
+    fmt::print("{}\n", json_text({{"pictures", pictures}}));
     return;
   }
   fmt::print("{} picture{}: {}", files.size(), files.size() == 1 ? "" : "s",

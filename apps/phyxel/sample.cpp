@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "command.hpp"
+#include "outside_text.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -92,7 +93,7 @@ void say_json(const SampleOptions& options, const Cloud& cloud, const SampleRepo
                                     {"relaxations", options.relaxations},
                                     {"warnings", report.warnings},
                                     {"seconds", seconds}};
-  fmt::print("{}\n", j.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", json_text(j));
 }
 
 void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleReport& report,

@@ -1,7 +1,7 @@
 /// What the measurements of `phyxel paper` share.
 #include "paper.hpp"
 
-#include "outside_text.hpp"
+#include "markdown.hpp"
 
 namespace phyxel::app {
 

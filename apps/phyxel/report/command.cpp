@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "report/report.hpp"
 
@@ -81,7 +82,7 @@ void report_command(const ReportOptions& options) {
                    {"colours", report.fields},
                    {"notes", report.notes}});
     }
-    fmt::print("{}\n", said.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(said));
     return;
   }
   const std::string holds =

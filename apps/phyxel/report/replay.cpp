@@ -11,6 +11,7 @@
 #include "compose.hpp"
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/neighbourhood.hpp"
@@ -555,7 +556,7 @@ class Replay {
       }
     };
     const auto text = [](const Json& value) {
-      return value.is_string() ? value.get<std::string>() : value.dump();
+      return value.is_string() ? value.get<std::string>() : json_text(value, -1);
     };
     const auto number = [](const char* unit) {
       return

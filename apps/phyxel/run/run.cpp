@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "mpi/watchdog.hpp"
+#include "outside_text.hpp"
 #include "picture.hpp"
 #include "stop_signal.hpp"
 
@@ -67,7 +68,7 @@ void Run::rehearse() {
     j["bytes"] = bytes;
     if (seconds) j["forecast_seconds"] = *seconds;
     j["warnings"] = model().warnings;
-    fmt::print("{}\n", j.dump(2));
+    fmt::print("{}\n", json_text(j));
     return;
   }
   if (options_.quiet) return;
@@ -181,8 +182,7 @@ void Run::execute() {
     if (!leads()) return;
     const nlohmann::ordered_json summary = summary_of(now, bytes, traffic);
     // Names of files need not be UTF-8.
-    const std::string text =
-        summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    const std::string text = json_text(summary) + "\n";
     recorder_->write_summary(text);
     if (options_.json) {
       fmt::print("{}", text);
