@@ -20,19 +20,19 @@ struct RenderOptions {
   bool no_phyxels = false, no_surface = false, force = false, json = false;
 };
 
-Vec3d vector_of(const std::vector<double>& values, const char* option, Vec3d otherwise) {
-  if (values.empty()) return otherwise;
+std::optional<Vec3d> vector_of(const std::vector<double>& values, const char* option) {
+  if (values.empty()) return std::nullopt;
   if (values.size() != 3) {
     throw InputError(fmt::format("{}: {} numbers; allowed: three, as in {} -1,2,-0.6", option,
                                  values.size(), option));
   }
-  return {values[0], values[1], values[2]};
+  return Vec3d{values[0], values[1], values[2]};
 }
 
 void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
-  request.view = vector_of(options.view, "--view", request.view);
-  request.up = vector_of(options.up, "--up", request.up);
+  request.view = vector_of(options.view, "--view");
+  request.up = vector_of(options.up, "--up");
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
   if (!request.phyxels && !request.surface) {
@@ -86,12 +86,12 @@ void add_render(CLI::App& program) {
   command->add_option("--height", request.height, "Pixels down")->capture_default_str();
   command
       ->add_option("--view", options->view,
-                   "Direction the camera looks along: x,y,z (default: -1,2,-0.6)")
+                   "Direction the camera looks along: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--up", options->up,
-                   "Direction that is up on the picture: x,y,z (default: 0,0,1)")
+                   "Direction that is up on the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_flag("--no-phyxels", options->no_phyxels, "The surface only");
