@@ -12,6 +12,7 @@
 #include "files/hdf5_file.hpp"
 #include "model/host_memory.hpp"
 #include "mpi/parallel_file.hpp"
+#include "outside_text.hpp"
 #include "program_ranks.hpp"
 #include "solver/nccl.hpp"
 #include "version.hpp"
@@ -159,7 +160,7 @@ void add_doctor(CLI::App& program) {
       "  mpirun -n 8 phyxel doctor");
   command->callback([json] {
     const Findings found = facts();
-    if (ranks().rank() == 0) fmt::print("{}", *json ? found.dump(2) + "\n" : table(found));
+    if (ranks().rank() == 0) fmt::print("{}", *json ? json_text(found) + "\n" : table(found));
   });
 }
 

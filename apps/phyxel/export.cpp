@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
 
@@ -22,7 +23,7 @@ void export_command(const ExportOptions& options) {
   if (options.json) {
     const nlohmann::ordered_json said{
         {"file", options.single.string()}, {"frames", frames}, {"bytes", bytes}};
-    fmt::print("{}\n", said.dump(2));
+    fmt::print("{}\n", json_text(said));
     return;
   }
   fmt::print("{}: {} frames, {:.1f} MB\n", options.single.string(), frames,

@@ -11,6 +11,7 @@
 #include "files/sealed_file.hpp"
 #include "info_partition.hpp"
 #include "model/box.hpp"
+#include "outside_text.hpp"
 #include "phyxel/phyxel.hpp"
 #include "setup.hpp"
 
@@ -191,7 +192,7 @@ Facts facts_of(const fs::path& file) {
 std::string shown(const Facts& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return fmt::format("{:.9g}", value.get<double>());
-  if (!value.is_array()) return value.dump();
+  if (!value.is_array()) return json_text(value, -1);
   std::string list;
   for (const Facts& item : value) list += (list.empty() ? "" : ", ") + shown(item);
   return list;
@@ -251,12 +252,12 @@ void add_info(CLI::App& program) {
   command->callback([options] {
     if (options->parts) {
       const Facts facts = partition_facts(options->file, *options->parts, options->partitioner);
-      fmt::print("{}", options->json ? facts.dump(2) + "\n" : partition_tables(facts));
+      fmt::print("{}", options->json ? json_text(facts) + "\n" : partition_tables(facts));
       return;
     }
     const Facts facts = facts_of(options->file);
     if (options->json) {
-      fmt::print("{}\n", facts.dump(2));
+      fmt::print("{}\n", json_text(facts));
     } else {
       print_facts(facts, 0);
     }

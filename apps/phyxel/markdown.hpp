@@ -7,8 +7,20 @@
 #include <vector>
 
 #include "csv.hpp"
+#include "outside_text.hpp"
 
 namespace phyxel::app {
+
+/// A table whose cells and facts are `markdown_text`, which leaves numbers and plain words as they
+/// are. @throws InputError as `read_csv`
+inline CsvTable read_page_table(const std::filesystem::path& file) {
+  CsvTable table = read_csv(file);
+  for (auto& [name, value] : table.facts) value = markdown_text(value);
+  for (auto& row : table.rows) {
+    for (std::string& text : row) text = markdown_text(text);
+  }
+  return table;
+}
 
 inline std::string table_text(const std::vector<std::string>& head,
                               const std::vector<std::vector<std::string>>& rows) {

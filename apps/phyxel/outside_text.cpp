@@ -39,15 +39,6 @@ std::string markdown_text(const std::string& text) {
   return safe;
 }
 
-CsvTable read_page_table(const std::filesystem::path& file) {
-  CsvTable table = read_csv(file);
-  for (auto& [name, value] : table.facts) value = markdown_text(value);
-  for (auto& row : table.rows) {
-    for (std::string& text : row) text = markdown_text(text);
-  }
-  return table;
-}
-
 std::string markdown_link(const std::filesystem::path& path) {
   std::string link;
   for (const char c : path.generic_string()) {

@@ -7,8 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "csv.hpp"
-
 namespace phyxel::app {
 
 /// The text with U+FFFD for every byte that is no UTF-8, as a file's name may have.
@@ -21,10 +19,6 @@ std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
 /// A text on one line in which Markdown finds no markup and HTML no element.
 std::string markdown_text(const std::string& text);
-
-/// A table whose cells and facts are `markdown_text`, which leaves numbers and plain words as they
-/// are. @throws InputError as `read_csv`
-CsvTable read_page_table(const std::filesystem::path& file);
 
 /// A relative address in a Markdown link: everything but letters, digits and "-._~/" is encoded.
 std::string markdown_link(const std::filesystem::path& path);

@@ -14,12 +14,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What the scene in a frame says of pictures; the defaults if it cannot be read.
+RenderRequest pictures_of(const fs::path& file) {
+  try {
+    return parse_render(read_frame(file, true).scene, file);
+  } catch (const InputError&) {
+    return {};  // frames of programs that have no scene text, or of another version's scene
+  }
+}
+
 /// Looks at every frame, so that the camera holds for the whole motion.
 Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request) {
   Setting setting;
-  setting.up = request.up;
   setting.time_decimals = time_decimals(shots);
-  CameraFit fit(request.width, request.height, request.view, request.up);
+  const Shot& first = shots.front();
+  const RenderRequest said = pictures_of(first.surface.empty() ? first.phyxels : first.surface);
+  setting.up = request.up.value_or(said.up);
+  // A direction of the scene that is up, and another one asked for, may be parallel: CameraFit
+  // knows.
+  CameraFit fit(request.width, request.height, request.view.value_or(said.view), setting.up);
   for (const Shot& shot : shots) {
     for (const fs::path& file : {shot.surface, shot.phyxels}) {
       if (const auto frame = read_if_any(file)) fit.include(frame->point);

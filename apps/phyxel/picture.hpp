@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,8 @@ namespace phyxel::app {
 
 struct PictureRequest {
   int width = 960, height = 720;  ///< [px]
-  Vec3d view{-1, 2, -0.6};        ///< Direction the camera looks along.
-  Vec3d up{0, 0, 1};
+  /// Direction the camera looks along, and the one that is up; unset: as the frames' scene has it.
+  std::optional<Vec3d> view, up;
   bool phyxels = true, surface = true;  ///< What is drawn, as far as there is any.
   FrameChoice choice;
 };

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel::app {
@@ -37,7 +38,7 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
   if (options_.json) {
     Json facts;
     for (const auto& [name, value] : table_.facts) facts[name] = value;
-    fmt::print("{{\"facts\": {},\n \"rows\": [", facts.dump());
+    fmt::print("{{\"facts\": {},\n \"rows\": [", json_text(facts, -1));
   } else {
     fmt::print("{}", csv_text(table_));
   }
@@ -52,7 +53,7 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
   if (options_.json) {
     Json row;
     for (std::size_t k = 0; k < cells.size(); ++k) row[table_.columns[k]] = value_of(cells[k]);
-    fmt::print("{}\n  {}", table_.rows.empty() ? "" : ",", row.dump());
+    fmt::print("{}\n  {}", table_.rows.empty() ? "" : ",", json_text(row, -1));
   } else {
     fmt::print("{}\n", csv_row(cells));
   }

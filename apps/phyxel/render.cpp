@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "picture.hpp"
 
@@ -19,19 +20,19 @@ struct RenderOptions {
   bool no_phyxels = false, no_surface = false, force = false, json = false;
 };
 
-Vec3d vector_of(const std::vector<double>& values, const char* option, Vec3d otherwise) {
-  if (values.empty()) return otherwise;
+std::optional<Vec3d> vector_of(const std::vector<double>& values, const char* option) {
+  if (values.empty()) return std::nullopt;
   if (values.size() != 3) {
     throw InputError(fmt::format("{}: {} numbers; allowed: three, as in {} -1,2,-0.6", option,
                                  values.size(), option));
   }
-  return {values[0], values[1], values[2]};
+  return Vec3d{values[0], values[1], values[2]};
 }
 
 void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
-  request.view = vector_of(options.view, "--view", request.view);
-  request.up = vector_of(options.up, "--up", request.up);
+  request.view = vector_of(options.view, "--view");
+  request.up = vector_of(options.up, "--up");
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
   if (!request.phyxels && !request.surface) {
@@ -46,7 +47,7 @@ void render_command(const RenderOptions& options) {
   if (options.json) {
     nlohmann::ordered_json pictures = nlohmann::ordered_json::array();
     for (const auto& file : files) pictures.push_back(file.string());
-    fmt::print("{}\n", nlohmann::ordered_json{{"pictures", pictures}}.dump(2));
+    fmt::print("{}\n", json_text({{"pictures", pictures}}));
     return;
   }
   fmt::print("{} picture{}: {}", files.size(), files.size() == 1 ? "" : "s",
@@ -85,12 +86,12 @@ void add_render(CLI::App& program) {
   command->add_option("--height", request.height, "Pixels down")->capture_default_str();
   command
       ->add_option("--view", options->view,
-                   "Direction the camera looks along: x,y,z (default: -1,2,-0.6)")
+                   "Direction the camera looks along: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--up", options->up,
-                   "Direction that is up on the picture: x,y,z (default: 0,0,1)")
+                   "Direction that is up on the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command->add_flag("--no-phyxels", options->no_phyxels, "The surface only");

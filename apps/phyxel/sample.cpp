@@ -8,6 +8,7 @@
 
 #include "command.hpp"
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -87,7 +88,7 @@ void say_json(const SampleOptions& options, const Cloud& cloud, const SampleRepo
                                     {"relaxations", options.relaxations},
                                     {"warnings", report.warnings},
                                     {"seconds", seconds}};
-  fmt::print("{}\n", j.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", json_text(j));
 }
 
 void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleReport& report,

@@ -9,7 +9,6 @@
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
 #include "markdown.hpp"
-#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "scaling_model.hpp"
 

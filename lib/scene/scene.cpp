@@ -12,6 +12,7 @@
 #include "phyxel/error.hpp"
 #include "scene/scene_body.hpp"
 #include "scene/scene_table.hpp"
+#include "scene/upright.hpp"
 
 namespace phyxel {
 namespace {
@@ -67,8 +68,25 @@ Vec3d scaled(Vec3d v) {
   return v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z), 1e-300});
 }
 
-RenderRequest read_render(const SceneTable& table) {
+/// `view` in axes whose last is up.
+Vec3d turned(Vec3d view, Vec3d up) {
+  const auto [x, y, z] = upright_axes(up);
+  return view.x * x + view.y * y + view.z * z;
+}
+
+bool are_parallel(Vec3d a, Vec3d b) { return norm(cross(a, b)) < 1e-6 * norm(a) * norm(b); }
+
+/// Pictures of a scene that says nothing of them: against gravity is up.
+RenderRequest default_render(Vec3d gravity) {
   RenderRequest render;
+  const Vec3d down = scaled(gravity);
+  if (!(norm(down) < 0.5)) render.up = normalised(-down);
+  render.view = turned(render.view, render.up);
+  return render;
+}
+
+RenderRequest read_render(const SceneTable& table, Vec3d gravity) {
+  RenderRequest render = default_render(gravity);
   table.read("pictures", render.pictures);
   table.read("count", render.count);
   table.read("width", render.width);
@@ -76,16 +94,26 @@ RenderRequest read_render(const SceneTable& table) {
   table.read("view", render.view);
   table.read("up", render.up);
   const auto words = [](Vec3d v) { return fmt::format("[{:g}, {:g}, {:g}]", v.x, v.y, v.z); };
+  if (table.has("up") && !table.has("view") && !(norm(scaled(render.up)) < 0.5)) {
+    render.view = turned(RenderRequest{}.view, scaled(render.up));
+  }
+  if (!table.has("up") && are_parallel(scaled(render.view), render.up)) {
+    render.up = RenderRequest{}.up;
+  }
   const Vec3d view = scaled(render.view), up = scaled(render.up);
   if (norm(view) < 0.5) table.refuse("view", words(render.view) + " found; allowed: not zero");
   if (norm(up) < 0.5) table.refuse("up", words(render.up) + " found; allowed: not zero");
-  if (norm(cross(view, up)) < 1e-6 * norm(view) * norm(up)) {
+  if (are_parallel(view, up)) {
     table.refuse(table.has("view") ? "view" : "up",
                  fmt::format("view {} and up {} found, which are parallel; allowed: any two other "
                              "directions",
                              words(render.view), words(render.up)));
   }
   return render;
+}
+
+RenderRequest render_of(const SceneTable& root, Vec3d gravity) {
+  return root.has("render") ? read_render(root.table("render"), gravity) : default_render(gravity);
 }
 
 std::vector<BodyRequest> read_bodies(const SceneTable& root) {
@@ -145,9 +173,17 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   }
   if (root.has("output")) scene.output = read_output(root.table("output"));
   if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
-  if (root.has("render")) scene.render = read_render(root.table("render"));
+  scene.render = render_of(root, scene.gravity);
   scene.bodies = read_bodies(root);
   return scene;
+}
+
+RenderRequest parse_render(const std::string& text, const std::filesystem::path& file) {
+  const toml::table parsed = parse_toml(text, file);
+  const SceneTable root(parsed, file);
+  Vec3d gravity;
+  root.read("gravity", gravity);
+  return render_of(root, gravity);
 }
 
 bool OutputRequest::wants(std::string_view field) const {

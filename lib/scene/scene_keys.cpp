@@ -147,7 +147,7 @@ std::vector<SceneKey> run_keys() {
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},
 
       {.section = "render", .name = "pictures", .type = KeyType::boolean, .fallback = "false",
-       .meaning = "Write pictures (PNG). The other keys here also serve `phyxel render`."},
+       .meaning = "Write pictures (PNG). `view` and `up` also serve `phyxel render` and `phyxel report`."},
       {.section = "render", .name = "count", .type = KeyType::integer, .fallback = "6",
        .range = between(1, 100000),
        .meaning = "How many, spread evenly over the frames, first and last included."},
@@ -155,10 +155,10 @@ std::vector<SceneKey> run_keys() {
        .fallback = "960", .range = between(16, 8192), .meaning = "Width of a picture."},
       {.section = "render", .name = "height", .type = KeyType::integer, .unit = "pixels",
        .fallback = "720", .range = between(16, 8192), .meaning = "Height of a picture."},
-      {.section = "render", .name = "view", .type = KeyType::vector, .fallback = "[-1, 2, -0.6]",
-       .range = within(longest), .meaning = "Direction the camera looks along."},
-      {.section = "render", .name = "up", .type = KeyType::vector, .fallback = "[0, 0, 1]",
-       .range = within(longest), .meaning = "Direction that points up in the picture; not parallel to `view`."},
+      {.section = "render", .name = "view", .type = KeyType::vector, .otherwise = "[-1, 2, -0.6], turned as z is to `up`",
+       .meaning = "Direction the camera looks along."},
+      {.section = "render", .name = "up", .type = KeyType::vector, .otherwise = "against `gravity`; [0, 0, 1] if there is none",
+       .meaning = "Direction that points up in the picture; not parallel to `view`."},
   };
 }
 

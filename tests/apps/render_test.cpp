@@ -5,12 +5,15 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <limits>
 #include <random>
 
 #include "ball.hpp"
 #include "picture.hpp"
 #include "png_file.hpp"
+#include "report/report.hpp"
 #include "support/folder.hpp"
 
 namespace phyxel::app {
@@ -62,6 +65,26 @@ TEST(Picture, ShowsPhyxelsAsDotsOnTheSurfaceAndTheTimeBelow) {
       if (x < 80 && y > 90) continue;  // the corner of the label
       ASSERT_TRUE(std::equal(with.pixel(x, y), with.pixel(x, y) + 3, unlabelled.pixel(x, y)));
     }
+  }
+}
+
+/// A frame behind a right digest may hold any normal; its picture is drawn.
+TEST(Picture, NormalsAndSpacingsThatAreNotFiniteAreDrawn) {
+  FrameData ball = sphere({0, 0, 0}, 1, 16), dots;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const Vec3d odd[] = {{infinity, 0, 0}, {std::nan(""), 0, 1}, {1e300, -1e300, 0}, {0, 0, 0}};
+  for (std::size_t s = 0; s < ball.normal.size(); ++s) ball.normal[s] = odd[s % std::size(odd)];
+  dots.point = {{0, 0, 0}, {0.1, 0, 0}};
+  Setting setting;
+  CameraFit fit(64, 48, {0, 1, 0}, {0, 0, 1});
+  fit.include(ball.point);
+  setting.camera = fit.camera();
+  for (const double spacing : {0.1, infinity, std::nan("")}) {
+    setting.spacing = spacing;
+    setting.extent = std::isnan(spacing) ? infinity : fit.extent();
+    const Image image = draw_picture(&ball, &dots, setting);
+    EXPECT_EQ(image.rgb.size(), 3u * 64 * 48);
+    draw_picture(nullptr, &dots, setting);
   }
 }
 
@@ -194,6 +217,15 @@ class Trajectory : public Files {
     scene_.output.directory = run_ = folder_ / "run";
     scene_.time.end = 0.5;
     scene_.output.frames_per_second = 4;
+    ball_ = ball;
+    record("");
+    request_.width = 160;
+    request_.height = 120;
+  }
+  /// Writes the trajectory, with that scene's text in its frames.
+  void record(const std::string& scene_text) {
+    scene_.text = scene_text;
+    const FrameData& ball = ball_;
     Recorder recorder(model_, scene_, false);
     for (int k = 0; k < 3; ++k) {
       const Vec3d fall{0, 0, -2.0 * k};
@@ -211,9 +243,8 @@ class Trajectory : public Files {
       frame.diagnostics.step = k;
       recorder.write(frame);
     }
-    request_.width = 160;
-    request_.height = 120;
   }
+  FrameData ball_;
   Model model_;
   Scene scene_;
   fs::path run_;
@@ -233,6 +264,70 @@ double height_of_body(const Image& image) {
   }
   EXPECT_GT(count, 100);
   return sum / count;
+}
+
+/// The scene that a frame carries turns its pictures; options go before it.
+TEST_F(Trajectory, PicturesAreUpAsTheirSceneSays) {
+  const auto drop = [&](const std::string& keys) {
+    fs::remove_all(run_);
+    record(keys + R"(
+[time]
+end = 1
+[[body]]
+cloud = "ball"
+material = { young = 1e5, poisson = 0.3, density = 1000 }
+)");
+    render(run_, folder_ / "p", request_, true);
+    return height_of_body(read_png(folder_ / "p" / "frame_000002.png")) -
+           height_of_body(read_png(folder_ / "p" / "frame_000000.png"));
+  };
+  // The ball moves towards -z: down where nothing is said, up where gravity is or the scene says
+  // so.
+  EXPECT_GT(drop(""), 20);
+  EXPECT_GT(drop("gravity = [0, 0, -9.81]"), 20);
+  EXPECT_LT(drop("gravity = [0, 0, 9.81]"), -20);
+  EXPECT_LT(drop("gravity = [0, 0, -9.81]\n[render]\nup = [0, 0, -1]"), -20);
+  EXPECT_NEAR(drop("[render]\nup = [0, 1, 0]\nview = [-1, 0, 0]"), 0, 3);  // sideways
+  request_.up = Vec3d{0, 0, 1};
+  request_.view = Vec3d{0, 1, 0};
+  EXPECT_GT(drop("gravity = [0, 0, 9.81]"), 20);
+}
+
+/// Whoever made a frame does not decide what reporting on it takes.
+TEST_F(Trajectory, ReportsBuildNoMoreThanTheFramesHold) {
+  const auto note = [&](const std::string& body) {
+    fs::remove_all(run_);
+    const std::string text = "[time]\nend = 1\n" + body +
+                             "\n[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n";
+    record(text);
+    const Report report = replay_page({.input = run_});
+    return report.notes.empty() ? "" : report.notes.front();
+  };
+  EXPECT_THAT(note("[[body]]\nshape = \"block\"\nsize = [1, 1, 1]\nphyxels = 20000000"),
+              HasSubstr("it asks for about 2e+07 phyxels, the frames have 2"));
+  EXPECT_THAT(note("[[body]]\nshape = \"block\"\nsize = [1, 1, 1]\nspacing = 1e-5"),
+              HasSubstr("it asks for about 1e+15 phyxels"));
+  EXPECT_THAT(note("[[body]]\nshape = \"dino\"\n[body.array]\ncount = [100, 10, 10]\n"
+                   "spacing = [1, 1, 1]"),
+              HasSubstr("it asks for about"));
+  const fs::path mesh = write("outside.obj",
+                              "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+                              "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  EXPECT_THAT(note("[[body]]\nmesh = \"" + mesh.string() + "\"\nphyxels = 2"),
+              HasSubstr("outside the run's folder"));
+}
+
+/// A run that was killed between its two frames of one time, or a folder put together by hand.
+TEST_F(Trajectory, ReportsLeaveOutFramesWithoutOneOfTheirFamilies) {
+  const fs::path series = run_ / "phyxels.hdf.series";
+  std::string text = test::text_of(series);
+  const std::size_t last = text.rfind(",\n{");
+  ASSERT_NE(last, std::string::npos);
+  text.replace(last, text.find(']', last) - last, "\n");
+  std::ofstream(series) << text;
+  const Report report = replay_page({.input = run_});
+  EXPECT_EQ(report.frames, 2u);
+  EXPECT_THAT(report.notes, ::testing::Contains(HasSubstr("1 frames are left out")));
 }
 
 TEST_F(Trajectory, OneCameraSeesTheWholeMotion) {

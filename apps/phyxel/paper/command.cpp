@@ -9,6 +9,7 @@
 
 #include "device_option.hpp"
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "paper.hpp"
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
@@ -76,7 +77,7 @@ void say_files(const fs::path& folder) {
   const Json said{{"page", (folder / paper_page_name).string()},
                   {"tables", there(tables)},
                   {"figures", there(figures)}};
-  fmt::print("{}\n", said.dump(2));
+  fmt::print("{}\n", json_text(said));
 }
 
 void paper_command(PaperOptions& options) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "markdown.hpp"
 #include "outside_text.hpp"
 #include "paper/paper_model.hpp"
 

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/atomic_file.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "report/report.hpp"
 
@@ -78,7 +79,7 @@ void report_command(const ReportOptions& options) {
                    {"colours", report.fields},
                    {"notes", report.notes}});
     }
-    fmt::print("{}\n", said.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(said));
     return;
   }
   const std::string holds =
@@ -111,8 +112,11 @@ void add_report(CLI::App& program) {
                    "Leave out frames, then phyxels, until the page is no larger")
       ->check(CLI::Range(1.0, 1e4))
       ->capture_default_str();
-  command->add_flag("--no-stress", options->no_stress,
-                    "Do not build the scene again to find strains and stresses that frames lack");
+  command->add_flag(
+      "--no-stress", options->no_stress,
+      "Do not build the scene again to find strains and stresses that frames lack (it "
+      "is built if it asks for no more phyxels than the frames have, and for no file "
+      "outside the run's folder unless the scene's own file is still the same)");
   command->add_flag("--force", options->force, "Replace the page if it exists");
   command->add_flag("--json", options->json, "What was written as JSON, nothing else on stdout");
   command->footer(

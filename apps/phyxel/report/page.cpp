@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "outside_text.hpp"
 #include "report/page_files.hpp"
 
 namespace phyxel::app {
@@ -55,8 +56,7 @@ std::string html_text(std::string_view text) {
 }
 
 std::string script_json(const nlohmann::ordered_json& json) {
-  // Bytes that are no UTF-8 come from file names at most.
-  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = json_text(json, -1);
   std::string safe;
   safe.reserve(text.size());
   for (const char c : text) {  // neither </script> nor <!-- can begin

@@ -11,12 +11,13 @@
 #include "compose.hpp"
 #include "csv.hpp"
 #include "files/atomic_file.hpp"
-#include "phyxel/diagnostics.hpp"
+#include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/neighbourhood.hpp"
-#include "phyxel/physics/strain.hpp"
 #include "report/page.hpp"
+#include "report/rebuilt.hpp"
 #include "report/report.hpp"
+#include "scene/upright.hpp"
 #include "trajectory.hpp"
 #include "version.hpp"
 
@@ -29,70 +30,6 @@ using Json = nlohmann::ordered_json;
 // A body of more takes longer to build anew than anyone waits for a page.
 constexpr std::size_t most_rebuilt = 1'000'000;
 constexpr double steps_of_16_bits = 65535;
-
-/// A quantity of each phyxel, by which colours go.
-struct Field {
-  std::string name, unit;
-  std::vector<double> values;
-};
-
-/// sqrt(2/3 E':E') of Green's strain, E' its deviator.
-double equivalent_strain(const Mat3d& gradient) {
-  const Sym3d e = green_strain(gradient);
-  const double mean = (e.xx + e.yy + e.zz) / 3;
-  const double x = e.xx - mean, y = e.yy - mean, z = e.zz - mean;
-  return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)) / 3);
-}
-
-/// The scene of a trajectory, built anew to say what its frames do not.
-class Rebuilt {
- public:
-  Rebuilt(Scene scene, std::size_t phyxels)
-      : scene_(std::move(scene)), model_(build_model(scene_)) {
-    if (static_cast<std::size_t>(model_.size()) != phyxels) {
-      throw InputError(fmt::format("it has {} phyxels now, the frames {}", model_.size(), phyxels));
-    }
-    backend_ = make_cpu_backend(model_, scene_.solver.precision, scene_.solver.threads);
-  }
-
-  /// Fields that are not there yet.
-  void add_fields(const FrameData& frame, std::vector<Field>& fields) {
-    const auto has = [&](const char* name) {
-      return std::any_of(fields.begin(), fields.end(),
-                         [&](const Field& field) { return field.name == name; });
-    };
-    State state;
-    state.velocity.resize(frame.point.size());
-    state.displacement.resize(frame.point.size());
-    for (std::size_t i = 0; i < frame.point.size(); ++i) {
-      state.displacement[i] = frame.point[i] - model_.position[i];
-    }
-    if (const auto u = frame.field.find("displacement"); u != frame.field.end()) {
-      for (std::size_t i = 0; i < frame.point.size(); ++i) {  // with all its digits
-        state.displacement[i] = {u->second[3 * i], u->second[3 * i + 1], u->second[3 * i + 2]};
-      }
-    }
-    backend_->upload(state);
-    std::vector<Mat3d> gradients;
-    backend_->displacement_gradients(gradients);
-    Field strain{"strain (equivalent)", "", {}};
-    for (const Mat3d& gradient : gradients) strain.values.push_back(equivalent_strain(gradient));
-    std::vector<double> von_mises, volume_ratio;
-    stress_fields(model_, *backend_, &von_mises, &volume_ratio);
-    fields.push_back(std::move(strain));
-    if (!has("stress (von Mises)")) {
-      fields.push_back({"stress (von Mises)", "Pa", std::move(von_mises)});
-    }
-    if (!has("volume ratio")) fields.push_back({"volume ratio", "", std::move(volume_ratio)});
-  }
-
-  const std::vector<Vec3d>& rest() const { return model_.position; }
-
- private:
-  Scene scene_;
-  Model model_;
-  std::unique_ptr<Backend> backend_;
-};
 
 /// For each surfel the phyxels that colour it, and by how many 255ths, shape [surfels, carriers].
 struct Carriers {
@@ -245,6 +182,7 @@ class Replay {
       : request_(request),
         trajectory_(find_trajectory(request.input, {})),
         folder_(fs::is_directory(request.input) ? request.input : request.input.parent_path()) {
+    leave_out_half_shots();
     first_surface_ = read(trajectory_.shots.front().surface, {});
     first_phyxels_ = read(trajectory_.shots.front().phyxels, {});
     read_summary();
@@ -279,6 +217,22 @@ class Replay {
 
   const FrameData& any() const { return first_phyxels_ ? *first_phyxels_ : *first_surface_; }
 
+  /// A run that was stopped, or whose files somebody has put together, may have shots without one
+  /// of the families that its first shot has.
+  void leave_out_half_shots() {
+    std::vector<Shot>& shots = trajectory_.shots;
+    const bool surface = !shots.front().surface.empty(), phyxels = !shots.front().phyxels.empty();
+    const std::size_t left_out = std::erase_if(shots, [&](const Shot& shot) {
+      return shot.surface.empty() == surface || shot.phyxels.empty() == phyxels;
+    });
+    if (left_out == 0) return;
+    notes_.push_back(fmt::format("{} frames are left out: they are not of {}, as the first is.",
+                                 left_out,
+                                 surface && phyxels ? "surface and phyxels"
+                                 : surface          ? "a surface alone"
+                                                    : "phyxels alone"));
+  }
+
   /// run.json, if the run came to its end.
   void read_summary() {
     const fs::path file = folder_ / "run.json";
@@ -300,6 +254,10 @@ class Replay {
     } catch (const InputError& error) {
       why = error.what();  // files that it names may be elsewhere by now
     }
+    try {
+      pictures_ = parse_render(any().scene, "scene.toml");
+    } catch (const InputError&) {  // the defaults serve
+    }
     if (!request_.stress || !first_phyxels_) return;
     const std::size_t phyxels = first_phyxels_->point.size();
     if (phyxels > most_rebuilt) {
@@ -310,7 +268,11 @@ class Replay {
       return;
     }
     try {
-      if (scene_) rebuilt_.emplace(*scene_, phyxels);
+      if (scene_) {
+        why =
+            obstacle_to_building(*scene_, phyxels, typical_spacing(first_phyxels_->point), folder_);
+        if (why.empty()) rebuilt_.emplace(*scene_, phyxels);
+      }
     } catch (const InputError& error) {
       why = error.what();
     }
@@ -398,7 +360,15 @@ class Replay {
       if (surface) instance.surfels = surface->point;
       if (phyxels) instance.phyxels = each(phyxels->point, stride_);
       std::vector<Field> fields = fields_of(phyxels ? *phyxels : *surface);
-      fields.resize(field_names_.size());
+      const bool same = std::equal(
+          fields.begin(), fields.end(), field_names_.begin(), field_names_.end(),
+          [](const Field& field, const std::string& name) { return field.name == name; });
+      if (!same) {
+        throw InputError(fmt::format(
+            "{}: has other fields than the first frame",
+            (phyxels ? trajectory_.shots[shot].phyxels : trajectory_.shots[shot].surface)
+                .string()));
+      }
       for (const Field& field : fields) {
         instance.fields.push_back(each(field.values, phyxels ? stride_ : 1));
       }
@@ -474,9 +444,11 @@ class Replay {
     }
     data["spacing"] = spacing / radius;
     data["carriers"] = Carriers::each;
-    const Vec3d towards = -(scene_ ? scene_->render.view : RenderRequest{}.view);
-    data["view"] = {{"yaw", std::atan2(towards.y, towards.x)},
-                    {"pitch", std::atan2(towards.z, std::hypot(towards.x, towards.y))}};
+    const auto axes = upright_axes(pictures_.up);
+    const auto along = [&](int axis) { return -dot(pictures_.view, axes[axis]); };
+    data["view"] = {{"yaw", std::atan2(along(1), along(0))},
+                    {"pitch", std::atan2(along(2), std::hypot(along(0), along(1)))}};
+    for (const Vec3d axis : axes) data["axes"].push_back({axis.x, axis.y, axis.z});
     data["log"] = log();
     data["timing"] = Json::array();
     if (summary_.contains("seconds")) {
@@ -555,7 +527,7 @@ class Replay {
       }
     };
     const auto text = [](const Json& value) {
-      return value.is_string() ? value.get<std::string>() : value.dump();
+      return value.is_string() ? value.get<std::string>() : json_text(value, -1);
     };
     const auto number = [](const char* unit) {
       return
@@ -593,6 +565,7 @@ class Replay {
   std::optional<FrameData> first_surface_, first_phyxels_;
   Json summary_ = Json::object();
   std::optional<Scene> scene_;
+  RenderRequest pictures_;
   std::optional<Rebuilt> rebuilt_;
   std::vector<std::size_t> chosen_;
   std::size_t stride_ = 1;

@@ -75,7 +75,7 @@ void Run::rehearse() {
     j["bytes"] = bytes;
     if (seconds) j["forecast_seconds"] = *seconds;
     j["warnings"] = model().warnings;
-    fmt::print("{}\n", j.dump(2));
+    fmt::print("{}\n", json_text(j));
     return;
   }
   if (options_.quiet) return;

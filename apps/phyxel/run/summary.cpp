@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "outside_text.hpp"
 #include "run/run.hpp"
 #include "version.hpp"
 
@@ -49,9 +50,7 @@ void Run::say_finished_already() const {
       fmt::format("the checkpoint is at t = {:g} s, the run ends at {:g} s: nothing is left to do",
                   solver_.time(), end_time());
   if (options_.json) {
-    fmt::print(
-        "{}\n",
-        nlohmann::ordered_json{{"program", program_version()}, {"finished", message}}.dump(2));
+    fmt::print("{}\n", json_text({{"program", program_version()}, {"finished", message}}));
   } else {
     fmt::print("  finished    {}\n", message);
   }

@@ -168,8 +168,8 @@ struct RenderRequest {
   bool pictures = false;  ///< Write PNG pictures at the end of a run.
   int count = 6;          ///< How many frames, evenly spread, first and last included.
   int width = 960, height = 720;
-  Vec3d view{-1, 2, -0.6};  ///< Direction the camera looks along.
-  Vec3d up{0, 0, 1};
+  Vec3d view{-1, 2, -0.6};  ///< Direction the camera looks along; a scene's turns with `up`.
+  Vec3d up{0, 0, 1};        ///< In a scene that names none: against its gravity, if there is any.
 };
 
 /// A whole request: `build_model` takes it.
@@ -220,6 +220,10 @@ Scene read_scene(const std::filesystem::path& file);
 
 /// The same from text; `file` is used in messages and to resolve paths.
 Scene parse_scene(const std::string& text, const std::filesystem::path& file);
+
+/// The pictures that a scene's text asks for, whatever its bodies are: files they name may be gone.
+/// @throws InputError likewise
+RenderRequest parse_render(const std::string& text, const std::filesystem::path& file);
 
 /// One line per key: name, type, unit, default, allowed range and meaning, as Markdown; made from
 /// the same table that parses, so that the documentation cannot drift.

@@ -117,6 +117,39 @@ TEST(Mesh, NonConvexPolygonsAreCutInside) {
   EXPECT_DOUBLE_EQ(area, 2 * 3 + 8 * 2);  // triangles outside the notch would add to it
 }
 
+/// A polygon with a notch keeps its outline and its side whichever way it faces: along each axis,
+/// and back, it is seen from its own front.
+TEST(Mesh, PolygonsThatFaceAnyWayKeepTheirSide) {
+  // The L of area 3, in the plane of the two axes after `axis`, counter-clockwise seen against it.
+  const double corners[][2] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool back : {false, true}) {
+      std::string text, face = "f";
+      for (const auto& corner : corners) {
+        double p[3] = {};
+        p[(axis + 1) % 3] = corner[0];
+        p[(axis + 2) % 3] = corner[1];
+        text += fmt::format("v {} {} {}\n", p[0], p[1], p[2]);
+      }
+      for (int k = 0; k < 6; ++k) face += fmt::format(" {}", back ? 6 - k : k + 1);
+      const Surface s = obj(text + face + "\n");
+      ASSERT_EQ(s.triangle.size(), 4u);
+      Vec3d sum;
+      double area = 0;
+      for (const Triangle& t : s.triangle) {
+        const Vec3d a =
+            0.5 * cross(s.position[t[1]] - s.position[t[0]], s.position[t[2]] - s.position[t[0]]);
+        sum += a;
+        area += norm(a);
+      }
+      const double along = axis == 0 ? sum.x : axis == 1 ? sum.y : sum.z;
+      // Small whole numbers and halves: exact. Triangles across the notch would add to the area.
+      EXPECT_EQ(along, back ? -3 : 3) << "axis " << axis;
+      EXPECT_EQ(area, 3) << "axis " << axis << (back ? ", back" : "");
+    }
+  }
+}
+
 TEST(Mesh, LargePolygonIsCutCompletely) {
   // The base of a cone with a star of 1000 corners.
   std::string text = "v 0 0 1\n", base = "f";

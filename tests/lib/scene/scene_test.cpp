@@ -117,6 +117,29 @@ TEST(Scene, RunKeysAreReadExactly) {
   expect_vector(scene.render.up, {1, 0, 0});
 }
 
+TEST(Scene, UpIsAgainstGravityAndTheViewTurnsWithIt) {
+  const auto render = [](const std::string& keys) {
+    return parse_render(keys +
+                            "\n[time]\nend = 1\n[[body]]\ncloud = \"c\"\n"
+                            "material = { young = 1, poisson = 0.3, density = 1 }\n",
+                        "scene.toml");
+  };
+  expect_vector(render("").up, {0, 0, 1});
+  expect_vector(render("").view, {-1, 2, -0.6});
+  expect_vector(render("gravity = [0, 0, -9.81]").view, {-1, 2, -0.6});
+  // z becomes y, so y becomes -z.
+  expect_vector(render("gravity = [0, -2, 0]").up, {0, 1, 0});
+  expect_vector(render("gravity = [0, -2, 0]").view, {-1, -0.6, -2});
+  expect_vector(render("gravity = [0, 0, 3]").up, {0, 0, -1});
+  expect_vector(render("gravity = [0, 0, 3]").view, {-1, -2, 0.6});
+  // What is said counts.
+  expect_vector(render("gravity = [0, -2, 0]\n[render]\nup = [1, 0, 0]").up, {1, 0, 0});
+  expect_vector(render("gravity = [0, -2, 0]\n[render]\nview = [0, 0, -1]").view, {0, 0, -1});
+  expect_vector(render("gravity = [0, -2, 0]\n[render]\nview = [0, 0, -1]").up, {0, 1, 0});
+  // A view along gravity, as there are in scenes from before, has the z that was up then.
+  expect_vector(render("gravity = [0, -2, 0]\n[render]\nview = [0, -1, 0]").up, {0, 0, 1});
+}
+
 TEST(Scene, BodyKeysAreReadExactly) {
   const Scene scene = parse_scene(full_scene, "folder/all.toml");
   ASSERT_EQ(scene.bodies.size(), 1u);

@@ -167,9 +167,11 @@ function distanceForAll(aspect) {
   return Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
 }
 
-function matrix(from) {  // rows: right, up, backwards
+/// Rows: right, up, backwards. Yaw and pitch are about data.axes, the last of which is up.
+function matrix(from) {
   const [cy, sy, cp, sp] = [Math.cos(from.yaw), Math.sin(from.yaw), Math.cos(from.pitch), Math.sin(from.pitch)];
-  return [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
+  const rows = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
+  return rows.map(row => [0, 1, 2].map(k => row[0] * data.axes[0][k] + row[1] * data.axes[1][k] + row[2] * data.axes[2][k]));
 }
 
 function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }

@@ -1,0 +1,155 @@
+#include "report/rebuilt.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "files/atomic_file.hpp"
+#include "files/hdf5_file.hpp"
+#include "files/sealed_file.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/physics/strain.hpp"
+
+namespace phyxel::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double most_pairs = 1e9;                           // of neighbours: 4 GB of lists
+constexpr double most_relaxed = 3e8;                         // phyxels times sweeps: minutes
+constexpr std::size_t largest_scene = std::size_t{2} << 20;  // bytes, as for scene files
+
+/// sqrt(2/3 E':E') of Green's strain, E' its deviator.
+double equivalent_strain(const Mat3d& gradient) {
+  const Sym3d e = green_strain(gradient);
+  const double mean = (e.xx + e.yy + e.zz) / 3;
+  const double x = e.xx - mean, y = e.yy - mean, z = e.zz - mean;
+  return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)) / 3);
+}
+
+/// Phyxels that a source makes, about; 0 where only making it tells.
+double phyxels_of(const BodySource& source) {
+  if (!source.file.empty()) {
+    check_seal(source.file, "body");
+    return static_cast<double>(Hdf5Reader(source.file).shape("/position").rows);
+  }
+  if (source.phyxels > 0) return source.phyxels;
+  const ShapeRequest& shape = source.shape;
+  if (is_paper_shape(shape.name)) return 238;  // of the smallest of them
+  const auto along = [&](double length) { return std::max(1.0, length / shape.spacing); };
+  if (shape.name == "sphere") return std::pow(along(1.6 * shape.radius), 3);
+  if (shape.name == "cylinder") return std::pow(along(1.7 * shape.radius), 2) * along(shape.length);
+  return along(shape.size.x) * along(shape.size.y) * along(shape.size.z);
+}
+
+/// Neighbours of a phyxel of a body of `phyxels` that lie `spacing` apart, about.
+double neighbours_of(const NeighbourhoodRule& rule, double phyxels, double spacing) {
+  const double reach =
+      rule.radius ? *rule.radius / std::max(spacing, 1e-300)
+                  : rule.factor * std::cbrt(static_cast<double>(std::max(rule.nearest, 1)));
+  return std::min(phyxels, 4.0 / 3 * std::numbers::pi * reach * reach * reach);
+}
+
+bool lies_in(const fs::path& file, const fs::path& folder) {
+  std::error_code error;
+  const fs::path inside =
+      fs::weakly_canonical(file, error)
+          .lexically_relative(fs::weakly_canonical(folder.empty() ? "." : folder, error));
+  return !error && !inside.empty() && *inside.begin() != "..";
+}
+
+/// Whether the scene's file is there, and still says what the frame does.
+bool is_users_own(const Scene& scene) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(scene.file, ignored)) return false;
+  try {
+    return read_text_file(scene.file, largest_scene) == scene.text;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double spacing,
+                                 const fs::path& folder) {
+  const bool own = is_users_own(scene);
+  const auto most = 1.5 * static_cast<double>(phyxels) + 1000;
+  double all = 0, pairs = 0, relaxed = 0;
+  for (const BodyRequest& body : scene.bodies) {
+    for (const fs::path& file : {body.source.mesh, body.source.file}) {
+      std::error_code ignored;
+      if (file.empty()) continue;
+      if (!own && !lies_in(file, folder)) {
+        return fmt::format(
+            "it names {}, which is outside the run's folder, and {} is not there with the same "
+            "text",
+            file.string(), scene.file.string());
+      }
+      if (!fs::is_regular_file(file, ignored)) {
+        return fmt::format("{} is no regular file", file.string());
+      }
+    }
+    const double some = phyxels_of(body.source);
+    const double apart = body.source.shape.spacing > 0 ? body.source.shape.spacing : spacing;
+    all += some;
+    pairs += some * neighbours_of(body.neighbourhood, some, body.scale * apart);
+    if (!body.source.mesh.empty()) relaxed += some * body.source.relaxations;
+    // Written so that NaN is an obstacle.
+    if (!(all <= most)) {
+      return fmt::format("it asks for about {:.3g} phyxels, the frames have {}", all, phyxels);
+    }
+    if (!(pairs <= most_pairs)) {
+      return fmt::format("it asks for about {:.3g} neighbours; allowed here: {:g}", pairs,
+                         most_pairs);
+    }
+    if (!(relaxed <= most_relaxed)) {
+      return fmt::format("it asks for {:.3g} phyxels times relaxations; allowed here: {:g}",
+                         relaxed, most_relaxed);
+    }
+  }
+  return "";
+}
+
+Rebuilt::Rebuilt(Scene scene, std::size_t phyxels)
+    : scene_(std::move(scene)), model_(build_model(scene_)) {
+  if (static_cast<std::size_t>(model_.size()) != phyxels) {
+    throw InputError(fmt::format("it has {} phyxels now, the frames {}", model_.size(), phyxels));
+  }
+  backend_ = make_cpu_backend(model_, scene_.solver.precision, scene_.solver.threads);
+}
+
+void Rebuilt::add_fields(const FrameData& frame, std::vector<Field>& fields) {
+  const auto has = [&](const char* name) {
+    return std::any_of(fields.begin(), fields.end(),
+                       [&](const Field& field) { return field.name == name; });
+  };
+  State state;
+  state.velocity.resize(frame.point.size());
+  state.displacement.resize(frame.point.size());
+  for (std::size_t i = 0; i < frame.point.size(); ++i) {
+    state.displacement[i] = frame.point[i] - model_.position[i];
+  }
+  if (const auto u = frame.field.find("displacement"); u != frame.field.end()) {
+    for (std::size_t i = 0; i < frame.point.size(); ++i) {  // with all its digits
+      state.displacement[i] = {u->second[3 * i], u->second[3 * i + 1], u->second[3 * i + 2]};
+    }
+  }
+  backend_->upload(state);
+  std::vector<Mat3d> gradients;
+  backend_->displacement_gradients(gradients);
+  Field strain{"strain (equivalent)", "", {}};
+  for (const Mat3d& gradient : gradients) strain.values.push_back(equivalent_strain(gradient));
+  std::vector<double> von_mises, volume_ratio;
+  stress_fields(model_, *backend_, &von_mises, &volume_ratio);
+  fields.push_back(std::move(strain));
+  if (!has("stress (von Mises)")) {
+    fields.push_back({"stress (von Mises)", "Pa", std::move(von_mises)});
+  }
+  if (!has("volume ratio")) fields.push_back({"volume ratio", "", std::move(volume_ratio)});
+}
+
+}  // namespace phyxel::app
