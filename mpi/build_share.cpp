@@ -1010,7 +1010,7 @@ class Builder {
   Partitioner partitioner_ = Partitioner::metis;
   PartitionQuality quality_;
   std::vector<std::string> warnings_;  // of the clouds, which every rank makes: alike on all
-  std::vector<Index> surfel_number_;  // of the surfels that this rank moves, in the whole model
+  std::vector<Index> surfel_number_;   // of the surfels that this rank moves, in the whole model
 };
 
 /// Bodies begin on one rank after the other, so that small ones are not all the first one's.

@@ -88,8 +88,8 @@ class Words {
     for (at_ = 0; at_ < words_.size() && words_[at_] != "--"; ++at_) {
       const std::string& word = words_[at_];
       const bool number = word.size() > 1 && (std::isdigit(word[1]) || word[1] == '.');
-      const auto wrong = word.size() > 1 && word[0] == '-' && !number ? option(word)
-                                                                       : command(word);
+      const auto wrong =
+          word.size() > 1 && word[0] == '-' && !number ? option(word) : command(word);
       if (wrong) return *wrong;
     }
     const std::string said = error.what();

@@ -129,7 +129,8 @@ std::string table(const Findings& f) {
                    f["cores"].get<long>(), f["cores_of_this_rank"].get<int>(),
                    f["memory_bytes"].get<double>() / 0x1p30));
   const std::string policy = text("thread_policy");
-  line("threads", "waiting: " + (policy.empty() ? "as the OpenMP runtime does by default" : policy));
+  line("threads",
+       "waiting: " + (policy.empty() ? "as the OpenMP runtime does by default" : policy));
   if (f["shared_cores"].get<bool>()) {
     line("warning", fmt::format("load {:.1f} on {} cores: other programs share them; steps will be "
                                 "slower, and fewer --threads may be faster",

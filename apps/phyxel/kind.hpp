@@ -13,8 +13,8 @@ enum class Kind { missing, folder, scene, mesh, series, hdf5, table, unknown };
 Kind kind_of(const std::filesystem::path& file);
 
 /// @throws InputError if the file is plainly of another kind than `wanted` (Kind::scene,
-/// Kind::mesh or Kind::series), naming the kind it has and the command that takes it. A missing file
-/// or an unknown kind is left to the reader.
+/// Kind::mesh or Kind::series), naming the kind it has and the command that takes it. A missing
+/// file or an unknown kind is left to the reader.
 void expect_kind(const std::filesystem::path& file, Kind wanted);
 
 }  // namespace phyxel::app

@@ -306,7 +306,8 @@ TEST_F(Program, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
   EXPECT_THAT(run({"rum", "x.toml"}).err, HasSubstr("did you mean \"run\""));
   EXPECT_THAT(run({"bench", "stop"}).err, HasSubstr("did you mean \"step\""));
   EXPECT_THAT(run({"run", "x.toml", "--forse"}).err, HasSubstr("did you mean \"--force\""));
-  EXPECT_THAT(run({"rnu", "x.toml"}).err, HasSubstr("did you mean \"run\""));  // two letters swapped
+  EXPECT_THAT(run({"rnu", "x.toml"}).err,
+              HasSubstr("did you mean \"run\""));  // two letters swapped
   EXPECT_THAT(run({"-V"}).err, HasSubstr("did you mean \"--version\""));
   const Outcome help = run({"help"});
   EXPECT_EQ(help.code, 2);
@@ -333,8 +334,7 @@ TEST_F(Program, FilesOfAnotherKindAreToldApart) {
 /// doctor reads the environment that its process began with, which is what the runtime has read.
 TEST_F(Program, WaitingThreadsSleepSoonUnlessTheUserSaysOtherwise) {
   const auto policy = [&] {
-    return nlohmann::json::parse(run({"doctor", "--json"}).out)["thread_policy"]
-        .get<std::string>();
+    return nlohmann::json::parse(run({"doctor", "--json"}).out)["thread_policy"].get<std::string>();
   };
   const char* ours = std::getenv("OMP_WAIT_POLICY");
   const std::string kept = ours ? ours : "";
