@@ -123,6 +123,7 @@ class Builder {
                              .regions = bits.empty() ? 0 : bits[i]};
         }
         surfaces_[b] = std::move(cloud.surface);
+        for (std::string& warning : cloud.warnings) warnings_.push_back(std::move(warning));
       }
     });
     const auto alike = static_cast<std::int64_t>(digest);
@@ -613,6 +614,7 @@ class Builder {
     add_surfels(local);
     std::size_t surfels = 0;
     for (const Surface& surface : surfaces_) surfels += surface.position.size();
+    m.warnings = warnings_;
     add_warnings(m, surfels);
   }
 
@@ -1010,7 +1012,8 @@ class Builder {
   Index groups_ = 0, group_size_ = 1;
   Partitioner partitioner_ = Partitioner::metis;
   PartitionQuality quality_;
-  std::vector<Index> surfel_number_;  // of the surfels that this rank moves, in the whole model
+  std::vector<std::string> warnings_;  // of the clouds, which every rank makes: alike on all
+  std::vector<Index> surfel_number_;   // of the surfels that this rank moves, in the whole model
 };
 
 /// Bodies begin on one rank after the other, so that small ones are not all the first one's.
@@ -1038,6 +1041,7 @@ BuiltShare build_share(const Communicator& ranks, const Scene& scene, const Shar
       }
       made = &request.source;
       cut = cut_piece(rest, piece);
+      cut.cloud.warnings = std::exchange(rest.warnings, {});  // once for all copies
     }
     place(cut.cloud, request);
     return cut;
@@ -1053,7 +1057,9 @@ BuiltShare build_share(const Communicator& ranks, const Scene& scene,
   }
   return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
     digest = 31 * digest + cloud_digest(clouds[b]);
-    return cut_piece(clouds[b], piece_of(ranks, b));
+    CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));
+    cut.cloud.warnings = clouds[b].warnings;
+    return cut;
   });
 }
 

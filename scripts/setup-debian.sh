@@ -10,11 +10,12 @@ set -euo pipefail
 build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev libfmt-dev
        libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev
        libmetis-dev libopenmpi-dev openmpi-bin
-       gnuplot-nox)  # the figures of phyxel paper
-# clang for the sanitizers, the fuzzers and a look at the sources, Doxygen for the reference, help2man and dpkg-dev for
-# packages, Python for the module and to read our files independently, Chromium to look at pages, fish and zsh for their
-# completions, and the HDF5 that knows MPI, beside the serial one.
-tests=(ccache pkg-config clang-format clang-tidy doxygen help2man dpkg-dev libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
+       gnuplot-nox           # the figures of phyxel paper
+       help2man dpkg-dev)    # the manual page, and packages
+# clang for the sanitizers, the fuzzers and a look at the sources, Doxygen for the reference, Python for the module and to
+# read our files independently, Chromium to look at pages, fish and zsh for their completions, and the HDF5 that knows MPI,
+# beside the serial one.
+tests=(ccache pkg-config clang-format clang-tidy doxygen libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
        python3-h5py python3-vtk9 python3-dev pybind11-dev python3-numpy python3-pytest
        python3-matplotlib chromium fish zsh libhdf5-openmpi-dev)
 

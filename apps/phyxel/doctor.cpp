@@ -15,6 +15,7 @@
 #include "outside_text.hpp"
 #include "program_ranks.hpp"
 #include "solver/nccl.hpp"
+#include "thread_policy.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -95,11 +96,15 @@ Findings facts() {
   for (const std::string& place : of_all_ranks(fmt::format("{} {}", host_name(), chosen))) {
     places.push_back(place);
   }
+  const HostLoad host = host_load().value_or(HostLoad{});
   return {{"program", program_version()},
           {"compiler", compiler_name()},
           {"processor", processor_name()},
           {"cores", sysconf(_SC_NPROCESSORS_ONLN)},
           {"cores_of_this_rank", omp_get_num_procs()},
+          {"load", host.load},
+          {"shared_cores", host.exceeds()},
+          {"thread_policy", thread_policy()},
           {"memory_bytes", usable_memory()},
           {"cuda", cuda_version()},
           {"gpus", gpu_facts(devices)},
@@ -124,6 +129,14 @@ std::string table(const Findings& f) {
        fmt::format("{}, {} cores ({} for this rank), {:.3g} GiB of memory", text("processor"),
                    f["cores"].get<long>(), f["cores_of_this_rank"].get<int>(),
                    f["memory_bytes"].get<double>() / 0x1p30));
+  const std::string policy = text("thread_policy");
+  line("threads",
+       "waiting: " + (policy.empty() ? "as the OpenMP runtime does by default" : policy));
+  if (f["shared_cores"].get<bool>()) {
+    line("warning", fmt::format("load {:.1f} on {} cores: other programs share them; steps will be "
+                                "slower, and fewer --threads may be faster",
+                                f["load"].get<double>(), f["cores"].get<long>()));
+  }
   line("CUDA", text("cuda"));
   if (f["gpus"].empty()) line("GPUs", "none: " + text("no_gpu_because"));
   for (const Findings& gpu : f["gpus"]) {

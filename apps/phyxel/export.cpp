@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
+#include "kind.hpp"
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
@@ -17,6 +18,7 @@ struct ExportOptions {
 };
 
 void export_command(const ExportOptions& options) {
+  expect_kind(options.series, Kind::series);
   const std::size_t frames = read_series(options.series).size();
   export_single(options.series, options.single, options.force);
   const std::uintmax_t bytes = std::filesystem::file_size(options.single);

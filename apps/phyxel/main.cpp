@@ -2,13 +2,13 @@
 /// message and an exit code.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cstring>
-
 #include "command.hpp"
+#include "complaint.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
 #include "program_ranks.hpp"
+#include "terminal.hpp"
+#include "thread_policy.hpp"
 #include "version.hpp"
 
 namespace {
@@ -29,33 +29,10 @@ void check_ranks(const CLI::App& program) {
                   ranks().size()));
 }
 
-/// What the first word that is no command or option could have been: a line, or "".
-std::string suggestion(const CLI::App& program, int argc, char** argv) {
-  const CLI::App* command = &program;
-  for (int k = 1; k < argc; ++k) {
-    const std::string word(argv[k], std::strcspn(argv[k], "="));
-    std::vector<std::string> known;
-    if (word.rfind("--", 0) == 0) {
-      for (const CLI::Option* option : command->get_options()) {
-        for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
-      }
-    } else {
-      const auto parts = command->get_subcommands([](const CLI::App*) { return true; });
-      for (const CLI::App* part : parts) known.push_back(part->get_name());
-    }
-    if (std::find(known.begin(), known.end(), word) == known.end()) {
-      const std::string found = phyxel::did_you_mean(word, known);
-      if (!found.empty()) return fmt::format("{}{}\n", word, found);
-    } else if (word.rfind("--", 0) != 0) {
-      command = command->get_subcommand(word);
-    }
-  }
-  return "";
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
+  phyxel::app::settle_thread_policy(argv);  // first: it starts the program again
   using phyxel::ExitCode;
   CLI::App program(
       "Deformable bodies made of phyxels (physics points without a mesh) that carry surfels.");
@@ -94,8 +71,8 @@ int main(int argc, char** argv) {
       return all.leads() ? program.exit(help) : 0;
     } catch (const CLI::ParseError& error) {
       if (all.leads()) {
-        program.exit(error);
-        fmt::print(stderr, "{}", suggestion(program, argc, argv));
+        fmt::print(stderr, "phyxel: {}{}\n", phyxel::error_word(),
+                   phyxel::app::complaint(program, error, argc, argv));
       }
       return static_cast<int>(ExitCode::bad_input);
     }

@@ -41,7 +41,8 @@ Progress::Progress(double end_time, std::FILE* stream, const ProgressStyle& styl
     : end_time_(end_time),
       stream_(stream),
       phyxels_(style.phyxels),
-      clock_(style.clock ? style.clock : steady_seconds) {
+      clock_(style.clock ? style.clock : steady_seconds),
+      load_(style.load ? style.load : host_load) {
   if (stream_ == nullptr) return;
   terminal_ = style.terminal.value_or(is_terminal(stream_));
   if (terminal_) columns_ = style.columns.value_or(terminal_columns(stream_));
@@ -106,6 +107,10 @@ std::vector<std::string> Progress::parts() const {
   parts.push_back(fmt::format("{:5.1f}%", 100 * fraction));
   parts.push_back(fmt::format("{} left", clock_text(left)));
   parts.push_back(fmt::format("{:.3f}/{:g} s", time_, end_time_));
+  // The run's own threads are in the load, too, and fill the cores at most.
+  if (const auto host = load_(); host && host->exceeds()) {
+    parts.push_back(fmt::format("load {:.1f} on {} cores", host->load, host->cores));
+  }
   if (phyxels_ > 0) {
     parts.push_back(
         fmt::format("{:.3g} phyxel-steps/s", steps_per_second_ * static_cast<double>(phyxels_)));

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "thread_policy.hpp"
+
 namespace phyxel::app {
 
 /// What a progress line shows and how. What is not set is found out from the stream and the
@@ -18,6 +20,8 @@ struct ProgressStyle {
   std::optional<bool> terminal;   ///< A terminal that can redraw; else plain lines.
   std::optional<int> columns;     ///< Width of the terminal.
   std::function<double()> clock;  ///< Wall-clock seconds from any origin.
+  /// Load and cores of the host; a load above the cores is shown.
+  std::function<std::optional<HostLoad>()> load;
 };
 
 class Progress {
@@ -53,6 +57,7 @@ class Progress {
   bool terminal_ = false;
   int columns_ = 80;
   std::function<double()> clock_;
+  std::function<std::optional<HostLoad>()> load_;
   double last_shown_ = 0;
   bool pending_ = false;  // the last update has not been shown
   bool drawn_ = false;    // a line on the terminal is not yet ended

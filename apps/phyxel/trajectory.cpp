@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kind.hpp"
 #include "phyxel/error.hpp"
 #include "sort_unique.hpp"
 
@@ -51,6 +52,9 @@ std::vector<Shot> only_family(const std::vector<SeriesEntry>& entries, Families 
 Trajectory find_trajectory(const fs::path& input, Families wanted) {
   if (!fs::exists(input)) {
     throw InputError(fmt::format("{}: no such file or folder", input.string()));
+  }
+  if (const Kind kind = kind_of(input); kind != Kind::folder && kind != Kind::hdf5) {
+    expect_kind(input, Kind::series);
   }
   Trajectory trajectory;
   if (fs::is_directory(input)) {

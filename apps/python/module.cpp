@@ -1,4 +1,7 @@
 /// The compiled half of the Python module: `phyxel/__init__.py` has the other.
+#include <omp.h>
+#include <pthread.h>
+
 #include "arrays.hpp"
 #include "version.hpp"
 
@@ -45,6 +48,11 @@ const Exceptions& add_exceptions(py::module_& module) {
   return e;
 }
 
+/// Ends the waiting OpenMP threads of the thread that is about to fork. A fork copies no threads
+/// but its own, so a child that believed in the others would wait for them for ever; parent and
+/// child start new ones when they need them.
+void end_waiting_threads() { omp_pause_resource_all(omp_pause_hard); }
+
 }  // namespace
 }  // namespace phyxel::python
 
@@ -58,6 +66,7 @@ PYBIND11_MODULE(_phyxel, module) {
       PyErr_SetString(exceptions.of(e.code()).ptr(), e.what());
     }
   });
+  pthread_atfork(phyxel::python::end_waiting_threads, nullptr, nullptr);
   module.attr("version") = phyxel::program_version();
   phyxel::python::add_clouds(module);
   phyxel::python::add_files(module);

@@ -279,7 +279,6 @@ class Simulation {
 
   /// So many steps of the present size: of twice as many, once they are halved.
   void take(std::int64_t count) {
-    auto last = std::chrono::steady_clock::now();
     for (std::int64_t k = 0; k < count; ++k) {
       const int made = shortener_->look(*solver_, plan_.halvings);
       plan_.halve(made);
@@ -291,10 +290,10 @@ class Simulation {
         throw py::error_already_set();
       }
       if (solver_->steps() - looked_ >= watch_interval) look();
-      if (std::chrono::steady_clock::now() - last > std::chrono::milliseconds(100)) {
+      if (std::chrono::steady_clock::now() - listened_ > std::chrono::milliseconds(100)) {
         const py::gil_scoped_acquire here;
+        listened_ = std::chrono::steady_clock::now();
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
-        last = std::chrono::steady_clock::now();
       }
     }
     backend_->wait();
@@ -324,6 +323,8 @@ class Simulation {
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::int64_t looked_ = 0;
+  // When Python last heard of signals: across frames, which may be shorter than the interval.
+  std::chrono::steady_clock::time_point listened_ = std::chrono::steady_clock::now();
   std::unique_ptr<std::mutex> busy_ = std::make_unique<std::mutex>();
 };
 

@@ -170,6 +170,34 @@ region = "x-"
   EXPECT_EQ(text_of(folder_ / "one" / "energy.csv"), text_of(folder_ / "two" / "energy.csv"));
 }
 
+/// A vertex that no triangle uses, before a tetrahedron: the sampler warns of it, every rank
+/// samples, and one of them speaks.
+TEST_F(Mpirun, WarningsOfMeshesAreShownOnce) {
+  write("t.obj",
+        "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 2 4 3\nf 2 3 5\nf 3 4 5\nf 2 5 4\n");
+  write("t.toml", R"([time]
+end = 0.01
+[solver]
+device = "cpu"
+[[body]]
+mesh = "t.obj"
+phyxels = 200
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)");
+  launcher_.clear();
+  const std::string warning = "vertices that no triangle uses";
+  ASSERT_THAT(run({"check", "t.toml"}).out, HasSubstr(warning));
+  use_ranks(2);
+  const Outcome outcome = run({"check", "t.toml"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::size_t at = outcome.out.find(warning);
+  ASSERT_NE(at, std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find(warning, at + 1), std::string::npos) << outcome.out;
+}
+
 TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
   write_scene();
   const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});

@@ -398,6 +398,43 @@ TEST_F(Program, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
   EXPECT_THAT(run({"rum", "x.toml"}).err, HasSubstr("did you mean \"run\""));
   EXPECT_THAT(run({"bench", "stop"}).err, HasSubstr("did you mean \"step\""));
   EXPECT_THAT(run({"run", "x.toml", "--forse"}).err, HasSubstr("did you mean \"--force\""));
+  EXPECT_THAT(run({"rnu", "x.toml"}).err,
+              HasSubstr("did you mean \"run\""));  // two letters swapped
+  EXPECT_THAT(run({"-V"}).err, HasSubstr("did you mean \"--version\""));
+  const Outcome help = run({"help"});
+  EXPECT_EQ(help.code, 2);
+  EXPECT_THAT(help.err, HasSubstr("did you mean \"--help\""));
+  EXPECT_EQ(std::count(help.err.begin(), help.err.end(), '\n'), 1) << help.err;
+}
+
+TEST_F(Program, OptionsAreQuotedAsTheyWereTyped) {
+  EXPECT_THAT(run({"run", "x.toml", "--until=abc"}).err, HasSubstr("error: --until=abc: "));
+  EXPECT_THAT(run({"run", "x.toml", "--until", "abc"}).err, HasSubstr("error: --until abc: "));
+}
+
+TEST_F(Program, FilesOfAnotherKindAreToldApart) {
+  write("cow.obj", "v 0 0 0\n");
+  const Outcome run_mesh = run({"run", "cow.obj"});
+  EXPECT_EQ(run_mesh.code, 2);
+  EXPECT_THAT(run_mesh.err, HasSubstr("is a mesh; \"phyxel sample cow.obj"));
+  write("scene.toml", "");
+  EXPECT_THAT(run({"render", "scene.toml"}).err, HasSubstr("is a scene; \"phyxel run scene.toml"));
+  write("x.h5", "phyxel sealed file 1\n");
+  EXPECT_THAT(run({"run", "x.h5"}).err, HasSubstr("is an HDF5 file"));
+}
+
+/// doctor reads the environment that its process began with, which is what the runtime has read.
+TEST_F(Program, WaitingThreadsSleepSoonUnlessTheUserSaysOtherwise) {
+  const auto policy = [&] {
+    return nlohmann::json::parse(run({"doctor", "--json"}).out)["thread_policy"].get<std::string>();
+  };
+  const char* ours = std::getenv("OMP_WAIT_POLICY");
+  const std::string kept = ours ? ours : "";
+  unsetenv("OMP_WAIT_POLICY");
+  EXPECT_EQ(policy(), "GOMP_SPINCOUNT=1000");
+  if (ours) setenv("OMP_WAIT_POLICY", kept.c_str(), 1);
+  environment_ = {{"OMP_WAIT_POLICY", "active"}};
+  EXPECT_EQ(policy(), "OMP_WAIT_POLICY=active");
 }
 
 /// On a terminal, where stderr is shown beside stdout.

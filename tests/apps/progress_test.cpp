@@ -21,6 +21,7 @@ class ProgressLines : public ::testing::Test {
   ProgressLines() : stream_(open_memstream(&text_, &size_)) {
     style_.terminal = false;
     style_.clock = [this] { return now_; };
+    style_.load = [] { return std::nullopt; };  // this machine's is no business of the tests
   }
   ~ProgressLines() override {
     std::fclose(stream_);
@@ -71,6 +72,20 @@ TEST_F(ProgressLines, ShowsACallersOwnPartsAndLinesThatStay) {
   now_ += 10;
   progress.update(0.5, 100, 50, -1.25);  // steps have theirs again
   EXPECT_THAT(text(), HasSubstr("0.500/2 s"));
+}
+
+/// Two threads of a run on two cores are a load of 2, and averages are a little off.
+TEST_F(ProgressLines, ALoadAboveTheCoresIsShown) {
+  HostLoad host{2.5, 2};
+  style_.load = [&] { return host; };
+  Progress progress(2, stream_, style_);
+  now_ += 10;
+  progress.update(0.5, 100, 50, -1.25);
+  EXPECT_THAT(text(), Not(HasSubstr("load")));
+  host.load = 2.6;
+  now_ += 10;
+  progress.update(0.6, 120, 50, -1.25);
+  EXPECT_THAT(text(), HasSubstr("load 2.6 on 2 cores"));
 }
 
 TEST_F(ProgressLines, LongTimesLeftAreGivenInHours) {

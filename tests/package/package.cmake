@@ -46,7 +46,8 @@ file(GLOB development ${WORK}/libphyxel-dev_${VERSION}*.deb)
 run(dpkg-deb --contents ${program})
 set(wanted "root/root .* ./usr/bin/phyxel\n" /usr/share/bash-completion/completions/phyxel
     /usr/share/zsh/vendor-completions/_phyxel /usr/share/fish/vendor_completions.d/phyxel.fish
-    /usr/share/doc/phyxel/copyright /usr/share/doc/phyxel/examples/large_body/main.cpp)
+    /usr/share/doc/phyxel/copyright /usr/share/doc/phyxel/examples/large_body/main.cpp
+    /usr/share/doc/phyxel/docs/tutorial.md /usr/share/doc/phyxel/CONTRIBUTING.md /usr/share/doc/phyxel/LICENSE)
 if(MANUAL)
   list(APPEND wanted /usr/share/man/man1/phyxel.1)
 endif()

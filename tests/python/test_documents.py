@@ -4,6 +4,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import types
 
 import pytest
 from conftest import needs_module
@@ -16,9 +17,10 @@ def test_the_page_runs_from_its_beginning(tmp_path, monkeypatch):
     blocks = re.findall(r"^```python\n(.*?)^```", (SOURCE / "docs/python.md").read_text(),
                         re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 5
-    names = {}
+    page = types.ModuleType("page")  # a module, where processes look for the page's functions
+    monkeypatch.setitem(sys.modules, "page", page)
     for block in blocks:
-        exec(compile(block, "docs/python.md", "exec"), names)
+        exec(compile(block, "docs/python.md", "exec"), page.__dict__)
 
 
 @pytest.mark.parametrize("script", sorted(p.name for p in (SOURCE / "examples/python").glob("*.py")))

@@ -1,4 +1,5 @@
 """The Python module, held against mechanics and against what the library promises."""
+import multiprocessing
 import signal
 import threading
 
@@ -267,6 +268,34 @@ def test_ctrl_c_stops_a_long_run():
     steps = s.steps
     s.step(3)  # and it goes on
     assert s.steps == steps + 3
+
+
+def test_ctrl_c_stops_a_run_of_short_frames():
+    # A frame is a few steps here, far less than the interval at which signals are looked for.
+    s = simulation(time={"end": 1e4}, output={"frames_per_second": 1e4})
+    signal.setitimer(signal.ITIMER_REAL, 0.3)
+    previous = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            s.run()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+
+
+def stepped(_):
+    s = simulation(solver={"device": "cpu", "precision": "double", "threads": 2})
+    s.set_state(velocity=np.cross(s.rest, [0, 0, 1]))
+    s.step(20)
+    return s.displacement
+
+
+def test_a_forked_child_steps_as_its_parent_does():
+    expected = stepped(0)  # starts threads, which no fork copies
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        for result in pool.map_async(stepped, range(3)).get(timeout=60):
+            assert np.array_equal(result, expected)
+    assert np.array_equal(stepped(0), expected)
 
 
 def test_a_run_that_diverges_says_so():

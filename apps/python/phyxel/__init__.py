@@ -20,7 +20,18 @@ import json
 import os
 import pathlib
 
-import numpy
+
+def _settle_thread_policy():
+    """Makes waiting OpenMP threads sleep soon, unless the environment says how they wait: what
+    `phyxel run` does (apps/phyxel/thread_policy.cpp says why). The runtime reads the environment
+    when it is loaded, and ignores this if another module has loaded it before."""
+    if "OMP_WAIT_POLICY" not in os.environ and "GOMP_SPINCOUNT" not in os.environ:
+        os.environ["GOMP_SPINCOUNT"] = "1000"
+
+
+_settle_thread_policy()  # before NumPy, whose libraries may load the runtime
+
+import numpy  # noqa: E402
 
 from ._phyxel import (Cloud, DeviceError, DivergedError, Error, Frame, InputError, Live,
                       OutputError, SimulationBase, inspect, read_body, read_frame, read_mesh,
