@@ -30,11 +30,11 @@ void refuse_absurd_stiffness(const Model& model) {
           "times young; stiffer bodies need steps too short to reach the end",
           part.name, m.volume_stiffness, m.young, most_volume_stiffness));
     }
-    if (m.hourglass > most_hourglass) {
+    if (m.hourglass.value_or(0) > most_hourglass) {
       throw InputError(
           fmt::format("body \"{}\": hourglass = {:g}: allowed is at most {:g}; more of it needs "
                       "steps too short to reach the end",
-                      part.name, m.hourglass, most_hourglass));
+                      part.name, *m.hourglass, most_hourglass));
     }
   }
 }
