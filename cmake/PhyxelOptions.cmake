@@ -71,7 +71,7 @@ set(PHYXEL_SKIP_PROPERTIES SKIP_RETURN_CODE 77)
 # phyxel_one_skip(name): after gtest_discover_tests, takes its own pattern for skips out of what it has written.
 function(phyxel_one_skip name)
   add_custom_command(TARGET ${name} POST_BUILD VERBATIM COMMAND ${CMAKE_COMMAND}
-    "-DFILE=${CMAKE_CURRENT_BINARY_DIR}/${name}[1]_tests.cmake" -P ${PROJECT_SOURCE_DIR}/cmake/PhyxelOneSkip.cmake)
+    -DFOLDER=${CMAKE_CURRENT_BINARY_DIR} -DNAME=${name} -P ${PROJECT_SOURCE_DIR}/cmake/PhyxelOneSkip.cmake)
 endfunction()
 
 # What a test may need of the tree: where the sources are, and the two folders of headers.
