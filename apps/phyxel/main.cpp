@@ -2,6 +2,10 @@
 /// message and an exit code.
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+
 #include "command.hpp"
 #include "complaint.hpp"
 #include "phyxel/error.hpp"
@@ -27,6 +31,12 @@ void check_ranks(const CLI::App& program) {
       fmt::format("{} ranks: allowed with \"phyxel run\", \"phyxel check\", \"phyxel doctor\" and "
                   "\"phyxel bench scaling\"; start all else without mpirun",
                   ranks().size()));
+}
+
+/// A full disk or a closed pipe behind the standard output: what was asked for has not been said.
+[[noreturn]] void refuse_standard_output(int error) {
+  throw phyxel::OutputError(fmt::format("standard output: cannot be written: {}",
+                                        std::generic_category().message(error)));
 }
 
 }  // namespace
@@ -66,7 +76,11 @@ int main(int argc, char** argv) {
     program.parse_complete_callback([&] { check_ranks(program); });
     try {
       program.parse(argc, argv);
+      if (std::fflush(stdout) != 0 || std::ferror(stdout)) refuse_standard_output(errno);
       return static_cast<int>(ExitCode::success);
+    } catch (const std::system_error& error) {
+      if (!std::ferror(stdout)) throw;
+      refuse_standard_output(error.code().value());
     } catch (const CLI::Success& help) {  // --help, --version
       return all.leads() ? program.exit(help) : 0;
     } catch (const CLI::ParseError& error) {

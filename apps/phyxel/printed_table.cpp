@@ -33,7 +33,7 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
   table_.facts.insert(table_.facts.end(), more.begin(), more.end());
   if (!options_.csv.empty()) {
     check_output_file(options_.csv, options_.force, Output::file_or_stream);
-    stream_ = is_stream(options_.csv);
+    if (is_stream(options_.csv)) stream_.open(options_.csv);
   }
   if (options_.json) {
     Json facts;
@@ -62,13 +62,14 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
   write();
 }
 
-void PrintedTable::write() const {
-  if (!options_.csv.empty() && !stream_) write_csv(options_.csv, table_);
-}
-
-void PrintedTable::finish() {
-  if (stream_) write_csv(options_.csv, table_);
-  stream_ = false;
+void PrintedTable::write() {
+  if (options_.csv.empty()) return;
+  if (!is_stream(options_.csv)) return write_csv(options_.csv, table_);
+  // A table only grows at its end.
+  const std::string text = csv_text(table_);
+  stream_ << std::string_view(text).substr(streamed_) << std::flush;
+  streamed_ = text.size();
+  if (!stream_) throw OutputError(fmt::format("{}: cannot be written", options_.csv));
 }
 
 }  // namespace phyxel::app

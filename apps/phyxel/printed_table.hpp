@@ -16,8 +16,9 @@ struct TableOptions {
 void add_table_options(CLI::App& command, TableOptions& options);
 
 /// A table whose rows go to the terminal as they come; the CSV file, if there is to be one, is
-/// written whole after each. As JSON it is one object, {"facts": {...}, "rows": [{...}, ...]},
-/// whose cells are numbers where they can be and null where they are empty.
+/// written whole after each; a FIFO or character device gets the rows one after another. As JSON it
+/// is one object, {"facts": {...}, "rows": [{...}, ...]}, whose cells are numbers where they can be
+/// and null where they are empty.
 class PrintedTable {
  public:
   /// @param more facts after those of the machine
@@ -29,15 +30,13 @@ class PrintedTable {
   PrintedTable(const PrintedTable&) = delete;
   PrintedTable& operator=(const PrintedTable&) = delete;
   void row(const std::vector<std::string>& cells);
-  /// Writes the table to a FIFO or character device, which takes it once and whole. @throws
-  /// OutputError
-  void finish();
 
  private:
-  void write() const;
+  void write();
 
   TableOptions options_;
-  bool stream_ = false;  ///< Whether the CSV goes to a FIFO or character device.
+  std::ofstream stream_;      ///< Where the CSV is a FIFO or character device, which takes rows.
+  std::size_t streamed_ = 0;  ///< Bytes it has.
   CsvTable table_;
 };
 

@@ -145,7 +145,8 @@ class CudaBackend final : public Backend {
     std::vector<TileStiffening> found(static_cast<std::size_t>(tiles));
     if (tiles > 0) {
       find_stiffest<<<tiles, diagnose_threads, 0, m_.stream()>>>(
-          m_.fields(), m_.materials(m_.dt() / 2), gradients.data(), m_.number_at(), stiffest_.data());
+          m_.fields(), m_.materials(m_.dt() / 2), gradients.data(), m_.number_at(),
+          stiffest_.data());
       m_.launched("find_stiffest", static_cast<unsigned>(tiles), diagnose_threads);
     }
     m_.wait();

@@ -15,7 +15,7 @@ namespace phyxel::cuda {
 /// What the sums need of a tile's body.
 struct TileMaterial {
   double lambda, mu, volume_stiffness, hourglass;
-  DampedFlow flow;         ///< From the time of the velocities to that of the displacements.
+  DampedFlow flow;      ///< From the time of the velocities to that of the displacements.
   Vec3<double> origin;  ///< What positions are taken from [m].
   Elasticity elasticity;
 };
@@ -98,8 +98,7 @@ inline constexpr int diagnose_threads = 128;
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
                                const TileMaterial* materials, const char* moved, const Real* force,
-                               const Real* gradient, const Index* number_at,
-                               TileTotals* totals) {
+                               const Real* gradient, const Index* number_at, TileTotals* totals) {
   __shared__ TileTotals shared[diagnose_threads];
   TileTotals both{};
   for (int part = 0; part < tile_size / diagnose_threads; ++part) {

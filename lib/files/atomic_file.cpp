@@ -269,7 +269,9 @@ void replace_tail(const fs::path& file, std::size_t keep, std::string_view text)
 void require_regular_file(const fs::path& file, const char* wanted) {
   struct stat status {};
   if (!found(file, &status)) {
-    throw InputError(fmt::format("{}: no such file", file.string()));
+    const std::string why =
+        errno == ENOENT || errno == ENOTDIR ? "no such file" : "cannot be read: " + reason(errno);
+    throw InputError(fmt::format("{}: {}", file.string(), why));
   }
   if (const char* what = irregular(status.st_mode)) {
     throw InputError(fmt::format("{}: is {}; allowed: {}", file.string(), what, wanted));

@@ -156,9 +156,9 @@ std::vector<SceneKey> run_keys() {
       {.section = "render", .name = "height", .type = KeyType::integer, .unit = "pixels",
        .fallback = "720", .range = between(16, 8192), .meaning = "Height of a picture."},
       {.section = "render", .name = "view", .type = KeyType::vector, .otherwise = "[-1, 2, -0.6], turned as z is to `up`",
-       .meaning = "Direction the camera looks along."},
+       .range = within(longest), .meaning = "Direction the camera looks along."},
       {.section = "render", .name = "up", .type = KeyType::vector, .otherwise = "against `gravity`; [0, 0, 1] if there is none",
-       .meaning = "Direction that points up in the picture; not parallel to `view`."},
+       .range = within(longest), .meaning = "Direction that points up in the picture; not parallel to `view`."},
   };
 }
 

@@ -349,7 +349,7 @@ TEST_F(Trajectory, PicturesThatExistAreKeptUnlessForced) {
   fs::create_directory(pictures);
   std::ofstream(pictures / "frame_000002.png") << "mine";
   EXPECT_THAT(message_of([&] { render(run_, pictures, request_, false); }),
-              HasSubstr("frame_000002.png: exists and is kept"));
+              HasSubstr("frame_000002.png: exists already and is kept"));
   EXPECT_THAT(names_in(pictures), ElementsAre("frame_000002.png"));
   EXPECT_EQ(fs::file_size(pictures / "frame_000002.png"), 4u);
   request_.choice.frames = {0, 1};

@@ -335,7 +335,7 @@ TEST_F(Reports, WrongRequestsAreRefused) {
   };
   refused({"report", "nowhere"}, "nowhere: no such file or folder");
   refused({"report", "out", "a.csv"}, "one run, or any number of tables");
-  refused({"report", "out", "-o", "kept.html"}, "kept.html: exists and is kept");
+  refused({"report", "out", "-o", "kept.html"}, "kept.html: exists already and is kept");
   refused({"report", "kept.html"}, "kept.html");
   EXPECT_EQ(text_of(folder_ / "kept.html"), "mine");
 }

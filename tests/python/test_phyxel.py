@@ -315,8 +315,9 @@ def test_a_run_that_diverges_says_so():
     (dict(step=-1.0), "step: -1"),
     (dict(step=1.0), "unstable"),
     (dict(end=float("nan")), "end: nan"),
-    (dict(end=1e300), "steps; allowed: below 1e15"),
-    (dict(step=1e-300), "steps; allowed: below 1e15"),
+    (dict(end=1e300), r"end: 1e\+300 found; allowed: a number, 0 < end < 1e\+09"),
+    (dict(step=1e-17), "steps; allowed: below 1e15"),
+        (dict(step=1e-300), "step: 1e-300 found; allowed"),
     (dict(clouds={}), "body.cloud.*no clouds"),
     (dict(clouds={"bean": BEAM}), "did you mean \"bean\""),
 ])

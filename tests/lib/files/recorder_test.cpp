@@ -227,7 +227,8 @@ TEST_F(Recording, ATrajectoryThatIsThereIsKept) {
   }
   const std::string before = text_of(folder_ / "out" / "phyxels_000000.hdf");
   EXPECT_THROW(Recorder(model_, scene_, false), InputError);
-  EXPECT_THROW(Recorder(model_, scene_, false, Continuation{3}), InputError);  // the checkpoint has seen more
+  EXPECT_THROW(Recorder(model_, scene_, false, Continuation{3}),
+               InputError);  // the checkpoint has seen more
   EXPECT_EQ(text_of(folder_ / "out" / "phyxels_000000.hdf"), before);
   const std::string other = "notes";
   std::ofstream(folder_ / "out" / "notes.txt") << other;

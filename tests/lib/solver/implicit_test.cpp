@@ -257,8 +257,8 @@ TEST(Plan, OfAbsurdStiffnessIsRefusedByKey) {
     }
     return std::string("planned");
   };
-  EXPECT_THAT(refusal(1e20, 0), ::testing::HasSubstr("body \"body\": volume_stiffness = 1e+20"));
-  EXPECT_THAT(refusal(0, 1e20), ::testing::HasSubstr("body \"body\": hourglass = 1e+20"));
+  EXPECT_THAT(refusal(1e17, 0), ::testing::HasSubstr("body \"body\": volume_stiffness = 1e+17"));
+  EXPECT_THAT(refusal(0, 1e5), ::testing::HasSubstr("body \"body\": hourglass = 100000"));
   EXPECT_EQ(refusal(1e8, 10), "planned");  // a thousand times the rubber, a hundred times usual
 }
 
