@@ -360,7 +360,7 @@ class LayoutReader {
       if (end == names.end() || name.empty() || name == "." || name.find('/') != name.npos) {
         file_.refuse(path + " has a member without a proper name");
       }
-      const std::string member = path + '/' + name;
+      const std::string member = fmt::format("{}/{}", path, name);
       if (objects_.count(member) > 0) file_.refuse(member + " is in the file twice");
       read_object(member, address, depth + 1);
     }

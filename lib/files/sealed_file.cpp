@@ -178,7 +178,7 @@ std::string check_seal(const fs::path& file) {
     throw InputError(fmt::format(
         "{}: altered since it was written: its digest does not fit its content", file.string()));
   }
-  const std::string kind = line_of(seal, "kind");
+  std::string kind = line_of(seal, "kind");
   if (kind.empty()) {
     throw InputError(fmt::format("{}: its seal names no kind of file", file.string()));
   }

@@ -33,7 +33,7 @@ struct NewtonReport {
   std::int64_t evaluations = 0;  ///< Of the forces of all phyxels.
   bool found = false;            ///< The residual is below the tolerance, all held are in place.
   bool interrupted = false;      ///< The observer asked to stop.
-  std::string why = "";          ///< Why nothing was found, in words.
+  std::string why;               ///< Why nothing was found, in words.
 };
 
 /// Each step's linear equations are solved by conjugate gradients over differences of the backend's
