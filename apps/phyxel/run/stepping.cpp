@@ -33,7 +33,9 @@ void Run::watch_newton(Progress& progress) {
                                              now.tolerance),
                       energy = fmt::format("E = {:.4g} J", now.energy);
     if (scene_.solver.method == Method::equilibrium) {
-      progress.update({residual, newton, iteration, energy});
+      // Before the first step there is none but that of the start.
+      progress.update(now.step > 0 ? std::vector{residual, newton, iteration, energy}
+                                   : std::vector{residual, newton, iteration});
     } else {
       const double share = solver_.time() / end_time();
       progress.update({fmt::format("{:5.1f}%", 100 * share),
