@@ -33,7 +33,10 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
   table_.facts.insert(table_.facts.end(), more.begin(), more.end());
   if (!options_.csv.empty()) {
     check_output_file(options_.csv, options_.force, Output::file_or_stream);
-    if (is_stream(options_.csv)) stream_.open(options_.csv);
+    if (is_stream(options_.csv)) {
+      stream_.open(options_.csv);
+      if (!stream_) throw OutputError(fmt::format("{}: cannot be written", options_.csv));
+    }
   }
   if (options_.json) {
     Json facts;
@@ -64,7 +67,7 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
 
 void PrintedTable::write() {
   if (options_.csv.empty()) return;
-  if (!is_stream(options_.csv)) return write_csv(options_.csv, table_);
+  if (!stream_.is_open()) return write_csv(options_.csv, table_);
   // A table only grows at its end.
   const std::string text = csv_text(table_);
   stream_ << std::string_view(text).substr(streamed_) << std::flush;

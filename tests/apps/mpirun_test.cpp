@@ -77,12 +77,6 @@ density = 1000
     use_ranks(count);
     return run(arguments);
   }
-  void wait_for(const std::string& file) const {
-    for (int wait = 0; wait < 4000 && !fs::exists(folder_ / file); ++wait) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    EXPECT_TRUE(fs::exists(folder_ / file));
-  }
   /// All files of an output folder, by name, but for run.json, which tells of times and ranks.
   std::map<std::string, std::string> files_of(const std::string& directory) const {
     std::map<std::string, std::string> files;

@@ -54,12 +54,6 @@ region = "x-"
     }
     return files;
   }
-  void wait_for(const std::string& file) const {
-    for (int wait = 0; wait < 4000 && !fs::exists(folder_ / file); ++wait) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-    EXPECT_TRUE(fs::exists(folder_ / file));
-  }
   std::string newest(const char* folder) const {
     return latest_checkpoint(folder_ / folder).value_or("none").string();
   }

@@ -4,7 +4,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
+#include <thread>
 
 #include "support/folder.hpp"
 
@@ -40,6 +42,14 @@ class Program : public Folder {
             text_of(folder_ / "stdout.txt"), text_of(folder_ / "stderr.txt")};
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
+
+  /// Waits until a file of the test's folder is there, which a run is to write soon.
+  void wait_for(const std::string& file) const {
+    for (int wait = 0; wait < 4000 && !std::filesystem::exists(folder_ / file); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    EXPECT_TRUE(std::filesystem::exists(folder_ / file));
+  }
 
   /// What starts the program, e.g. mpirun and its options; empty: nothing.
   std::vector<std::string> launcher_;
