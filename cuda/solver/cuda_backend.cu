@@ -201,6 +201,10 @@ class CudaBackend final : public Backend {
     passes_.receive_displacements();
     return std::make_unique<CudaVibration<Real, StateReal>>(m_, passes_);
   }
+  std::unique_ptr<Vibration> vibration_at_present(double distance) override {
+    settle();
+    return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, passes_, distance);
+  }
 
   void update_surfels() override {
     if (!has_surfels_) return;

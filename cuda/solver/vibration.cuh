@@ -2,6 +2,7 @@
 /// do not depend on the order of tiles, nor on which rank has which.
 #pragma once
 
+#include <bit>
 #include <limits>
 
 #include "solver/passes.cuh"
@@ -31,6 +32,50 @@ __global__ void bend(Fields<Real, StateReal> f, const Real* x, Real amplitude) {
   const Real scale = amplitude * root_of_inverse_mass(f.force_constants, f.places, place);
   point.u = scale * column3(x, f.places, place);
   f.points.set(place, point);
+}
+
+/// u = there + a M^-1/2 x
+template <class Real, class StateReal>
+__global__ void bend_from(Fields<Real, StateReal> f, const Real* there, const Real* x,
+                          Real amplitude) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  auto point = f.points.get(place);
+  const Real scale = amplitude * root_of_inverse_mass(f.force_constants, f.places, place);
+  point.u = column3(there, f.places, place) + scale * column3(x, f.places, place);
+  f.points.set(place, point);
+}
+
+template <class Real, class StateReal>
+__global__ void keep_displacements(Fields<Real, StateReal> f, Real* kept) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  set_column3(kept, f.places, place, f.points.get(place).u);
+}
+
+template <class Real, class StateReal>
+__global__ void put_displacements(Fields<Real, StateReal> f, const Real* kept) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  auto point = f.points.get(place);
+  point.u = column3(kept, f.places, place);
+  f.points.set(place, point);
+}
+
+/// The largest |M^-1/2 x| of a place, as the bits of a float: those of floats that are not negative
+/// are in the order of the floats.
+template <class Real, class StateReal>
+__global__ void find_farthest(Fields<Real, StateReal> f, const Real* x, unsigned* largest) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  const Vec3<Real> v = column3(x, f.places, place);
+  const auto length = static_cast<float>(sqrt(dot(v, v)) *
+                                         root_of_inverse_mass(f.force_constants, f.places, place));
+  __shared__ float shared[tile_size];
+  shared[threadIdx.x] = length;
+  for (int half = tile_size / 2; half > 0; half /= 2) {
+    __syncthreads();
+    if (static_cast<int>(threadIdx.x) < half) {
+      shared[threadIdx.x] = fmaxf(shared[threadIdx.x], shared[threadIdx.x + half]);
+    }
+  }
+  if (threadIdx.x == 0) atomicMax(largest, __float_as_uint(shared[0]));
 }
 
 /// y = -M^-1/2 f / a - beta x
@@ -76,7 +121,7 @@ __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
 
 /// M^-1/2 K M^-1/2 at rest, by the linear law that every material has there.
 template <class Real, class StateReal>
-class CudaVibration final : public Vibration {
+class CudaVibration : public Vibration {
  public:
   CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes)
       : m_(model),
@@ -101,9 +146,7 @@ class CudaVibration final : public Vibration {
     passes_.send_displacements();
     passes_.linear_stress(tiles_.data());
     passes_.gather(force_.data());
-    m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
-                    previous_.data(), static_cast<Real>(beta), amplitude_, next_.data());
-    return product(next_, current_);
+    return times_stiffness(amplitude_, beta);
   }
   double subtract(double alpha) override {
     m_.use_device();
@@ -118,11 +161,24 @@ class CudaVibration final : public Vibration {
     scale(current_, 1 / norm);
   }
 
+ protected:
+  using Model = DeviceModel<Real, StateReal>;
+  const Model& model() const { return m_; }
+  const Passes<Real, StateReal>& passes() const { return passes_; }
+  const DeviceArray<Real>& current() const { return current_; }
+  const DeviceArray<Real>& force() const { return force_; }
+  /// next = -M^-1/2 force / a - beta previous. @returns next · current
+  double times_stiffness(Real amplitude, double beta) {
+    m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
+                    previous_.data(), static_cast<Real>(beta), amplitude, next_.data());
+    return product(next_, current_);
+  }
+
  private:
   /// Makes displacements of a vector's ones the size of a support: smallest support times the root
   /// of the smallest mass. Forces of a unit vector then stay as far from the ends of float as those
   /// of a step.
-  static Real amplitude_at_rest(const Model& model) {
+  static Real amplitude_at_rest(const phyxel::Model& model) {
     double support = 0, mass = 0;
     for (Index i = 0; i < model.size(); ++i) {
       const double h = model.neighbourhood.support[i], m = model.mass[i];
@@ -155,12 +211,75 @@ class CudaVibration final : public Vibration {
     m_.launch_tiles("scale", scale_vector<Real>, a.data(), m_.places(), static_cast<Real>(factor));
   }
 
-  const DeviceModel<Real, StateReal>& m_;
+  const Model& m_;
   const Passes<Real, StateReal>& passes_;
   Real amplitude_;
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
   DeviceArray<unsigned long long> product_;
   DeviceArray<Real> previous_, current_, next_, force_;
+};
+
+/// The same at the present displacements, by differences of forces there. The displacements are
+/// back when this object is gone; velocities are not touched.
+template <class Real, class StateReal>
+class CudaDeformedVibration final : public CudaVibration<Real, StateReal> {
+  using Base = CudaVibration<Real, StateReal>;
+
+ public:
+  /// @param distance how far the other displacements are off [m]
+  CudaDeformedVibration(const DeviceModel<Real, StateReal>& model,
+                        const Passes<Real, StateReal>& passes, double distance)
+      : Base(model, passes),
+        distance_(distance),
+        present_(3 * model.places(), "displacements of " + model.subject()),
+        forces_there_(3 * model.places(), "forces of " + model.subject()),
+        farthest_(1, "sums") {
+    model.launch_tiles("keep_displacements", keep_displacements<Real, StateReal>, model.fields(),
+                       present_.data());
+    passes.stress();
+    passes.gather(forces_there_.data());
+  }
+  CudaDeformedVibration(const CudaDeformedVibration&) = delete;
+  CudaDeformedVibration& operator=(const CudaDeformedVibration&) = delete;
+  ~CudaDeformedVibration() override {
+    try {
+      this->model().use_device();
+      this->model().launch_tiles("put_displacements", put_displacements<Real, StateReal>,
+                                 this->model().fields(), present_.data());
+      this->passes().send_displacements();
+      this->model().wait();
+    } catch (const DeviceError&) {  // the next step meets it again
+    }
+  }
+
+  double apply(double beta) override {
+    const auto& m = this->model();
+    m.use_device();
+    const auto amplitude = static_cast<Real>(distance_ / farthest());
+    m.launch_tiles("bend_from", bend_from<Real, StateReal>, m.fields(), present_.data(),
+                   this->current().data(), amplitude);
+    this->passes().send_displacements();
+    this->passes().stress();
+    this->passes().gather(this->force().data());
+    m.launch_tiles("subtract", subtract_multiple<Real>, this->force().data(), forces_there_.data(),
+                   m.places(), Real(1));
+    return this->times_stiffness(amplitude, beta);
+  }
+
+ private:
+  double farthest() {
+    const auto& m = this->model();
+    farthest_.clear(m.stream());
+    m.launch_tiles("find_farthest", find_farthest<Real, StateReal>, m.fields(),
+                   this->current().data(), farthest_.data());
+    m.wait();
+    const auto largest = static_cast<double>(std::bit_cast<float>(fetched(farthest_)[0]));
+    return m.share() ? m.share()->others->largest(largest) : largest;
+  }
+
+  double distance_;
+  DeviceArray<Real> present_, forces_there_;
+  DeviceArray<unsigned> farthest_;
 };
 
 }  // namespace phyxel::cuda

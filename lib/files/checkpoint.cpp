@@ -83,6 +83,35 @@ void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3
   }
 }
 
+void write_looks(Hdf5Writer& out, const Looks& looks) {
+  out.group("/state/looks");
+  out.attribute("/state/looks", "next", looks.next);
+  out.attribute("/state/looks", "last", looks.last);
+  out.attribute("/state/looks", "ratio", looks.ratio);
+  out.attribute("/state/looks", "measured", looks.measured);
+  out.attribute("/state/looks", "measured_ratio", looks.measured_ratio);
+  out.attribute("/state/looks", "measured_share", looks.measured_share);
+  out.attribute("/state/looks", "apart", looks.apart);
+}
+
+Looks read_looks(const Hdf5Reader& in) {
+  Looks looks;
+  looks.next = in.integer_attribute("/state/looks", "next");
+  looks.last = in.integer_attribute("/state/looks", "last");
+  looks.ratio = in.number_attribute("/state/looks", "ratio");
+  looks.measured = in.integer_attribute("/state/looks", "measured");
+  looks.measured_ratio = in.number_attribute("/state/looks", "measured_ratio");
+  looks.measured_share = in.number_attribute("/state/looks", "measured_share");
+  looks.apart = in.integer_attribute("/state/looks", "apart");
+  if (std::min({looks.next, looks.last + 1, looks.measured + 1, looks.apart}) < 0 ||
+      std::max({looks.next, looks.last, looks.measured, looks.apart}) > most_counted ||
+      !std::isfinite(looks.ratio) || !(looks.measured_ratio > 0) ||
+      !std::isfinite(looks.measured_ratio) || !(looks.measured_share >= 0)) {
+    in.refuse("/state/looks: steps that are negative or ratios that are not finite");
+  }
+  return looks;
+}
+
 }  // namespace
 
 fs::path write_checkpoint(const fs::path& directory, const State& state,
@@ -114,6 +143,7 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   out.attribute("/state", "step", state.step);
   out.attribute("/state", "time", state.time);
   out.attribute("/state", "dt", state.dt);
+  write_looks(out, state.looks);
   const bool as_float = info.precision == Precision::single;
   write_later(out, {"/state/displacement", as_float, phyxels, {Quantity::displacement}}, values);
   write_later(out, {"/state/velocity", as_float, phyxels, {Quantity::velocity}}, values);
@@ -167,6 +197,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
     in.refuse(fmt::format("counts {} steps and {} frames; allowed: 0 to {}", state_.step,
                           info_.frames_written, most_counted));
   }
+  if (info_.version > 2) state_.looks = read_looks(in);
   if (!(state_.dt > 0) || !std::isfinite(state_.dt) || !std::isfinite(state_.time)) {
     in.refuse(
         fmt::format("dt = {} s at t = {} s; allowed: dt > 0, both finite", state_.dt, state_.time));

@@ -47,7 +47,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
 }
 
 Solver::Solver(Backend& backend, const State& start)
-    : backend_(backend), steps_(start.step), first_step_(start.step), dt_(start.dt) {
+    : backend_(backend), steps_(start.step), first_step_(start.step), dt_(start.dt), looks_(start.looks) {
   backend_.upload(start);
 }
 
@@ -98,6 +98,13 @@ void Solver::step() {
   ++steps_;
 }
 
+void Looks::halve_step() {
+  next *= 2;
+  if (last >= 0) last *= 2;
+  if (measured >= 0) measured *= 2;
+  measured_share /= 4;
+}
+
 void Solver::halve_step() {
   if (!model_ || method_ != Method::verlet) {
     throw InputError("only Verlet's steps of a solver that knows its model can be halved");
@@ -134,6 +141,7 @@ void Solver::halve_step() {
   first_step_ += steps_;  // as many have been taken as before
   steps_ *= 2;
   dt_ /= 2;
+  looks_.halve_step();
   state.step = steps_;
   state.dt = dt_;
   backend_.upload(state);
@@ -147,6 +155,7 @@ State Solver::state() const {
   state.step = steps_;
   state.dt = dt_;
   state.time = time();
+  state.looks = looks_;
   return state;
 }
 

@@ -14,38 +14,46 @@
 namespace phyxel {
 namespace {
 
-/// K x is minus the force of a displacement so small that only its linear part shows. Of a share,
-/// vectors have its own phyxels, and their products those of all ranks.
-class CpuVibration final : public Vibration {
+/// K x is minus the difference of the forces at two displacements so close to each other that only
+/// its linear part shows. Of a share, vectors have its own phyxels, and their products those of all
+/// ranks.
+class HostVibration final : public Vibration {
  public:
-  CpuVibration(const Model& model, int threads)
+  /// @param present where forces are linear; with its ghosts
+  /// @param distance how far the other displacements are off [m]
+  HostVibration(const Model& model, Backend& backend, const State& present, double distance)
       : model_(model),
-        backend_(make_cpu_backend(model, Precision::double_, threads)),
-        vectors_(model, backend_->threads()),
+        backend_(backend),
+        vectors_(model, std::max(1, backend.threads())),
+        present_(present),
+        moved_(present),
         previous_(vectors_.make()),
         current_(vectors_.make()),
         next_(vectors_.make()),
-        smallest_support_(vectors_.smallest_support()) {
+        distance_(distance) {
+    backend_.upload(present_);
+    backend_.internal_forces(there_);
     vectors_.for_each([&](Index i) { current_[i] = start_component(model.number(i)); });
     const double length = std::sqrt(vectors_.product(current_, current_));
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
-    state_.displacement = vectors_.make();
-    state_.velocity = vectors_.make();
   }
+  HostVibration(const HostVibration&) = delete;
+  HostVibration& operator=(const HostVibration&) = delete;
 
   double apply(double beta) override {
     const double largest =
         vectors_.largest([&](Index i) { return norm(current_[i]) / std::sqrt(model_.mass[i]); });
-    // Strains of 1e-8: second-order terms are 1e-8 of the force, rounding 1e-8 of the strain.
-    const double amplitude = 1e-8 * smallest_support_ / largest;
+    const double amplitude = distance_ / largest;
     vectors_.for_each([&](Index i) {
-      state_.displacement[i] = (amplitude / std::sqrt(model_.mass[i])) * current_[i];
+      moved_.displacement[i] =
+          present_.displacement[i] + (amplitude / std::sqrt(model_.mass[i])) * current_[i];
     });
-    vectors_.refresh_ghosts(state_.displacement);
-    backend_->upload(state_);
-    backend_->internal_forces(force_);
+    vectors_.refresh_ghosts(moved_.displacement);
+    backend_.upload(moved_);
+    backend_.internal_forces(force_);
     vectors_.for_each([&](Index i) {
-      next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * force_[i] - beta * previous_[i];
+      next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * (force_[i] - there_[i]) -
+                 beta * previous_[i];
     });
     return vectors_.product(next_, current_);
   }
@@ -62,13 +70,28 @@ class CpuVibration final : public Vibration {
 
  private:
   const Model& model_;
-  std::unique_ptr<Backend> backend_;
+  Backend& backend_;
   OwnedVectors vectors_;
+  const State& present_;
+  State moved_;
   OwnedVectors::Vector previous_, current_, next_;
-  State state_;
-  std::vector<Vec3d> force_;
-  double smallest_support_;
+  std::vector<Vec3d> there_, force_;
+  double distance_;  // [m]
 };
+
+/// Second-order terms are 1e-8 of the force, rounding 1e-8 of the strain.
+constexpr double strain_at_rest = 1e-8;
+/// Stresses that are there already lose digits in the difference: 1e-4 of it in float. Second-order
+/// terms are 3e-3 of it.
+constexpr double strain_at_work = 3e-3;
+
+State at_rest(const Model& model) {
+  State state;
+  state.displacement.resize(static_cast<std::size_t>(model.size()));
+  state.velocity.resize(state.displacement.size());
+  state.dt = 1;
+  return state;
+}
 
 /// An upper bound of the largest eigenvalue of a tridiagonal matrix that a residual `beta` may
 /// continue: the Ritz value is a lower bound, an eigenvalue lies within the residual of it, and
@@ -100,9 +123,13 @@ double smallest_sound_step(const Model& model) {
   return smallest;
 }
 
-StepLimit step_limit(const Model& model, Vibration& vibration) {
-  StepLimit limit;
-  limit.sound_step = smallest_sound_step(model);
+/// Largest eigenfrequency, with a bound of what is still missing in it.
+struct Frequency {
+  double omega = 0;  ///< [rad/s]; NaN where a force is not finite.
+  int iterations = 0;
+};
+Frequency largest_frequency(const Model& model, Vibration& vibration, double tolerance) {
+  Frequency found;
   std::vector<double> diagonal, off_diagonal;
   double beta = 0;
   const auto most = std::min<std::int64_t>(120, 3 * static_cast<std::int64_t>(model.whole_size()));
@@ -111,16 +138,24 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     diagonal.push_back(alpha);
     beta = vibration.subtract(alpha);
     if (!std::isfinite(alpha) || !std::isfinite(beta)) {
-      limit.omega_max = std::numeric_limits<double>::quiet_NaN();  // earlier ones say nothing
+      found.omega = std::numeric_limits<double>::quiet_NaN();  // earlier ones say nothing
       break;
     }
     const auto [value, residual] = largest_eigenvalue(diagonal, off_diagonal, beta);
-    limit.omega_max = std::sqrt(std::max(0.0, value + residual));
-    limit.iterations = static_cast<int>(k) + 1;
-    if (residual <= 0.002 * value || beta <= 1e-12 * value) break;
+    found = {std::sqrt(std::max(0.0, value + residual)), static_cast<int>(k) + 1};
+    if (residual <= tolerance * value || beta <= 1e-12 * value) break;
     off_diagonal.push_back(beta);
     vibration.advance(beta);
   }
+  return found;
+}
+
+StepLimit step_limit(const Model& model, Vibration& vibration) {
+  StepLimit limit;
+  limit.sound_step = smallest_sound_step(model);
+  const Frequency found = largest_frequency(model, vibration, 0.002);
+  limit.omega_max = found.omega;
+  limit.iterations = found.iterations;
   if (!(limit.omega_max > 0) || !std::isfinite(limit.omega_max)) {
     const std::string why =
         fmt::format("nothing in this model resists deformation (largest eigenfrequency {}): {}",
@@ -136,13 +171,37 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
 }  // namespace
 
 StepLimit step_limit(const Model& model, int threads) {
-  CpuVibration vibration(model, threads);
+  const std::unique_ptr<Backend> backend = make_cpu_backend(model, Precision::double_, threads);
+  const double distance =
+      strain_at_rest * OwnedVectors(model, backend->threads()).smallest_support();
+  HostVibration vibration(model, *backend, at_rest(model), distance);
   return step_limit(model, vibration);
 }
 
 StepLimit step_limit(const Model& model, Backend& backend) {
   const std::unique_ptr<Vibration> vibration = backend.vibration();
   return vibration ? step_limit(model, *vibration) : step_limit(model, backend.threads());
+}
+
+StepLimit step_limit_at(const Model& model, Backend& backend, const State& present) {
+  const OwnedVectors vectors(model, std::max(1, backend.threads()));
+  const double distance = strain_at_work * vectors.smallest_support();
+  Frequency found;
+  if (const std::unique_ptr<Vibration> on_device = backend.vibration_at_present(distance)) {
+    found = largest_frequency(model, *on_device, 0.02);
+  } else {
+    State there = present;
+    vectors.refresh_ghosts(there.displacement);
+    HostVibration vibration(model, backend, there, distance);
+    found = largest_frequency(model, vibration, 0.02);
+    backend.upload(there);
+  }
+  StepLimit limit;
+  limit.sound_step = smallest_sound_step(model);
+  limit.omega_max = found.omega;
+  limit.largest_step = 2 / found.omega;
+  limit.iterations = found.iterations;
+  return limit;
 }
 
 }  // namespace phyxel

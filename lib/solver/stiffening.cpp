@@ -1,7 +1,5 @@
-/// How much stiffer than at rest a deformed model is, and steps that follow from it.
+/// How much stiffer than at rest a deformed model is.
 #include "phyxel/physics/stiffening.hpp"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,10 +13,6 @@
 
 namespace phyxel {
 namespace {
-
-/// Phyxels at a surface have neighbours on one side, so that their gradients are not quite those of
-/// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
-constexpr double at_surfaces = 1.1;
 
 /// Largest stiffness of plane waves [Pa] of a law that is known by its stresses only: forward
 /// differences give ∂P/∂F, and directions and polarisations are improved in turn.
@@ -98,58 +92,6 @@ Stiffening find_stiffening(const Model& model, Backend& backend) {
   }
   if (model.share) found.look_at_others(*model.share->others);
   return found.values();
-}
-
-StepShortener::StepShortener(const Model& model, Backend& backend, const StepPlan& plan)
-    : model_(model), backend_(backend), limit_(plan.limit.largest_step) {
-  if (!plan.shortens) return;
-  for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
-  // Ranks look together; one of them may have nothing that stiffens.
-  if (model.share) active_ = model.share->others->largest(active_) > 0;
-}
-
-int StepShortener::look(Solver& solver, int halvings) {
-  if (!active_ || solver.steps() % interval != 0) return 0;
-  const Stiffening now = find_stiffening(model_, backend_);
-  if (std::isfinite(now.ratio)) seen_ = {now, solver.time()};
-  int made = 0;
-  const auto too_long = [&] {
-    const double share = solver.dt() / limit_;
-    return !(share * share * at_surfaces * now.ratio <= largest_share);
-  };
-  while (too_long()) {
-    if (halvings + made == most_halvings || !std::isfinite(now.ratio)) {
-      const std::string why = fmt::format(
-          "the simulation diverged: {} at t = {:g} s (step {}); {}; a stiffer material, damping, "
-          "smaller loads or a smaller time.step may help",
-          std::isfinite(now.ratio)
-              ? fmt::format("a body is {:.3g} times as stiff as at rest, for which steps would "
-                            "have to be shorter than {:g} s, 1/{} of those planned,",
-                            now.ratio, solver.dt(), std::int64_t{1} << most_halvings)
-              : "the state is not finite",
-          solver.time(), solver.steps(), where_it_began());
-      throw DivergedError(why);  // on all ranks
-    }
-    if (!first_) first_ = seen_;
-    solver.halve_step();
-    ++made;
-  }
-  return made;
-}
-
-void StepShortener::see(const Solver& solver) {
-  const Stiffening now = find_stiffening(model_, backend_);
-  if (std::isfinite(now.ratio)) seen_ = {now, solver.time()};
-}
-
-std::string StepShortener::where_it_began() const {
-  const std::optional<Seen>& began = first_ ? first_ : seen_;
-  if (!began || began->what.phyxel < 0) return "nobody has looked at it before";
-  if (!(began->what.stretch > 1 + 1e-6)) {
-    return fmt::format("at t = {:g} s, the last look, nothing was stretched", began->time);
-  }
-  return fmt::format("it began at {}, stretched to {:.3g} times its length at t = {:g} s",
-                     describe_phyxel(model_, began->what.phyxel), began->what.stretch, began->time);
 }
 
 }  // namespace phyxel

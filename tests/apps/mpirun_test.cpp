@@ -97,6 +97,30 @@ density = 1000
   }
 };
 
+/// Each rank starts itself once more, with threads that sleep soon while they wait: its OpenMP
+/// runtime says so, which has read the environment each time that it was loaded.
+TEST_F(Mpirun, WaitingThreadsOfEachRankSleepSoon) {
+  write_scene();
+  const char* ours = std::getenv("OMP_WAIT_POLICY");
+  const std::string kept = ours ? ours : "";
+  unsetenv("OMP_WAIT_POLICY");
+  use_ranks(2);
+  environment_.emplace_back("OMP_DISPLAY_ENV", "VERBOSE");
+  const Outcome outcome = run({"run", "scene.toml", "--dry-run"});
+  if (ours) setenv("OMP_WAIT_POLICY", kept.c_str(), 1);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto said = [&](const std::string& what) {
+    int times = 0;
+    for (auto at = outcome.err.find(what); at != std::string::npos;
+         at = outcome.err.find(what, at + 1)) {
+      ++times;
+    }
+    return times;
+  };
+  EXPECT_EQ(said("GOMP_SPINCOUNT = '"), 4) << outcome.err;
+  EXPECT_EQ(said("GOMP_SPINCOUNT = '1000'"), 2) << outcome.err;
+}
+
 /// A body that stiffens has its steps halved at the same ones on any number of ranks, and a search
 /// for rest comes to the same bits, also when all ranks were stopped by a signal that one has
 /// heard.

@@ -300,7 +300,8 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
 }
 INSTANTIATE_TEST_SUITE_P(Rings, AgainstTheOracle, ::testing::Values(1, 2));
 
-/// The stiffest phyxel of all ranks is that of one, and a step is halved to the same bits.
+/// The stiffest phyxel of all ranks is that of one, a step is halved to the same bits, and the
+/// limit of the deformed body is the same.
 TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
   const State start_of_whole = start(whole_), start_of_share = start(model_);
   const auto alone = backend(whole_, Precision::double_),
@@ -317,6 +318,14 @@ TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
   }
   const Stiffening one = find_stiffening(whole_, *alone), all = find_stiffening(model_, *here);
   const std::string in_words = describe_phyxel(model_, all.phyxel);
+  const StepLimit limit_of_one = step_limit_at(whole_, *alone, whole.state()),
+                  limit_of_all = step_limit_at(model_, *here, share.state());
+  EXPECT_EQ(limit_of_one.omega_max, limit_of_all.omega_max);
+  EXPECT_GT(limit_of_one.omega_max, 0);
+  for (int s = 0; s < 3; ++s) {  // looking for it has changed nothing
+    whole.step();
+    share.step();
+  }
   const State a = whole.state(), b = share.state();
   std::vector<Index> different;
   for (Index i = 0; i < model_.size(); ++i) {

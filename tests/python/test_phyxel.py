@@ -1,6 +1,10 @@
 """The Python module, held against mechanics and against what the library promises."""
 import multiprocessing
+import os
+import re
 import signal
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -290,12 +294,25 @@ def stepped(_):
     return s.displacement
 
 
-def test_a_forked_child_steps_as_its_parent_does():
+@pytest.mark.parametrize("way", ["fork", "spawn"])
+def test_a_child_steps_as_its_parent_does(way):
     expected = stepped(0)  # starts threads, which no fork copies
-    with multiprocessing.get_context("fork").Pool(2) as pool:
+    with multiprocessing.get_context(way).Pool(2) as pool:
         for result in pool.map_async(stepped, range(3)).get(timeout=60):
             assert np.array_equal(result, expected)
     assert np.array_equal(stepped(0), expected)
+
+
+@pytest.mark.parametrize("given, turns", [({}, "1000"), ({"GOMP_SPINCOUNT": "7"}, "7"),
+                                          ({"OMP_WAIT_POLICY": "active"}, "30000000000")])
+def test_waiting_threads_sleep_soon_unless_the_user_says_otherwise(given, turns):
+    # The runtime itself tells how many turns its threads wait. Those of "active" are its own.
+    environment = {k: v for k, v in os.environ.items()
+                   if k not in ("OMP_WAIT_POLICY", "GOMP_SPINCOUNT")}
+    said = subprocess.run([sys.executable, "-c", "import phyxel"], text=True, check=True,
+                          stderr=subprocess.PIPE,
+                          env={**environment, "OMP_DISPLAY_ENV": "VERBOSE", **given}).stderr
+    assert re.findall(r"GOMP_SPINCOUNT = '(\d+)'", said) == [turns]
 
 
 def test_a_run_that_diverges_says_so():

@@ -25,7 +25,7 @@ struct Exchanges {
   Traffic traffic;        ///< Of this rank, since the start.
 };
 
-/// A model at rest as Lanczos' iteration sees it: three vectors of three numbers a phyxel, on one
+/// A model, at rest or deformed, as Lanczos' iteration sees it: three vectors of three numbers a phyxel, on one
 /// device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared eigenfrequencies. `current`
 /// starts as a unit vector, `previous` as zero.
 class Vibration {
@@ -131,6 +131,12 @@ class Backend {
   /// For the step limit; nothing where that is left to the host. It may use the arrays of this
   /// backend: a state is to be uploaded after.
   virtual std::unique_ptr<Vibration> vibration() { return nullptr; }
+  /// The same about the present displacements, by differences of forces; they are there again when
+  /// it is gone. Nothing where that is left to the host.
+  /// @param distance of the other displacements [m]
+  virtual std::unique_ptr<Vibration> vibration_at_present([[maybe_unused]] double distance) {
+    return nullptr;
+  }
 
   /// Of a share: how it exchanges values with the others, and what that has cost it.
   virtual std::optional<Exchanges> exchanges() const { return std::nullopt; }

@@ -31,6 +31,12 @@ StepLimit step_limit(const Model& model, int threads = 0);
 /// to rounding. It uses the backend's arrays: a state is to be uploaded after.
 StepLimit step_limit(const Model& model, Backend& backend);
 
+/// The limit at the present displacements, within 2%: by Lanczos iteration on differences of the
+/// forces there. Of a share: collective, and the same on any number of ranks.
+/// @param present what the backend holds, and holds again after
+/// @returns a largest step that is infinite where nothing resists, NaN where a force is not finite
+StepLimit step_limit_at(const Model& model, Backend& backend, const State& present);
+
 /// The steps a scene is taken in, and why.
 struct StepPlan {
   StepLimit limit;                   ///< Of Verlet's steps.
@@ -98,6 +104,8 @@ class Solver {
   /// Taken since t = 0.
   std::int64_t steps() const { return steps_; }
   double dt() const { return dt_; }  ///< [s]
+  /// What a `StepShortener` has found.
+  Looks& looks() { return looks_; }
   /// When the present state is, for `diagnose`.
   Instant now() const;
   State state() const;  ///< Downloaded copy.
@@ -110,6 +118,7 @@ class Solver {
   Method method_ = Method::verlet;
   std::int64_t steps_, first_step_;
   double dt_;
+  Looks looks_;
   std::unique_ptr<ImplicitStep> implicit_;
   State implicit_state_;
   NewtonObserver observer_;
@@ -117,20 +126,23 @@ class Solver {
   SolverWork rest_;     ///< Of the search for rest.
 };
 
-/// Halves Verlet's steps where a law has become so stiff that they would be unstable: the stiffness
-/// is looked at again at fixed step numbers, so that runs, restarts and any number of threads and
-/// ranks halve at the same ones. Laws that cannot stiffen cost nothing.
+/// Halves Verlet's steps where laws have become so stiff that they would soon be unstable. It looks
+/// at a bound that costs little, a wave in the stiffest phyxel; only beyond that bound it finds the
+/// limit itself, as far fewer bodies outgrow their step than have a phyxel that would. When it looks
+/// follows from what it has seen: often where a body stiffens, seldom where nothing changes. All of
+/// that is part of the state, so that runs, restarts and any number of threads and ranks halve at
+/// the same steps. Laws that cannot stiffen cost nothing.
 class StepShortener {
  public:
-  static constexpr std::int64_t interval = 16;  ///< Steps between two looks.
-  static constexpr int most_halvings = 10;      ///< Of one run.
-  /// Of (dt / limit at rest)² × stiffening; 1 is the limit itself.
-  static constexpr double largest_share = 1;
+  static constexpr std::int64_t fewest = 16, most = 128;  ///< Steps between two looks.
+  static constexpr int most_halvings = 10;                ///< Of one run.
+  /// Of (dt / limit)²: bodies that stiffen fast come to half as much again between two looks.
+  static constexpr double largest_share = 0.75;
 
   /// All must outlive this.
   StepShortener(const Model& model, Backend& backend, const StepPlan& plan);
 
-  /// Before a step: if its number is due, looks, and halves the solver's step as often as needed.
+  /// Before a step: if a look is due, looks, and halves the solver's step as often as needed.
   /// Collective.
   /// @param halvings made before
   /// @returns those made now
@@ -146,6 +158,13 @@ class StepShortener {
   std::string where_it_began() const;
 
  private:
+  /// (dt / limit)² at the present displacements.
+  double share_of_limit(Solver& solver) const;
+  /// What it may be: `largest_share`, or a little more than at rest where a scene asked for more.
+  double allowed_share(double dt) const;
+  /// When to look again, after a look that found `ratio`.
+  void look_again(const Solver& solver, Looks& looks, double ratio) const;
+
   struct Seen {
     Stiffening what;
     double time = 0;  ///< [s]

@@ -7,6 +7,22 @@
 
 namespace phyxel {
 
+/// What looks at a body that stiffens have found (`StepShortener`): with it a resumed run looks at
+/// the steps at which the unbroken one does, and finds the same.
+struct Looks {
+  std::int64_t next = 0;   ///< Step of the next look.
+  std::int64_t last = -1;  ///< Step of the last one; -1: there has been none.
+  double ratio = 1;        ///< Stiffening that it found.
+  std::int64_t measured = -1;  ///< Step at which the limit of the step was found; -1: never.
+  double measured_ratio = 1;   ///< Stiffening then.
+  double measured_share = 0;   ///< (dt / limit)² then.
+  std::int64_t apart = 0;      ///< Steps after which it is found again.
+
+  /// As many seconds are twice as many steps of half the size.
+  void halve_step();
+  bool operator==(const Looks&) const = default;
+};
+
 /// State of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.
@@ -15,6 +31,7 @@ struct State {
   double time = 0;  ///< t [s] = step * dt.
   std::int64_t step = 0;
   double dt = 0;  ///< [s]
+  Looks looks;
 };
 
 /// When a backend's present state is.

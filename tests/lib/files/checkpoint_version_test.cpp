@@ -16,7 +16,8 @@ using ::testing::HasSubstr;
 class CheckpointVersions : public test::Folder {
  protected:
   /// A checkpoint as version 2 wrote it, one phyxel; or with another number, or with parameters.
-  std::filesystem::path written(std::int64_t version, const std::string& parameters = "") const {
+  std::filesystem::path written(std::int64_t version, const std::string& parameters = "",
+                                const Looks& looks = {}) const {
     Hdf5Writer out;
     out.group("/phyxel");
     out.attribute("/phyxel", "version", version);
@@ -33,12 +34,23 @@ class CheckpointVersions : public test::Folder {
     out.attribute("/state", "step", std::int64_t{7});
     out.attribute("/state", "time", 0.7);
     out.attribute("/state", "dt", 0.1);
+    if (version > 2) write_looks(out, looks);
     const std::vector<Vec3d> values{{1, 2, 3}};
     out.vectors("/state/displacement", values, false);
     out.vectors("/state/velocity", values, false);
     std::filesystem::path file = folder_ / "checkpoint_000000007.h5";
     write_sealed(file, "checkpoint", out.content(), Durable::yes);
     return file;
+  }
+  static void write_looks(Hdf5Writer& out, const Looks& looks) {
+    out.group("/state/looks");
+    out.attribute("/state/looks", "next", looks.next);
+    out.attribute("/state/looks", "last", looks.last);
+    out.attribute("/state/looks", "ratio", looks.ratio);
+    out.attribute("/state/looks", "measured", looks.measured);
+    out.attribute("/state/looks", "measured_ratio", looks.measured_ratio);
+    out.attribute("/state/looks", "measured_share", looks.measured_share);
+    out.attribute("/state/looks", "apart", looks.apart);
   }
   static std::string refusal_of(const std::filesystem::path& file) {
     try {
@@ -63,6 +75,17 @@ TEST_F(CheckpointVersions, OthersAreRefusedByNumber) {
   EXPECT_THAT(refusal_of(written(1)),
               HasSubstr("format version 1; this program reads versions 2 to 3"));
   EXPECT_THAT(refusal_of(written(4)), HasSubstr("format version 4"));
+}
+
+TEST_F(CheckpointVersions, LooksThatNoRunTookAreRefused) {
+  EXPECT_TRUE(read_checkpoint(written(2)).state.looks == Looks{});
+  EXPECT_TRUE(read_checkpoint(written(3)).state.looks == Looks{});
+  const double nan = std::nan("");
+  for (const Looks& wrong : {Looks{.next = -1}, Looks{.last = -2}, Looks{.ratio = nan},
+                             Looks{.measured = -5}, Looks{.apart = -1}, Looks{.measured_ratio = 0},
+                             Looks{.measured_share = -1}, Looks{.measured_share = nan}}) {
+    EXPECT_THAT(refusal_of(written(3, "", wrong)), HasSubstr("/state/looks"));
+  }
 }
 
 TEST_F(CheckpointVersions, ParametersAreNamesAndValues) {

@@ -91,7 +91,14 @@ TEST_F(Files, TheSameContentIsTheSameBytes) {
 
 TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
   for (const Precision precision : {Precision::single, Precision::double_, Precision::mixed}) {
-    const State state = small_state(precision == Precision::single);
+    State state = small_state(precision == Precision::single);
+    state.looks = {.next = 130,
+                   .last = 114,
+                   .ratio = 4.0 / 3,
+                   .measured = 98,
+                   .measured_ratio = 1.1,
+                   .measured_share = 0.7,
+                   .apart = 512};
     CheckpointInfo info;
     info.program = "phyxel 0 (test)";
     info.precision = precision;
@@ -108,6 +115,7 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     EXPECT_EQ(back.state.step, state.step);
     EXPECT_EQ(back.state.time, state.time);
     EXPECT_EQ(back.state.dt, state.dt);
+    EXPECT_TRUE(back.state.looks == state.looks);
     EXPECT_EQ(back.info.precision, precision);
     EXPECT_EQ(back.info.program, info.program);
     EXPECT_EQ(back.info.scene_text, info.scene_text);
