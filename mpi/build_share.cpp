@@ -702,6 +702,7 @@ class Builder {
       part.size = bodies_[b].size;
       part.surfels = static_cast<Index>(surfaces_[b].position.size());
       part.origin = bodies_[b].origin;
+      part.farthest = boxes_[b].farthest();
       sums[b] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
         if (owns(local, static_cast<std::size_t>(i))) {
           sum.add(m.mass[i], m.volume[i], m.position[i]);

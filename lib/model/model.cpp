@@ -163,6 +163,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     sums.add(model, part.begin, part.end);
     sums.tell(part);
     part.centre = body.centre;
+    part.farthest = box_around(cloud.position).farthest();
   }
   check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(body.volume));
 
