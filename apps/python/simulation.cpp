@@ -13,6 +13,7 @@
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"
+#include "stages.hpp"
 
 namespace phyxel::python {
 namespace {
@@ -343,7 +344,8 @@ py::dict energies_of(const Diagnostics& now) {
 std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>& file,
                                      const std::string& text,
                                      const std::map<std::string, Cloud>& clouds,
-                                     Overrides overrides) {
+                                     Overrides overrides, const py::object& progress) {
+  const ObserveStages observing = stages_for(progress);
   const py::gil_scoped_release others;
   return std::make_unique<Simulation>(file ? read_scene(*file) : parse_scene(text, ""), clouds,
                                       overrides);
@@ -372,12 +374,14 @@ void add_simulation(py::module_& module) {
                        const std::optional<std::string>& device,
                        const std::optional<std::string>& precision,
                        const std::optional<std::string>& method, std::optional<int> threads,
-                       std::optional<double> step, std::optional<double> end, bool unsafe_step) {
+                       std::optional<double> step, std::optional<double> end, bool unsafe_step,
+                       const py::object& progress) {
              return simulate(file, text, clouds,
-                             {device, precision, method, threads, step, end, unsafe_step});
+                             {device, precision, method, threads, step, end, unsafe_step},
+                             progress);
            }),
            "file"_a, "text"_a, "clouds"_a, "device"_a, "precision"_a, "method"_a, "threads"_a,
-           "step"_a, "end"_a, "unsafe_step"_a)
+           "step"_a, "end"_a, "unsafe_step"_a, "progress"_a)
       .def("step", &Simulation::step, "steps"_a = 1, "Takes so many steps.")
       .def("run", &Simulation::run, "until"_a = py::none(),
            "Steps until then [s], or to the scene's end; writes frames if they are recorded.")

@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "stage.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -203,6 +204,7 @@ void append(Degenerate& to, const Degenerate& found, Index shift) {
 
 void find_moments(Model& model) {
   if (!model.has_lists()) return;
+  Stage stage("moments");
   const Index n = model.size();
   model.inverse_moment.resize(static_cast<std::size_t>(n));
   model.moment_offset.resize(static_cast<std::size_t>(n));
@@ -232,6 +234,7 @@ void find_moments(Model& model) {
     if (rank[i] == 1) model.degenerate.collinear.push_back(i);
     if (rank[i] == 2) model.degenerate.coplanar.push_back(i);
   }
+  stage.finish();
 }
 
 void add_warnings(Model& model, std::size_t surfels) {

@@ -15,6 +15,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "shapes/lattice_shapes.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -88,6 +89,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
   }
   Survey survey;
+  Stage neighbours("neighbours");
   if (surveyor) {
     survey = (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
     if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
@@ -97,6 +99,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     survey = survey_with_lists(cloud, request, kernel_volumes, hood);
     append_lists(model.neighbourhood, hood, shift);
   }
+  neighbours.finish();
   const std::vector<MaterialGroup> groups =
       sorted ? sorted->groups
              : std::vector<MaterialGroup>{
@@ -123,9 +126,11 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   Surfels& surfels = model.surfels;
   Index unreached = 0;
   if (!cloud.surface.position.empty()) {
-    append_rows(surfels.carriers,
-                phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached),
-                shift);
+    in_stage("surfels", [&] {
+      append_rows(surfels.carriers,
+                  phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached),
+                  shift);
+    });
   }
   surfels.unreached += unreached;
   append(surfels.position, cloud.surface.position);
@@ -239,8 +244,10 @@ Cloud rest_cloud(const BodySource& source) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
   }
-  const std::optional<ShapeRequest> lattice = lattice_of(source, {});
-  return make_shape(lattice ? *lattice : source.shape);
+  return in_stage("making the shape", [&] {
+    const std::optional<ShapeRequest> lattice = lattice_of(source, {});
+    return make_shape(lattice ? *lattice : source.shape);
+  });
 }
 
 std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {

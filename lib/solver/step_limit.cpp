@@ -10,6 +10,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/owned_vectors.hpp"
 #include "solver/start_vector.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -100,7 +101,10 @@ double smallest_sound_step(const Model& model) {
   return smallest;
 }
 
-StepLimit step_limit(const Model& model, Vibration& vibration) {
+constexpr const char* stage_name = "largest time step";
+
+StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
+  constexpr double accuracy = 0.002;  // of the largest eigenvalue
   StepLimit limit;
   limit.sound_step = smallest_sound_step(model);
   std::vector<double> diagonal, off_diagonal;
@@ -117,7 +121,10 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     const auto [value, residual] = largest_eigenvalue(diagonal, off_diagonal, beta);
     limit.omega_max = std::sqrt(std::max(0.0, value + residual));
     limit.iterations = static_cast<int>(k) + 1;
-    if (residual <= 0.002 * value || beta <= 1e-12 * value) break;
+    if (residual <= accuracy * value || beta <= 1e-12 * value) break;
+    // The residual falls by about as much in each iteration.
+    stage.reach(std::max(static_cast<double>(k + 1) / static_cast<double>(most),
+                         std::log(residual / value) / std::log(accuracy)));
     off_diagonal.push_back(beta);
     vibration.advance(beta);
   }
@@ -130,19 +137,23 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     throw InputError(why);
   }
   limit.largest_step = 2 / limit.omega_max;
+  stage.finish();
   return limit;
 }
 
 }  // namespace
 
 StepLimit step_limit(const Model& model, int threads) {
+  Stage stage(stage_name);
   CpuVibration vibration(model, threads);
-  return step_limit(model, vibration);
+  return step_limit(model, vibration, stage);
 }
 
 StepLimit step_limit(const Model& model, Backend& backend) {
   const std::unique_ptr<Vibration> vibration = backend.vibration();
-  return vibration ? step_limit(model, *vibration) : step_limit(model, backend.threads());
+  if (!vibration) return step_limit(model, backend.threads());
+  Stage stage(stage_name);
+  return step_limit(model, *vibration, stage);
 }
 
 }  // namespace phyxel

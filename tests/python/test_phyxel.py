@@ -283,6 +283,42 @@ def test_ctrl_c_stops_a_run_of_short_frames():
         signal.signal(signal.SIGALRM, previous)
 
 
+def test_set_up_tells_its_stages():
+    heard = []
+    cloud = phyxel.sample(cube(), phyxels=300, progress=lambda stage, share: heard.append((stage, share)))
+    phyxel.Simulation({"time": {"end": 0.1}, "solver": {"device": "cpu"},
+                       "body": [{"cloud": "cube", "material": MATERIAL}]}, clouds={"cube": cloud},
+                      progress=lambda stage, share: heard.append((stage, share)))
+    stages = {stage for stage, _ in heard}
+    assert {"filling the surface", "evening out distances", "volumes of phyxels", "neighbours",
+            "moments", "solver arrays", "largest time step"} <= stages
+    for stage in stages:
+        shares = [share for name, share in heard if name == stage]
+        assert shares[0] == 0 and shares[-1] == 1, stage
+
+    def refuse(stage, share):
+        if stage == "moments":
+            raise LookupError(stage)
+
+    with pytest.raises(LookupError, match="moments"):
+        phyxel.Simulation({"time": {"end": 0.1}, "body": [{"cloud": "beam", "material": MATERIAL}]},
+                          clouds={"beam": BEAM}, progress=refuse)
+
+
+def test_ctrl_c_stops_a_set_up():
+    heard = {}
+    previous = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)  # of seconds
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            # A method of dict runs no Python code, which would hear the signal itself.
+            phyxel.sample(cube(), phyxels=30000, progress=heard.__setitem__)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert heard and "volumes of phyxels" not in heard  # the last stage
+
+
 def stepped(_):
     s = simulation(solver={"device": "cpu", "precision": "double", "threads": 2})
     s.set_state(velocity=np.cross(s.rest, [0, 0, 1]))
