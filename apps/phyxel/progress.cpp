@@ -81,7 +81,7 @@ void Progress::stage(std::string_view name, double share) {
     stage_ = name;
     stage_start_ = now;
   }
-  given_ = share_parts(share);
+  given_ = share_parts(share < 1 ? std::min(share, 0.999) : 1);  // 100% is the end
   given_.push_back(stage_);
   if (share > 0.01 && share < 1) {
     given_.push_back(

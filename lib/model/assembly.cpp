@@ -210,6 +210,8 @@ void find_moments(Model& model) {
   model.moment_offset.resize(static_cast<std::size_t>(n));
   std::vector<signed char> rank(static_cast<std::size_t>(n));
   std::vector<char> coincident(static_cast<std::size_t>(n), 0);
+  constexpr Index part = 4096;
+  stage.expect(static_cast<std::size_t>(n / part));
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     Sym3d moment;
@@ -227,6 +229,7 @@ void find_moments(Model& model) {
     model.inverse_moment[i] = inverse.matrix;
     model.moment_offset[i] = offset;
     rank[i] = static_cast<signed char>(inverse.rank);
+    if ((i + 1) % part == 0) stage.count();
   }
   for (Index i = 0; i < n; ++i) {
     if (coincident[i]) model.degenerate.coincident.push_back(i);

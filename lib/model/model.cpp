@@ -89,9 +89,10 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
   }
   Survey survey;
-  Stage neighbours("neighbours");
   if (surveyor) {
-    survey = (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
+    survey = in_stage("neighbours", [&] {
+      return (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
+    });
     if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
     append(model.degenerate, survey.degenerate, shift);
   } else {
@@ -99,7 +100,6 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     survey = survey_with_lists(cloud, request, kernel_volumes, hood);
     append_lists(model.neighbourhood, hood, shift);
   }
-  neighbours.finish();
   const std::vector<MaterialGroup> groups =
       sorted ? sorted->groups
              : std::vector<MaterialGroup>{
@@ -126,11 +126,9 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   Surfels& surfels = model.surfels;
   Index unreached = 0;
   if (!cloud.surface.position.empty()) {
-    in_stage("surfels", [&] {
-      append_rows(surfels.carriers,
-                  phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached),
-                  shift);
-    });
+    append_rows(surfels.carriers,
+                phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached),
+                shift);
   }
   surfels.unreached += unreached;
   append(surfels.position, cloud.surface.position);

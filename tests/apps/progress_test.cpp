@@ -190,6 +190,8 @@ void tell_stages(double& now) {
     now += 1;
     filling.reach(k / 25.0);
   }
+  now += 1;
+  filling.reach(0.99999);
   filling.finish();
 }
 
@@ -202,6 +204,7 @@ TEST_F(ProgressLines, StagesOfASetUpAreABarThatGoesAway) {
   }
   const auto drawn = split('\r');
   ASSERT_GE(drawn.size(), 28u);
+  EXPECT_THAT(drawn[drawn.size() - 2], HasSubstr(" 99.9%  filling"));  // 100% is the end
   EXPECT_EQ(drawn[1], "[................]    0.0%  reading\x1b[K");
   EXPECT_EQ(drawn[2], "\x1b[K");  // taken away
   EXPECT_EQ(drawn[3], "[................]    0.0%  filling\x1b[K");
@@ -222,7 +225,7 @@ TEST_F(ProgressLines, ALogGetsALineOfALongSetUpInFiveSecondsAndNoneOfAShortOne) 
     tell_stages(now_);
   }
   const auto lines = split('\n');
-  ASSERT_EQ(lines.size(), 5u);  // after 5, 10, 15, 20 and 25 s
+  ASSERT_EQ(lines.size(), 5u);  // after 5, 10, 15, 20 and 25 s of 26
   EXPECT_EQ(lines[0], " 16.0%  filling  0:21 left");
   EXPECT_THAT(lines[4], StartsWith(" 96.0%  filling  0:0"));
 }

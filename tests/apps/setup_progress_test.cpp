@@ -60,7 +60,8 @@ TEST_F(SetupLines, EachStageOfCheckAndSampleIsShownToItsEnd) {
   const Outcome check = run({"check", "scene.toml"});
   ASSERT_EQ(check.code, 0) << check.err;
   EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of(of_meshes)));
-  EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of({"neighbours", "surfels", "moments",
+  EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of({"distances between phyxels", "neighbours",
+                                                         "phyxels near the surface", "moments",
                                                          "solver arrays", "largest time step"})));
   const Outcome sample = run({"sample", "cube.obj", "--phyxels", "500", "--out", "cube.h5"});
   ASSERT_EQ(sample.code, 0) << sample.err;
