@@ -305,6 +305,38 @@ def test_set_up_tells_its_stages():
                           clouds={"beam": BEAM}, progress=refuse)
 
 
+def test_runs_tell_how_far_they_are():
+    heard = []
+    tell = lambda stage, share: heard.append((stage, share))
+    s = simulation(time={"end": 0.05}, output={"frames_per_second": 100})
+    s.run(progress=tell)
+    assert heard[0] == ("steps", 0) and heard[-1] == ("steps", 1)
+    shares = [share for _, share in heard]
+    assert shares == sorted(shares)
+
+    hung = dict(gravity=[0, 0, -9.81], solver={"method": "equilibrium", "device": "cpu"})
+    rest = simulation({"fixed": [{"region": "x-"}]}, **hung)
+    heard.clear()
+    rest.run(progress=tell)
+    assert heard[0] == ("search for rest", 0) and heard[-1] == ("search for rest", 1)
+    rest.run()  # nobody hears any more
+    assert heard[-1] == ("search for rest", 1) and len(heard) == len(set(heard))
+
+    # What the function raises ends a run and a search, which go on from there.
+    def refuse(stage, share):
+        if share > 0:
+            raise LookupError(stage)
+
+    s = simulation(time={"end": 1e3})
+    with pytest.raises(LookupError, match="steps"):
+        s.run(progress=refuse)
+    s.step(3)
+    fine = phyxel.shape("beam", size=(1, 0.2, 0.2), spacing=0.02)
+    rest = simulation({"fixed": [{"region": "x-"}]}, clouds={"beam": fine}, **hung)
+    with pytest.raises(LookupError, match="search for rest"):
+        rest.run(progress=refuse)
+
+
 def test_ctrl_c_stops_a_set_up():
     heard = {}
     previous = signal.signal(signal.SIGALRM, signal.default_int_handler)

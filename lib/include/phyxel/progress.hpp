@@ -8,7 +8,8 @@ namespace phyxel {
 
 /// Hears how far a stage of a set-up has come: `share` is 0 at the beginning of the stage, grows,
 /// and is 1 at its end. It is called on the thread that sets up. An exception that it throws
-/// abandons the set-up, and reaches whoever asked for that.
+/// abandons the set-up, and reaches whoever asked for that; ranks that set up a model together must
+/// all throw it, or none.
 using StageObserver = std::function<void(std::string_view stage, double share)>;
 
 /// While it lives, an observer hears of the stages of everything that this thread sets up: meshes
