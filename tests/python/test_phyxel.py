@@ -324,7 +324,7 @@ def test_runs_tell_how_far_they_are():
 
     # What the function raises ends a run and a search, which go on from there.
     def refuse(stage, share):
-        if share > 0:
+        if 0 < share < 1:
             raise LookupError(stage)
 
     s = simulation(time={"end": 1e3})
