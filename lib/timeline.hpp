@@ -46,11 +46,4 @@ class Phase {
   std::chrono::steady_clock::time_point since_;
 };
 
-/// `work()` as a span.
-template <class Work>
-auto in_phase(const char* what, Work&& work) {
-  const Phase phase(what);
-  return work();
-}
-
 }  // namespace phyxel

@@ -25,8 +25,8 @@
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
 #include "shapes/lattice_shapes.hpp"
+#include "stage.hpp"
 #include "tabulated.hpp"
-#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -65,20 +65,20 @@ class Builder {
       : ranks_(ranks), scene_(scene), options_(options), bodies_(scene.bodies.size()) {}
 
   BuiltShare build(const Pieces& piece) {
-    SpreadPhyxels own = in_phase("making phyxels", [&] { return make_pieces(piece); });
+    SpreadPhyxels own = in_stage("making phyxels", [&] { return make_pieces(piece); });
     boxes_ = boxes_of(ranks_, own, bodies_.size());
     count_bodies();
-    own = in_phase("ordering along the curve", [&] {
+    own = in_stage("ordering along the curve", [&] {
       return spread_along_curve(ranks_, std::move(own), sizes(), boxes_, group_size_);
     });
-    in_phase("spacings", [&] { find_spacings(own); });
+    in_stage("spacings", [&] { find_spacings(own); });
     find_supports(own);
-    Bulk<int> owner = in_phase("partition", [&] { return partition(own); });
-    own = in_phase("sending to owners",
+    Bulk<int> owner = in_stage("partition", [&] { return partition(own); });
+    own = in_stage("sending to owners",
                    [&] { return sent_to_owners(ranks_, std::move(own), std::move(owner)); });
-    Local local = in_phase("lists", [&] { return surroundings_of(std::move(own)); });
-    in_phase("masses, moments, boundary, surfels", [&] { finish(local); });
-    return in_phase("share", [&] { return share_out_of(local); });
+    Local local = in_stage("lists", [&] { return surroundings_of(std::move(own)); });
+    in_stage("masses, moments, boundary, surfels", [&] { finish(local); });
+    return in_stage("share", [&] { return share_out_of(local); });
   }
 
  private:
@@ -702,6 +702,7 @@ class Builder {
       part.size = bodies_[b].size;
       part.surfels = static_cast<Index>(surfaces_[b].position.size());
       part.origin = bodies_[b].origin;
+      part.farthest = boxes_[b].farthest();
       sums[b] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
         if (owns(local, static_cast<std::size_t>(i))) {
           sum.add(m.mass[i], m.volume[i], m.position[i]);

@@ -1,7 +1,7 @@
 """Reads what the tests of lib/files/recorder.cpp wrote, with readers that are not ours: VTK's and h5py.
 
-read_back.py frames|single FOLDER; exit code 77 if a reader is missing. The expected numbers are those of
-tests/lib/files/recorder_test.cpp: in frame k everything has moved by k/2 in x.
+read_back.py frames|single FOLDER FAR; exit code 77 if a reader is missing. The expected numbers are those of
+tests/lib/files/recorder_test.cpp: in frame k everything has moved by k/2 in x, from FAR on.
 """
 
 import json
@@ -17,8 +17,9 @@ except ImportError as missing:
     print(missing)
     sys.exit(77)
 
-REST = np.array([[0, 0, 0], [1, 0, 0], [5, 0, 0], [5, 1, 0], [5, 0, 1]], float)
-SURFACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+FAR = float(sys.argv[3])
+REST = np.array([[0, 0, 0], [1, 0, 0], [5, 0, 0], [5, 1, 0], [5, 0, 1]], float) + [FAR, 0, 0]
+SURFACE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float) + [FAR, 0, 0]
 TRIANGLES = [0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]
 
 
@@ -39,7 +40,7 @@ def check_phyxels(folder, k):
     grid = grid_of(folder / f"phyxels_{k:06d}.hdf")
     moved = REST + [0.5 * k, 0, 0]
     check(np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), moved), f"points of frame {k}")
-    check(np.allclose(grid.GetBounds()[0:2], [0.5 * k, 5 + 0.5 * k], rtol=0, atol=0), "bounds")
+    check(np.allclose(grid.GetBounds()[0:2], [FAR + 0.5 * k, FAR + 5 + 0.5 * k], rtol=0, atol=0), "bounds")
     check(grid.GetNumberOfCells() == 2, "one cell a body")
     check([grid.GetCell(c).GetNumberOfPoints() for c in range(2)] == [2, 3], "points of each body")
     data = grid.GetPointData()

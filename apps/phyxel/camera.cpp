@@ -73,12 +73,13 @@ double CameraFit::extent() const {
 Camera CameraFit::camera() const {
   Camera fitted = camera_;
   if (empty()) return fitted;
-  // Never nearer than half the extent: a body seen along its axis would else touch the lens. The
-  // 1e-3 keeps a single point far from the origin at a depth that its coordinates resolve.
+  // Never nearer than half the extent: a body seen along its axis would else touch the lens. Depths
+  // stay above what coordinates far from the origin resolve; a single point, which no distance
+  // makes smaller, is seen from well beyond.
   const double magnitude =
       std::max({std::abs(low_x_), std::abs(high_x_), std::abs(low_y_), std::abs(high_y_),
                 std::abs(nearest_), std::abs(farthest_), 1e-9});
-  const double clearance = std::max(0.5 * extent(), 1e-3 * magnitude);
+  const double clearance = std::max(0.5 * extent(), (extent() > 0 ? 1e-9 : 1e-3) * magnitude);
   const double z = std::min({(right_ - left_) / (2 * slope_x_), (above_ - below_) / (2 * slope_y_),
                              nearest_ - clearance});
   fitted.eye = 0.5 * (left_ + right_) * camera_.right + 0.5 * (below_ + above_) * camera_.up +

@@ -9,6 +9,7 @@
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/scene.hpp"
+#include "progress.hpp"
 #include "setup/tiling.hpp"
 #include "stopwatch.hpp"
 
@@ -56,7 +57,10 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
     throw InputError(
         fmt::format("{}: --partition {}: allowed for scenes (.toml)", file.string(), parts));
   }
-  const Model model = build_model(read_scene(file));
+  const Model model = [&] {
+    const SetupProgress progress(stderr);
+    return build_model(read_scene(file));
+  }();
   const Graph phyxels = phyxel_graph(model);
   const Groups tiles = curve_groups(model, cuda::tile_size);
   const Graph coarse = grouped_graph(phyxels, tiles);

@@ -14,8 +14,8 @@
 namespace phyxel::app {
 namespace {
 
-constexpr double redraw_interval = 0.1, line_interval = 5;  // [s]
-constexpr std::size_t bar_length = 16;  // leaves an 80-column terminal room for the speed
+constexpr double redraw_interval = 0.1;  // [s]
+constexpr std::size_t bar_length = 16;   // leaves an 80-column terminal room for the speed
 
 int terminal_columns(std::FILE* stream) {
   winsize size = {};
@@ -25,6 +25,11 @@ int terminal_columns(std::FILE* stream) {
 
 double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double usual_line_interval() {
+  const char* said = std::getenv("PHYXEL_PROGRESS_SECONDS");
+  return said ? std::atof(said) : 5;
 }
 
 /// "0:07", "12:34", "5:06:07", or "-:--" if unknown.
@@ -41,6 +46,7 @@ Progress::Progress(double end_time, std::FILE* stream, const ProgressStyle& styl
     : end_time_(end_time),
       stream_(stream),
       phyxels_(style.phyxels),
+      line_interval_(style.line_interval.value_or(usual_line_interval())),
       clock_(style.clock ? style.clock : steady_seconds),
       load_(style.load ? style.load : host_load) {
   if (stream_ == nullptr) return;
@@ -68,6 +74,31 @@ void Progress::update(std::vector<std::string> parts) {
   show_if_due();
 }
 
+void Progress::stage(std::string_view name, double share) {
+  if (stream_ == nullptr) return;
+  const double now = clock_();
+  if (name != stage_ || share <= 0) {
+    stage_ = name;
+    stage_start_ = now;
+  }
+  given_ = share_parts(share < 1 ? std::min(share, 0.999) : 1);  // 100% is the end
+  given_.push_back(stage_);
+  if (share > 0.01 && share < 1) {
+    given_.push_back(
+        fmt::format("{} left", clock_text((now - stage_start_) * (1 - share) / share)));
+  }
+  if (terminal_ && share >= 1) return take_away();
+  if (terminal_ && share <= 0) last_shown_ = now - redraw_interval;
+  show_if_due();
+  pending_ = false;  // the end of set-up shows nothing more of it
+}
+
+void Progress::take_away() {
+  if (drawn_) std::fputs("\r\x1b[K", stream_);
+  std::fflush(stream_);
+  drawn_ = false;
+}
+
 void Progress::say(const std::string& line) {
   if (stream_ == nullptr) return;
   std::fputs((terminal_ ? '\r' + line + "\x1b[K\n" : line + '\n').c_str(), stream_);
@@ -77,7 +108,7 @@ void Progress::say(const std::string& line) {
 void Progress::show_if_due() {
   pending_ = true;
   const double now = clock_();
-  if (now - last_shown_ < (terminal_ ? redraw_interval : line_interval)) return;
+  if (now - last_shown_ < (terminal_ ? redraw_interval : line_interval_)) return;
   last_shown_ = now;
   show();
 }
@@ -90,6 +121,16 @@ void Progress::finish() {
   stream_ = nullptr;
 }
 
+std::vector<std::string> Progress::share_parts(double share) const {
+  std::vector<std::string> parts;
+  if (terminal_) {
+    const auto filled = static_cast<std::size_t>(std::clamp(share, 0.0, 1.0) * bar_length);
+    parts.push_back('[' + std::string(filled, '#') + std::string(bar_length - filled, '.') + ']');
+  }
+  parts.push_back(fmt::format("{:5.1f}%", 100 * share));
+  return parts;
+}
+
 // The parts of a line, the most wanted first: a narrow terminal drops the last ones.
 std::vector<std::string> Progress::parts() const {
   if (!given_.empty()) return given_;
@@ -99,12 +140,7 @@ std::vector<std::string> Progress::parts() const {
   // Time left from the steps still to go; the step size is time / step.
   const double dt = step_ > 0 ? time_ / static_cast<double>(step_) : 0;
   const double left = done ? 0 : (end_time_ - time_) / (dt * steps_per_second_);
-  std::vector<std::string> parts;
-  if (terminal_) {
-    const auto filled = static_cast<std::size_t>(fraction * bar_length);
-    parts.push_back('[' + std::string(filled, '#') + std::string(bar_length - filled, '.') + ']');
-  }
-  parts.push_back(fmt::format("{:5.1f}%", 100 * fraction));
+  std::vector<std::string> parts = share_parts(fraction);
   parts.push_back(fmt::format("{} left", clock_text(left)));
   parts.push_back(fmt::format("{:.3f}/{:g} s", time_, end_time_));
   // The run's own threads are in the load, too, and fill the cores at most.

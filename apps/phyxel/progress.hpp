@@ -7,8 +7,10 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "phyxel/progress.hpp"
 #include "thread_policy.hpp"
 
 namespace phyxel::app {
@@ -20,6 +22,9 @@ struct ProgressStyle {
   std::optional<bool> terminal;   ///< A terminal that can redraw; else plain lines.
   std::optional<int> columns;     ///< Width of the terminal.
   std::function<double()> clock;  ///< Wall-clock seconds from any origin.
+  /// Seconds between two lines that are no terminal's; unset: those of the environment's
+  /// PHYXEL_PROGRESS_SECONDS, for tests, or 5.
+  std::optional<double> line_interval;
   /// Load and cores of the host; a load above the cores is shown.
   std::function<std::optional<HostLoad>()> load;
 };
@@ -40,6 +45,11 @@ class Progress {
   /// The same with parts of the caller's own, the most wanted first.
   void update(std::vector<std::string> parts);
 
+  /// A stage of a set-up: drawn at once on a terminal, and taken away at its end (`share` 1), so
+  /// that set-up leaves nothing there; elsewhere a line if the last one is old enough, so that a
+  /// short one leaves nothing either.
+  void stage(std::string_view name, double share);
+
   /// A line that stays, above what is redrawn.
   void say(const std::string& line);
 
@@ -48,13 +58,17 @@ class Progress {
 
  private:
   std::vector<std::string> parts() const;
+  /// What the parts of a line begin with: the bar, on a terminal, and the percentage.
+  std::vector<std::string> share_parts(double share) const;
   void show();
+  void take_away();
   void show_if_due();
 
   double end_time_;
   std::FILE* stream_;
   std::int64_t phyxels_;
   bool terminal_ = false;
+  double line_interval_;
   int columns_ = 80;
   std::function<double()> clock_;
   std::function<std::optional<HostLoad>()> load_;
@@ -64,6 +78,24 @@ class Progress {
   double time_ = 0, steps_per_second_ = 0, energy_ = 0;
   std::int64_t step_ = 0;
   std::vector<std::string> given_;  // of the caller's own, if the last update had them
+  std::string stage_;
+  double stage_start_ = 0;
+};
+
+/// Shows the stages of all that this thread sets up while it lives.
+class SetupProgress {
+ public:
+  /// @param stream null: silent
+  explicit SetupProgress(std::FILE* stream, const ProgressStyle& style = {})
+      : progress_(1, stream, style),
+        observing_(stream ? StageObserver([this](std::string_view name, double share) {
+          progress_.stage(name, share);
+        })
+                          : StageObserver()) {}
+
+ private:
+  Progress progress_;
+  ObserveStages observing_;
 };
 
 }  // namespace phyxel::app

@@ -13,6 +13,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "progress.hpp"
 #include "stopwatch.hpp"
 #include "version.hpp"
 
@@ -115,13 +116,16 @@ void sample(const SampleOptions& options) {
   const SampleRequest request = request_of(options);
   expect_kind(options.mesh, Kind::mesh);
   check_output(options);
-  const Surface surface = read_mesh(options.mesh);
   SampleReport report;
   Cloud cloud;
-  try {
-    cloud = sample_surface(surface, request, &report);
-  } catch (const InputError& error) {
-    throw InputError(fmt::format("{}: {}", options.mesh.string(), error.what()));
+  {
+    const SetupProgress progress(options.json ? nullptr : stderr);
+    const Surface surface = read_mesh(options.mesh);
+    try {
+      cloud = sample_surface(surface, request, &report);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", options.mesh.string(), error.what()));
+    }
   }
   write_body(options.out, cloud, options.force);
   const double seconds = seconds_since(start);

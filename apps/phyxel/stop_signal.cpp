@@ -8,6 +8,7 @@
 #include <initializer_list>
 
 #include "phyxel/error.hpp"
+#include "terminal.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -17,6 +18,7 @@ std::atomic<int> stop = 0;
 std::atomic<bool> checkpoint = false;
 std::atomic<bool> at_work = false;  // whether a stop is for the loop over steps to see
 std::atomic<bool> says = true;
+std::atomic<bool> on_terminal = false;
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 constexpr auto to_stop = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGXCPU, SIGPIPE};
@@ -25,8 +27,12 @@ constexpr auto to_stop = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGXCPU, SIGPIPE};
 [[noreturn]] void leave() {
   constexpr const char* words =
       "phyxel: error: stopped by a signal during set-up: nothing was written or changed\n";
-  if (says) [[maybe_unused]]
-    const ssize_t written = ::write(STDERR_FILENO, words, std::strlen(words));
+  constexpr const char* clear = "\r\x1b[K";  // of the stage that is drawn there
+  if (says) {
+    [[maybe_unused]] ssize_t written = 0;
+    if (on_terminal) written = ::write(STDERR_FILENO, clear, std::strlen(clear));
+    written = ::write(STDERR_FILENO, words, std::strlen(words));
+  }
   ::_exit(static_cast<int>(ExitCode::stopped));
 }
 
@@ -62,6 +68,7 @@ StopSignal::StopSignal(bool speaks) {
   checkpoint = false;
   at_work = false;
   says = speaks;
+  on_terminal = is_terminal(stderr);
   for (const int signal : to_stop) {
     if (!is_ignored(signal)) handle(signal, ask_to_stop);
   }

@@ -5,6 +5,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/shapes.hpp"
+#include "stages.hpp"
 
 namespace phyxel::python {
 namespace {
@@ -127,8 +128,9 @@ Surface surface_of(const py::object& mesh) {
 }
 
 Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int relaxations,
-             std::optional<bool> on_surface) {
+             std::optional<bool> on_surface, const py::object& progress) {
   if (phyxels < 1) throw InputError(fmt::format("phyxels: {} found; allowed: >= 1", phyxels));
+  const ObserveStages observing = stages_for(progress);
   const Surface surface = surface_of(mesh);
   const py::gil_scoped_release others;
   SampleReport report;
@@ -196,9 +198,9 @@ void add_clouds(py::module_& module) {
           "file"_a, "overwrite"_a = false, "Writes a body file, which scenes name as `file`.");
   module.def("read_body", &read_body, "file"_a, "A body file as `phyxel sample` writes it.");
   module.def("sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
-             "on_surface"_a = py::none(),
+             "on_surface"_a = py::none(), "progress"_a = py::none(),
              "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
-             "exactly so many phyxels.");
+             "exactly so many phyxels. progress(stage, share) is called meanwhile.");
   module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
              "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
              "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,

@@ -13,6 +13,7 @@
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"
+#include "stages.hpp"
 
 namespace phyxel::python {
 namespace {
@@ -105,7 +106,7 @@ class Simulation {
   }
 
   /// To the end of the scene, or until then.
-  void run(std::optional<double> until) {
+  void run(std::optional<double> until, const py::object& progress) {
     if (until) check_positive("until", *until);
     const double wanted = until ? std::ceil(*until / plan_.dt - 1e-9) : 0;
     if (wanted > 1e15) {
@@ -115,6 +116,8 @@ class Simulation {
     std::int64_t last = until ? static_cast<std::int64_t>(wanted) : plan_.steps;
     const auto turn = my_turn();
     const py::gil_scoped_release others;
+    const RunProgress::Scope telling(told_, progress, scene_.solver.method, solver_->time(),
+                                     static_cast<double>(last) * plan_.dt);
     while (solver_->steps() < last) {
       const std::int64_t frame =
           (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
@@ -122,8 +125,10 @@ class Simulation {
       take(std::min(last, frame) - solver_->steps());
       last <<= plan_.halvings - halvings;
       if (recorder_) write_one();
+      told_.reach_time(solver_->time());
     }
     look();
+    told_.end();
   }
 
   void record(const std::filesystem::path& directory, bool force) {
@@ -265,12 +270,19 @@ class Simulation {
   void start(const State& state) {
     solver_ = std::make_unique<Solver>(model_, *backend_, state, scene_.solver.method);
     shortener_.emplace(model_, *backend_, plan_);
-    solver_->observe([last = std::chrono::steady_clock::now()](const NewtonProgress&) mutable {
-      if (std::chrono::steady_clock::now() - last < std::chrono::milliseconds(100)) return true;
-      last = std::chrono::steady_clock::now();
-      const py::gil_scoped_acquire here;
-      return PyErr_CheckSignals() == 0;  // Ctrl-C
-    });
+    solver_->observe(
+        [this, last = std::chrono::steady_clock::now()](const NewtonProgress& newton) mutable {
+          if (std::chrono::steady_clock::now() - last < std::chrono::milliseconds(100)) return true;
+          last = std::chrono::steady_clock::now();
+          const py::gil_scoped_acquire here;
+          try {
+            told_.reach_residual(newton.residual, newton.tolerance);
+          } catch (py::error_already_set& error) {
+            error.restore();  // for `take`
+            return false;
+          }
+          return PyErr_CheckSignals() == 0;  // Ctrl-C
+        });
     looked_ = solver_->steps();
     const Diagnostics now = diagnose(model_, *backend_, solver_->now());
     watch_.reset();
@@ -294,6 +306,7 @@ class Simulation {
         const py::gil_scoped_acquire here;
         listened_ = std::chrono::steady_clock::now();
         if (PyErr_CheckSignals() != 0) throw py::error_already_set();  // Ctrl-C
+        told_.reach_time(solver_->time());
       }
     }
     backend_->wait();
@@ -323,6 +336,7 @@ class Simulation {
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::int64_t looked_ = 0;
+  RunProgress told_;
   // When Python last heard of signals: across frames, which may be shorter than the interval.
   std::chrono::steady_clock::time_point listened_ = std::chrono::steady_clock::now();
   std::unique_ptr<std::mutex> busy_ = std::make_unique<std::mutex>();
@@ -343,7 +357,8 @@ py::dict energies_of(const Diagnostics& now) {
 std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>& file,
                                      const std::string& text,
                                      const std::map<std::string, Cloud>& clouds,
-                                     Overrides overrides) {
+                                     Overrides overrides, const py::object& progress) {
+  const ObserveStages observing = stages_for(progress);
   const py::gil_scoped_release others;
   return std::make_unique<Simulation>(file ? read_scene(*file) : parse_scene(text, ""), clouds,
                                       overrides);
@@ -372,15 +387,18 @@ void add_simulation(py::module_& module) {
                        const std::optional<std::string>& device,
                        const std::optional<std::string>& precision,
                        const std::optional<std::string>& method, std::optional<int> threads,
-                       std::optional<double> step, std::optional<double> end, bool unsafe_step) {
+                       std::optional<double> step, std::optional<double> end, bool unsafe_step,
+                       const py::object& progress) {
              return simulate(file, text, clouds,
-                             {device, precision, method, threads, step, end, unsafe_step});
+                             {device, precision, method, threads, step, end, unsafe_step},
+                             progress);
            }),
            "file"_a, "text"_a, "clouds"_a, "device"_a, "precision"_a, "method"_a, "threads"_a,
-           "step"_a, "end"_a, "unsafe_step"_a)
+           "step"_a, "end"_a, "unsafe_step"_a, "progress"_a)
       .def("step", &Simulation::step, "steps"_a = 1, "Takes so many steps.")
-      .def("run", &Simulation::run, "until"_a = py::none(),
-           "Steps until then [s], or to the scene's end; writes frames if they are recorded.")
+      .def("run", &Simulation::run, "until"_a = py::none(), "progress"_a = py::none(),
+           "Steps until then [s], or to the scene's end; writes frames if they are recorded.\n"
+           "progress(stage, share) is called meanwhile.")
       .def("record", &Simulation::record, "directory"_a, "force"_a = false,
            "From now on frames go there, the present one first, as the scene's [output] asks.")
       .def("write_frame", &Simulation::write_frame, "Records the present state.")

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
@@ -18,7 +19,8 @@ constexpr std::uint8_t vtk_poly_vertex = 2, vtk_triangle = 5;
 constexpr std::int64_t version = 1;
 
 /// The run's own metadata, beside the VTKHDF group.
-void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diagnostics) {
+void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diagnostics,
+                    bool floats_do) {
   out.group("/phyxel");
   out.attribute("/phyxel", "version", version);
   out.attribute("/phyxel", "program", program_version());
@@ -28,6 +30,7 @@ void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diag
   for (const DiagnosticColumn& column : diagnostic_columns()) {
     out.attribute("/phyxel", column.name, column.value(diagnostics));
   }
+  if (!floats_do) out.attribute("/phyxel", far_attribute, std::int64_t{1});
   out.text("/phyxel/scene", scene.text);
 }
 
@@ -89,6 +92,14 @@ void write_rows(Hdf5Writer& out, const FileArray& array, Stretches& values) {
   }
 }
 
+/// Typical distance between two points of a part [m], from its volume v: that of n phyxels is
+/// (v/n)^(1/3), that of n surfels at least that on a sphere, the smallest surface around v.
+double spacing_of(const Part& part, Points points) {
+  if (points == Points::phyxels) return std::cbrt(part.volume / std::max(1, part.size));
+  const double area = std::cbrt(36 * std::numbers::pi * part.volume * part.volume);
+  return std::sqrt(area / std::max(1, part.surfels));
+}
+
 /// 0, 1, 2, ... times `step`.
 Hdf5Writer::Fill<std::int64_t> counting(std::int64_t step) {
   return [step](std::size_t first, std::span<std::int64_t> rows) {
@@ -110,6 +121,14 @@ Hdf5Writer::Fill<Index> bodies(std::vector<std::int64_t> ends) {
 }
 
 }  // namespace
+
+bool floats_hold_positions(const Model& model, double displacement, Points points) {
+  constexpr double share = 1e-3, epsilon = std::numeric_limits<float>::epsilon();
+  return std::all_of(model.parts.begin(), model.parts.end(), [&](const Part& part) {
+    if (points == Points::surfels && part.surfels == 0) return true;
+    return epsilon * (part.farthest + displacement) <= share * spacing_of(part, points);
+  });
+}
 
 void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values) {
   if (array.as_float) return write_rows<float>(out, array, values);
@@ -145,6 +164,8 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
                         const Diagnostics& diagnostics, Stretches& values) {
   const bool as_float = scene.solver.precision == Precision::single;
+  const bool floats_do =
+      floats_hold_positions(model, diagnostics.largest_displacement, Points::phyxels);
   const Index n = model.whole_size();
   const auto rows = static_cast<std::size_t>(n),
              stretch = static_cast<std::size_t>(values.length());
@@ -155,8 +176,10 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
 
   Hdf5Writer out;
   write_counts(out, n, static_cast<std::int64_t>(cells), n);
-  write_later(out, {"/VTKHDF/Points", as_float, n, {Quantity::position, Quantity::displacement}},
-              values);
+  write_later(
+      out,
+      {"/VTKHDF/Points", as_float && floats_do, n, {Quantity::position, Quantity::displacement}},
+      values);
   out.array<std::uint8_t>("/VTKHDF/Types", std::vector<std::uint8_t>(cells, vtk_poly_vertex));
   out.later<std::int64_t>("/VTKHDF/Connectivity", rows, 0, stretch, counting(1));
   out.array<std::int64_t>("/VTKHDF/Offsets", offsets);
@@ -173,12 +196,14 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
   if (cells > 1 || scene.output.wants("body")) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.phyxels));
   }
-  write_metadata(out, scene, diagnostics);
+  write_metadata(out, scene, diagnostics, floats_do);
   write_sealed(file, phyxel_frame_kind, out.content(), Durable::no);
 }
 
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
                          const Diagnostics& diagnostics, Stretches& values) {
+  const bool floats_do =
+      floats_hold_positions(model, diagnostics.largest_displacement, Points::surfels);
   const Ends ends = ends_of(model);
   const std::int64_t points = ends.surfels.empty() ? 0 : ends.surfels.back();
   const auto rows = static_cast<std::size_t>(points);
@@ -191,7 +216,8 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   const auto vectors = [&](const char* path, bool as_float, Quantity quantity) {
     write_later(out, {path, as_float, static_cast<Index>(points), {quantity}}, values);
   };
-  vectors("/VTKHDF/Points", scene.solver.precision == Precision::single, Quantity::surfel_position);
+  vectors("/VTKHDF/Points", scene.solver.precision == Precision::single && floats_do,
+          Quantity::surfel_position);
   out.later<std::uint8_t>("/VTKHDF/Types", cells, 0, stretch,
                           [](std::size_t, std::span<std::uint8_t> types) {
                             std::fill(types.begin(), types.end(), vtk_triangle);
@@ -208,7 +234,7 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   if (ends.surfels.size() > 1) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }
-  write_metadata(out, scene, diagnostics);
+  write_metadata(out, scene, diagnostics, floats_do);
   write_sealed(file, surface_frame_kind, out.content(), Durable::no);
 }
 

@@ -113,11 +113,16 @@ void Recorder::check_space(std::int64_t frames_before) const {
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
   double frame = 20e3;  // seal, HDF5's own structure, metadata
   const double phyxels = model_.whole_size();
-  if (writes_phyxels_)
-    frame += phyxels * (3 * scalar * (1 + count(scene_.output.fields.size())) + 8);
+  const auto position = [&](Points points) {  // at rest; a motion may carry bodies farther
+    return floats_hold_positions(model_, 0, points) ? scalar : 8;
+  };
+  if (writes_phyxels_) {
+    frame += phyxels *
+             (3 * position(Points::phyxels) + 3 * scalar * count(scene_.output.fields.size()) + 8);
+  }
   if (writes_surface_) {
     // A closed surface has twice as many triangles as corners.
-    frame += model_.whole_surfels() * (3 * (scalar + 4) + 2 * 33);
+    frame += model_.whole_surfels() * (3 * (position(Points::surfels) + 4) + 2 * 33);
   }
   const double frames = scene_.output.frames_per_second > 0
                             ? std::floor(scene_.time.end * scene_.output.frames_per_second) + 1

@@ -72,6 +72,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
         {name, first.is_integer(point_data + name), first.shape(point_data + name).columns});
   }
 
+  bool floats_do = true;
   std::vector<double> times;
   std::vector<std::int64_t> point_offsets;
   for (const SeriesEntry& entry : entries) {
@@ -81,6 +82,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
         in.array<std::int64_t>(grid + "Connectivity") != connectivity) {
       in.refuse("has other points or cells than the first frame of its series");
     }
+    floats_do = floats_do && !in.has_attribute("/phyxel", far_attribute);
     point_offsets.push_back(static_cast<std::int64_t>(times.size() * points));
     times.push_back(entry.time);
   }
@@ -97,12 +99,16 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.array<std::uint8_t>(grid + "Types", first.array<std::uint8_t>(grid + "Types"));
   put(out, grid + "Connectivity", connectivity, 0);
   put(out, grid + "Offsets", offsets, 0);
-  gather<float>(out, grid + "Points", entries, points, 3);
+  const auto gather_reals = [&](const std::string& path, std::size_t columns, bool as_float) {
+    (as_float ? gather<float> : gather<double>)(out, path, entries, points, columns);
+  };
+  gather_reals(grid + "Points", 3, floats_do);
   for (const Field& field : fields) {
     if (field.integer) {
       gather<Index>(out, point_data + field.name, entries, points, field.columns);
     } else {
-      gather<float>(out, point_data + field.name, entries, points, field.columns);
+      gather_reals(point_data + field.name, field.columns,
+                   floats_do || field.name != "displacement");
     }
   }
   out.group("/phyxel");

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "mesh/random_bits.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -196,7 +197,8 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally,
   if (!block.offset.empty()) visit_block(block);
 }
 
-SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& visit_block) const {
+SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& visit_block,
+                                 Stage* stage) const {
   Cell root;
   root.level = block_level;
   while (voxel * static_cast<double>(std::int64_t{1} << root.level) < extent_ * 1.001 + voxel) {
@@ -220,6 +222,7 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
 
   SampleTally total;
   const auto n_tasks = static_cast<std::ptrdiff_t>(tasks.size());
+  if (stage) stage->expect(tasks.size());
 #pragma omp parallel for schedule(dynamic)
   for (std::ptrdiff_t task = 0; task < n_tasks; ++task) {
     SampleTally tally;
@@ -227,17 +230,18 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
             [&](const SampleBlock& block) { visit_block(static_cast<std::size_t>(task), block); });
 #pragma omp critical(phyxel_sample_tally)
     total.add(tally);
+    if (stage) stage->count();
   }
   return total;
 }
 
 SampleTally InsideSampler::collect(double voxel, std::uint64_t seed,
-                                   std::vector<SampleBlock>& blocks) const {
+                                   std::vector<SampleBlock>& blocks, Stage* stage) const {
   // Eight children at most of fewer than enough_tasks cells.
   std::vector<std::vector<SampleBlock>> by_task(8 * enough_tasks);
-  const SampleTally tally = visit(voxel, seed, [&](std::size_t task, const SampleBlock& block) {
-    by_task[task].push_back(block);
-  });
+  const SampleTally tally = visit(
+      voxel, seed,
+      [&](std::size_t task, const SampleBlock& block) { by_task[task].push_back(block); }, stage);
   blocks.clear();
   for (std::vector<SampleBlock>& part : by_task) {
     std::move(part.begin(), part.end(), std::back_inserter(blocks));

@@ -10,6 +10,8 @@
 
 namespace phyxel {
 
+class Stage;
+
 /// Neighbouring sample points, at `centre` + offset.
 struct SampleBlock {
   Vec3d centre;                     ///< [m]
@@ -41,10 +43,12 @@ class InsideSampler {
   /// Calls visit(task, block) for blocks of up to 4 x 4 x 4 voxels with the side `voxel` [m]. The
   /// tasks run on many threads in any order, the blocks of one task in order; the blocks depend
   /// on `voxel` and `seed` only.
-  SampleTally visit(double voxel, std::uint64_t seed, const Visit& visit_block) const;
+  /// @param stage that this is all of; may be null
+  SampleTally visit(double voxel, std::uint64_t seed, const Visit& visit_block, Stage* stage) const;
 
   /// All blocks, by task.
-  SampleTally collect(double voxel, std::uint64_t seed, std::vector<SampleBlock>& blocks) const;
+  SampleTally collect(double voxel, std::uint64_t seed, std::vector<SampleBlock>& blocks,
+                      Stage* stage) const;
 
   bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
   /// About how many voxels the surface passes through, all of which are looked at.

@@ -9,6 +9,7 @@
 #include "mesh/mesh_formats.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -71,7 +72,8 @@ Surface parse_mesh(std::string_view content, MeshFormat format, const std::strin
 
 Surface read_mesh(const std::filesystem::path& file) {
   const MeshFormat format = format_of(file);
-  return parse_mesh(read_bytes(file), format, file.string());
+  return in_stage("reading the mesh",
+                  [&] { return parse_mesh(read_bytes(file), format, file.string()); });
 }
 
 }  // namespace phyxel

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "mesh/random_bits.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -130,12 +131,15 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
   const double share = (12.0 * n + 100) / static_cast<double>(samples_in(blocks));
   // Random packings of spheres jam at a diameter of 0.90 spacings.
   double radius = 0.9 * spacing;
+  Stage stage("placing phyxels");
   Darts darts(blocks, share, seed, radius, before, static_cast<std::size_t>(n));
   while (darts.count() < static_cast<std::size_t>(n)) {
     darts.take(radius, static_cast<std::size_t>(n));
+    stage.reach(static_cast<double>(darts.count()) / n);
     // Samples closer together than this are told apart by nothing.
     radius = radius > 1e-6 * spacing ? 0.96 * radius : 0;
   }
+  stage.finish();
   return darts.points();
 }
 
@@ -246,6 +250,7 @@ void SampledVoronoi::assign(const std::vector<Vec3d>& site, double spacing) {
 
 void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
                            std::size_t fixed) {
+  Stage stage("evening out distances");
   const Vec3d origin = blocks_.front().centre;
   std::vector<Vec3d> sum(site.size());
   std::vector<Offset> count(site.size());
@@ -267,7 +272,9 @@ void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
       homeless |= count[i] == 0;
     }
     if (homeless) settle_homeless(site, count, fixed);
+    stage.reach((sweep + 1.0) / sweeps);
   }
+  stage.finish();
 }
 
 void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site, const std::vector<Offset>& count,

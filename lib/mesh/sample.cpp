@@ -10,6 +10,7 @@
 #include "mesh/surface_topology.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -115,9 +116,11 @@ void drop_unused_vertices(Surface& surface) {
 double fill_inside(const InsideSampler& sampler, double wanted, std::uint64_t seed,
                    const std::string& defects, std::vector<SampleBlock>& blocks,
                    SampleTally& tally) {
+  Stage stage("filling the surface");
   // The volume is not known if the surface is open or covers parts of space twice: a coarse
   // filling tells how fine the next must be.
   double voxel = sampler.extent() / 24;
+  double expected = 0;  // samples of the next attempt: rough ones are not worth telling of
   for (int attempt = 0;; ++attempt) {
     // Among so many voxels, some would lie inside a plate of even 1e-7 of its width.
     const double cost = sampler.surface_voxels(voxel);
@@ -126,12 +129,17 @@ double fill_inside(const InsideSampler& sampler, double wanted, std::uint64_t se
       throw InputError(
           fmt::format("the surface encloses no volume, or too little for its area: {}", defects));
     }
-    tally = sampler.collect(voxel, seed, blocks);
+    tally = sampler.collect(voxel, seed, blocks, expected > 0.5 * wanted ? &stage : nullptr);
     const double found = static_cast<double>(tally.samples);
-    if (found >= 0.9 * wanted && found <= 1.3 * wanted) return voxel;
-    if (attempt > 8 && found >= 0.5 * wanted) return voxel;
+    if ((found >= 0.9 * wanted && found <= 1.3 * wanted) ||
+        (attempt > 8 && found >= 0.5 * wanted)) {
+      stage.finish();
+      return voxel;
+    }
     // Small numbers of samples are only a rough guess; go four times finer at most at a time.
-    voxel *= found > 0 ? std::clamp(std::cbrt(found / wanted), 0.25, 4.0) : 0.4;
+    const double finer = found > 0 ? std::clamp(std::cbrt(found / wanted), 0.25, 4.0) : 0.4;
+    voxel *= finer;
+    expected = found / (finer * finer * finer);
   }
 }
 
@@ -150,21 +158,25 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
 std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
                                    double voxel, double spacing, std::uint64_t seed,
                                    double& sampled_volume) {
+  Stage stage("volumes of phyxels");
   const NearestSite nearest(site, spacing);
   std::vector<std::uint32_t> count(site.size(), 0);
-  const SampleTally tally =
-      sampler.visit(0.5 * voxel, seed, [&](std::size_t, const SampleBlock& b) {
+  const SampleTally tally = sampler.visit(
+      0.5 * voxel, seed,
+      [&](std::size_t, const SampleBlock& b) {
         thread_local NearestSite::Scratch scratch;
         nearest.find(b, scratch);
         for (const Index i : scratch.owner) {
 #pragma omp atomic
           ++count[i];
         }
-      });
+      },
+      &stage);
   sampled_volume = static_cast<double>(tally.samples) * std::pow(0.5 * voxel, 3);
   std::vector<double> share(site.size());
   // A phyxel too small to be seen still has a place of its own: half a sample's worth.
   for (std::size_t i = 0; i < site.size(); ++i) share[i] = std::max(0.5, double(count[i]));
+  stage.finish();
   return share;
 }
 
@@ -212,6 +224,7 @@ void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::st
 Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
   check_request(surface, request);
   SampleReport found;
+  Stage inspecting("inspecting the surface");
   found.defects = inspect_surface(surface);
   const std::string defects = found.defects.describe();
 
@@ -230,6 +243,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   const SurfaceTopology topology = connect(cloud.surface);
   const bool closed = topology.closed;
   const InsideSampler sampler(cloud.surface, closed);
+  inspecting.finish();
 
   const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
   const std::uint64_t seed = request.seed;

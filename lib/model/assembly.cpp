@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "stage.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -203,11 +204,14 @@ void append(Degenerate& to, const Degenerate& found, Index shift) {
 
 void find_moments(Model& model) {
   if (!model.has_lists()) return;
+  Stage stage("moments");
   const Index n = model.size();
   model.inverse_moment.resize(static_cast<std::size_t>(n));
   model.moment_offset.resize(static_cast<std::size_t>(n));
   std::vector<signed char> rank(static_cast<std::size_t>(n));
   std::vector<char> coincident(static_cast<std::size_t>(n), 0);
+  constexpr Index part = 4096;
+  stage.expect(static_cast<std::size_t>(n / part));
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
     Sym3d moment;
@@ -225,6 +229,7 @@ void find_moments(Model& model) {
     model.inverse_moment[i] = inverse.matrix;
     model.moment_offset[i] = offset;
     rank[i] = static_cast<signed char>(inverse.rank);
+    if ((i + 1) % part == 0) stage.count();
   }
   for (Index i = 0; i < n; ++i) {
     if (coincident[i]) model.degenerate.coincident.push_back(i);
@@ -232,6 +237,7 @@ void find_moments(Model& model) {
     if (rank[i] == 1) model.degenerate.collinear.push_back(i);
     if (rank[i] == 2) model.degenerate.coplanar.push_back(i);
   }
+  stage.finish();
 }
 
 void add_warnings(Model& model, std::size_t surfels) {

@@ -11,6 +11,8 @@ namespace phyxel {
 struct Box {
   Vec3d low, high;  ///< [m]
   double extent() const { return std::max({high.x - low.x, high.y - low.y, high.z - low.z}); }
+  /// The largest coordinate, unsigned [m].
+  double farthest() const { return std::max({-low.x, high.x, -low.y, high.y, -low.z, high.z}); }
 };
 
 /// Of no points: at the origin.

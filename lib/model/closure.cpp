@@ -11,7 +11,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
-#include "timeline.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -268,6 +268,7 @@ struct Solution {
   double left = 0;  ///< Root mean square of the sums over that of the areas, summed anew.
 };
 Solution close(const Sums& sums, double tolerance) {
+  Stage stage("closed gradients");
   const Index n = sums.size();
   const auto count = static_cast<std::size_t>(n);
   Solution solution{std::vector<Unknown>(count)};
@@ -281,10 +282,12 @@ Solution close(const Sums& sums, double tolerance) {
   std::vector<Unknown> slope(count), direction;
   sums.apply_transpose(residual, slope);
   direction = slope;
-  double left_before = HUGE_VAL;
+  double left_before = HUGE_VAL, left_first = 0;
   double steepness = exact_sum(n, [&](Index i) { return dot(slope[i], slope[i]); });
   for (;; ++solution.iterations) {
     const double left = left_by([&](Index i) { return residual[i]; });
+    if (solution.iterations == 0) left_first = left;
+    stage.reach(std::log(left_first / left) / std::log(left_first / tolerance));
     if (!(left > tolerance) || !(steepness > 0) || solution.iterations == most_iterations) break;
     if (solution.iterations % patience == 0) {
       if (!(left < 0.9 * left_before)) break;
@@ -312,6 +315,7 @@ Solution close(const Sums& sums, double tolerance) {
   }
   sums.apply(solution.x, image);
   solution.left = left_by([&](Index i) { return open[i] + image[i]; });
+  stage.finish();
   return solution;
 }
 

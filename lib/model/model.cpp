@@ -15,6 +15,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "shapes/lattice_shapes.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -89,7 +90,9 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   }
   Survey survey;
   if (surveyor) {
-    survey = (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
+    survey = in_stage("neighbours", [&] {
+      return (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
+    });
     if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
     append(model.degenerate, survey.degenerate, shift);
   } else {
@@ -163,6 +166,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     sums.add(model, part.begin, part.end);
     sums.tell(part);
     part.centre = body.centre;
+    part.farthest = box_around(cloud.position).farthest();
   }
   check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(body.volume));
 
@@ -238,8 +242,10 @@ Cloud rest_cloud(const BodySource& source) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
   }
-  const std::optional<ShapeRequest> lattice = lattice_of(source, {});
-  return make_shape(lattice ? *lattice : source.shape);
+  return in_stage("making the shape", [&] {
+    const std::optional<ShapeRequest> lattice = lattice_of(source, {});
+    return make_shape(lattice ? *lattice : source.shape);
+  });
 }
 
 std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {

@@ -10,6 +10,7 @@
 #include "model/nearest_distances.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/spatial_hash.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -17,13 +18,14 @@ namespace {
 constexpr Index block_size = 4096;  // rows a thread fills at a time
 
 /// Builds rows in parallel: fill(i, row) appends row i's indices; rows come out ascending and in
-/// order whatever the number of threads.
+/// order whatever the number of threads. @param stage that this is all of
 template <class Fill>
-Csr build_rows(Index rows, Fill&& fill) {
+Csr build_rows(Index rows, Stage& stage, Fill&& fill) {
   const Index blocks = (rows + block_size - 1) / block_size;
   std::vector<std::vector<Index>> block_indices(static_cast<std::size_t>(blocks));
   Csr csr;
   csr.offsets.assign(static_cast<std::size_t>(rows) + 1, 0);
+  stage.expect(static_cast<std::size_t>(blocks));
 #pragma omp parallel for schedule(dynamic)
   for (Index b = 0; b < blocks; ++b) {
     std::vector<Index> row;
@@ -36,6 +38,7 @@ Csr build_rows(Index rows, Fill&& fill) {
       csr.offsets[i + 1] = static_cast<Offset>(row.size());
       indices.insert(indices.end(), row.begin(), row.end());
     }
+    stage.count();
   }
   std::partial_sum(csr.offsets.begin(), csr.offsets.end(), csr.offsets.begin());
   csr.indices.resize(static_cast<std::size_t>(csr.entries()));
@@ -101,7 +104,9 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, d
   const Index n = static_cast<Index>(position.size());
   std::vector<double> spacing(position.size(), 0);
   if (n < 2) return spacing;
+  Stage stage("distances between phyxels");
   const SpatialHash hash = roomy_hash(position);
+  stage.expect(static_cast<std::size_t>(n / block_size));
 #pragma omp parallel
   {
     const int wanted = std::min<int>(nearest, n - 1);
@@ -118,8 +123,10 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, d
           [&](int ring) { hash.visit_ring(here, ring, offer); }, [&] { hash.visit_all(offer); });
       spacing[i] = found.mean_distance();
       if (farthest) farthest[i] = std::sqrt(found.largest());
+      if ((i + 1) % block_size == 0) stage.count();
     }
   }
+  stage.finish();
   return spacing;
 }
 
@@ -136,10 +143,11 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
   result.support = std::move(support);
   result.symmetric = !rule.one_sided();
   if (n == 0) return result;
+  Stage stage("neighbours");
   const SpatialHash hash(position, median_of(result.support));
 
   using Candidate = std::pair<double, Index>;
-  result.neighbours = build_rows(n, [&](Index i, std::vector<Index>& row) {
+  result.neighbours = build_rows(n, stage, [&](Index i, std::vector<Index>& row) {
     const Vec3d here = position[i];
     const double h = result.support[i];
     const int rings = rings_within(h, hash.cell_size());
@@ -164,6 +172,7 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
     for (std::size_t k = 0; k < kept; ++k) row.push_back(candidates[k].second);
   });
   if (!result.symmetric) result.inverse_lists = transpose(result.neighbours, n);
+  stage.finish();
   return result;
 }
 
@@ -174,16 +183,19 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
     csr.offsets.assign(point.size() + 1, 0);
     return csr;
   }
+  Stage stage("phyxels near the surface");
   const double largest = *std::max_element(support.begin(), support.end());
   const SpatialHash hash(position, median_of(support));
   const int rings = rings_within(largest, hash.cell_size());
-  return build_rows(static_cast<Index>(point.size()), [&](Index s, std::vector<Index>& row) {
+  csr = build_rows(static_cast<Index>(point.size()), stage, [&](Index s, std::vector<Index>& row) {
     const Vec3d here = point[s];
     hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
       const double h = support[e.index];
       if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
     });
   });
+  stage.finish();
+  return csr;
 }
 
 std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position) {

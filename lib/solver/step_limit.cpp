@@ -10,6 +10,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/owned_vectors.hpp"
 #include "solver/start_vector.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -123,12 +124,17 @@ double smallest_sound_step(const Model& model) {
   return smallest;
 }
 
+constexpr const char* stage_name = "largest time step";
+
 /// Largest eigenfrequency, with a bound of what is still missing in it.
 struct Frequency {
   double omega = 0;  ///< [rad/s]; NaN where a force is not finite.
   int iterations = 0;
 };
-Frequency largest_frequency(const Model& model, Vibration& vibration, double tolerance) {
+/// @param tolerance of the largest eigenvalue
+/// @param stage that is told how far the search is, or null
+Frequency largest_frequency(const Model& model, Vibration& vibration, double tolerance,
+                            Stage* stage = nullptr) {
   Frequency found;
   std::vector<double> diagonal, off_diagonal;
   double beta = 0;
@@ -144,16 +150,21 @@ Frequency largest_frequency(const Model& model, Vibration& vibration, double tol
     const auto [value, residual] = largest_eigenvalue(diagonal, off_diagonal, beta);
     found = {std::sqrt(std::max(0.0, value + residual)), static_cast<int>(k) + 1};
     if (residual <= tolerance * value || beta <= 1e-12 * value) break;
+    // The residual falls by about as much in each iteration.
+    if (stage) {
+      stage->reach(std::max(static_cast<double>(k + 1) / static_cast<double>(most),
+                            std::log(residual / value) / std::log(tolerance)));
+    }
     off_diagonal.push_back(beta);
     vibration.advance(beta);
   }
   return found;
 }
 
-StepLimit step_limit(const Model& model, Vibration& vibration) {
+StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
   StepLimit limit;
   limit.sound_step = smallest_sound_step(model);
-  const Frequency found = largest_frequency(model, vibration, 0.002);
+  const Frequency found = largest_frequency(model, vibration, 0.002, &stage);
   limit.omega_max = found.omega;
   limit.iterations = found.iterations;
   if (!(limit.omega_max > 0) || !std::isfinite(limit.omega_max)) {
@@ -165,22 +176,26 @@ StepLimit step_limit(const Model& model, Vibration& vibration) {
     throw InputError(why);
   }
   limit.largest_step = 2 / limit.omega_max;
+  stage.finish();
   return limit;
 }
 
 }  // namespace
 
 StepLimit step_limit(const Model& model, int threads) {
+  Stage stage(stage_name);
   const std::unique_ptr<Backend> backend = make_cpu_backend(model, Precision::double_, threads);
   const double distance =
       strain_at_rest * OwnedVectors(model, backend->threads()).smallest_support();
   HostVibration vibration(model, *backend, at_rest(model), distance);
-  return step_limit(model, vibration);
+  return step_limit(model, vibration, stage);
 }
 
 StepLimit step_limit(const Model& model, Backend& backend) {
   const std::unique_ptr<Vibration> vibration = backend.vibration();
-  return vibration ? step_limit(model, *vibration) : step_limit(model, backend.threads());
+  if (!vibration) return step_limit(model, backend.threads());
+  Stage stage(stage_name);
+  return step_limit(model, *vibration, stage);
 }
 
 StepLimit step_limit_at(const Model& model, Backend& backend, const State& present) {

@@ -10,6 +10,7 @@
 #include "phyxel/ranks.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 namespace {
@@ -102,9 +103,11 @@ std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
   check_transport_name(transport);
   const auto& names = transport_names();
   const auto which = std::find(names.begin(), names.end(), transport);
-  if (!device.gpu) return make_cpu_backend(model, precision, threads);
-  return make_cuda_backend(model, precision, device.gpu->index, CudaPath::automatic,
-                           static_cast<Transport>(which - names.begin()));
+  return in_stage("solver arrays", [&] {
+    if (!device.gpu) return make_cpu_backend(model, precision, threads);
+    return make_cuda_backend(model, precision, device.gpu->index, CudaPath::automatic,
+                             static_cast<Transport>(which - names.begin()));
+  });
 }
 
 }  // namespace phyxel

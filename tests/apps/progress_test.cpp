@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <sstream>
 
+#include "stage.hpp"
+
 namespace phyxel::app {
 namespace {
 
@@ -178,6 +180,63 @@ TEST(Progress, WithoutAStreamItIsSilent) {
   progress.update(1, 1, 1, 1);
   progress.finish();
   EXPECT_EQ(asked, 0);  // not even the clock is read
+}
+
+/// A set-up of half a minute, whose second stage takes most of it.
+void tell_stages(double& now) {
+  in_stage("reading", [&] { now += 1; });
+  Stage filling("filling");
+  for (int k = 1; k < 25; ++k) {
+    now += 1;
+    filling.reach(k / 25.0);
+  }
+  now += 1;
+  filling.reach(0.99999);
+  filling.finish();
+}
+
+TEST_F(ProgressLines, StagesOfASetUpAreABarThatGoesAway) {
+  style_.terminal = true;
+  style_.columns = 80;
+  {
+    const SetupProgress shown(stream_, style_);
+    tell_stages(now_);
+  }
+  const auto drawn = split('\r');
+  ASSERT_GE(drawn.size(), 28u);
+  EXPECT_THAT(drawn[drawn.size() - 2], HasSubstr(" 99.9%  filling"));  // 100% is the end
+  EXPECT_EQ(drawn[1], "[................]    0.0%  reading\x1b[K");
+  EXPECT_EQ(drawn[2], "\x1b[K");  // taken away
+  EXPECT_EQ(drawn[3], "[................]    0.0%  filling\x1b[K");
+  // 5 of 25 parts took 5 s: 20 are left.
+  EXPECT_THAT(drawn[8], StartsWith("[###.............]   20.0%  filling  0:2"));
+  EXPECT_EQ(drawn.back(), "\x1b[K");
+  EXPECT_EQ(std::count(text_, text_ + size_, '\n'), 0);
+}
+
+TEST_F(ProgressLines, ALogGetsALineOfALongSetUpInFiveSecondsAndNoneOfAShortOne) {
+  {
+    const SetupProgress shown(stream_, style_);
+    in_stage("short", [&] { now_ += 4.9; });
+  }
+  EXPECT_EQ(text(), "");
+  {
+    const SetupProgress shown(stream_, style_);
+    tell_stages(now_);
+  }
+  const auto lines = split('\n');
+  ASSERT_EQ(lines.size(), 5u);  // after 5, 10, 15, 20 and 25 s of 26
+  EXPECT_EQ(lines[0], " 16.0%  filling  0:21 left");
+  EXPECT_THAT(lines[4], StartsWith(" 96.0%  filling  0:0"));
+}
+
+TEST(Progress, WithoutAStreamNoStageIsTold) {
+  int asked = 0;
+  ProgressStyle style;
+  style.clock = [&] { return 10.0 * ++asked; };
+  const SetupProgress silent(nullptr, style);
+  in_stage("reading", [] {});
+  EXPECT_EQ(asked, 0);
 }
 
 TEST(Progress, AStreamThatCannotBeWrittenDoesNotEndTheRun) {

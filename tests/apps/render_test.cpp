@@ -266,6 +266,26 @@ double height_of_body(const Image& image) {
   return sum / count;
 }
 
+/// Positions, camera and depths are in double, so that a body looks the same wherever it is.
+TEST_F(Trajectory, PicturesFarFromTheOriginShowTheBodyAsNearIt) {
+  render(run_, folder_ / "near", request_, false);
+  const Vec3d far{1e7, -1e7, 1e7};
+  for (auto* points : {&ball_.point, &model_.position, &model_.surfels.position}) {
+    for (Vec3d& p : *points) p += far;
+  }
+  model_.parts[0].farthest = 1e7;
+  model_.parts[0].surfels = model_.parts[0].surfel_end;
+  fs::remove_all(run_);
+  record("");
+  render(run_, folder_ / "far", request_, false);
+  for (const char* name : {"frame_000000.png", "frame_000002.png"}) {
+    const Image near = read_png(folder_ / "near" / name), there = read_png(folder_ / "far" / name);
+    EXPECT_NEAR(height_of_body(near), height_of_body(there), 0.1) << name;
+    // Coordinates are 2 nm apart there: some pixels at edges may fall to the other side.
+    EXPECT_LT(pixels_that_differ(near, there), near.width * near.height / 100) << name;
+  }
+}
+
 /// The scene that a frame carries turns its pictures; options go before it.
 TEST_F(Trajectory, PicturesAreUpAsTheirSceneSays) {
   const auto drop = [&](const std::string& keys) {

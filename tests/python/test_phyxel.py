@@ -287,6 +287,74 @@ def test_ctrl_c_stops_a_run_of_short_frames():
         signal.signal(signal.SIGALRM, previous)
 
 
+def test_set_up_tells_its_stages():
+    heard = []
+    cloud = phyxel.sample(cube(), phyxels=300, progress=lambda stage, share: heard.append((stage, share)))
+    phyxel.Simulation({"time": {"end": 0.1}, "solver": {"device": "cpu"},
+                       "body": [{"cloud": "cube", "material": MATERIAL}]}, clouds={"cube": cloud},
+                      progress=lambda stage, share: heard.append((stage, share)))
+    stages = {stage for stage, _ in heard}
+    assert {"filling the surface", "evening out distances", "volumes of phyxels", "neighbours",
+            "moments", "solver arrays", "largest time step"} <= stages
+    for stage in stages:
+        shares = [share for name, share in heard if name == stage]
+        assert shares[0] == 0 and shares[-1] == 1, stage
+
+    def refuse(stage, share):
+        if stage == "moments":
+            raise LookupError(stage)
+
+    with pytest.raises(LookupError, match="moments"):
+        phyxel.Simulation({"time": {"end": 0.1}, "body": [{"cloud": "beam", "material": MATERIAL}]},
+                          clouds={"beam": BEAM}, progress=refuse)
+
+
+def test_runs_tell_how_far_they_are():
+    heard = []
+    tell = lambda stage, share: heard.append((stage, share))
+    s = simulation(time={"end": 0.05}, output={"frames_per_second": 100})
+    s.run(progress=tell)
+    assert heard[0] == ("steps", 0) and heard[-1] == ("steps", 1)
+    shares = [share for _, share in heard]
+    assert shares == sorted(shares)
+
+    hung = dict(gravity=[0, 0, -9.81], solver={"method": "equilibrium", "device": "cpu"})
+    rest = simulation({"fixed": [{"region": "x-"}]}, **hung)
+    heard.clear()
+    rest.run(progress=tell)
+    assert heard[0] == ("search for rest", 0) and heard[-1] == ("search for rest", 1)
+    rest.run()  # nobody hears any more
+    assert heard[-1] == ("search for rest", 1) and len(heard) == len(set(heard))
+
+    # What the function raises ends a run and a search, which go on from there.
+    def refuse(stage, share):
+        if 0 < share < 1:
+            raise LookupError(stage)
+
+    s = simulation(time={"end": 1e3})
+    with pytest.raises(LookupError, match="steps"):
+        s.run(progress=refuse)
+    s.step(3)
+    fine = phyxel.shape("beam", size=(1, 0.2, 0.2), spacing=0.02)
+    rest = simulation({"fixed": [{"region": "x-"}]}, clouds={"beam": fine}, **hung)
+    with pytest.raises(LookupError, match="search for rest"):
+        rest.run(progress=refuse)
+
+
+def test_ctrl_c_stops_a_set_up():
+    heard = {}
+    previous = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.3)  # of seconds
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            # A method of dict runs no Python code, which would hear the signal itself.
+            phyxel.sample(cube(), phyxels=30000, progress=heard.__setitem__)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, previous)
+    assert heard and "volumes of phyxels" not in heard  # the last stage
+
+
 def stepped(_):
     s = simulation(solver={"device": "cpu", "precision": "double", "threads": 2})
     s.set_state(velocity=np.cross(s.rest, [0, 0, 1]))

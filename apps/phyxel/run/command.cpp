@@ -7,18 +7,25 @@
 namespace phyxel::app {
 namespace {
 
+/// What the run is made of, with the stages of that shown.
+std::unique_ptr<Run> set_up(const RunOptions& options) {
+  const bool speaks = !options.quiet && !options.json && ranks().rank() == 0;
+  const SetupProgress progress(speaks ? stderr : nullptr);
+  return std::make_unique<Run>(options);
+}
+
 void run(const RunOptions& options) {
   if (options.dry_run) {
-    Run(options).rehearse();
+    set_up(options)->rehearse();
     return;
   }
   if (options.profile.empty()) {
-    Run(options).execute();
+    set_up(options)->execute();
     return;
   }
   start_profile(options.profile, options.force);
   try {
-    Run(options).execute();
+    set_up(options)->execute();
   } catch (const AgreedError&) {  // on all ranks, e.g. after a signal
     write_profile(options.profile);
     throw;

@@ -80,10 +80,11 @@ class Simulation(SimulationBase):
     clouds: {name: Cloud} for bodies that say `cloud = "name"`.
     device, precision, method, threads, step, end: instead of the scene's.
     unsafe_step: allow a step above the largest stable one.
+    progress: called as progress(stage, share) while bodies are made and the step is found.
     """
 
     def __init__(self, scene, clouds=None, *, device=None, precision=None, method=None,
-                 threads=None, step=None, end=None, unsafe_step=False):
+                 threads=None, step=None, end=None, unsafe_step=False, progress=None):
         file, text = None, ""
         if isinstance(scene, dict):
             text = to_toml(scene)
@@ -93,7 +94,7 @@ class Simulation(SimulationBase):
         else:
             file = os.fspath(scene)
         super().__init__(file, text, dict(clouds or {}), device, precision, method, threads, step,
-                         end, unsafe_step)
+                         end, unsafe_step, progress)
         self._made = True
 
     @property

@@ -41,6 +41,7 @@ struct Part {
   Vec3d origin;                 ///< Its body's first phyxel at rest [m]: solvers count from it.
   double mass = 0, volume = 0;  ///< Of the whole part [kg, m³].
   Vec3d centre;                 ///< Of its body's mass, at rest [m].
+  double farthest = 0;          ///< Largest coordinate of its body's phyxels at rest, unsigned [m].
 
   /// The first of its ghosts.
   Index owned_end() const { return end - ghosts; }

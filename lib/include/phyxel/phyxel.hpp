@@ -14,6 +14,7 @@
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
+#include "phyxel/progress.hpp"
 #include "phyxel/ranks.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"

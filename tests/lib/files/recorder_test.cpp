@@ -274,11 +274,11 @@ TEST_F(Recording, SeriesThatAreNoneAreRefused) {
 
 /// The independent readers: VTK's own reader and h5py, through Debian's Python, or another one that
 /// the environment names.
-int read_back(const fs::path& folder, const std::string& what) {
+int read_back(const fs::path& folder, const std::string& what, double far) {
   const char* named = std::getenv("PHYXEL_PYTHON");
   const std::string python = named ? named : "/usr/bin/python3";
-  const std::string command =
-      python + " '" PHYXEL_SOURCE_DIR "/tests/read_back.py' " + what + " '" + folder.string() + "'";
+  const std::string command = python + " '" PHYXEL_SOURCE_DIR "/tests/read_back.py' " + what +
+                              " '" + folder.string() + "' " + std::to_string(far);
   const int status = std::system(command.c_str());
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -289,9 +289,36 @@ TEST_F(Recording, VtkAndH5pyReadTheSameNumbers) {
     scene_.solver.precision = precision;
     Recorder recorder(model_, scene_, true);
     for (int k = 0; k < 3; ++k) record(recorder, k);
-    const int code = read_back(folder_ / "out", "frames");
+    const int code = read_back(folder_ / "out", "frames", 0);
     PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");
     EXPECT_EQ(code, 0);
+  }
+}
+
+/// Ten thousand kilometres from the origin floats are a metre apart: a run in float writes doubles
+/// there, which VTK and h5py read too, and the single file keeps them.
+TEST_F(Recording, FramesFarFromTheOriginTellAllPointsApart) {
+  constexpr double far = 1e7;
+  for (Vec3d& x : model_.position) x.x += far;
+  for (Vec3d& x : model_.surfels.position) x.x += far;
+  for (Part& part : model_.parts) {
+    part.farthest = far + 5;
+    part.volume = part.size = part.surfels = 1;
+  }
+  {
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 3; ++k) record(recorder, k);
+  }
+  for (const char* family : {"phyxels", "surface"}) {
+    const fs::path series = folder_ / "out" / (std::string(family) + ".hdf.series");
+    const FrameData frame = read_frame(read_series(series)[1].file);
+    EXPECT_EQ(frame.point[1].x, far + 1.5) << family;
+    export_single(series, folder_ / "out" / (std::string(family) + ".vtkhdf"), false);
+  }
+  for (const char* what : {"frames", "single"}) {
+    const int code = read_back(folder_ / "out", what, far);
+    PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");
+    EXPECT_EQ(code, 0) << what;
   }
 }
 
@@ -307,7 +334,7 @@ TEST_F(Recording, TheSingleFileHoldsEveryStep) {
                  InputError);
     EXPECT_FALSE(fs::exists(out.string() + ".tmp"));
   }
-  const int code = read_back(folder_ / "out", "single");
+  const int code = read_back(folder_ / "out", "single", 0);
   PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");
   EXPECT_EQ(code, 0);
 }

@@ -1,0 +1,33 @@
+/// How far a set-up has come, for programs that show it.
+#pragma once
+
+#include <functional>
+#include <string_view>
+
+namespace phyxel {
+
+/// Hears how far a stage of a set-up has come: `share` is 0 at the beginning of the stage, grows,
+/// and is 1 at its end. It is called on the thread that sets up. An exception that it throws
+/// abandons the set-up, and reaches whoever asked for that; ranks that set up a model together must
+/// all throw it, or none.
+using StageObserver = std::function<void(std::string_view stage, double share)>;
+
+/// While it lives, an observer hears of the stages of everything that this thread sets up: meshes
+/// read and filled, neighbours, moments, closed gradients, shares of ranks, the arrays of a solver,
+/// the largest step. Other threads have observers of their own, so that they can set up models at
+/// the same time. The last observer made is the one that hears. Where there is none, a stage costs
+/// a comparison.
+class ObserveStages {
+ public:
+  /// An empty observer: nobody hears.
+  explicit ObserveStages(StageObserver observer);
+  ~ObserveStages();
+  ObserveStages(const ObserveStages&) = delete;
+  ObserveStages& operator=(const ObserveStages&) = delete;
+
+ private:
+  StageObserver observer_;
+  const StageObserver* before_;
+};
+
+}  // namespace phyxel
