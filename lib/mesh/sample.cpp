@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mesh/inside_filling.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
@@ -110,31 +111,6 @@ void drop_unused_vertices(Surface& surface) {
   }
 }
 
-/// Blocks of samples that fill the inside, with voxels small enough that there are about `wanted`.
-/// @returns the voxel's side [m].
-double fill_inside(const InsideSampler& sampler, double wanted, std::uint64_t seed,
-                   const std::string& defects, std::vector<SampleBlock>& blocks,
-                   SampleTally& tally) {
-  // The volume is not known if the surface is open or covers parts of space twice: a coarse
-  // filling tells how fine the next must be.
-  double voxel = sampler.extent() / 24;
-  for (int attempt = 0;; ++attempt) {
-    // Among so many voxels, some would lie inside a plate of even 1e-7 of its width.
-    const double cost = sampler.surface_voxels(voxel);
-    const double most = attempt > 0 && tally.samples == 0 ? 3e5 : std::max(3e6, 8 * wanted);
-    if (cost > most || voxel < 1e-7 * sampler.extent()) {
-      throw InputError(
-          fmt::format("the surface encloses no volume, or too little for its area: {}", defects));
-    }
-    tally = sampler.collect(voxel, seed, blocks);
-    const double found = static_cast<double>(tally.samples);
-    if (found >= 0.9 * wanted && found <= 1.3 * wanted) return voxel;
-    if (attempt > 8 && found >= 0.5 * wanted) return voxel;
-    // Small numbers of samples are only a rough guess; go four times finer at most at a time.
-    voxel *= found > 0 ? std::clamp(std::cbrt(found / wanted), 0.25, 4.0) : 0.4;
-  }
-}
-
 void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects, bool closed) {
   if (closed || tally.samples == 0) return;
   const double doubtful = static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
@@ -233,9 +209,19 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
 
   const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
   const std::uint64_t seed = request.seed;
-  std::vector<SampleBlock> blocks;
-  SampleTally tally;
-  const double voxel = fill_inside(sampler, wanted, seed, defects, blocks, tally);
+  InsideFilling filling;
+  fill_inside(sampler,
+              {.phyxels = request.phyxels,
+               .samples = wanted,
+               .seed = seed,
+               .triangles = cloud.surface.triangle.size(),
+               .volume = closed ? std::optional(enclosed_volume(cloud.surface)) : std::nullopt,
+               .exponent = exponent,
+               .defects = defects},
+              filling);
+  std::vector<SampleBlock>& blocks = filling.blocks;
+  const SampleTally& tally = filling.tally;
+  const double voxel = filling.voxel;
   refuse_if_too_open(tally, found.defects, closed);
   found.doubtful_fraction =
       static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);

@@ -331,6 +331,29 @@ density = 1000
   EXPECT_EQ(count_of("Usage:", run_on(2, {"--help"}).out), 1);
 }
 
+/// Each rank reads its own command line: what changes the plan must be the same on all, or they
+/// would step to different ends and wait for each other for ever.
+TEST_F(Mpirun, OptionsThatDifferBetweenRanksAreToldOnce) {
+  write_scene();
+  const struct {
+    const char *option, *first, *second;
+  } cases[] = {{"--until", "0.1", "0.05"},
+               {"--step", "1e-4", "2e-4"},
+               {"--precision", "float", "double"},
+               {"--method", "verlet", "equilibrium"}};
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.option);
+    use_ranks(1);
+    const Outcome outcome = run({"run", "scene.toml", c.option, c.first, ":", "-n", "1",
+                                 PHYXEL_PROGRAM, "run", "scene.toml", c.option, c.second});
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_EQ(count_of("phyxel: error: the ranks have different options", outcome.err), 1)
+        << outcome.err;
+    EXPECT_EQ(count_of("error: ", outcome.err), 1) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out"));
+  }
+}
+
 /// The plan of two ranks is that of one, and no file is written.
 TEST_F(Mpirun, CheckTellsThePlanOnce) {
   write_scene();
