@@ -311,17 +311,28 @@ young = 2e5
 poisson = 0.3
 density = 1000
 )");
+  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const std::string material = "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1e3\n";
+  write("flat.toml", "[time]\nend = 1\n[[body]]\nmesh = \"flat.obj\"\nphyxels = 50\n" + material);
+  write("loose.toml",
+        "[time]\nend = 1\n[[body]]\nshape = \"beam\"\nsize = [1, 1, 1]\nspacing = "
+        "0.2\n[[body.fixed]]\n"
+        "\n\nregion = \"left\"\n" +
+            material);
   const struct {
     std::vector<std::string> arguments;
     std::string message;
-  } cases[] = {{{"run", "missing.toml"}, "missing.toml"},
-               {{"run", "scene.toml", "--partitioner", "metiss"}, "--partitioner metiss"},
-               {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
-               {{"run", "scene.toml", "--step", "1"}, "unstable"},
-               {{"run", "scene.toml", "--transport", "pigeon"}, "--transport pigeon"},
-               {{"run", "huge.toml"}, "to each of 2 ranks"},
-               {{"run", "scene.toml", "--out", "kept"}, "kept"},
-               {{"render", "out"}, "2 ranks"}};
+  } cases[] = {
+      {{"run", "missing.toml"}, "missing.toml"},
+      {{"run", "scene.toml", "--partitioner", "metiss"}, "--partitioner metiss"},
+      {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
+      {{"run", "scene.toml", "--step", "1"}, "error: scene.toml: time.step = 1 s is unstable"},
+      {{"run", "scene.toml", "--transport", "pigeon"}, "--transport pigeon"},
+      {{"run", "huge.toml"}, "error: huge.toml:6:1: body \"huge\": "},
+      {{"run", "flat.toml"}, "error: flat.toml:3:1: body \"flat\": flat.obj: the surface"},
+      {{"run", "loose.toml"}, "error: loose.toml:10:10: body \"beam\" has no region"},
+      {{"run", "scene.toml", "--out", "kept"}, "kept"},
+      {{"render", "out"}, "2 ranks"}};
   for (const auto& c : cases) {
     const Outcome outcome = run_on(2, c.arguments);
     EXPECT_EQ(outcome.code, 2) << outcome.err;
