@@ -228,6 +228,7 @@ TEST(SceneRefusal, EveryRangeRefusesWhatLiesJustOutside) {
       if (vector || key.type == KeyType::counts) text = "[1, 1, " + text + "]";
       if (list) text = "[" + text + "]";
       const std::string message = message_of(scene_with(key, text));
+      EXPECT_THAT(message, StartsWith("scene.toml:")) << text;
       EXPECT_THAT(message, HasSubstr(": key " + path_in_file(key) + ": ")) << text;
       EXPECT_THAT(message, HasSubstr(" found; allowed: " + allowed_words(key))) << text;
       ++tried;
