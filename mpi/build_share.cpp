@@ -24,6 +24,7 @@
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
+#include "scene/scene_error.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
@@ -1029,9 +1030,7 @@ BuiltShare build_share(const Communicator& ranks, const Scene& scene, const Shar
   // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
   Cloud rest;
-  return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
-    const BodyRequest& request = scene.bodies[b];
-    const Piece piece = piece_of(ranks, b);
+  const auto piece_of_source = [&](const BodyRequest& request, Piece piece, std::uint64_t& digest) {
     CloudPiece cut;
     if (const auto lattice = lattice_of(request.source, piece)) {
       cut = make_lattice_shape(*lattice, piece);
@@ -1046,21 +1045,29 @@ BuiltShare build_share(const Communicator& ranks, const Scene& scene, const Shar
     }
     place(cut.cloud, request);
     return cut;
+  };
+  return naming(scene, [&] {
+    return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
+      const BodyRequest& request = scene.bodies[b];
+      return naming(request, [&] { return piece_of_source(request, piece_of(ranks, b), digest); });
+    });
   });
 }
 
 BuiltShare build_share(const Communicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
-  if (clouds.size() != scene.bodies.size()) {
-    throw AgreedError(ExitCode::bad_input,
-                      fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
-                                  clouds.size(), scene.bodies.size()));
-  }
-  return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
-    digest = 31 * digest + cloud_digest(clouds[b]);
-    CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));
-    cut.cloud.warnings = clouds[b].warnings;
-    return cut;
+  return naming(scene, [&] {
+    if (clouds.size() != scene.bodies.size()) {
+      throw AgreedError(ExitCode::bad_input,
+                        fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
+                                    clouds.size(), scene.bodies.size()));
+    }
+    return Builder(ranks, scene, options).build([&](std::size_t b, std::uint64_t& digest) {
+      digest = 31 * digest + cloud_digest(clouds[b]);
+      CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));
+      cut.cloud.warnings = clouds[b].warnings;
+      return cut;
+    });
   });
 }
 

@@ -66,11 +66,25 @@ const CLI::Option* option_named(const CLI::App& command, const std::string& word
   return nullptr;
 }
 
-/// "; "phyxel render" has --colour" if another command has the option, or "".
+/// What people type that no command has, as `plain` spells it, and what there is instead.
+constexpr std::pair<std::string_view, std::string_view> instead[] = {
+    {"color", "colours are for terminals, and NO_COLOR=1 turns them off"},
+    {"no-color", "NO_COLOR=1 in the environment turns colours off"}};
+
+/// "; "phyxel run" has --until" if the program or another command has the option, or "".
 std::string elsewhere(const CLI::App& program, const std::string& word) {
+  const std::string typed = plain(word);
+  for (const auto& [known, what] : instead) {
+    if (typed == known) return fmt::format("; {}", what);
+  }
+  for (const std::string& name : options_of(program)) {
+    if (plain(name) == typed || (typed.size() == 1 && plain(name).substr(0, 1) == typed)) {
+      return fmt::format("; \"{}\" has {}", program.get_name(), name);
+    }
+  }
   for (const CLI::App* command : parts_of(program)) {
     for (const std::string& name : options_of(*command)) {
-      if (plain(name) == plain(word)) {
+      if (plain(name) == typed) {
         return fmt::format("; \"phyxel {}\" has {}", command->get_name(), name);
       }
     }
@@ -92,7 +106,11 @@ class Words {
           word.size() > 1 && word[0] == '-' && !number ? option(word) : command(word);
       if (wrong) return *wrong;
     }
-    const std::string said = error.what();
+    std::string said = error.what();
+    constexpr std::string_view unexpected = "The following argument was not expected: ";
+    if (said.rfind(unexpected, 0) == 0) {
+      said = fmt::format("{}: one argument too many", said.substr(unexpected.size()));
+    }
     for (const auto& [option, typed] : typed_) {
       for (const std::string& name : option->get_lnames()) {
         const std::string full = "--" + name;

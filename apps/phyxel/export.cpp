@@ -18,7 +18,7 @@ struct ExportOptions {
 };
 
 void export_command(const ExportOptions& options) {
-  expect_kind(options.series, Kind::series);
+  expect_kind(options.series, {Kind::series});
   const std::size_t frames = read_series(options.series).size();
   export_single(options.series, options.single, options.force);
   const std::uintmax_t bytes = std::filesystem::file_size(options.single);

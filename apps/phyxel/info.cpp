@@ -10,6 +10,7 @@
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "info_partition.hpp"
+#include "kind.hpp"
 #include "model/box.hpp"
 #include "outside_text.hpp"
 #include "phyxel/phyxel.hpp"
@@ -177,15 +178,21 @@ Facts folder_facts(const fs::path& folder) {
 }
 
 Facts facts_of(const fs::path& file) {
-  if (fs::is_directory(file)) return folder_facts(file);
-  if (!fs::exists(file)) throw InputError(fmt::format("{}: no such file", file.string()));
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (extension == ".toml") return scene_facts(file);
-  if (extension == ".series") return series_facts(file);
-  if (extension == ".obj" || extension == ".ply" || extension == ".stl") return mesh_facts(file);
-  return sealed_facts(file);
+  expect_kind(file, {Kind::folder, Kind::scene, Kind::mesh, Kind::series, Kind::hdf5});
+  switch (kind_of(file)) {
+    case Kind::missing:
+      throw InputError(fmt::format("{}: no such file", file.string()));
+    case Kind::folder:
+      return folder_facts(file);
+    case Kind::scene:
+      return scene_facts(file);
+    case Kind::mesh:
+      return mesh_facts(file);
+    case Kind::series:
+      return series_facts(file);
+    default:
+      return sealed_facts(file);
+  }
 }
 
 /// Texts as they are, numbers to nine digits, short lists on one line.

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "kind.hpp"
 #include "partition/exchange_size.hpp"
 #include "partition/halo_plan.hpp"
 #include "partition/partition.hpp"
@@ -53,10 +54,7 @@ Facts partition_facts(const std::filesystem::path& file, int parts,
                       const std::string& partitioner) {
   const bool best = partitioner == "auto";
   Partitioner chosen = best ? Partitioner::metis : partitioner_of(partitioner);
-  if (file.extension() != ".toml") {
-    throw InputError(
-        fmt::format("{}: --partition {}: allowed for scenes (.toml)", file.string(), parts));
-  }
+  expect_kind(file, {Kind::scene});
   const Model model = [&] {
     const SetupProgress progress(stderr);
     return build_model(read_scene(file));

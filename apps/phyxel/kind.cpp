@@ -1,11 +1,13 @@
 #include "kind.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
 #include <fstream>
 #include <string_view>
+#include <vector>
 
 #include "phyxel/error.hpp"
 
@@ -54,10 +56,48 @@ std::string advice(const fs::path& file, Kind kind) {
   }
 }
 
-const char* wanted_in_words(Kind wanted) {
-  if (wanted == Kind::scene) return "a scene (.toml)";
-  if (wanted == Kind::mesh) return "a mesh (.obj, .ply, .stl)";
-  return "a run's folder, a series (.hdf.series) or a frame";
+struct Extension {
+  std::string_view end;
+  Kind kind;
+};
+/// The only list of extensions of the program.
+constexpr Extension extensions[] = {{".toml", Kind::scene},    {".obj", Kind::mesh},
+                                    {".ply", Kind::mesh},      {".stl", Kind::mesh},
+                                    {".series", Kind::series}, {".csv", Kind::table}};
+
+/// " (.obj, .ply, .stl)"
+std::string extensions_of(Kind kind) {
+  std::vector<std::string_view> ends;
+  for (const Extension& e : extensions) {
+    if (e.kind == kind) ends.push_back(e.end);
+  }
+  return ends.empty() ? "" : fmt::format(" ({})", fmt::join(ends, ", "));
+}
+
+const char* noun_of(Kind kind) {
+  switch (kind) {
+    case Kind::folder:
+      return "a run's folder";
+    case Kind::scene:
+      return "a scene";
+    case Kind::mesh:
+      return "a mesh";
+    case Kind::series:
+      return "a series";
+    case Kind::hdf5:
+      return "an HDF5 file of phyxel's";
+    case Kind::table:
+      return "a table";
+    default:
+      return "a file";
+  }
+}
+
+/// "a run's folder, a series (.series), an HDF5 file of phyxel's"
+std::string in_words(std::initializer_list<Kind> wanted) {
+  std::vector<std::string> words;
+  for (const Kind kind : wanted) words.push_back(noun_of(kind) + extensions_of(kind));
+  return fmt::format("{}", fmt::join(words, ", "));
 }
 
 }  // namespace
@@ -70,19 +110,19 @@ Kind kind_of(const fs::path& file) {
   std::string end = file.extension().string();
   std::transform(end.begin(), end.end(), end.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (end == ".toml") return Kind::scene;
-  if (end == ".obj" || end == ".ply" || end == ".stl") return Kind::mesh;
-  if (end == ".series") return Kind::series;
-  if (end == ".csv") return Kind::table;
+  for (const Extension& known : extensions) {
+    if (end == known.end) return known.kind;
+  }
   if (fs::is_regular_file(status) && is_hdf5(file)) return Kind::hdf5;
   return Kind::unknown;
 }
 
-void expect_kind(const fs::path& file, Kind wanted) {
+void expect_kind(const fs::path& file, std::initializer_list<Kind> wanted) {
   const Kind kind = kind_of(file);
-  if (kind == wanted || kind == Kind::missing || kind == Kind::unknown) return;
-  throw InputError(fmt::format("{}: {}; allowed here: {}", file.string(), advice(file, kind),
-                               wanted_in_words(wanted)));
+  if (kind == Kind::missing || kind == Kind::unknown) return;
+  if (std::find(wanted.begin(), wanted.end(), kind) != wanted.end()) return;
+  throw InputError(
+      fmt::format("{}: {}; allowed here: {}", file.string(), advice(file, kind), in_words(wanted)));
 }
 
 }  // namespace phyxel::app

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
+#include <initializer_list>
 
 namespace phyxel::app {
 
@@ -12,9 +12,9 @@ enum class Kind { missing, folder, scene, mesh, series, hdf5, table, unknown };
 /// not opened.
 Kind kind_of(const std::filesystem::path& file);
 
-/// @throws InputError if the file is plainly of another kind than `wanted` (Kind::scene,
-/// Kind::mesh or Kind::series), naming the kind it has and the command that takes it. A missing
-/// file or an unknown kind is left to the reader.
-void expect_kind(const std::filesystem::path& file, Kind wanted);
+/// @throws InputError if the file is plainly of none of the kinds `wanted`, naming the kind it has,
+/// the command that takes it, and what is allowed. A missing file or an unknown kind is left to the
+/// reader.
+void expect_kind(const std::filesystem::path& file, std::initializer_list<Kind> wanted);
 
 }  // namespace phyxel::app

@@ -114,7 +114,7 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
 void sample(const SampleOptions& options) {
   const auto start = Clock::now();
   const SampleRequest request = request_of(options);
-  expect_kind(options.mesh, Kind::mesh);
+  expect_kind(options.mesh, {Kind::mesh});
   check_output(options);
   SampleReport report;
   Cloud cloud;

@@ -57,7 +57,7 @@ void add_overrides(CLI::App& command, Overrides& o) {
 }
 
 Scene scene_with(const Overrides& o) {
-  expect_kind(o.scene, Kind::scene);
+  expect_kind(o.scene, {Kind::scene});
   Scene scene = read_scene(o.scene);
   if (!o.out.empty()) scene.output.directory = o.out;
   if (!o.device.empty()) scene.solver.device = o.device;

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_series(const fs::path& file) { return file.extension() == ".series"; }
+bool is_series(const fs::path& file) { return kind_of(file) == Kind::series; }
 
 /// Surface and phyxel frames of equal time, one shot each.
 std::vector<Shot> pair_by_time(const std::vector<SeriesEntry>& surface,
@@ -53,9 +53,7 @@ Trajectory find_trajectory(const fs::path& input, Families wanted) {
   if (!fs::exists(input)) {
     throw InputError(fmt::format("{}: no such file or folder", input.string()));
   }
-  if (const Kind kind = kind_of(input); kind != Kind::folder && kind != Kind::hdf5) {
-    expect_kind(input, Kind::series);
-  }
+  expect_kind(input, {Kind::folder, Kind::series, Kind::hdf5});
   Trajectory trajectory;
   if (fs::is_directory(input)) {
     const fs::path surface = input / "surface.hdf.series", phyxels = input / "phyxels.hdf.series";

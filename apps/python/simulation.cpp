@@ -13,6 +13,7 @@
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"
+#include "scene/scene_error.hpp"
 #include "stages.hpp"
 
 namespace phyxel::python {
@@ -296,7 +297,7 @@ class Simulation {
       plan_.halve(made);
       count = k + ((count - k) << made);
       try {
-        solver_->step();
+        naming(scene_, [&] { solver_->step(); });
       } catch (const InterruptedError&) {
         const py::gil_scoped_acquire here;
         throw py::error_already_set();

@@ -12,10 +12,34 @@ namespace {
 constexpr int block_level = 2;             ///< Blocks have 2^2 voxels a side.
 constexpr std::size_t enough_tasks = 400;  ///< For an even load on any number of threads.
 
-/// Up to here, walking from a known point beats the winding number.
+/// Up to here, walking from a known point beats the winding number of a compact surface, which
+/// looks at few of its triangles.
 constexpr std::size_t few_triangles = 48;
 
 double component(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// True if a direction square to an edge of the triangle and one of the cube separates the two; the
+/// cube lies about the origin. Without this test a long thin triangle across the axes touches its
+/// whole plane within its bounding box, of which it fills little.
+/// Source: Akenine-Moeller 2001, the nine axes of class 3.
+bool parted_by_an_edge(Vec3d a, Vec3d b, Vec3d c, double half) {
+  const Vec3d corner[3] = {a, b, c};
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d edge = corner[(k + 1) % 3] - corner[k];
+    for (const Vec3d side : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}}) {
+      const Vec3d axis = cross(edge, side);
+      const double on_edge = dot(axis, corner[k]), beyond = dot(axis, corner[(k + 2) % 3]);
+      const double reach = half * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
+      // The products of coordinates that cancel in `on_edge` round it.
+      const double rounding =
+          1e-15 * (std::abs(axis.x * corner[k].x) + std::abs(axis.y * corner[k].y) +
+                   std::abs(axis.z * corner[k].z));
+      const double most = reach * (1 + 1e-9) + 4 * rounding;
+      if (std::min(on_edge, beyond) > most || std::max(on_edge, beyond) < -most) return true;
+    }
+  }
+  return false;
+}
 
 bool is_doubtful(double winding) { return std::abs(winding - std::round(winding)) > 0.1; }
 
@@ -25,6 +49,7 @@ void SampleTally::add(const SampleTally& other) {
   samples += other.samples;
   doubtful += other.doubtful;
   repeated += other.repeated;
+  work += other.work;
 }
 
 InsideSampler::InsideSampler(const Surface& surface, bool closed)
@@ -45,10 +70,28 @@ InsideSampler::InsideSampler(const Surface& surface, bool closed)
   }
   middle_ = 0.5 * (low + high);
   extent_ = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+  few_ = few_for_walking();
 }
 
-/// Whether a triangle's bounding box and plane both meet a cube: it may yet miss the cube, which
-/// costs time only.
+/// Long thin triangles that reach across each other's groups leave the winding number nothing to
+/// sum up: near them it looks at all, and walking past hundreds costs less.
+std::size_t InsideSampler::few_for_walking() const {
+  constexpr std::size_t probes = 32;
+  const std::size_t step = surface_.triangle.size() / probes + 1;
+  Offset work = 0, probed = 0;
+  for (std::size_t t = 0; t < surface_.triangle.size(); t += step, ++probed) {
+    const Triangle& corner = surface_.triangle[t];
+    winding_number_((surface_.position[corner[0]] + surface_.position[corner[1]] +
+                     surface_.position[corner[2]]) /
+                        3.0,
+                    &work);
+  }
+  return std::max(few_triangles, static_cast<std::size_t>(work / std::max<Offset>(probed, 1) / 8));
+}
+
+/// False if the triangle surely misses the cube: one of their separating axes lies between them.
+/// On an open surface only the axes of the cube and the plane are tried, and a triangle may yet
+/// miss the cube: `agrees_throughout` is evidence, not proof, and finds less to do so.
 bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
   const Triangle& t = surface_.triangle[triangle];
   const Vec3d a = surface_.position[t[0]] - middle, b = surface_.position[t[1]] - middle,
@@ -59,23 +102,30 @@ bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
   }
   const Vec3d normal = cross(b - a, c - a);
   const double reach = half * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
-  return std::abs(dot(normal, a)) <= reach * (1 + 1e-9);
+  if (std::abs(dot(normal, a)) > reach * (1 + 1e-9)) return false;
+  return !closed_ || !parted_by_an_edge(a, b, c, half);
 }
 
-/// The winding number at a point in a cell of a closed surface, from that in the cell's middle: it
-/// changes by one at each triangle that the straight way there goes through.
-double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d point) const {
-  const Vec3d start = grid.middle(cell), way = point - start;
+/// The winding number, which counts as work.
+double InsideSampler::winding_at(Vec3d point, SampleTally& tally) const {
+  return winding_number_(point, &tally.work);
+}
+
+/// The change of the winding number on the straight way between two points of a cell of a closed
+/// surface: one at each triangle that the way goes through. Nothing if rounding might decide.
+std::optional<double> InsideSampler::change_between(const Cell& cell, Vec3d start, Vec3d point,
+                                                    SampleTally& tally) const {
+  tally.work += static_cast<Offset>(cell.triangles.size());
+  const Vec3d way = point - start;
   const double length = norm(way);
-  double winding = cell.winding;
+  double change = 0;
   for (const Index index : cell.triangles) {
     const Triangle& t = surface_.triangle[index];
     const Vec3d a = surface_.position[t[0]] - start, b = surface_.position[t[1]] - start,
                 c = surface_.position[t[2]] - start;
     const Vec3d normal = cross(b - a, c - a);
     const double size = std::max({norm(a), norm(b), norm(c)});
-    // Six times the volumes of start, point and triangle; what rounding might decide is left to
-    // the winding number itself.
+    // Six times the volumes of start, point and triangle.
     const double rounding = 1e-12 * size * size * size,
                  edge_rounding = 1e-12 * size * size * length;
     const double before = dot(a, normal), after = before - dot(way, normal);
@@ -86,38 +136,54 @@ double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d poi
     if (std::min({u, v, w}) < -edge_rounding && std::max({u, v, w}) > edge_rounding) continue;
     const bool clear = std::min({std::abs(u), std::abs(v), std::abs(w)}) > edge_rounding &&
                        std::min(std::abs(before), std::abs(after)) > rounding;
-    if (!clear) return winding_number_(point);
-    winding += before > 0 ? -1 : 1;
+    if (!clear) return std::nullopt;
+    change += before > 0 ? -1 : 1;
   }
-  return winding;
+  return change;
+}
+
+/// The winding number at a point in a cell of a closed surface, from that in the cell's middle. A
+/// straight way that meets an edge, as many do on surfaces with a plane of symmetry, is tried once
+/// more with a bend, halfway and inside the cell.
+double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d point,
+                                   SampleTally& tally) const {
+  const Vec3d start = grid.middle(cell);
+  if (const auto change = change_between(cell, start, point, tally)) return cell.winding + *change;
+  const double length = norm(point - start);
+  const Vec3d bend = 0.5 * (start + point) + length * Vec3d{0.137, 0.071, -0.193};
+  const auto first = change_between(cell, start, bend, tally);
+  const auto second = first ? change_between(cell, bend, point, tally) : std::nullopt;
+  return second ? cell.winding + *first + *second : winding_at(point, tally);
 }
 
 /// Whether an open surface, none of whose triangles touch the cell, has the same side everywhere in
 /// it. There its winding number is harmonic: it has no extremes inside the cell, so agreement in
 /// the middle and at the corners is good evidence.
-bool InsideSampler::agrees_throughout(const Grid& grid, const Cell& cell) const {
+bool InsideSampler::agrees_throughout(const Grid& grid, const Cell& cell,
+                                      SampleTally& tally) const {
   const auto clear = [&](double w) {
     return (w > 0.5) == (cell.winding > 0.5) && std::abs(w - 0.5) > 0.1;
   };
   bool agrees = clear(cell.winding);
   const std::int64_t side = std::int64_t{1} << cell.level;
   for (int corner = 0; corner < 8 && agrees; ++corner) {
-    agrees =
-        clear(winding_number_(grid.place(static_cast<double>(cell.x + (corner & 1) * side),
+    agrees = clear(winding_at(grid.place(static_cast<double>(cell.x + (corner & 1) * side),
                                          static_cast<double>(cell.y + (corner >> 1 & 1) * side),
-                                         static_cast<double>(cell.z + (corner >> 2) * side))));
+                                         static_cast<double>(cell.z + (corner >> 2) * side)),
+                              tally));
   }
   return agrees;
 }
 
-std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& cell) const {
+std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& cell,
+                                                      SampleTally& tally) const {
   std::vector<Cell> children(8);
   const std::int64_t side = std::int64_t{1} << (cell.level - 1);
   // A little larger than it is, for the rounding of sample points to float.
   const double half = 0.5 * grid.voxel * (static_cast<double>(side) + 1e-3);
-  const bool few = closed_ && cell.triangles.size() <= few_triangles;
+  const bool few = closed_ && cell.triangles.size() <= few_;
   if (few && !cell.measured) {
-    const double winding = winding_number_(grid.middle(cell));
+    const double winding = winding_at(grid.middle(cell), tally);
     cell.measured = !is_doubtful(winding);
     cell.winding = std::round(winding);
   }
@@ -131,6 +197,7 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
     child.measured = cell.measured;
     child.winding = cell.winding;
     if (cell.known) continue;
+    tally.work += static_cast<Offset>(cell.triangles.size());
     const Vec3d middle = grid.middle(child);
     for (const Index t : cell.triangles) {
       if (may_touch(t, middle, half)) child.triangles.push_back(t);
@@ -138,12 +205,12 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
     child.measured = false;
     if (child.level == 0) continue;
     if (few && cell.measured) {
-      child.winding = winding_from(grid, cell, middle);
+      child.winding = winding_from(grid, cell, middle, tally);
       child.measured = !is_doubtful(child.winding);
     }
     if (!child.triangles.empty()) continue;
-    if (!child.measured) child.winding = winding_number_(middle);
-    child.known = closed_ || agrees_throughout(grid, child);
+    if (!child.measured) child.winding = winding_at(middle, tally);
+    child.known = closed_ || agrees_throughout(grid, child, tally);
   }
   return children;
 }
@@ -151,7 +218,7 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
 void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
                          SampleTally& tally) const {
   if (cell.known && !(cell.winding > 0.5)) return;
-  for (Cell& child : split(grid, cell)) {
+  for (Cell& child : split(grid, cell, tally)) {
     if (child.level > 0) {
       fill(grid, child, block, tally);
     } else {
@@ -173,32 +240,38 @@ void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell&
       {static_cast<float>(offset.x), static_cast<float>(offset.y), static_cast<float>(offset.z)});
   const Vec3d rounded = block.position(block.offset.size() - 1);
   const double winding = cell.known                   ? cell.winding
-                         : parent.measured && closed_ ? winding_from(grid, parent, rounded)
-                                                      : winding_number_(rounded);
+                         : parent.measured && closed_ ? winding_from(grid, parent, rounded, tally)
+                                                      : winding_at(rounded, tally);
   if (!(winding > 0.5)) {
     block.offset.pop_back();
     return;
   }
   ++tally.samples;
+  ++tally.work;
   tally.doubtful += is_doubtful(winding);
   tally.repeated += winding > 1.5;
 }
 
-void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally,
+void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, WorkLimit& limit,
                             const std::function<void(const SampleBlock&)>& visit_block) const {
   if (cell.known && !(cell.winding > 0.5)) return;
+  if (limit.reached()) return;
+  const Offset before = tally.work;
   if (cell.level > block_level) {
-    for (Cell& child : split(grid, cell)) descend(grid, child, tally, visit_block);
+    std::vector<Cell> children = split(grid, cell, tally);
+    limit.done += tally.work - before;
+    for (Cell& child : children) descend(grid, child, tally, limit, visit_block);
     return;
   }
   SampleBlock block;
   block.centre = grid.middle(cell);
   fill(grid, cell, block, tally);
+  limit.done += tally.work - before;
   if (!block.offset.empty()) visit_block(block);
 }
 
 SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& visit_block,
-                                 Stage* stage) const {
+                                 Stage* stage, Offset most_work) const {
   Cell root;
   root.level = block_level;
   while (voxel * static_cast<double>(std::int64_t{1} << root.level) < extent_ * 1.001 + voxel) {
@@ -209,24 +282,26 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
   root.triangles.resize(surface_.triangle.size());
   for (std::size_t t = 0; t < root.triangles.size(); ++t) root.triangles[t] = static_cast<Index>(t);
 
+  SampleTally total;
   std::vector<Cell> tasks{root};
-  while (tasks.size() < enough_tasks && !tasks.empty() && tasks.front().level > block_level) {
+  while (total.work <= most_work && tasks.size() < enough_tasks && !tasks.empty() &&
+         tasks.front().level > block_level) {
     std::vector<Cell> finer;
     for (Cell& cell : tasks) {
-      for (Cell& child : split(grid, cell)) {
+      for (Cell& child : split(grid, cell, total)) {
         if (!child.known || child.winding > 0.5) finer.push_back(std::move(child));
       }
     }
     tasks.swap(finer);
   }
 
-  SampleTally total;
+  WorkLimit limit{total.work, most_work};
   const auto n_tasks = static_cast<std::ptrdiff_t>(tasks.size());
   if (stage) stage->expect(tasks.size());
 #pragma omp parallel for schedule(dynamic)
   for (std::ptrdiff_t task = 0; task < n_tasks; ++task) {
     SampleTally tally;
-    descend(grid, tasks[task], tally,
+    descend(grid, tasks[task], tally, limit,
             [&](const SampleBlock& block) { visit_block(static_cast<std::size_t>(task), block); });
 #pragma omp critical(phyxel_sample_tally)
     total.add(tally);
@@ -236,12 +311,14 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
 }
 
 SampleTally InsideSampler::collect(double voxel, std::uint64_t seed,
-                                   std::vector<SampleBlock>& blocks, Stage* stage) const {
+                                   std::vector<SampleBlock>& blocks, Stage* stage,
+                                   Offset most_work) const {
   // Eight children at most of fewer than enough_tasks cells.
   std::vector<std::vector<SampleBlock>> by_task(8 * enough_tasks);
   const SampleTally tally = visit(
       voxel, seed,
-      [&](std::size_t task, const SampleBlock& block) { by_task[task].push_back(block); }, stage);
+      [&](std::size_t task, const SampleBlock& block) { by_task[task].push_back(block); }, stage,
+      most_work);
   blocks.clear();
   for (std::vector<SampleBlock>& part : by_task) {
     std::move(part.begin(), part.end(), std::back_inserter(blocks));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "mesh/inside_filling.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
@@ -108,38 +109,6 @@ void drop_unused_vertices(Surface& surface) {
   surface.position.resize(kept);
   for (Triangle& t : surface.triangle) {
     for (Index& corner : t) corner = number[corner];
-  }
-}
-
-/// Blocks of samples that fill the inside, with voxels small enough that there are about `wanted`.
-/// @returns the voxel's side [m].
-double fill_inside(const InsideSampler& sampler, double wanted, std::uint64_t seed,
-                   const std::string& defects, std::vector<SampleBlock>& blocks,
-                   SampleTally& tally) {
-  Stage stage("filling the surface");
-  // The volume is not known if the surface is open or covers parts of space twice: a coarse
-  // filling tells how fine the next must be.
-  double voxel = sampler.extent() / 24;
-  double expected = 0;  // samples of the next attempt: rough ones are not worth telling of
-  for (int attempt = 0;; ++attempt) {
-    // Among so many voxels, some would lie inside a plate of even 1e-7 of its width.
-    const double cost = sampler.surface_voxels(voxel);
-    const double most = attempt > 0 && tally.samples == 0 ? 3e5 : std::max(3e6, 8 * wanted);
-    if (cost > most || voxel < 1e-7 * sampler.extent()) {
-      throw InputError(
-          fmt::format("the surface encloses no volume, or too little for its area: {}", defects));
-    }
-    tally = sampler.collect(voxel, seed, blocks, expected > 0.5 * wanted ? &stage : nullptr);
-    const double found = static_cast<double>(tally.samples);
-    if ((found >= 0.9 * wanted && found <= 1.3 * wanted) ||
-        (attempt > 8 && found >= 0.5 * wanted)) {
-      stage.finish();
-      return voxel;
-    }
-    // Small numbers of samples are only a rough guess; go four times finer at most at a time.
-    const double finer = found > 0 ? std::clamp(std::cbrt(found / wanted), 0.25, 4.0) : 0.4;
-    voxel *= finer;
-    expected = found / (finer * finer * finer);
   }
 }
 
@@ -247,9 +216,19 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
 
   const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
   const std::uint64_t seed = request.seed;
-  std::vector<SampleBlock> blocks;
-  SampleTally tally;
-  const double voxel = fill_inside(sampler, wanted, seed, defects, blocks, tally);
+  InsideFilling filling;
+  fill_inside(sampler,
+              {.phyxels = request.phyxels,
+               .samples = wanted,
+               .seed = seed,
+               .triangles = cloud.surface.triangle.size(),
+               .volume = closed ? std::optional(enclosed_volume(cloud.surface)) : std::nullopt,
+               .exponent = exponent,
+               .defects = defects},
+              filling);
+  std::vector<SampleBlock>& blocks = filling.blocks;
+  const SampleTally& tally = filling.tally;
+  const double voxel = filling.voxel;
   refuse_if_too_open(tally, found.defects, closed);
   found.doubtful_fraction =
       static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);

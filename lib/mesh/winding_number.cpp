@@ -93,14 +93,16 @@ void WindingNumber::build(Index index) {
   nodes_[index] = node;
 }
 
-double WindingNumber::operator()(Vec3d point) const {
+double WindingNumber::operator()(Vec3d point, Offset* work) const {
   if (nodes_.empty()) return 0;
+  Offset done = 0;
   double near = 0, far = 0;  // in units of half solid angles and of solid angles
   Index stack[64];
   int depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
     const Node& node = nodes_[stack[--depth]];
+    ++done;
     const Vec3d r = node.centre - point;
     const double r2 = dot(r, r);
     if (r2 > node.radius * node.radius) {
@@ -113,12 +115,14 @@ double WindingNumber::operator()(Vec3d point) const {
       stack[depth++] = node.child + 1;
       stack[depth++] = node.child;
     } else {
+      done += angle_work * node.count;
       for (Index t = node.first; t < node.first + node.count; ++t) {
         const Corners& c = corners_[t];
         near += half_solid_angle(c.a - point, c.b - point, c.c - point);
       }
     }
   }
+  if (work) *work += done;
   return near / (2 * std::numbers::pi) + far / (4 * std::numbers::pi);
 }
 

@@ -23,7 +23,10 @@ class WindingNumber {
   /// sides of a closed surface; the error falls with the square of the accuracy.
   explicit WindingNumber(const Surface& surface, double accuracy = 2.5);
 
-  double operator()(Vec3d point) const;
+  /// @param work if given, is raised by one for each group and by `angle_work` for each triangle
+  ///   that had to be looked at
+  double operator()(Vec3d point, Offset* work = nullptr) const;
+  static constexpr Offset angle_work = 8;  ///< A solid angle's time, in expansions of groups.
 
  private:
   struct Corners {

@@ -14,6 +14,7 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "scene/scene_error.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "stage.hpp"
 
@@ -257,7 +258,7 @@ std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {
 }
 
 Cloud make_cloud(const BodyRequest& request) {
-  Cloud cloud = rest_cloud(request.source);
+  Cloud cloud = naming(request, [&] { return rest_cloud(request.source); });
   place(cloud, request);
   return cloud;
 }
@@ -283,8 +284,10 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
   Cloud rest;
   for (const BodyRequest& request : scene.bodies) {
     if (!made || !(*made == request.source)) {
-      rest =
-          request.source.cloud.empty() ? rest_cloud(request.source) : named_cloud(request, named);
+      rest = naming(request, [&] {
+        return request.source.cloud.empty() ? rest_cloud(request.source)
+                                            : named_cloud(request, named);
+      });
     }
     made = &request.source;
     Cloud cloud = rest;
@@ -300,7 +303,7 @@ Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
   model.gravity = scene.gravity;
   for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
     append(model.warnings, cloud.warnings);
-    add_body(model, request, cloud, surveyor);
+    naming(request, [&] { add_body(model, request, cloud, surveyor); });
   });
   find_moments(model);
   close_gradients(model);
@@ -319,7 +322,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
   model.gravity = scene.gravity;
   for (std::size_t b = 0; b < clouds.size(); ++b) {
     append(model.warnings, clouds[b].warnings);
-    add_body(model, scene.bodies[b], clouds[b], surveyor);
+    naming(scene.bodies[b], [&] { add_body(model, scene.bodies[b], clouds[b], surveyor); });
   }
   find_moments(model);
   close_gradients(model);
@@ -331,8 +334,10 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
 
 std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named) {
   std::vector<Cloud> clouds;
-  for_each_cloud(scene, named,
-                 [&](const BodyRequest&, Cloud&& cloud) { clouds.push_back(std::move(cloud)); });
+  naming(scene, [&] {
+    for_each_cloud(scene, named,
+                   [&](const BodyRequest&, Cloud&& cloud) { clouds.push_back(std::move(cloud)); });
+  });
   return clouds;
 }
 
@@ -369,15 +374,17 @@ Offset Model::pairs() const {
   return sum;
 }
 
-Model build_model(const Scene& scene) { return model_from_sources(scene, nullptr); }
+Model build_model(const Scene& scene) {
+  return naming(scene, [&] { return model_from_sources(scene, nullptr); });
+}
 Model build_model(const Scene& scene, std::span<const Cloud> clouds) {
-  return model_from_clouds(scene, clouds, nullptr);
+  return naming(scene, [&] { return model_from_clouds(scene, clouds, nullptr); });
 }
 Model build_model(const Scene& scene, const Surveyor& survey) {
-  return model_from_sources(scene, &survey);
+  return naming(scene, [&] { return model_from_sources(scene, &survey); });
 }
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey) {
-  return model_from_clouds(scene, clouds, &survey);
+  return naming(scene, [&] { return model_from_clouds(scene, clouds, &survey); });
 }
 
 std::vector<char> held_phyxels(const Model& model) {

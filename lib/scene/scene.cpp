@@ -11,6 +11,7 @@
 #include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 #include "scene/scene_body.hpp"
+#include "scene/scene_error.hpp"
 #include "scene/scene_table.hpp"
 #include "scene/upright.hpp"
 
@@ -174,7 +175,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   if (root.has("output")) scene.output = read_output(root.table("output"));
   if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
   scene.render = render_of(root, scene.gravity);
-  scene.bodies = read_bodies(root);
+  scene.bodies = naming(scene, [&] { return read_bodies(root); });
   return scene;
 }
 

@@ -7,6 +7,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/shapes.hpp"
+#include "scene/scene_error.hpp"
 
 namespace phyxel {
 namespace {
@@ -259,7 +260,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("velocity", body.velocity);
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
-  choose_placement(table, body);
+  naming(body, [&] { choose_placement(table, body); });
   table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   body.material = read_material(table.table("material"));

@@ -7,6 +7,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
+#include "scene/scene_error.hpp"
 
 namespace phyxel {
 namespace {
@@ -188,7 +189,9 @@ void StepPlan::halve(int times) {
   }
 }
 
-StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
+namespace {
+
+StepPlan plan_of(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
   refuse_absurd_stiffness(model);
   if (scene.solver.method == Method::verlet) {
     return plan_verlet_steps(scene, model, backend, unsafe_step);
@@ -209,6 +212,12 @@ StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bo
   divide_time(scene, *scene.time.step, plan);
   plan.why = fmt::format("{:.6g} s, implicit", plan.dt);
   return plan;
+}
+
+}  // namespace
+
+StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend, bool unsafe_step) {
+  return naming(scene, [&] { return plan_of(scene, model, backend, unsafe_step); });
 }
 
 }  // namespace phyxel

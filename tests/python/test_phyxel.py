@@ -439,6 +439,20 @@ def test_scenes_are_files_texts_and_dicts(tmp_path):
         phyxel.to_toml({"title": object()})
 
 
+def test_late_refusals_begin_with_the_scene(tmp_path):
+    text = ("[time]\nend = 1.0\nstep = {}\n[[body]]\nshape = \"beam\"\nsize = [1, 0.2, 0.2]\n"
+            "spacing = {}\nmaterial = {{young = 1e5, poisson = 0.3, density = 1e3}}\n{}")
+    for scene, words in [
+        (text.format("1.0", "0.1", ""), ": time.step = 1 s is unstable"),
+        (text.format("1e-3", "9.0", ""), ":4:1: body \"beam\": shape \"beam\": spacing = 9 m"),
+        (text.format("1e-3", "0.1", "[[body.fixed]]\nregion = \"left\"\n"), ":10:10: body \"beam\" has no"),
+    ]:
+        (tmp_path / "late.toml").write_text(scene)
+        for given, name in [(tmp_path / "late.toml", tmp_path / "late.toml"), (scene, "scene")]:
+            with pytest.raises(phyxel.InputError, match="^" + re.escape(f"{name}{words}")):
+                phyxel.Simulation(given)
+
+
 # --- trajectories --------------------------------------------------------------------------------
 
 def test_trajectories_come_back(tmp_path):

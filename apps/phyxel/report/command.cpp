@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/atomic_file.hpp"
+#include "kind.hpp"
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "report/report.hpp"
@@ -24,7 +25,7 @@ struct ReportOptions {
   bool no_stress = false, force = false, json = false;
 };
 
-bool is_table(const fs::path& file) { return file.extension() == ".csv"; }
+bool is_table(const fs::path& file) { return kind_of(file) == Kind::table; }
 
 /// Tables of a folder that holds no trajectory.
 std::vector<fs::path> tables_in(const fs::path& folder) {
@@ -52,6 +53,7 @@ void report_command(const ReportOptions& options) {
     if (!fs::exists(input)) {
       throw InputError(fmt::format("{}: no such file or folder", input.string()));
     }
+    expect_kind(input, {Kind::folder, Kind::series, Kind::hdf5, Kind::table});
     const std::vector<fs::path> found = is_table(input) ? std::vector{input} : tables_in(input);
     only_tables = only_tables && !found.empty();
     tables.insert(tables.end(), found.begin(), found.end());

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "run/run.hpp"
+#include "scene/scene_error.hpp"
 #include "stop_signal.hpp"
 
 namespace phyxel::app {
@@ -21,7 +22,7 @@ void Run::take_step(Progress& progress) {
                       before, solver_.dt(), solver_.time(), where));
     }
   }
-  solver_.step();
+  naming(scene_, [&] { solver_.step(); });  // a search may be refused
 }
 
 void Run::watch_newton(Progress& progress) {

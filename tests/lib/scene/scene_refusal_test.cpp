@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "scene/scene_schema.hpp"
-#include "support/scene_text.hpp"
+#include "support/scene_with.hpp"
 
 namespace phyxel {
 namespace {
@@ -20,10 +20,6 @@ struct Malformed {
   std::string message;  // part of it
 };
 
-/// A scene whose last lines are `lines`, the first of them on line 12.
-std::string after_beam(const std::string& lines) {
-  return time_section + "\n" + beam + material + lines;  // 2 + 1 + 4 + 4 lines
-}
 /// A scene whose body, on line 3, is `lines`.
 std::string body_of(const std::string& lines) {
   return time_section + "[[body]]\n" + lines + "\n" + material;
@@ -211,26 +207,6 @@ TEST(SceneRefusal, EveryMalformedSceneIsToldWhatIsWrongAndWhere) {
   }
 }
 
-/// A scene that gives `key` the value `text`, and is right up to there.
-std::string scene_with(const SceneKey& key, const std::string& text) {
-  const std::string line = key.name + " = " + text + "\n";
-  const std::string& section = key.section;
-  if (section.empty()) return line + (key.name == "body" ? "" : dino);
-  if (section == "time") return "[time]\n" + line + dino;
-  if (section == "body") return time_section + "[[body]]\n" + line;
-  if (section == "selection") return after_beam("[[body.fixed]]\n" + line);
-  if (section == "selection.ball") return after_beam("[[body.fixed]]\n[body.fixed.ball]\n" + line);
-  const std::string& header = scene_section(section).header;
-  return time_section + "[[body]]\nshape = 'dino'\n" +
-         (section == "body.material" ? "" : material) + header + "\n" + line;
-}
-
-std::string path_in_file(const SceneKey& key) {
-  std::string section = key.section;
-  if (section.starts_with("selection")) section.replace(0, 9, "body.fixed");
-  return section.empty() ? key.name : section + "." + key.name;
-}
-
 TEST(SceneRefusal, EveryKeyRefusesAWrongType) {
   for (const SceneKey& key : scene_keys()) {
     EXPECT_THAT(message_of(scene_with(key, "1979-05-27")),  // no key takes a date
@@ -252,6 +228,7 @@ TEST(SceneRefusal, EveryRangeRefusesWhatLiesJustOutside) {
       if (vector || key.type == KeyType::counts) text = "[1, 1, " + text + "]";
       if (list) text = "[" + text + "]";
       const std::string message = message_of(scene_with(key, text));
+      EXPECT_THAT(message, StartsWith("scene.toml:")) << text;
       EXPECT_THAT(message, HasSubstr(": key " + path_in_file(key) + ": ")) << text;
       EXPECT_THAT(message, HasSubstr(" found; allowed: " + allowed_words(key))) << text;
       ++tried;

@@ -1,0 +1,243 @@
+/// Wrong scenes of every kind, made from the table of keys and taken as far as `phyxel check` takes
+/// them: whatever refuses one names its file, the key or body, and the value.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/body_file.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/solver.hpp"
+#include "scene/scene_error.hpp"
+#include "support/clouds.hpp"
+#include "support/scene_with.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+class EveryRefusal : public SceneFiles {
+ protected:
+  /// What is said of a scene up to its plan, and of a search for equilibrium up to its end.
+  std::string refusal_of(const std::string& text) {
+    const fs::path file = write("wrong.toml", text);
+    try {
+      const Scene scene = read_scene(file);
+      const Model model = build_model(scene);
+      const auto backend = make_cpu_backend(model, scene.solver.precision, 1);
+      const StepPlan plan = plan_steps(scene, model, *backend);
+      const State start = initial_state(model, scene, plan.dt);
+      if (scene.solver.method != Method::equilibrium) return "accepted";
+      Solver solver(model, *backend, start, scene.solver.method);
+      naming(scene, [&] { solver.step(); });
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ExitCode::bad_input) << error.what();
+      return error.what();
+    }
+    return "accepted";
+  }
+  /// The refusal names the file first and what is wrong, in one line.
+  void expect_named(const std::string& text, const std::vector<std::string>& names) {
+    const std::string message = refusal_of(text);
+    EXPECT_THAT(message, StartsWith((folder_ / "wrong.toml").string() + ":")) << text;
+    for (const std::string& name : names) EXPECT_THAT(message, HasSubstr(name)) << text;
+    EXPECT_THAT(message, Not(HasSubstr("\n"))) << text;
+    ++refused_;
+  }
+  int refused_ = 0;
+};
+
+/// Values as TOML, with the types that take them.
+struct Value {
+  const char* text;
+  const char* shown;
+  std::set<KeyType> taken_by;
+};
+
+const std::vector<Value>& values() {
+  using enum KeyType;
+  static const std::vector<Value> all = {
+      {"true", "true", {boolean}},
+      {"'nonsense'", "\"nonsense\"", {text, path, choice}},
+      {"''", "\"\"", {choice}},
+      {"3.25", "3.25", {number, number_or_auto}},
+      {"nan", "nan", {}},
+      {"-inf", "-inf", {}},
+      {"[]", "empty list", {choices}},
+      {"[1, 2]", "[1, 2]", {indices}},
+      {"[1, 2, 3, 4]", "[1, 2, 3, 4]", {indices}},
+      {"[1, 2, 'x']", "\"x\"", {}},
+      {"[[0, 0, 0], [1, 1]]", "[1, 1]", {}},
+      {"{a = 1}", "", {table, tables}},
+      {"1979-05-27", "a date or time", {}},
+  };
+  return all;
+}
+
+TEST_F(EveryRefusal, OfAWrongTypeNamesFileKeyAndValue) {
+  for (const SceneKey& key : scene_keys()) {
+    for (const Value& value : values()) {
+      if (value.taken_by.contains(key.type)) continue;
+      expect_named(scene_with(key, value.text), {"key " + path_in_file(key), " found"});
+    }
+  }
+  EXPECT_GT(refused_, 700);
+}
+
+TEST_F(EveryRefusal, OfAMisspeltOrRepeatedKeyNamesFileAndKey) {
+  for (const SceneKey& key : scene_keys()) {
+    SceneKey misspelt = key;
+    misspelt.name += "q";
+    expect_named(scene_with(misspelt, "1"),
+                 {"key " + path_in_file(misspelt) + ": unknown", "did you mean \"" + key.name});
+    const std::string line = key.name + " = 1\n";
+    std::string twice = scene_with(key, "1");
+    twice.insert(twice.find(line), line);
+    expect_named(twice, {"cannot redefine existing integer", key.name});
+  }
+  EXPECT_GT(refused_, 150);
+}
+
+const std::string still = "[time]\nend = 1e-3\n[solver]\nthreads = 1\n";
+const std::string bar = "[[body]]\nshape = 'beam'\nsize = [0.4, 0.1, 0.1]\nspacing = 0.05\n";
+
+/// A scene of one bar with these lines after its material.
+std::string with_bar(const std::string& lines, const std::string& time = still) {
+  return time + bar + material + lines;
+}
+/// A scene whose body is these lines.
+std::string with_body(const std::string& lines) {
+  return still + "[[body]]\n" + lines + "\n" + material;
+}
+
+struct Late {
+  std::string text;
+  std::vector<std::string> names;
+};
+
+/// What only shows when the model is built or its steps are planned.
+std::vector<Late> late_refusals() {
+  const std::string implicit = "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
+  const std::string rest = "[solver]\nmethod = 'equilibrium'\nprecision = 'double'\n";
+  const std::string mesh = "mesh = 'ball.obj'\nphyxels = 50\n";
+  const auto step = [](const char* size) {
+    return fmt::format("[time]\nend = 1.0\nstep = {}\n", size);
+  };
+  const std::string shake =
+      "[[body.motion]]\nregion = 'x-'\namplitude = [0.01, 0, 0]\nfrequency = 2000\n";
+  return {
+      // Selections
+      {with_bar("[[body.fixed]]\nregion = 'left'\n"), {":14:", "no region \"left\"", "x-"}},
+      {with_bar("[[body.fixed]]\nindices = [77777]\n"), {":14:", "77777", "allowed 0 to"}},
+      {with_bar("[[body.fixed]]\nbox = [[7, 7, 7], [8, 8, 8]]\n"), {":14:", "selects no phyxel"}},
+      {with_bar(
+           "[[body.motion]]\nball = {centre = [9, 0, 0], radius = 0.1}\nvelocity = [1, 0, 0]\n"),
+       {":14:", "selects no phyxel"}},
+      {with_bar("[[body.load]]\nregion = 'top'\nforce = [1, 0, 0]\n"), {":14:", "\"top\""}},
+      {with_bar("[[body.fixed]]\nall = true\n[[body.fixed]]\nregion = 'x-'\n"),
+       {":16:", "already fixed or moved"}},
+      {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake), {":16:", "already fixed or moved"}},
+      // Inclusions
+      {with_bar("[[body.inclusion]]\nbox = [[7, 7, 7], [8, 8, 8]]\nyoung = 1e6\n"),
+       {":14:", "selects no phyxel"}},
+      {with_bar("[[body.inclusion]]\nall = true\nyoung = 1e6\n"), {":14:", "no phyxel is left"}},
+      {still + bar + "volumes = 'kernel'\n" + material +
+           "[[body.inclusion]]\nregion = 'x-'\nyoung = 1e6\n",
+       {":15:", "volumes = \"geometry\""}},
+      // Steps
+      {step("1.0") + bar + material, {"time.step = 1 s", "largest stable step"}},
+      {step("1e-4") + bar + material + shake, {"time.step = 0.0001 s", "frequency = 2000 Hz"}},
+      {step("1e-4") + bar + material +
+           "[[body.load]]\nregion = 'x-'\nforce = [1, 0, 0]\nramp = 1e-5\n",
+       {"time.step = 0.0001 s", "body.load.ramp = 1e-05 s"}},
+      {step("1e-4") + bar + material + "damping = 1e6\n",
+       {"time.step = 0.0001 s", "damping = 1e+06 1/s"}},
+      {step("0.1") + implicit + bar + material + shake, {"time.step = 0.1 s", "2000 Hz"}},
+      {"[time]\nend = 1.0\n" + implicit + bar + material, {"time.step = \"auto\""}},
+      {"[time]\nend = 9e8\n" + bar +
+           "[body.material]\nyoung = 1e18\npoisson = 0.3\ndensity = 1e-6\n",
+       {"time.end = 9e+08 s", "below 1e15"}},
+      {with_bar("volume_stiffness = 1e17\n"), {"body \"beam\"", "volume_stiffness = 1e+17 Pa"}},
+      {with_bar("hourglass = 1e5\n"), {"body \"beam\"", "hourglass = 100000"}},
+      // Searches for equilibrium
+      {rest + bar + material + "[[body.load]]\nregion = 'x-'\nforce = [1, 0, 0]\n",
+       {"body \"beam\""}},
+      {rest + bar + material + shake, {"velocity or an amplitude never ends"}},
+      // Supports, volumes, closed gradients
+      {with_bar("hourglass = 0.1\n[body.neighbours]\nsupport = 'adaptive'\n"),
+       {":5:1", "hourglass control (0.1)", "\"uniform\""}},
+      {still + bar + "closure = 0.01\n" + material + "[body.neighbours]\nsupport = 'adaptive'\n",
+       {":5:1", "closed gradients (0.01)"}},
+      {with_body("file = 'bare.h5'\nvolumes = 'geometry'"), {":5:1", "volumes = \"geometry\""}},
+      {with_body("file = 'bare.h5'\nclosure = 0.1"), {":5:1", "closure = 0.1"}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 1\nvolumes = 'kernel'"),
+       {":5:1", "a single phyxel"}},
+      // Bodies
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
+      {with_body("shape = 'cylinder'\nradius = 1\nlength = 1\nspacing = 0.2\nlattice = 'nodes'"),
+       {":5:1", "lattice \"nodes\""}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 2147483647"), {":5:1", "GiB"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647"),
+       {":5:1", "ball.obj: 2147483647", "GiB"}},
+      {with_body("mesh = 'empty.obj'\nphyxels = 50"), {":5:1", "empty.obj: the file is empty"}},
+      {with_body("mesh = 'flat.obj'\nphyxels = 50"), {":5:1", "flat.obj: the surface encloses no"}},
+      {with_body("mesh = 'ball.txt'\nphyxels = 50"), {":5:1", "ball.txt: the extension"}},
+      {with_body("mesh = 'flat.obj'\nphyxels = 50\non_surface = true"), {":5:1", "flat.obj: "}},
+      {with_body(mesh + "on_surface = true"), {":5:1", "ball.obj: "}},
+      {with_body("file = 'ball.obj'"), {":5:1", "ball.obj: not a file written by phyxel"}},
+      {with_body("cloud = 'mine'"), {":5:1", "key body.cloud: \"mine\" found"}},
+      {with_body("mesh = 'gone.obj'\nphyxels = 5"), {":6:8", "gone.obj"}},
+  };
+}
+
+TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
+  write("ball.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write("empty.obj", "");
+  write("ball.txt", "v 0 0 0\n");
+  Cloud bare = testing::lattice(4, 4, 4, 0.1);
+  bare.volume.clear();
+  write_body(folder_ / "bare.h5", bare, false);
+  ASSERT_EQ(refusal_of(with_bar("")), "accepted");
+  for (const Late& late : late_refusals()) expect_named(late.text, late.names);
+  EXPECT_GT(refused_, 30);
+}
+
+TEST(SceneError, IsNamedOnce) {
+  Scene scene;
+  EXPECT_EQ(named(scene, "no"), "no");  // made in code
+  scene.text = "x";
+  EXPECT_EQ(named(scene, "no"), "scene: no");  // read from text
+  scene.file = "a/b.toml";
+  EXPECT_EQ(named(scene, "no"), "a/b.toml: no");
+  EXPECT_EQ(named(scene, "a/b.toml:3:1: no"), "a/b.toml:3:1: no");
+  BodyRequest body;
+  EXPECT_EQ(named(body, "no"), "no");
+  body.where = "a/b.toml:3:1";
+  body.name = "bar";
+  EXPECT_EQ(named(body, "no"), "a/b.toml:3:1: body \"bar\": no");
+  EXPECT_EQ(named(body, "body \"bar\": no"), "a/b.toml:3:1: body \"bar\": no");
+  EXPECT_EQ(named(body, "a/b.toml:9:2: no"), "a/b.toml:9:2: no");
+  EXPECT_THROW(naming(scene, []() -> int { throw DivergedError("x"); }), DivergedError);
+  try {
+    naming(scene, [] { throw AgreedError(ExitCode::bad_input, "no"); });
+    FAIL();
+  } catch (const AgreedError& error) {
+    EXPECT_STREQ(error.what(), "a/b.toml: no");
+  }
+  try {
+    naming(scene, [] { throw InterruptedError("searching"); });
+    FAIL();
+  } catch (const InterruptedError& error) {
+    EXPECT_STREQ(error.what(), "searching");
+  }
+}
+
+}  // namespace
+}  // namespace phyxel
