@@ -47,6 +47,11 @@ double f(double a, double b) {
     sources = {"x.cpp": text, "y.cpp": text}
     check("a seed fixes the order", faults.chosen(sources, 3) == faults.chosen(sources, 3))
     check("another seed is another order", faults.chosen(sources, 3) != faults.chosen(sources, 4))
+    longer = {"x.cpp": text.replace("h(a);", "h(a);\n  k(a, b);"), "y.cpp": text}
+    added = set(faults.chosen(longer, 3)) - set(faults.chosen(sources, 3))
+    as_before = [f.change for f in faults.chosen(sources, 3) if f.kind == "operator"]
+    check("a change elsewhere leaves the draw as it was",
+          added and [f.change for f in faults.chosen(longer, 3) if f.kind == "operator"] == as_before, as_before)
     check("every fault is chosen once", len(set(faults.chosen(sources, 3))) == 2 * len(expected))
     check("kinds take turns", len({f.kind for f in faults.chosen(sources, 3)[:5]}) == 5)
 
