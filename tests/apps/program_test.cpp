@@ -321,6 +321,8 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
        "bad.toml:4:9: key body.shape: \"dinno\" found (did you mean \"dino\"?)"},
       {{"run", "beam.toml", "--device", "gpu"}, "--device gpu: unknown device"},
       {{"run", "beam.toml", "--device", "cuda:x"}, "--device cuda:x: unknown device"},
+      {{"run", "beam.toml", "--device", "cuda:1000"}, "--device cuda:1000: unknown device"},
+      {{"run", "beam.toml", "--device", "cuda:99999999999999999999"}, "9999: unknown device"},
       {{"run", "beam.toml", "--precision", "half"}, "--precision half: unknown; allowed: float"},
       {{"run", "beam.toml", "--until", "-1"}, "--until -1: out of range: allowed > 0"},
       {{"run", "beam.toml", "--threads", "0"}, "--threads 0: out of range: allowed 1 to"},

@@ -5,6 +5,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "support/clouds.hpp"
@@ -90,6 +91,36 @@ INSTANTIATE_TEST_SUITE_P(Support, Hash,
                            return test.param == NeighbourhoodRule::Support::uniform ? "Uniform"
                                                                                     : "Adaptive";
                          });
+
+/// Places along the curve are places in space, whatever the size of a body and wherever it lies.
+TEST(OrderAlongCurve, PutsNeighboursSideBySide) {
+  for (const double size : {1e-3, 0.5, 1.0, 2e3}) {
+    std::mt19937_64 engine(3);
+    Cloud cloud;
+    for (int i = 0; i < 4096; ++i) {  // 16 to an edge of the cube: spacings of 1/8 of `size`
+      cloud.position.push_back(size * (Vec3d{-7, 5, 0} + uniform_vector(engine, 1)));
+      cloud.volume.push_back(i);
+    }
+    cloud.regions["even"] = {};
+    for (int i = 0; i < 4096; i += 2) cloud.regions["even"].push_back(i);
+    const Cloud before = cloud;
+    order_along_curve(cloud);
+    double way = 0;
+    std::set<double> seen;
+    for (std::size_t i = 0; i < 4096; ++i) {
+      const auto from = static_cast<std::size_t>(cloud.volume[i]);
+      EXPECT_EQ(cloud.position[i], before.position[from]);
+      seen.insert(cloud.volume[i]);
+      if (i > 0) way += norm(cloud.position[i] - cloud.position[i - 1]);
+    }
+    EXPECT_EQ(seen.size(), 4096u);
+    for (const Index i : cloud.regions["even"]) EXPECT_EQ(std::fmod(cloud.volume[i], 2), 0);
+    EXPECT_EQ(cloud.regions["even"].size(), 2048u);
+    // Two random places are 1.3 `size` apart on average; a Morton curve steps 1.7 spacings or so,
+    // its long steps included.
+    EXPECT_LT(way / 4095, 2.5 * size / 8);
+  }
+}
 
 TEST(MeanSpacing, EqualsBruteForce) {
   auto points = uneven_points(700);
