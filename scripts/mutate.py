@@ -440,7 +440,8 @@ def main():
         sys.exit(f"mutate.py: the copy does not build, see {copy.log}")
     graph = Graph(copy)
     print("runs the tests without a fault", flush=True)
-    commit = git(source, "describe", "--always", "--dirty").strip()
+    changed = git(source, "status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
+    commit = git(source, "describe", "--always").strip() + ("-dirty" if changed else "")
     state = folder / f"clean-{commit}.json"
     if not options.resume or commit.endswith("-dirty"):
         state.unlink(missing_ok=True)
