@@ -30,6 +30,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 from faults import chosen  # noqa: E402
@@ -40,10 +41,8 @@ KILLED, HUNG, SURVIVED, NOT_BUILT = "killed", "hung", "survived", "not built"
 SOURCES = ("lib/*.cpp", "lib/*.hpp", "mpi/*.cpp", "mpi/*.hpp", "partition/*.cpp", "partition/*.hpp", "apps/phyxel/*.cpp")
 
 
-def hear_signals():
-    """Signals mean to a test what they mean in a terminal, also where nohup or a shell's & ignores them for this program."""
-    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGPIPE):
-        signal.signal(number, signal.SIG_DFL)
+# Signals mean to a test what they mean in a terminal, also where nohup or a shell's & ignores them for this program.
+HEAR_SIGNALS = ["env", "--default-signal=HUP,INT,QUIT,PIPE"]
 
 
 def git(source, *arguments):
@@ -85,9 +84,9 @@ class Copy:
 
     def run(self, command, seconds=None):
         """Exit code and output; None as the code of what ran too long. All its children end with it."""
-        with subprocess.Popen(command, cwd=self.build if self.build.exists() else self.tree, env=self.environment,
+        with subprocess.Popen([*HEAR_SIGNALS, *command], cwd=self.build if self.build.exists() else self.tree, env=self.environment,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              errors="replace", start_new_session=True, preexec_fn=hear_signals) as child:
+                              errors="replace", start_new_session=True) as child:
             try:
                 output, _ = child.communicate(timeout=seconds)
                 return child.returncode, output
@@ -244,6 +243,14 @@ def near_first(jobs, file):
     return sorted(jobs, key=lambda j: (stem not in j.name, j.seconds))
 
 
+def batches(jobs):
+    """The first alone, which mostly notices, then more and more at a time, which builds and runs them side by side."""
+    begin, size = 0, 1
+    while begin < len(jobs):
+        yield jobs[begin:begin + size]
+        begin, size = begin + size, 2 * size
+
+
 def what_one_fault_does(copy, graph, jobs, fault, factor, least):
     """Outcome, and the test of these that noticed. The copy is as before when this returns, whatever happens."""
     path = copy.tree / fault.file
@@ -255,14 +262,16 @@ def what_one_fault_does(copy, graph, jobs, fault, factor, least):
         own = [o for o in objects if pathlib.Path(o).name == pathlib.Path(fault.file).name + ".o"] or objects[:1]
         if own and not copy.make(own[:1]):
             return NOT_BUILT, ""
-        for job in near_first([j for j in jobs if j.program in programs], fault.file):
-            if not copy.make(graph.needed(job.program)):
+        for batch in batches(near_first([j for j in jobs if j.program in programs], fault.file)):
+            if not copy.make(sorted({n for job in batch for n in graph.needed(job.program)})):
                 return NOT_BUILT, ""
-            code, _ = job.run(copy, max(least, factor * job.seconds))
-            if code is None:
-                return HUNG, job.name
-            if not good(code):
-                return KILLED, job.name
+            with ThreadPoolExecutor(copy.jobs) as pool:
+                codes = list(pool.map(lambda job: job.run(copy, max(least, factor * job.seconds))[0], batch))
+            for job, code in zip(batch, codes):
+                if code is None:
+                    return HUNG, job.name
+                if not good(code):
+                    return KILLED, job.name
         return SURVIVED, ""
     finally:
         path.write_text(original)
@@ -400,7 +409,7 @@ def arguments():
     add("--factor", type=float, default=5, help="a test hangs after so many times what it takes without a fault (5)")
     add("--limit", type=float, default=20, help="the least time limit of a test in seconds (20)")
     add("--quick", type=float, default=float("inf"), help="seconds of a test above which it waits for what the others let pass")
-    add("--jobs", type=int, default=os.cpu_count(), help="compilers at a time")
+    add("--jobs", type=int, default=os.cpu_count(), help="compilers, or tests, at a time")
     add("--minutes", type=float, default=float("inf"), help="begin no fault after so many")
     add("--aim", type=float, default=95, help="the score in percent below which the exit code is 1 (95)")
     add("--list", action="store_true", help="print the faults, change nothing")

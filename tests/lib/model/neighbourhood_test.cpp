@@ -8,6 +8,7 @@
 #include <cmath>
 #include <set>
 
+#include "model/space_filling_curve.hpp"
 #include "support/clouds.hpp"
 
 namespace phyxel {
@@ -91,6 +92,25 @@ INSTANTIATE_TEST_SUITE_P(Support, Hash,
                            return test.param == NeighbourhoodRule::Support::uniform ? "Uniform"
                                                                                     : "Adaptive";
                          });
+
+/// Cells of a box, wherever it lies, follow each other face to face along Hilbert's curve.
+TEST(HilbertFrame, StepsThroughABoxFromCellToCell) {
+  constexpr int cells = 8;
+  const Vec3d low{-3, 100, 0.5};
+  for (const double size : {1e-3, 1.0, 50.0}) {
+    const HilbertFrame frame = HilbertFrame::around(low, low + Vec3d{size, size, size});
+    std::vector<std::pair<std::uint64_t, Vec3d>> order;
+    for (int k = 0; k < cells * cells * cells; ++k) {
+      const Vec3d cell{k % cells + 0.5, k / cells % cells + 0.5, k / cells / cells + 0.5};
+      order.emplace_back(frame.key_of(low + size / cells * cell), cell);
+    }
+    std::sort(order.begin(), order.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      ASSERT_EQ(norm(order[k].second - order[k - 1].second), 1) << size;
+    }
+  }
+}
 
 /// Places along the curve are places in space, whatever the size of a body and wherever it lies.
 TEST(OrderAlongCurve, PutsNeighboursSideBySide) {
