@@ -128,9 +128,20 @@ BuildCase lumps() {
   return {"Lumps", plain(), {cloud}};
 }
 
+/// A body whose surfels all lie on the phyxels of the next one, which do not carry them.
+BuildCase astray() {
+  std::vector<Cloud> clouds{testing::lattice(6, 6, 6, 0.1, 0.2),
+                            testing::lattice(5, 5, 5, 0.1, 0.2),
+                            testing::lattice(4, 4, 4, 0.1, 0.2)};
+  for (Vec3d& p : clouds[1].position) p += Vec3d{7, 0, 0};
+  clouds[0].surface.position = clouds[1].position;
+  clouds[0].surface.normal.assign(clouds[1].position.size(), {0, 0, 1});
+  return {"Astray", plain(3), clouds};
+}
+
 const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{beam(),       rules(), nearest(), small(),
-                                            degenerate(), lumps(), lattice()};
+                                            degenerate(), lumps(), astray(),  lattice()};
   return cases;
 }
 
@@ -290,6 +301,30 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
   }
 }
 
+/// What is told of a cut, of which each rank has seen a stretch, is what the whole graph says.
+TEST_P(BuiltShares, TellTheQualityOfTheirCut) {
+  std::vector<std::int64_t> part_of(static_cast<std::size_t>(whole_.size()), 0);
+  for (Index i = 0; i < here_.size(); ++i) {
+    if (here_.owns(i)) part_of.at(here_.number(i)) = world().rank();
+  }
+  world().add(part_of);
+  const bool chosen = std::any_of(
+      case_.scene.bodies.begin(), case_.scene.bodies.end(),
+      [](const BodyRequest& body) { return body.neighbourhood.max_neighbours.has_value(); });
+  // Where a phyxel chooses the nearest of all, or some phyxels speak for all, it is an estimate.
+  if (chosen || whole_.size() > cut_.options.most_samples) return;
+  const PartitionQuality told = built_of(case_, cut_).quality;
+  const PartitionQuality expected = quality_of(
+      phyxel_graph(whole_), std::vector<int>(part_of.begin(), part_of.end()), world().size());
+  EXPECT_EQ(told.ghosts, expected.ghosts);
+  EXPECT_EQ(told.most_ghosts, expected.most_ghosts);
+  EXPECT_EQ(told.most_peers, expected.most_peers);
+  EXPECT_EQ(told.empty, expected.empty);
+  EXPECT_EQ(told.cut, expected.cut);
+  // Ranks know who shares an edge, the whole also in which direction.
+  if (whole_.neighbourhood.symmetric) EXPECT_DOUBLE_EQ(told.imbalance, expected.imbalance);
+}
+
 TEST_P(BuiltShares, KnowOfTheWhole) {
   ASSERT_EQ(here_.parts.size(), whole_.parts.size());
   for (std::size_t p = 0; p < here_.parts.size(); ++p) {
@@ -384,6 +419,10 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
     EXPECT_THAT(said, ::testing::HasSubstr(expected));
     // Behind other bodies, too.
     scene.bodies.insert(scene.bodies.begin(), 3, shape("block", 0.3));
+    EXPECT_THAT(words_of([&] { build_share(world(), scene, {}); }), ::testing::HasSubstr(expected));
+    // Of which one holds phyxels of its own.
+    scene.bodies[1].fixed.push_back({.select = {.region = "x-"}});
+    scene.bodies[1].loads.push_back({.select = {.region = "x+"}, .force = {1, 0, 0}});
     EXPECT_THAT(words_of([&] { build_share(world(), scene, {}); }), ::testing::HasSubstr(expected));
   }
   const std::vector<Cloud> one{testing::lattice(5, 5, 5, 0.1)};
