@@ -208,6 +208,7 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
   EXPECT_TRUE(uniform.neighbourhood.symmetric);
   EXPECT_EQ(uniform.neighbourhood.inverse_lists.indices.size(), 0u);
   EXPECT_EQ(&uniform.neighbourhood.inverse(), &uniform.neighbourhood.neighbours);
+  EXPECT_EQ(uniform.pairs(), uniform.neighbourhood.neighbours.entries());
   const auto names = [](const Backend& backend) {
     std::vector<std::string> list;
     for (const ArrayBytes& array : backend.memory()) list.push_back(array.name);
