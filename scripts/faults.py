@@ -1,7 +1,7 @@
 """Where small faults can be put into C++ sources: what scripts/mutate.py tries. A source is formatted by clang-format, which
 tells operators from template brackets and pointers by their spaces."""
 import dataclasses
-import random
+import hashlib
 import re
 
 KINDS = ("operator", "constant", "dropped statement", "swapped arguments", "negated condition")
@@ -230,18 +230,24 @@ def faults_in(file, text):
     return sorted(finder.faults, key=lambda f: (f.begin, f.kind))
 
 
+def lot(seed, fault, number):
+    """A fault's place in the draw. It comes from the fault alone: a change elsewhere in the sources leaves the draw as it was."""
+    return hashlib.sha256("\0".join([str(seed), fault.file, fault.kind, fault.change, str(number)]).encode()).digest()
+
+
 def chosen(sources, seed):
     """The faults of these sources (name: text) in the order in which they are tried: kinds take turns, places are drawn."""
     by_kind = {kind: [] for kind in KINDS}
     for file in sorted(sources):
+        alike = {}
         for fault in faults_in(file, sources[file]):
-            by_kind[fault.kind].append(fault)
-    draw = random.Random(seed)
+            number = alike[fault.kind, fault.change] = alike.get((fault.kind, fault.change), -1) + 1
+            by_kind[fault.kind].append((lot(seed, fault, number), fault))
     for faults in by_kind.values():
-        draw.shuffle(faults)
+        faults.sort(key=lambda f: f[0], reverse=True)
     order = []
     while any(by_kind.values()):
         for kind in KINDS:
             if by_kind[kind]:
-                order.append(by_kind[kind].pop())
+                order.append(by_kind[kind].pop()[1])
     return order

@@ -5,6 +5,7 @@
     scripts/mutate.py --base v0.1                     in what changed since a revision
     scripts/mutate.py --files lib/solver 'mpi/*.cpp'  in these files and folders
     scripts/mutate.py --count 200 --seed 2 --resume   goes on with what the table of results does not have
+    scripts/mutate.py --quick 6                       tests that take longer see only what the others let pass, at the end
     scripts/mutate.py --page                          only makes the page of the table again
 
 The faults are wrong operators, constants, dropped statements, swapped arguments and negated conditions, drawn from a fixed
@@ -29,6 +30,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 from faults import chosen  # noqa: E402
@@ -37,6 +39,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 COLUMNS = ["commit", "seed", "file", "line", "kind", "change", "outcome", "noticed_by", "seconds"]
 KILLED, HUNG, SURVIVED, NOT_BUILT = "killed", "hung", "survived", "not built"
 SOURCES = ("lib/*.cpp", "lib/*.hpp", "mpi/*.cpp", "mpi/*.hpp", "partition/*.cpp", "partition/*.hpp", "apps/phyxel/*.cpp")
+
+
+# Signals mean to a test what they mean in a terminal, also where nohup or a shell's & ignores them for this program.
+HEAR_SIGNALS = ["env", "--default-signal=HUP,INT,QUIT,PIPE"]
 
 
 def git(source, *arguments):
@@ -78,7 +84,7 @@ class Copy:
 
     def run(self, command, seconds=None):
         """Exit code and output; None as the code of what ran too long. All its children end with it."""
-        with subprocess.Popen(command, cwd=self.build if self.build.exists() else self.tree, env=self.environment,
+        with subprocess.Popen([*HEAR_SIGNALS, *command], cwd=self.build if self.build.exists() else self.tree, env=self.environment,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               errors="replace", start_new_session=True) as child:
             try:
@@ -237,8 +243,16 @@ def near_first(jobs, file):
     return sorted(jobs, key=lambda j: (stem not in j.name, j.seconds))
 
 
+def batches(jobs):
+    """The first alone, which mostly notices, then more and more at a time, which builds and runs them side by side."""
+    begin, size = 0, 1
+    while begin < len(jobs):
+        yield jobs[begin:begin + size]
+        begin, size = begin + size, 2 * size
+
+
 def what_one_fault_does(copy, graph, jobs, fault, factor, least):
-    """Outcome, and the test that noticed. The copy is as before when this returns, whatever happens."""
+    """Outcome, and the test of these that noticed. The copy is as before when this returns, whatever happens."""
     path = copy.tree / fault.file
     original = path.read_text()
     try:
@@ -248,14 +262,16 @@ def what_one_fault_does(copy, graph, jobs, fault, factor, least):
         own = [o for o in objects if pathlib.Path(o).name == pathlib.Path(fault.file).name + ".o"] or objects[:1]
         if own and not copy.make(own[:1]):
             return NOT_BUILT, ""
-        for job in near_first([j for j in jobs if j.program in programs], fault.file):
-            if not copy.make(graph.needed(job.program)):
+        for batch in batches(near_first([j for j in jobs if j.program in programs], fault.file)):
+            if not copy.make(sorted({n for job in batch for n in graph.needed(job.program)})):
                 return NOT_BUILT, ""
-            code, _ = job.run(copy, max(least, factor * job.seconds))
-            if code is None:
-                return HUNG, job.name
-            if not good(code):
-                return KILLED, job.name
+            with ThreadPoolExecutor(copy.jobs) as pool:
+                codes = list(pool.map(lambda job: job.run(copy, max(least, factor * job.seconds))[0], batch))
+            for job, code in zip(batch, codes):
+                if code is None:
+                    return HUNG, job.name
+                if not good(code):
+                    return KILLED, job.name
         return SURVIVED, ""
     finally:
         path.write_text(original)
@@ -325,6 +341,47 @@ def report(rows, reasons):
     return killed >= all_
 
 
+def try_faults(faults, copy, graph, jobs, table, row_begin, options, begin):
+    """Writes a row for each fault that the table does not have. What the quick tests let pass waits for the slow ones."""
+    done = {identity(r): r for r in read_rows(table)}
+    quick = [j for j in jobs if j.seconds <= options.quick]
+    slow = [j for j in jobs if j.seconds > options.quick]
+    counted, waiting = 0, []
+
+    def tried(row, fault, tests):
+        start = time.monotonic()
+        row["outcome"], row["noticed_by"] = what_one_fault_does(copy, graph, tests, fault, options.factor, options.limit)
+        row["seconds"] = f"{float(row.get('seconds', 0)) + time.monotonic() - start:.1f}"
+        left = row["outcome"] == SURVIVED and tests is quick and slow
+        if not left:
+            add_row(table, row)
+        print(f"{counted:4} {'waits' if left else row['outcome']:9} {float(row['seconds']):6.1f} s  {fault.file}:{fault.line}: "
+              f"{fault.kind}: {fault.change}{'  by ' + row['noticed_by'] if row['noticed_by'] else ''}", flush=True)
+        return left
+
+    def late():
+        return (time.monotonic() - begin) / 60 > options.minutes
+
+    for fault in faults:
+        row = {**row_begin, "file": fault.file, "line": fault.line, "kind": fault.kind, "change": fault.change}
+        known = done.get(identity(row))
+        if known:
+            counted += known["outcome"] != NOT_BUILT
+        if counted >= options.count or late():
+            break
+        if known:
+            continue
+        if tried(row, fault, quick):
+            waiting.append((row, fault))
+        counted += row["outcome"] != NOT_BUILT
+        done[identity(row)] = row
+    for row, fault in waiting:
+        if late():
+            add_row(table, {**row, "noticed_by": "slow tests not run"})
+        else:
+            tried(row, fault, slow)
+
+
 # --- the command ---------------------------------------------------------------------------------
 
 def sources_of(source, options):
@@ -352,7 +409,8 @@ def arguments():
     add("--resume", action="store_true", help="skip the faults that the table has; else it is begun anew")
     add("--factor", type=float, default=5, help="a test hangs after so many times what it takes without a fault (5)")
     add("--limit", type=float, default=20, help="the least time limit of a test in seconds (20)")
-    add("--jobs", type=int, default=os.cpu_count(), help="compilers at a time")
+    add("--quick", type=float, default=float("inf"), help="seconds of a test above which it waits for what the others let pass")
+    add("--jobs", type=int, default=os.cpu_count(), help="compilers, or tests, at a time")
     add("--minutes", type=float, default=float("inf"), help="begin no fault after so many")
     add("--aim", type=float, default=95, help="the score in percent below which the exit code is 1 (95)")
     add("--list", action="store_true", help="print the faults, change nothing")
@@ -392,29 +450,13 @@ def main():
         sys.exit(f"mutate.py: the copy does not build, see {copy.log}")
     graph = Graph(copy)
     print("runs the tests without a fault", flush=True)
-    commit = git(source, "describe", "--always", "--dirty").strip()
+    changed = git(source, "status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/results")
+    commit = git(source, "describe", "--always").strip() + ("-dirty" if changed else "")
     state = folder / f"clean-{commit}.json"
     if not options.resume or commit.endswith("-dirty"):
         state.unlink(missing_ok=True)
     jobs = time_clean(copy, jobs_of(copy, graph), state)
-    done = {identity(r): r for r in read_rows(table)}
-    counted = 0
-    for fault in faults:
-        row = {"commit": commit, "seed": options.seed, "file": fault.file, "line": fault.line, "kind": fault.kind, "change": fault.change}
-        if identity(row) in done:
-            counted += done[identity(row)]["outcome"] != NOT_BUILT
-        if counted >= options.count or (time.monotonic() - begin) / 60 > options.minutes:
-            break
-        if identity(row) in done:
-            continue
-        start = time.monotonic()
-        row["outcome"], row["noticed_by"] = what_one_fault_does(copy, graph, jobs, fault, options.factor, options.limit)
-        row["seconds"] = f"{time.monotonic() - start:.1f}"
-        counted += row["outcome"] != NOT_BUILT
-        add_row(table, row)
-        done[identity(row)] = row
-        print(f"{counted:4} {row['outcome']:9} {float(row['seconds']):6.1f} s  {fault.file}:{fault.line}: {fault.kind}: {fault.change}"
-              f"{'  by ' + row['noticed_by'] if row['noticed_by'] else ''}", flush=True)
+    try_faults(faults, copy, graph, jobs, table, {"commit": commit, "seed": options.seed}, options, begin)
     copy.sync()
     rows = read_rows(table)
     write_page()

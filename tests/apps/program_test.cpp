@@ -25,6 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 using test::Outcome;
 using test::text_of;
+using ::testing::AnyOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 class Program : public test::Program {
@@ -318,6 +320,8 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
        "bad.toml:4:9: key body.shape: \"dinno\" found (did you mean \"dino\"?)"},
       {{"run", "beam.toml", "--device", "gpu"}, "--device gpu: unknown device"},
       {{"run", "beam.toml", "--device", "cuda:x"}, "--device cuda:x: unknown device"},
+      {{"run", "beam.toml", "--device", "cuda:1000"}, "--device cuda:1000: unknown device"},
+      {{"run", "beam.toml", "--device", "cuda:99999999999999999999"}, "9999: unknown device"},
       {{"run", "beam.toml", "--precision", "half"}, "--precision half: unknown; allowed: float"},
       {{"run", "beam.toml", "--until", "-1"}, "--until -1: out of range: allowed > 0"},
       {{"run", "beam.toml", "--threads", "0"}, "--threads 0: out of range: allowed 1 to"},
@@ -611,9 +615,10 @@ TEST_F(Program, ACheckpointThatCannotBeWrittenEndsTheRunBetweenFrames) {
   write("out", "a file where the folder was");
   const Outcome outcome = finish(child);
   EXPECT_EQ(outcome.code, 74) << outcome.out << outcome.err;
-  // The frames that it counts are brought to the disk first.
+  // The frames that it counts are brought to the disk first; the folder may go right after that.
   EXPECT_THAT(outcome.err, HasSubstr("error: out/"));
-  EXPECT_THAT(outcome.err, HasSubstr(".hdf.series: cannot be brought to the disk"));
+  EXPECT_THAT(outcome.err, AnyOf(HasSubstr(".hdf.series: cannot be brought to the disk"),
+                                 ContainsRegex("checkpoint_[0-9]*.h5: cannot be written")));
   EXPECT_TRUE(latest_checkpoint(folder_ / "kept").has_value());
 }
 

@@ -2,12 +2,17 @@
 #include "mpi/build_share.hpp"
 
 #include <gmock/gmock.h>
+#include <malloc.h>
 
+#include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <map>
 
 #include "../partition/bodies.hpp"
 #include "model/assembly.hpp"
+#include "model/host_memory.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/share_surveyor.hpp"
 #include "partition/share.hpp"
@@ -123,9 +128,20 @@ BuildCase lumps() {
   return {"Lumps", plain(), {cloud}};
 }
 
+/// A body whose surfels all lie on the phyxels of the next one, which do not carry them.
+BuildCase astray() {
+  std::vector<Cloud> clouds{testing::lattice(6, 6, 6, 0.1, 0.2),
+                            testing::lattice(5, 5, 5, 0.1, 0.2),
+                            testing::lattice(4, 4, 4, 0.1, 0.2)};
+  for (Vec3d& p : clouds[1].position) p += Vec3d{7, 0, 0};
+  clouds[0].surface.position = clouds[1].position;
+  clouds[0].surface.normal.assign(clouds[1].position.size(), {0, 0, 1});
+  return {"Astray", plain(3), clouds};
+}
+
 const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{beam(),       rules(), nearest(), small(),
-                                            degenerate(), lumps(), lattice()};
+                                            degenerate(), lumps(), astray(),  lattice()};
   return cases;
 }
 
@@ -285,6 +301,30 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
   }
 }
 
+/// What is told of a cut, of which each rank has seen a stretch, is what the whole graph says.
+TEST_P(BuiltShares, TellTheQualityOfTheirCut) {
+  std::vector<std::int64_t> part_of(static_cast<std::size_t>(whole_.size()), 0);
+  for (Index i = 0; i < here_.size(); ++i) {
+    if (here_.owns(i)) part_of.at(here_.number(i)) = world().rank();
+  }
+  world().add(part_of);
+  const bool chosen = std::any_of(
+      case_.scene.bodies.begin(), case_.scene.bodies.end(),
+      [](const BodyRequest& body) { return body.neighbourhood.max_neighbours.has_value(); });
+  // Where a phyxel chooses the nearest of all, or some phyxels speak for all, it is an estimate.
+  if (chosen || whole_.size() > cut_.options.most_samples) return;
+  const PartitionQuality told = built_of(case_, cut_).quality;
+  const PartitionQuality expected = quality_of(
+      phyxel_graph(whole_), std::vector<int>(part_of.begin(), part_of.end()), world().size());
+  EXPECT_EQ(told.ghosts, expected.ghosts);
+  EXPECT_EQ(told.most_ghosts, expected.most_ghosts);
+  EXPECT_EQ(told.most_peers, expected.most_peers);
+  EXPECT_EQ(told.empty, expected.empty);
+  EXPECT_EQ(told.cut, expected.cut);
+  // Ranks know who shares an edge, the whole also in which direction.
+  if (whole_.neighbourhood.symmetric) EXPECT_DOUBLE_EQ(told.imbalance, expected.imbalance);
+}
+
 TEST_P(BuiltShares, KnowOfTheWhole) {
   ASSERT_EQ(here_.parts.size(), whole_.parts.size());
   for (std::size_t p = 0; p < here_.parts.size(); ++p) {
@@ -380,6 +420,10 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
     // Behind other bodies, too.
     scene.bodies.insert(scene.bodies.begin(), 3, shape("block", 0.3));
     EXPECT_THAT(words_of([&] { build_share(world(), scene, {}); }), ::testing::HasSubstr(expected));
+    // Of which one holds phyxels of its own.
+    scene.bodies[1].fixed.push_back({.select = {.region = "x-"}});
+    scene.bodies[1].loads.push_back({.select = {.region = "x+"}, .force = {1, 0, 0}});
+    EXPECT_THAT(words_of([&] { build_share(world(), scene, {}); }), ::testing::HasSubstr(expected));
   }
   const std::vector<Cloud> one{testing::lattice(5, 5, 5, 0.1)};
   EXPECT_EQ(words_of([&] { build_share(world(), plain(2), one, {}); }),
@@ -390,6 +434,54 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
   EXPECT_THAT(words_of([&] { build_share(world(), plain(), own, {}); }),
               ::testing::HasSubstr("different bodies"));
 }
+
+#if !PHYXEL_SANITIZED  // whose memory holds more than the program's
+
+/// A line of this process's status, in bytes.
+double status_bytes(const std::string& key) {
+  std::ifstream lines("/proc/self/status");
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind(key + ":", 0) == 0) return 1024 * std::atof(line.c_str() + key.size() + 1);
+  }
+  return 0;
+}
+
+/// A share is refused before it is built if it would not fit: a rank asks for about as much memory
+/// as it then takes at most, whatever the number of ranks.
+TEST(BuiltShare, AsksForTheMemoryThatItTakes) {
+  Scene scene{.bodies = {shape("beam", 0.05)}};  // 24,000 phyxels: tens of MB
+  scene.bodies[0].neighbourhood.nearest = 20;
+  // Few groups, as bodies have that are large enough to fill a machine.
+  const ShareOptions options{{Partitioner::metis}, 1, 0, nullptr, 60, 400};
+  malloc_trim(0);
+  const double before = status_bytes("VmRSS");
+  std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
+  const Index phyxels = build_share(world(), scene, options).model.whole_size();
+  const auto taken = static_cast<double>(
+      world().largest(static_cast<std::int64_t>(status_bytes("VmHWM") - before)));
+  ASSERT_GT(taken, 100.0 * phyxels / world().size());  // positions, lists and moments alone
+
+  const double usable = usable_memory();
+  share_host_memory(1);
+  const double host = usable_memory();
+  const auto built_in = [&](double memory) {
+    share_host_memory(static_cast<int>(std::lround(host / memory)));
+    std::string refusal;
+    try {
+      build_share(world(), scene, options);
+    } catch (const Error& error) {
+      refusal = error.what();
+    }
+    share_host_memory(static_cast<int>(std::lround(host / usable)));
+    return refusal;
+  };
+  // What ghosts take depends on the cut, and what lists take on the neighbourhood: 0.85 to 1.6
+  // times as much as is taken here was asked for on one to three ranks.
+  EXPECT_THAT(built_in(0.7 * taken), ::testing::HasSubstr("the scene: 24000 phyxels need about"));
+  EXPECT_EQ(built_in(2.1 * taken), "");
+}
+
+#endif
 
 }  // namespace
 }  // namespace phyxel

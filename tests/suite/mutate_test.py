@@ -47,6 +47,11 @@ double f(double a, double b) {
     sources = {"x.cpp": text, "y.cpp": text}
     check("a seed fixes the order", faults.chosen(sources, 3) == faults.chosen(sources, 3))
     check("another seed is another order", faults.chosen(sources, 3) != faults.chosen(sources, 4))
+    longer = {"x.cpp": text.replace("h(a);", "h(a);\n  k(a, b);"), "y.cpp": text}
+    added = set(faults.chosen(longer, 3)) - set(faults.chosen(sources, 3))
+    as_before = [f.change for f in faults.chosen(sources, 3) if f.kind == "operator"]
+    check("a change elsewhere leaves the draw as it was",
+          added and [f.change for f in faults.chosen(longer, 3) if f.kind == "operator"] == as_before, as_before)
     check("every fault is chosen once", len(set(faults.chosen(sources, 3))) == 2 * len(expected))
     check("kinds take turns", len({f.kind for f in faults.chosen(sources, 3)[:5]}) == 5)
 
@@ -56,8 +61,8 @@ SAMPLE = {
 project(sample LANGUAGES CXX)
 enable_testing()
 set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib)
-add_library(sample STATIC lib/sum.cpp lib/unused.cpp)
-foreach(name IN ITEMS sum_test other_test)
+add_library(sample STATIC lib/sum.cpp lib/unused.cpp lib/slow.cpp lib/hung.cpp)
+foreach(name IN ITEMS sum_test other_test slow_test signal_test)
   add_executable(${name} ${name}.cpp)
   target_link_libraries(${name} PRIVATE sample)
   add_test(NAME ${name} COMMAND ${name})
@@ -71,6 +76,21 @@ endforeach()
     k += 1;
   }
   return sum;
+}
+""",
+    "lib/slow.cpp": "int doubled(int slow) {\n  return slow * 2;\n}\n",
+    "lib/hung.cpp": "int twice(int hung) {\n  return hung * 2;\n}\n",
+    "slow_test.cpp": "#include <unistd.h>\nint doubled(int);\nint main() { usleep(400000); return doubled(4) == 8 ? 0 : 1; }\n",
+    # Without a fault the program ends by the hangup that it sends itself, which its parent waits for.
+    "signal_test.cpp": """#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+int twice(int);
+int main() {
+  int status = 0;
+  if (const pid_t child = fork()) return waitpid(child, &status, 0) == child && WIFSIGNALED(status) && twice(4) == 8 ? 0 : 1;
+  raise(SIGHUP);
+  return 0;
 }
 """,
     "lib/unused.cpp": "int unused(int a) {\n  return a + 1;\n}\n",
@@ -90,8 +110,8 @@ def a_sample():
             subprocess.run(["git", "-C", folder, *command], check=True)
 
         def mutate(*arguments):
-            return subprocess.run([sys.executable, "-B", SCRIPTS / "mutate.py", "--source", folder, "--jobs", "2", "--limit", "2",
-                                   "--files", "lib", *arguments], capture_output=True, text=True)
+            return subprocess.run(["nohup", sys.executable, "-B", SCRIPTS / "mutate.py", "--source", folder, "--jobs", "2",
+                                   "--limit", "2", "--files", "lib", *arguments], capture_output=True, text=True)
 
         def rows():
             with open(source / "docs/results/mutation.csv", newline="") as lines:
@@ -104,13 +124,15 @@ def a_sample():
         left = source / "build/mutate/tree/lib/sum.cpp"
         check("the copy is as the tree when it ends", left.read_text() == SAMPLE["lib/sum.cpp"])
         left.write_text("int sum_to(int) { return 7; }\n")
-        done = mutate("--count", "1000", "--resume")
+        done = mutate("--count", "1000", "--resume", "--quick", "0.2")
         check("a table is gone on with", rows()[:len(kept)] == kept, done.stdout + done.stderr)
         check("no fault is tried twice", len({(r["file"], r["kind"], r["change"]) for r in rows()}) == len(rows()))
         outcome = {r["change"]: (r["outcome"], r["noticed_by"]) for r in rows()}
         check("a dropped sum is noticed", outcome["sum += k; -> nothing"] == ("killed", "sum_test"), outcome)
         check("a loop without end is noticed", outcome["k += 1; -> nothing"] == ("hung", "sum_test"), outcome)
         check("k <= n to k < n is noticed", outcome["while (k [<= -> <] n) {"] == ("killed", "sum_test"), outcome)
+        check("a slow test sees what the quick ones let pass", outcome["return slow [* -> /] 2;"] == ("killed", "slow_test"), outcome)
+        check("a test hears the hangup that this program ignores", outcome["return hung [* -> /] 2;"] == ("killed", "signal_test"), outcome)
         check("what no test reaches survives", outcome["return a [+ -> -] 1;"] == ("survived", ""), outcome)
         check("survivors bring the score below the aim", done.returncode == 1, done.returncode)
         # Explained as equivalent, they do not count; a reason holds wherever the line has gone.

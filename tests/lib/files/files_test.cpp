@@ -8,6 +8,7 @@
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
+#include "files/hdf5_memory.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
@@ -429,6 +430,32 @@ TEST_F(Files, ArraysThatComeLaterTakeNoMemory) {
   EXPECT_THROW(for (const Content::Piece& piece : content.pieces) piece.produce(look), Enough);
   EXPECT_EQ(longest, 3000 * sizeof(double));
   EXPECT_GT(next, 0);
+}
+
+/// As a file on a disk: what is cut off is gone, and comes back as zeros.
+TEST(SparseBytes, CutAndGrownAreZero) {
+  const auto read_all = [](const SparseBytes& bytes) {
+    std::vector<std::byte> all(bytes.size());
+    bytes.read(0, all);
+    return all;
+  };
+  constexpr std::uint64_t far = std::uint64_t{1} << 40;
+  const std::vector<std::byte> ones(300'000, std::byte{1});  // of several pages
+  for (const std::uint64_t cut : {0, 1, 65'536, 100'000, 299'999}) {
+    SparseBytes bytes;
+    bytes.write(0, ones);
+    bytes.write(far, std::span(ones).first(1));
+    EXPECT_EQ(bytes.size(), far + 1);
+    bytes.resize(cut);
+    bytes.resize(ones.size());
+    std::vector<std::byte> expected(ones.size(), std::byte{0});
+    std::fill_n(expected.begin(), cut, std::byte{1});
+    EXPECT_TRUE(read_all(bytes) == expected) << cut;
+    std::byte last{1};
+    bytes.resize(far + 1);
+    bytes.read(far, {&last, 1});
+    EXPECT_EQ(last, std::byte{0});
+  }
 }
 
 TEST_F(Files, ALogIsExtendedInOneWriteAndNeverShortenedByAnother) {

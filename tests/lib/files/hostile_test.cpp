@@ -199,6 +199,22 @@ TEST_F(HostileFiles, ManyRegionsComeBack) {
   EXPECT_EQ(read_body(folder_ / "many.h5").regions, cloud.regions);
 }
 
+/// Names that are no steps of a path, behind which a member would hide or lead elsewhere.
+TEST_F(HostileFiles, MembersHaveProperNames) {
+  const std::string good = body_content();
+  const std::size_t at = good.find("mouth");
+  ASSERT_NE(at, std::string::npos);
+  ASSERT_EQ(good.find("mouth", at + 1), std::string::npos);
+  for (const std::string& name :
+       {std::string("m/uth"), std::string("/"), std::string("."), std::string()}) {
+    std::string bad = good;
+    bad.replace(at, 5, name + std::string(5 - name.size(), '\0'));
+    EXPECT_THAT(refusal([&] { read_body(sealed("named.h5", "body", bad)); }),
+                HasSubstr("member without a proper name"))
+        << name;
+  }
+}
+
 /// What HDF5 can store and phyxel never does.
 TEST_F(HostileFiles, OtherPartsOfHdf5AreRefused) {
   using Make = std::function<void(hid_t)>;

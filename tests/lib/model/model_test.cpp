@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "support/backend.hpp"
@@ -207,6 +208,7 @@ TEST(Model, InverseListsCostNothingWhereSupportIsUniform) {
   EXPECT_TRUE(uniform.neighbourhood.symmetric);
   EXPECT_EQ(uniform.neighbourhood.inverse_lists.indices.size(), 0u);
   EXPECT_EQ(&uniform.neighbourhood.inverse(), &uniform.neighbourhood.neighbours);
+  EXPECT_EQ(uniform.pairs(), uniform.neighbourhood.neighbours.entries());
   const auto names = [](const Backend& backend) {
     std::vector<std::string> list;
     for (const ArrayBytes& array : backend.memory()) list.push_back(array.name);
@@ -248,6 +250,11 @@ TEST(Inclusions, HaveMaterialsOfTheirOwn) {
   EXPECT_EQ(model.parts[1].end, 12);
   EXPECT_EQ(model.parts[1].material.young, 7e5);
   EXPECT_EQ(model.parts[2].name, "body, inclusion 2");
+  for (const Part& part : model.parts) EXPECT_EQ(part.size, part.end - part.begin) << part.name;
+  EXPECT_THAT(describe_phyxel(model, 7), HasSubstr("phyxel 7 of body \"body\", at rest at (0."));
+  EXPECT_THAT(describe_phyxel(model, 8), HasSubstr("of body \"body, inclusion 1\""));
+  EXPECT_THAT(describe_phyxel(model, 15), HasSubstr("of body \"body, inclusion 2\""));
+  EXPECT_EQ(describe_phyxel(model, 16), "no phyxel");
   EXPECT_NEAR(model.parts[0].mass, 8, 1e-12);
   EXPECT_NEAR(model.parts[2].mass, 12, 1e-12);
   for (Index i = 0; i < model.size(); ++i) {

@@ -5,8 +5,10 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
+#include "model/space_filling_curve.hpp"
 #include "support/clouds.hpp"
 
 namespace phyxel {
@@ -90,6 +92,55 @@ INSTANTIATE_TEST_SUITE_P(Support, Hash,
                            return test.param == NeighbourhoodRule::Support::uniform ? "Uniform"
                                                                                     : "Adaptive";
                          });
+
+/// Cells of a box, wherever it lies, follow each other face to face along Hilbert's curve.
+TEST(HilbertFrame, StepsThroughABoxFromCellToCell) {
+  constexpr int cells = 8;
+  const Vec3d low{-3, 100, 0.5};
+  for (const double size : {1e-3, 1.0, 50.0}) {
+    const HilbertFrame frame = HilbertFrame::around(low, low + Vec3d{size, size, size});
+    std::vector<std::pair<std::uint64_t, Vec3d>> order;
+    for (int k = 0; k < cells * cells * cells; ++k) {
+      const Vec3d cell{k % cells + 0.5, k / cells % cells + 0.5, k / cells / cells + 0.5};
+      order.emplace_back(frame.key_of(low + size / cells * cell), cell);
+    }
+    std::sort(order.begin(), order.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      ASSERT_EQ(norm(order[k].second - order[k - 1].second), 1) << size;
+    }
+  }
+}
+
+/// Places along the curve are places in space, whatever the size of a body and wherever it lies.
+TEST(OrderAlongCurve, PutsNeighboursSideBySide) {
+  for (const double size : {1e-3, 0.5, 1.0, 2e3}) {
+    std::mt19937_64 engine(3);
+    Cloud cloud;
+    for (int i = 0; i < 4096; ++i) {  // 16 to an edge of the cube: spacings of 1/8 of `size`
+      cloud.position.push_back(size * (Vec3d{-7, 5, 0} + uniform_vector(engine, 1)));
+      cloud.volume.push_back(i);
+    }
+    cloud.regions["even"] = {};
+    for (int i = 0; i < 4096; i += 2) cloud.regions["even"].push_back(i);
+    const Cloud before = cloud;
+    order_along_curve(cloud);
+    double way = 0;
+    std::set<double> seen;
+    for (std::size_t i = 0; i < 4096; ++i) {
+      const auto from = static_cast<std::size_t>(cloud.volume[i]);
+      EXPECT_EQ(cloud.position[i], before.position[from]);
+      seen.insert(cloud.volume[i]);
+      if (i > 0) way += norm(cloud.position[i] - cloud.position[i - 1]);
+    }
+    EXPECT_EQ(seen.size(), 4096u);
+    for (const Index i : cloud.regions["even"]) EXPECT_EQ(std::fmod(cloud.volume[i], 2), 0);
+    EXPECT_EQ(cloud.regions["even"].size(), 2048u);
+    // Two random places are 1.3 `size` apart on average; a Morton curve steps 1.7 spacings or so,
+    // its long steps included.
+    EXPECT_LT(way / 4095, 2.5 * size / 8);
+  }
+}
 
 TEST(MeanSpacing, EqualsBruteForce) {
   auto points = uneven_points(700);

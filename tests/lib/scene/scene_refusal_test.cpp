@@ -268,6 +268,20 @@ TEST(SceneRefusal, DotsAndLettersInTextAndCommentsAreFree) {
   const Scene scene = parse_scene(
       "\xef\xbb\xbf# " + dots + "\ntitle = '" + dots + "'\n" + time_section + dino, "scene.toml");
   EXPECT_EQ(scene.title, dots);
+  // A quote behind a backslash ends no string, but one behind an escaped backslash does.
+  const auto title_of = [&](const std::string& title) {
+    return parse_scene("title = " + title + "  # M\xc3\xbcller\n" + time_section + dino,
+                       "scene.toml")
+        .title;
+  };
+  EXPECT_EQ(title_of(R"("\"M)"
+                     "\xc3\xbc"
+                     R"(ller\"")"),
+            "\"M\xc3\xbcller\"");
+  EXPECT_EQ(title_of(R"("M)"
+                     "\xc3\xbc"
+                     R"(ller\\")"),
+            "M\xc3\xbcller\\");
 }
 
 TEST(SceneRefusal, MoreBodiesThanAllowedAreRefused) {

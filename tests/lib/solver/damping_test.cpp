@@ -169,6 +169,26 @@ TEST(StepPlan, KeepsStepsShortAgainstDamping) {
   EXPECT_EQ(refusal_of(scene, model, true), "");
 }
 
+/// Devices find the limit to different last digits; the step has three digits, just below.
+TEST(StepPlan, KeepsThreeDigitsOfTheStep) {
+  for (const double young : {1e2, 1e5, 3e8}) {
+    Scene scene = one_body();
+    scene.bodies[0].material.young = young;
+    scene.output.frames_per_second = 0;
+    scene.time.safety = 0.7;
+    scene.time.end = 1e6;  // more than 1e7 steps: to end on a whole one changes the eighth digit
+    const Model model = model_of(scene, cube);
+    const auto backend = make_test_backend(model, Precision::double_);
+    const StepPlan plan = plan_steps(scene, model, *backend);
+    double digits = plan.dt;  // as a number from 100 to 999
+    while (digits < 100) digits *= 10;
+    EXPECT_NEAR(digits, std::round(digits), 1e-3) << plan.dt;
+    EXPECT_LE(digits, 1000);
+    EXPECT_LE(plan.dt, 0.7 * plan.limit.largest_step);
+    EXPECT_GE(plan.dt, 0.7 * plan.limit.largest_step * (1 - 1e-2));
+  }
+}
+
 MotionRequest shake(double frequency) {
   MotionRequest motion;
   motion.select.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}};

@@ -166,8 +166,21 @@ TEST(Equilibrium, IsAStepOfTheSolver) {
   scene.gravity = {0.5, 0, 0};
   const Model model = bar_of(scene);
   const auto backend = make_test_backend(model, Precision::double_);
-  Solver solver(model, *backend, initial_state(model, scene, 1), Method::equilibrium);
+  const StepPlan plan = plan_steps(scene, model, *backend);
+  Solver solver(model, *backend, initial_state(model, scene, plan.dt), Method::equilibrium);
+  double last = 1;
+  solver.observe([&](const NewtonProgress& now) {
+    EXPECT_EQ(now.tolerance, 1e-8);  // what is asked where nobody asks for anything else
+    last = now.residual;
+    return true;
+  });
   solver.step();
+  EXPECT_GT(last, 1e-8);  // of the step before the last, which ends the search
+  EXPECT_LT(last, 0.1);
+  // Rest comes after the start: times of frames grow, which viewers order them by.
+  EXPECT_EQ(plan.steps, 1);
+  EXPECT_EQ(plan.steps_per_frame, 1);
+  EXPECT_EQ(solver.time(), 1);
   EXPECT_LE(solver.work().residual, 1e-8);
   EXPECT_GT(solver.work().evaluations, solver.work().newton_steps);
   const State found = solver.state();

@@ -216,6 +216,17 @@ TEST(Motion, FollowsItsPath) {
 }
 
 /// A smooth step of two turns about an axis beside the body, and more: positions are set.
+/// A motion that takes no time has always been at its end, and goes on from there.
+TEST(Motion, OfNoDurationIsAtItsEnd) {
+  Motion motion;
+  motion.displacement = {1, -2, 3};
+  motion.velocity = {0, 0, 2};
+  for (const double time : {0.0, 1e-3, 7.0}) {
+    const Vec3d expected = Vec3d{1, -2, 3} + time * Vec3d{0, 0, 2};
+    EXPECT_EQ(motion.path_at(time).at({5, 6, 7}), expected) << time;
+  }
+}
+
 TEST(Motion, TurnsAboutAnAxis) {
   Scene scene = one_body();
   MotionRequest request;
