@@ -107,7 +107,9 @@ class Builder {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
         CloudPiece made = piece(b, digest);
         Cloud& cloud = made.cloud;
-        if (!cloud.position.empty()) check_cloud(scene_.bodies[b], cloud);
+        if (!cloud.position.empty()) {
+          naming(scene_.bodies[b], [&] { check_cloud(scene_.bodies[b], cloud); });
+        }
         Body& body = bodies_[b];
         body.size = made.whole;
         with_volumes[b] = !cloud.volume.empty();
@@ -761,7 +763,9 @@ class Builder {
         BoundaryChoice& choice = choices[b];
         // No phyxel here: an empty list of numbers would mean all.
         if (number.empty()) number.push_back(bodies_[b].size);
-        choice = choose_boundary(scene_.bodies[b], cloud, number, bodies_[b].size);
+        choice = naming(scene_.bodies[b], [&] {
+          return choose_boundary(scene_.bodies[b], cloud, number, bodies_[b].size);
+        });
         BoundaryChoice own = choice;
         for (std::vector<Index>& chosen : own.chosen) {
           std::erase_if(chosen, [&](Index i) {
@@ -782,11 +786,13 @@ class Builder {
       for (std::size_t b = 0; b < bodies_.size(); ++b) {
         const BodyRequest& request = scene_.bodies[b];
         const auto entries = static_cast<std::ptrdiff_t>(choices[b].chosen.size());
-        choices[b].refuse_empty(request, {count, count + entries}, boxes_[b]);
+        naming(request, [&] {
+          choices[b].refuse_empty(request, {count, count + entries}, boxes_[b]);
+        });
         count += entries;
         std::vector<double> loaded;
         for (std::size_t l = 0; l < request.loads.size(); ++l) loaded.push_back((mass++)->value());
-        choices[b].add_to(m, request, m.parts[b].begin, loaded);
+        naming(request, [&] { choices[b].add_to(m, request, m.parts[b].begin, loaded); });
       }
     });
   }

@@ -21,6 +21,8 @@ std::string named(const Scene& scene, const std::string& message) {
 }
 
 std::string named(const BodyRequest& body, const std::string& message) {
+  // A selection made in code says no place of its own.
+  if (message.starts_with(": ")) return named(body, message.substr(2));
   if (body.where.empty() || message.starts_with(file_of(body.where) + ":")) return message;
   const std::string name = fmt::format("body \"{}\"", body.name);
   if (message.starts_with(name)) return fmt::format("{}: {}", body.where, message);

@@ -1,4 +1,6 @@
 /// The program on several ranks, as mpirun starts it: one answer, one message, no hang.
+#include "mpirun.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -14,7 +16,6 @@
 
 #include "device.hpp"
 #include "phyxel/checkpoint.hpp"
-#include "support/program.hpp"
 
 namespace phyxel {
 namespace {
@@ -24,78 +25,6 @@ using test::Outcome;
 using test::text_of;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-class Mpirun : public test::Program {
- protected:
-  /// Two bodies of which one is held, pulled and moved, with surfels and every field.
-  void write_scene(const std::string& end = "0.1") const {
-    write("scene.toml", "gravity = [0.0, 0.0, -9.81]\n[time]\nend = " + end + R"(
-[solver]
-threads = 1
-device = "cpu"
-[output]
-directory = "out"
-frames_per_second = 40
-fields = ["displacement", "velocity", "von_mises", "volume_ratio", "mass"]
-[[body]]
-name = "beam"
-shape = "beam"
-size = [0.8, 0.2, 0.2]
-spacing = 0.04
-jitter = 0.1
-[body.material]
-young = 2e5
-poisson = 0.3
-density = 1000
-[body.neighbours]
-support = "adaptive"
-[[body.fixed]]
-region = "x-"
-[[body.load]]
-region = "x+"
-force = [0.0, 1.0, 0.0]
-ramp = 0.05
-[[body]]
-name = "bug"
-shape = "horn_bug"
-translation = [10.0, 0.0, 0.0]
-spin = [0.0, 1.0, 0.0]
-[body.material]
-young = 6e5
-poisson = 0.3
-density = 1000
-)");
-  }
-  void use_ranks(int count) {
-    launcher_ = {};
-    if (count == 0) return;
-    launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n",
-                 std::to_string(count)};
-    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI's own
-  }
-  Outcome run_on(int count, const std::vector<std::string>& arguments) {
-    use_ranks(count);
-    return run(arguments);
-  }
-  /// All files of an output folder, by name, but for run.json, which tells of times and ranks.
-  std::map<std::string, std::string> files_of(const std::string& directory) const {
-    std::map<std::string, std::string> files;
-    for (const auto& entry : fs::directory_iterator(folder_ / directory)) {
-      if (!entry.is_regular_file() || entry.path().filename() == "run.json") continue;
-      files[entry.path().filename().string()] = text_of(entry.path());
-    }
-    return files;
-  }
-  void expect_same_files(const std::string& a, const std::string& b) const {
-    const auto left = files_of(a), right = files_of(b);
-    EXPECT_GT(left.size(), 10u);
-    ASSERT_EQ(left.size(), right.size());
-    for (const auto& [name, content] : left) {
-      ASSERT_TRUE(right.contains(name)) << name;
-      EXPECT_TRUE(right.at(name) == content) << b << "/" << name;
-    }
-  }
-};
 
 /// Each rank starts itself once more, with threads that sleep soon while they wait: its OpenMP
 /// runtime says so, which has read the environment each time that it was loaded.
@@ -311,84 +240,6 @@ TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
 }
 
 /// How often a text stands in another.
-int count_of(const std::string& what, const std::string& text) {
-  int count = 0;
-  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
-  return count;
-}
-
-TEST_F(Mpirun, WrongInputIsToldOnce) {
-  write_scene();
-  write("kept", "precious");
-  write("huge.toml", R"(
-[time]
-end = 1.0
-[output]
-directory = "out"
-[[body]]
-name = "huge"
-shape = "beam"
-size = [1.0, 1.0, 1.0]
-spacing = 1e-4
-[body.material]
-young = 2e5
-poisson = 0.3
-density = 1000
-)");
-  write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const std::string material = "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1e3\n";
-  write("flat.toml", "[time]\nend = 1\n[[body]]\nmesh = \"flat.obj\"\nphyxels = 50\n" + material);
-  write("loose.toml",
-        "[time]\nend = 1\n[[body]]\nshape = \"beam\"\nsize = [1, 1, 1]\nspacing = "
-        "0.2\n[[body.fixed]]\n"
-        "\n\nregion = \"left\"\n" +
-            material);
-  const struct {
-    std::vector<std::string> arguments;
-    std::string message;
-  } cases[] = {
-      {{"run", "missing.toml"}, "missing.toml"},
-      {{"run", "scene.toml", "--partitioner", "metiss"}, "--partitioner metiss"},
-      {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
-      {{"run", "scene.toml", "--step", "1"}, "error: scene.toml: time.step = 1 s is unstable"},
-      {{"run", "scene.toml", "--transport", "pigeon"}, "--transport pigeon"},
-      {{"run", "huge.toml"}, "error: huge.toml:6:1: body \"huge\": "},
-      {{"run", "flat.toml"}, "error: flat.toml:3:1: body \"flat\": flat.obj: the surface"},
-      {{"run", "loose.toml"}, "error: loose.toml:10:10: body \"beam\" has no region"},
-      {{"run", "scene.toml", "--out", "kept"}, "kept"},
-      {{"render", "out"}, "2 ranks"}};
-  for (const auto& c : cases) {
-    const Outcome outcome = run_on(2, c.arguments);
-    EXPECT_EQ(outcome.code, 2) << outcome.err;
-    EXPECT_EQ(count_of(c.message, outcome.err), 1) << outcome.err;
-  }
-  EXPECT_EQ(text_of(folder_ / "kept"), "precious");
-  EXPECT_EQ(count_of("Usage:", run_on(2, {"--help"}).out), 1);
-}
-
-/// Each rank reads its own command line: what changes the plan must be the same on all, or they
-/// would step to different ends and wait for each other for ever.
-TEST_F(Mpirun, OptionsThatDifferBetweenRanksAreToldOnce) {
-  write_scene();
-  const struct {
-    const char *option, *first, *second;
-  } cases[] = {{"--until", "0.1", "0.05"},
-               {"--step", "1e-4", "2e-4"},
-               {"--precision", "float", "double"},
-               {"--method", "verlet", "equilibrium"}};
-  for (const auto& c : cases) {
-    SCOPED_TRACE(c.option);
-    use_ranks(1);
-    const Outcome outcome = run({"run", "scene.toml", c.option, c.first, ":", "-n", "1",
-                                 PHYXEL_PROGRAM, "run", "scene.toml", c.option, c.second});
-    EXPECT_EQ(outcome.code, 2) << outcome.err;
-    EXPECT_EQ(count_of("phyxel: error: the ranks have different options", outcome.err), 1)
-        << outcome.err;
-    EXPECT_EQ(count_of("error: ", outcome.err), 1) << outcome.err;
-    EXPECT_FALSE(fs::exists(folder_ / "out"));
-  }
-}
-
 /// The plan of two ranks is that of one, and no file is written.
 TEST_F(Mpirun, CheckTellsThePlanOnce) {
   write_scene();

@@ -219,11 +219,13 @@ TEST(SceneError, IsNamedOnce) {
   EXPECT_EQ(named(scene, "a/b.toml:3:1: no"), "a/b.toml:3:1: no");
   BodyRequest body;
   EXPECT_EQ(named(body, "no"), "no");
+  EXPECT_EQ(named(body, ": no"), "no");  // a selection without a place
   body.where = "a/b.toml:3:1";
   body.name = "bar";
   EXPECT_EQ(named(body, "no"), "a/b.toml:3:1: body \"bar\": no");
   EXPECT_EQ(named(body, "body \"bar\": no"), "a/b.toml:3:1: body \"bar\": no");
   EXPECT_EQ(named(body, "a/b.toml:9:2: no"), "a/b.toml:9:2: no");
+  EXPECT_EQ(named(body, ": no"), "a/b.toml:3:1: body \"bar\": no");
   EXPECT_THROW(naming(scene, []() -> int { throw DivergedError("x"); }), DivergedError);
   try {
     naming(scene, [] { throw AgreedError(ExitCode::bad_input, "no"); });

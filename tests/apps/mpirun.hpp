@@ -1,0 +1,93 @@
+/// The program on several ranks, as mpirun starts it.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "support/program.hpp"
+
+namespace phyxel {
+
+class Mpirun : public test::Program {
+ protected:
+  /// Two bodies of which one is held, pulled and moved, with surfels and every field.
+  void write_scene(const std::string& end = "0.1") const {
+    write("scene.toml", "gravity = [0.0, 0.0, -9.81]\n[time]\nend = " + end + R"(
+[solver]
+threads = 1
+device = "cpu"
+[output]
+directory = "out"
+frames_per_second = 40
+fields = ["displacement", "velocity", "von_mises", "volume_ratio", "mass"]
+[[body]]
+name = "beam"
+shape = "beam"
+size = [0.8, 0.2, 0.2]
+spacing = 0.04
+jitter = 0.1
+[body.material]
+young = 2e5
+poisson = 0.3
+density = 1000
+[body.neighbours]
+support = "adaptive"
+[[body.fixed]]
+region = "x-"
+[[body.load]]
+region = "x+"
+force = [0.0, 1.0, 0.0]
+ramp = 0.05
+[[body]]
+name = "bug"
+shape = "horn_bug"
+translation = [10.0, 0.0, 0.0]
+spin = [0.0, 1.0, 0.0]
+[body.material]
+young = 6e5
+poisson = 0.3
+density = 1000
+)");
+  }
+  void use_ranks(int count) {
+    launcher_ = {};
+    if (count == 0) return;
+    launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n",
+                 std::to_string(count)};
+    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI's own
+  }
+  test::Outcome run_on(int count, const std::vector<std::string>& arguments) {
+    use_ranks(count);
+    return run(arguments);
+  }
+  /// All files of an output folder, by name, but for run.json, which tells of times and ranks.
+  std::map<std::string, std::string> files_of(const std::string& directory) const {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / directory)) {
+      if (!entry.is_regular_file() || entry.path().filename() == "run.json") continue;
+      files[entry.path().filename().string()] = test::text_of(entry.path());
+    }
+    return files;
+  }
+  void expect_same_files(const std::string& a, const std::string& b) const {
+    const auto left = files_of(a), right = files_of(b);
+    EXPECT_GT(left.size(), 10u);
+    ASSERT_EQ(left.size(), right.size());
+    for (const auto& [name, content] : left) {
+      ASSERT_TRUE(right.contains(name)) << name;
+      EXPECT_TRUE(right.at(name) == content) << b << "/" << name;
+    }
+  }
+};
+
+/// How often `what` is said.
+inline int count_of(const std::string& what, const std::string& text) {
+  int count = 0;
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;
+  return count;
+}
+
+}  // namespace phyxel
