@@ -73,6 +73,34 @@ TEST_F(Outputs, AreOnTheDiskBeforeTheirNameIs) {
   EXPECT_THAT(disk_calls(), ElementsAre("sync file", "rename", "sync folder"));
 }
 
+/// Given up on the way, by an exception that has nothing to do with the file.
+TEST_F(Outputs, GivenUpLeaveTheOldFileAndNothingElse) {
+  const auto open_files = [] {
+    return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator());
+  };
+  write("kept", "old");
+  const auto before = open_files();
+  {
+    NewFile file(folder_ / "kept", 3);
+    file.write(0, std::as_bytes(std::span("new", 3)));
+    EXPECT_TRUE(fs::exists(file.temporary()));
+  }
+  EXPECT_EQ(open_files(), before);
+  EXPECT_EQ(text_of(folder_ / "kept"), "old");
+  EXPECT_FALSE(fs::exists(folder_ / "kept.tmp"));
+  // What is finished is no more touched, also if another begins meanwhile.
+  NewFile next(folder_ / "next", 3);
+  {
+    NewFile file(folder_ / "kept", 3);
+    file.write(0, std::as_bytes(std::span("new", 3)));
+    file.finish(Durable::no);
+    write("kept.tmp", "another's");
+  }
+  EXPECT_EQ(open_files(), before + 1);
+  EXPECT_EQ(text_of(folder_ / "kept"), "new");
+  EXPECT_EQ(text_of(folder_ / "kept.tmp"), "another's");
+}
+
 TEST_F(Outputs, ReplaceRegularFilesOnly) {
   const fs::path pipe = fifo();
   Cloud cloud;

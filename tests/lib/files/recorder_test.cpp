@@ -10,6 +10,7 @@
 
 #include <cstdlib>
 
+#include "files/hdf5_file.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
 #include "support/folder.hpp"
@@ -333,6 +334,18 @@ TEST_F(Recording, TheSingleFileHoldsEveryStep) {
     EXPECT_THROW(export_single(folder_ / "out" / (std::string(family) + ".hdf.series"), out, false),
                  InputError);
     EXPECT_FALSE(fs::exists(out.string() + ".tmp"));
+    // Cells stay where they are: each step has an offset of 0 for each of its two kinds of them.
+    const Hdf5Reader in(out);
+    const std::string steps = "/VTKHDF/Steps/";
+    EXPECT_EQ(in.array<std::int64_t>(steps + "PartOffsets"), (std::vector<std::int64_t>{0, 0, 0}));
+    EXPECT_EQ(in.array<std::int64_t>(steps + "NumberOfParts"),
+              (std::vector<std::int64_t>{1, 1, 1}));
+    for (const char* name : {"CellOffsets", "ConnectivityIdOffsets"}) {
+      EXPECT_EQ(in.array<std::int64_t>(steps + name, 1), (std::vector<std::int64_t>{0, 0, 0}));
+    }
+    const auto points = static_cast<std::int64_t>(in.shape("/VTKHDF/Points").rows / 3);
+    EXPECT_EQ(in.array<std::int64_t>(steps + "PointOffsets"),
+              (std::vector<std::int64_t>{0, points, 2 * points}));
   }
   const int code = read_back(folder_ / "out", "single", 0);
   PHYXEL_NEEDS_TOOL(code != no_reader, "python3-vtk9 or python3-h5py");

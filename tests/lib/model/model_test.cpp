@@ -4,6 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <set>
+
+#include "model/assembly.hpp"
+#include "model/cloud_piece.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
@@ -27,6 +32,47 @@ TEST(Weight, IntegratesToOne) {
   }
   EXPECT_NEAR(sum, 1, 1e-8);  // midpoint rule, h²/24 n² times the second derivative
   EXPECT_EQ(weight(h, h), 0);
+}
+
+/// A rotation keeps its axis and lengths, and turns what is across by its angle, by the right hand.
+TEST(Rotation, TurnsByItsAngleAboutItsAxis) {
+  for (const Vec3d& axis : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}, Vec3d{2, -1, 3}}) {
+    const Vec3d a = axis / norm(axis);
+    for (const double angle : {1e-3, 1.0, 3.0, 5.0}) {
+      const Mat3d r = rotation_by(angle * a);
+      EXPECT_LT(norm(r * a - a), 1e-15);
+      for (const Vec3d& v : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0.3, 0.4, -0.5}}) {
+        const Vec3d across = v - dot(v, a) * a, ahead = cross(a, across);
+        EXPECT_LT(norm(r * across - std::cos(angle) * across - std::sin(angle) * ahead), 1e-15);
+      }
+    }
+  }
+  EXPECT_EQ(rotation_by({}) * (Vec3d{1, 2, 3}), (Vec3d{1, 2, 3}));
+}
+
+/// Ranks that read files of their own are told apart by whatever the files hold.
+TEST(CloudDigest, TellsCloudsApartByAllTheyHave) {
+  Cloud cloud = lattice(2, 2, 2, 0.1);
+  cloud.surface = {
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}, {{0, 1, 2}}};
+  cloud.regions = {{"a", {0, 1}}, {"b", {}}};
+  std::set<std::uint64_t> seen{cloud_digest(cloud)};
+  const auto changed = [&](const auto& change) {
+    Cloud other = cloud;
+    change(other);
+    seen.insert(cloud_digest(other));
+  };
+  changed([](Cloud& c) { c.position[7].z += 1e-15; });
+  changed([](Cloud& c) { c.volume[7] *= 2; });
+  changed([](Cloud& c) { c.volume.clear(); });
+  changed([](Cloud& c) { c.surface.position[2].y = 2; });
+  changed([](Cloud& c) { c.surface.triangle[0] = {0, 2, 1}; });
+  changed([](Cloud& c) { c.surface.triangle.clear(); });
+  changed([](Cloud& c) { c.regions["a"] = {0, 2}; });
+  changed([](Cloud& c) { c.regions["c"] = {}; });
+  changed([](Cloud& c) { c.regions = {{"a", {}}, {"b", {0, 1}}}; });
+  EXPECT_EQ(seen.size(), 10u);
+  EXPECT_EQ(seen.count(cloud_digest(cloud)), 1u);
 }
 
 TEST(KernelMasses, HaveTheBodysDensityOnAverage) {
