@@ -325,8 +325,9 @@ def page_of(rows, reasons):
     for row in rows:
         if row["outcome"] == SURVIVED:
             reason = reasons.get(identity(row), {})
+            left = f" ({row['noticed_by']})" if row["noticed_by"] else ""
             lines.append(f"| {row['file']}:{row['line']} | {row['kind']}: {cell(row['change'])} | {reason.get('equivalent', '?')} | "
-                         f"{cell(reason.get('reason', 'not explained yet'))} |")
+                         f"{cell(reason.get('reason', 'not explained yet'))}{left} |")
     return "\n".join(lines) + "\n"
 
 
