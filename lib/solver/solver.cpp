@@ -47,7 +47,11 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
 }
 
 Solver::Solver(Backend& backend, const State& start)
-    : backend_(backend), steps_(start.step), first_step_(start.step), dt_(start.dt), looks_(start.looks) {
+    : backend_(backend),
+      steps_(start.step),
+      first_step_(start.step),
+      dt_(start.dt),
+      looks_(start.looks) {
   backend_.upload(start);
 }
 

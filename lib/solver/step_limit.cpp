@@ -38,6 +38,7 @@ class HostVibration final : public Vibration {
     const double length = std::sqrt(vectors_.product(current_, current_));
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
   }
+  HostVibration(const Model&, Backend&, State&&, double) = delete;  // it is kept by reference
   HostVibration(const HostVibration&) = delete;
   HostVibration& operator=(const HostVibration&) = delete;
 
@@ -187,7 +188,8 @@ StepLimit step_limit(const Model& model, int threads) {
   const std::unique_ptr<Backend> backend = make_cpu_backend(model, Precision::double_, threads);
   const double distance =
       strain_at_rest * OwnedVectors(model, backend->threads()).smallest_support();
-  HostVibration vibration(model, *backend, at_rest(model), distance);
+  const State rest = at_rest(model);
+  HostVibration vibration(model, *backend, rest, distance);
   return step_limit(model, vibration, stage);
 }
 

@@ -113,6 +113,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   struct Header {
     std::int64_t step;
     double time, dt;
+    Looks looks;
   };
   Header now{};
   ranks_.together([&] {
@@ -123,7 +124,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
     }
     const State header = checkpoint->state(0, 0);
-    now = {header.step, header.time, header.dt};
+    now = {header.step, header.time, header.dt, header.looks};
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -132,6 +133,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.step = now.step;
   state.time = now.time;
   state.dt = now.dt;
+  state.looks = now.looks;
   return state;
 }
 

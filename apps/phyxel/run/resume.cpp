@@ -88,7 +88,6 @@ std::optional<Checkpoint> Run::checkpoint_for_all() {
   share(state.step);
   share(state.time);
   share(state.dt);
-  share(state.looks);
   return found;
 }
 
