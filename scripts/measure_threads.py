@@ -42,7 +42,7 @@ density = 1000
 """
 
 
-def speed(program, folder, phyxels, policy, seconds=3):
+def speed(program, folder, phyxels, policy, seconds=2):
     """Steps per second of two threads, after `seconds`."""
     scene = pathlib.Path(folder) / "scene.toml"
     scene.write_text(SCENE.format(phyxels=phyxels))
