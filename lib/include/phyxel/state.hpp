@@ -7,12 +7,12 @@
 
 namespace phyxel {
 
-/// What looks at a body that stiffens have found (`StepShortener`): with it a resumed run looks at
-/// the steps at which the unbroken one does, and finds the same.
+/// What `StepShortener` has seen of bodies that stiffen. A state carries it, so that a resumed run
+/// looks at the same steps as the unbroken one, and finds the same.
 struct Looks {
-  std::int64_t next = 0;   ///< Step of the next look.
-  std::int64_t last = -1;  ///< Step of the last one; -1: there has been none.
-  double ratio = 1;        ///< Stiffening that it found.
+  std::int64_t next = 0;       ///< Step of the next look.
+  std::int64_t last = -1;      ///< Step of the last one; -1: there has been none.
+  double ratio = 1;            ///< Stiffening that it found.
   std::int64_t measured = -1;  ///< Step at which the limit of the step was found; -1: never.
   double measured_ratio = 1;   ///< Stiffening then.
   double measured_share = 0;   ///< (dt / limit)² then.
