@@ -25,9 +25,9 @@ struct Exchanges {
   Traffic traffic;        ///< Of this rank, since the start.
 };
 
-/// A model, at rest or deformed, as Lanczos' iteration sees it: three vectors of three numbers a phyxel, on one
-/// device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared eigenfrequencies. `current`
-/// starts as a unit vector, `previous` as zero.
+/// A model, at rest or deformed, as Lanczos' iteration sees it: three vectors of three numbers a
+/// phyxel, on one device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared
+/// eigenfrequencies. `current` starts as a unit vector, `previous` as zero.
 class Vibration {
  public:
   virtual ~Vibration() = default;

@@ -128,10 +128,10 @@ class Solver {
 
 /// Halves Verlet's steps where laws have become so stiff that they would soon be unstable. It looks
 /// at a bound that costs little, a wave in the stiffest phyxel; only beyond that bound it finds the
-/// limit itself, as far fewer bodies outgrow their step than have a phyxel that would. When it looks
-/// follows from what it has seen: often where a body stiffens, seldom where nothing changes. All of
-/// that is part of the state, so that runs, restarts and any number of threads and ranks halve at
-/// the same steps. Laws that cannot stiffen cost nothing.
+/// limit itself, as far fewer bodies outgrow their step than have a phyxel that would. When it
+/// looks follows from what it has seen: often where a body stiffens, seldom where nothing changes.
+/// All of that is part of the state, so that runs, restarts and any number of threads and ranks
+/// halve at the same steps. Laws that cannot stiffen cost nothing.
 class StepShortener {
  public:
   static constexpr std::int64_t fewest = 16, most = 128;  ///< Steps between two looks.
