@@ -9,6 +9,7 @@
 
 #include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
+#include "files/looks_group.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
 
@@ -21,8 +22,6 @@ constexpr const char* kind = "checkpoint";
 constexpr std::int64_t version = 3;
 constexpr std::int64_t oldest_version = 2;  // without parameters
 constexpr std::size_t kept = 2;
-// Steps and frames beyond what double counts exactly are none that a run has made.
-constexpr std::int64_t most_counted = std::int64_t{1} << 53;
 // Phyxels whose values are looked at together.
 constexpr Index looked_at_together = 1 << 20;
 
@@ -81,35 +80,6 @@ void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3
       in.refuse(
           fmt::format("{} is not finite in row {}", path, i + static_cast<std::size_t>(first)));
   }
-}
-
-void write_looks(Hdf5Writer& out, const Looks& looks) {
-  out.group("/state/looks");
-  out.attribute("/state/looks", "next", looks.next);
-  out.attribute("/state/looks", "last", looks.last);
-  out.attribute("/state/looks", "ratio", looks.ratio);
-  out.attribute("/state/looks", "measured", looks.measured);
-  out.attribute("/state/looks", "measured_ratio", looks.measured_ratio);
-  out.attribute("/state/looks", "measured_share", looks.measured_share);
-  out.attribute("/state/looks", "apart", looks.apart);
-}
-
-Looks read_looks(const Hdf5Reader& in) {
-  Looks looks;
-  looks.next = in.integer_attribute("/state/looks", "next");
-  looks.last = in.integer_attribute("/state/looks", "last");
-  looks.ratio = in.number_attribute("/state/looks", "ratio");
-  looks.measured = in.integer_attribute("/state/looks", "measured");
-  looks.measured_ratio = in.number_attribute("/state/looks", "measured_ratio");
-  looks.measured_share = in.number_attribute("/state/looks", "measured_share");
-  looks.apart = in.integer_attribute("/state/looks", "apart");
-  if (std::min({looks.next, looks.last + 1, looks.measured + 1, looks.apart}) < 0 ||
-      std::max({looks.next, looks.last, looks.measured, looks.apart}) > most_counted ||
-      !std::isfinite(looks.ratio) || !(looks.measured_ratio > 0) ||
-      !std::isfinite(looks.measured_ratio) || !(looks.measured_share >= 0)) {
-    in.refuse("/state/looks: steps that are negative or ratios that are not finite");
-  }
-  return looks;
 }
 
 }  // namespace

@@ -200,21 +200,21 @@ StepLimit step_limit(const Model& model, Backend& backend) {
   return step_limit(model, *vibration, stage);
 }
 
-StepLimit step_limit_at(const Model& model, Backend& backend, const State& present) {
+StepLimit present_step_limit(const Model& model, Backend& backend) {
   const OwnedVectors vectors(model, std::max(1, backend.threads()));
   const double distance = strain_at_work * vectors.smallest_support();
   Frequency found;
   if (const std::unique_ptr<Vibration> on_device = backend.vibration_at_present(distance)) {
     found = largest_frequency(model, *on_device, 0.02);
   } else {
-    State there = present;
-    vectors.refresh_ghosts(there.displacement);
-    HostVibration vibration(model, backend, there, distance);
+    State present;
+    backend.download(present);
+    vectors.refresh_ghosts(present.displacement);
+    HostVibration vibration(model, backend, present, distance);
     found = largest_frequency(model, vibration, 0.02);
-    backend.upload(there);
+    backend.upload(present);
   }
   StepLimit limit;
-  limit.sound_step = smallest_sound_step(model);
   limit.omega_max = found.omega;
   limit.largest_step = 2 / found.omega;
   limit.iterations = found.iterations;

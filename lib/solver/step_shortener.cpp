@@ -1,4 +1,4 @@
-/// When steps of Verlet's method are halved.
+/// `StepShortener` decides when steps of Verlet's method are halved.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,18 +15,19 @@ namespace {
 /// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
 constexpr double at_surfaces = 1.1;
 
-/// Steps until a limit is found again though no phyxel has stiffened, as what is stiffest may have
-/// moved: twice as many each time that the limit has stayed what it was.
+/// The limit is found again after so many steps even if no phyxel has stiffened, because the
+/// stiffest place may have moved. The number doubles each time that the limit has stayed the same.
 constexpr std::int64_t least_apart = 256, most_apart = 2048;
-constexpr double same_share = 0.02;  // what a limit found is good to
+constexpr double same_share = 0.02;  // the accuracy of a limit that was found
 
-/// Of the limit, as the bound of a wave in the stiffest phyxel has it.
+/// The bound of (dt / limit)² that follows from a plane wave in the stiffest phyxel.
 double bound_of_share(double dt, double limit_at_rest, double ratio) {
   const double share = dt / limit_at_rest;
   return share * share * at_surfaces * ratio;
 }
 
-/// (dt / limit)² that the last limit found leads to, if all has stiffened as the stiffest phyxel.
+/// (dt / limit)² that follows from the last limit found, if all phyxels have stiffened as much as
+/// the stiffest one.
 double expected_share(const Looks& looks, double ratio) {
   return looks.measured_share * std::max(1.0, ratio / looks.measured_ratio);
 }
@@ -80,10 +81,10 @@ int StepShortener::look(Solver& solver, int halvings) {
   return made;
 }
 
-double StepShortener::share_of_limit(Solver& solver) const {
-  const StepLimit limit = step_limit_at(model_, backend_, solver.state());
+double StepShortener::share_of_limit(const Solver& solver) const {
+  const StepLimit limit = present_step_limit(model_, backend_);
   const double share = solver.dt() / limit.largest_step;
-  // Where forces nearby are not finite, the bound is what is known.
+  // Where forces nearby are not finite, only the bound is known.
   return std::isfinite(share) ? share * share
                               : bound_of_share(solver.dt(), limit_, seen_->what.ratio);
 }
@@ -95,7 +96,7 @@ double StepShortener::allowed_share(double dt) const {
 
 void StepShortener::look_again(const Solver& solver, Looks& looks, double ratio) const {
   const std::int64_t step = solver.steps();
-  // What the stiffest phyxel may come to before there is something to do.
+  // The stiffening of one phyxel up to which nothing has to be done.
   const double bounded = 1 / bound_of_share(solver.dt(), limit_, 1);
   const double most_ratio =
       ratio <= bounded ? bounded

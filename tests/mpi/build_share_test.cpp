@@ -322,7 +322,9 @@ TEST_P(BuiltShares, TellTheQualityOfTheirCut) {
   EXPECT_EQ(told.empty, expected.empty);
   EXPECT_EQ(told.cut, expected.cut);
   // Ranks know who shares an edge, the whole also in which direction.
-  if (whole_.neighbourhood.symmetric) EXPECT_DOUBLE_EQ(told.imbalance, expected.imbalance);
+  if (whole_.neighbourhood.symmetric) {
+    EXPECT_DOUBLE_EQ(told.imbalance, expected.imbalance);
+  }
 }
 
 TEST_P(BuiltShares, KnowOfTheWhole) {

@@ -318,8 +318,8 @@ TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
   }
   const Stiffening one = find_stiffening(whole_, *alone), all = find_stiffening(model_, *here);
   const std::string in_words = describe_phyxel(model_, all.phyxel);
-  const StepLimit limit_of_one = step_limit_at(whole_, *alone, whole.state()),
-                  limit_of_all = step_limit_at(model_, *here, share.state());
+  const StepLimit limit_of_one = present_step_limit(whole_, *alone),
+                  limit_of_all = present_step_limit(model_, *here);
   EXPECT_EQ(limit_of_one.omega_max, limit_of_all.omega_max);
   EXPECT_GT(limit_of_one.omega_max, 0);
   for (int s = 0; s < 3; ++s) {  // looking for it has changed nothing

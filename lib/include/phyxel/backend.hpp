@@ -131,9 +131,9 @@ class Backend {
   /// For the step limit; nothing where that is left to the host. It may use the arrays of this
   /// backend: a state is to be uploaded after.
   virtual std::unique_ptr<Vibration> vibration() { return nullptr; }
-  /// The same about the present displacements, by differences of forces; they are there again when
-  /// it is gone. Nothing where that is left to the host.
-  /// @param distance of the other displacements [m]
+  /// A vibration about the present displacements, found by differences of forces. Its destructor
+  /// restores the displacements. Nothing where that is left to the host.
+  /// @param distance to the displaced states of which the forces are found [m]
   virtual std::unique_ptr<Vibration> vibration_at_present([[maybe_unused]] double distance) {
     return nullptr;
   }

@@ -31,11 +31,11 @@ StepLimit step_limit(const Model& model, int threads = 0);
 /// to rounding. It uses the backend's arrays: a state is to be uploaded after.
 StepLimit step_limit(const Model& model, Backend& backend);
 
-/// The limit at the present displacements, within 2%: by Lanczos iteration on differences of the
-/// forces there. Of a share: collective, and the same on any number of ranks.
-/// @param present what the backend holds, and holds again after
+/// The limit at the displacements that the backend holds, and holds again after, within 2%: by
+/// Lanczos iteration on differences of the forces there. `sound_step`, which is of the model at
+/// rest, is not found. Of a share: collective, and the same on any number of ranks.
 /// @returns a largest step that is infinite where nothing resists, NaN where a force is not finite
-StepLimit step_limit_at(const Model& model, Backend& backend, const State& present);
+StepLimit present_step_limit(const Model& model, Backend& backend);
 
 /// The steps a scene is taken in, and why.
 struct StepPlan {
@@ -159,8 +159,9 @@ class StepShortener {
 
  private:
   /// (dt / limit)² at the present displacements.
-  double share_of_limit(Solver& solver) const;
-  /// What it may be: `largest_share`, or a little more than at rest where a scene asked for more.
+  double share_of_limit(const Solver& solver) const;
+  /// The largest share that is allowed: `largest_share`, or a tenth more than at rest where a scene
+  /// asks for longer steps.
   double allowed_share(double dt) const;
   /// When to look again, after a look that found `ratio`.
   void look_again(const Solver& solver, Looks& looks, double ratio) const;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "files/hdf5_file.hpp"
+#include "files/looks_group.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
@@ -41,16 +42,6 @@ class CheckpointVersions : public test::Folder {
     std::filesystem::path file = folder_ / "checkpoint_000000007.h5";
     write_sealed(file, "checkpoint", out.content(), Durable::yes);
     return file;
-  }
-  static void write_looks(Hdf5Writer& out, const Looks& looks) {
-    out.group("/state/looks");
-    out.attribute("/state/looks", "next", looks.next);
-    out.attribute("/state/looks", "last", looks.last);
-    out.attribute("/state/looks", "ratio", looks.ratio);
-    out.attribute("/state/looks", "measured", looks.measured);
-    out.attribute("/state/looks", "measured_ratio", looks.measured_ratio);
-    out.attribute("/state/looks", "measured_share", looks.measured_share);
-    out.attribute("/state/looks", "apart", looks.apart);
   }
   static std::string refusal_of(const std::filesystem::path& file) {
     try {
