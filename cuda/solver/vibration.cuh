@@ -119,16 +119,14 @@ __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
   if (threadIdx.x == 0) add_exactly(words, shared[0]);
 }
 
-/// M^-1/2 K M^-1/2 at rest, by the linear law that every material has there.
+/// Lanczos' vectors of M^-1/2 K M^-1/2 on the device, from a start vector that does not depend on
+/// the order of tiles. What K is, those that inherit this say.
 template <class Real, class StateReal>
-class CudaVibration : public Vibration {
+class CudaLanczosVectors : public Vibration {
  public:
-  CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes)
-      : m_(model),
-        passes_(passes),
-        amplitude_(amplitude_at_rest(model.model())),
-        tiles_(model.rest_constants()),
-        product_(ExactSum::words, "sums") {
+  CudaLanczosVectors(const DeviceModel<Real, StateReal>& model,
+                     const Passes<Real, StateReal>& passes)
+      : m_(model), passes_(passes), product_(ExactSum::words, "sums") {
     const std::string what = "vectors of " + m_.subject();
     const std::size_t count = 3 * m_.places();
     previous_ = {count, what};
@@ -139,14 +137,6 @@ class CudaVibration : public Vibration {
     m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), m_.places(),
                     m_.number_at());
     scale(current_, 1 / std::sqrt(product(current_, current_)));
-  }
-  double apply(double beta) override {
-    m_.use_device();
-    m_.launch_tiles("bend", bend<Real, StateReal>, m_.fields(), current_.data(), amplitude_);
-    passes_.send_displacements();
-    passes_.linear_stress(tiles_.data());
-    passes_.gather(force_.data());
-    return times_stiffness(amplitude_, beta);
   }
   double subtract(double alpha) override {
     m_.use_device();
@@ -162,8 +152,7 @@ class CudaVibration : public Vibration {
   }
 
  protected:
-  using Model = DeviceModel<Real, StateReal>;
-  const Model& model() const { return m_; }
+  const DeviceModel<Real, StateReal>& model() const { return m_; }
   const Passes<Real, StateReal>& passes() const { return passes_; }
   const DeviceArray<Real>& current() const { return current_; }
   const DeviceArray<Real>& force() const { return force_; }
@@ -172,6 +161,47 @@ class CudaVibration : public Vibration {
     m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
                     previous_.data(), static_cast<Real>(beta), amplitude, next_.data());
     return product(next_, current_);
+  }
+
+ private:
+  double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) const {
+    product_.clear(m_.stream());
+    m_.launch_tiles("multiply_tiles", multiply_tiles<Real>, a.data(), b.data(), m_.places(),
+                    product_.data());
+    m_.wait();
+    ExactSum sum;
+    std::ranges::copy(fetched(product_), sum.ready().begin());
+    if (m_.share()) m_.share()->others->add(sum.ready());
+    return sum.value();
+  }
+  void scale(DeviceArray<Real>& a, double factor) {
+    m_.launch_tiles("scale", scale_vector<Real>, a.data(), m_.places(), static_cast<Real>(factor));
+  }
+
+  const DeviceModel<Real, StateReal>& m_;
+  const Passes<Real, StateReal>& passes_;
+  DeviceArray<unsigned long long> product_;
+  DeviceArray<Real> previous_, current_, next_, force_;
+};
+
+/// At rest, by the linear law that every material has there.
+template <class Real, class StateReal>
+class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
+  using Base = CudaLanczosVectors<Real, StateReal>;
+
+ public:
+  CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes)
+      : Base(model, passes),
+        amplitude_(amplitude_at_rest(model.model())),
+        tiles_(model.rest_constants()) {}
+  double apply(double beta) override {
+    const auto& m = this->model();
+    m.use_device();
+    m.launch_tiles("bend", bend<Real, StateReal>, m.fields(), this->current().data(), amplitude_);
+    this->passes().send_displacements();
+    this->passes().linear_stress(tiles_.data());
+    this->passes().gather(this->force().data());
+    return this->times_stiffness(amplitude_, beta);
   }
 
  private:
@@ -197,33 +227,16 @@ class CudaVibration : public Vibration {
     }
     return support > 0 && mass > 0 ? static_cast<Real>(support * std::sqrt(mass)) : Real(1);
   }
-  double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) const {
-    product_.clear(m_.stream());
-    m_.launch_tiles("multiply_tiles", multiply_tiles<Real>, a.data(), b.data(), m_.places(),
-                    product_.data());
-    m_.wait();
-    ExactSum sum;
-    std::ranges::copy(fetched(product_), sum.ready().begin());
-    if (m_.share()) m_.share()->others->add(sum.ready());
-    return sum.value();
-  }
-  void scale(DeviceArray<Real>& a, double factor) {
-    m_.launch_tiles("scale", scale_vector<Real>, a.data(), m_.places(), static_cast<Real>(factor));
-  }
 
-  const Model& m_;
-  const Passes<Real, StateReal>& passes_;
   Real amplitude_;
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
-  DeviceArray<unsigned long long> product_;
-  DeviceArray<Real> previous_, current_, next_, force_;
 };
 
-/// The same at the present displacements, by differences of forces there. The displacements are
+/// At the present displacements, by differences of forces there. The displacements are
 /// back when this object is gone; velocities are not touched.
 template <class Real, class StateReal>
-class CudaDeformedVibration final : public CudaVibration<Real, StateReal> {
-  using Base = CudaVibration<Real, StateReal>;
+class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
+  using Base = CudaLanczosVectors<Real, StateReal>;
 
  public:
   /// @param distance how far the other displacements are off [m]
