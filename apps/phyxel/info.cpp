@@ -178,8 +178,7 @@ Facts folder_facts(const fs::path& folder) {
 }
 
 Facts facts_of(const fs::path& file) {
-  expect_kind(file, {Kind::folder, Kind::scene, Kind::mesh, Kind::series, Kind::hdf5});
-  switch (kind_of(file)) {
+  switch (expect_kind(file, {Kind::folder, Kind::scene, Kind::mesh, Kind::series, Kind::hdf5})) {
     case Kind::missing:
       throw InputError(fmt::format("{}: no such file", file.string()));
     case Kind::folder:
@@ -258,7 +257,8 @@ void add_info(CLI::App& program) {
       "  phyxel info out/dino/phyxels_000010.hdf --json");
   command->callback([options] {
     if (options->parts) {
-      const Facts facts = partition_facts(options->file, *options->parts, options->partitioner);
+      const Facts facts = partition_facts(options->file, *options->parts, options->partitioner,
+                                          options->json ? nullptr : stderr);
       fmt::print("{}", options->json ? json_text(facts) + "\n" : partition_tables(facts));
       return;
     }

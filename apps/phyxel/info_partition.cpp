@@ -50,13 +50,13 @@ Facts plan_facts(const HaloPlan& plan) {
 
 }  // namespace
 
-Facts partition_facts(const std::filesystem::path& file, int parts,
-                      const std::string& partitioner) {
+Facts partition_facts(const std::filesystem::path& file, int parts, const std::string& partitioner,
+                      std::FILE* told) {
   const bool best = partitioner == "auto";
   Partitioner chosen = best ? Partitioner::metis : partitioner_of(partitioner);
   expect_kind(file, {Kind::scene});
   const Model model = [&] {
-    const SetupProgress progress(stderr);
+    const SetupProgress progress(told);
     return build_model(read_scene(file));
   }();
   const Graph phyxels = phyxel_graph(model);

@@ -117,10 +117,10 @@ Kind kind_of(const fs::path& file) {
   return Kind::unknown;
 }
 
-void expect_kind(const fs::path& file, std::initializer_list<Kind> wanted) {
+Kind expect_kind(const fs::path& file, std::initializer_list<Kind> wanted) {
   const Kind kind = kind_of(file);
-  if (kind == Kind::missing || kind == Kind::unknown) return;
-  if (std::find(wanted.begin(), wanted.end(), kind) != wanted.end()) return;
+  if (kind == Kind::missing || kind == Kind::unknown) return kind;
+  if (std::find(wanted.begin(), wanted.end(), kind) != wanted.end()) return kind;
   throw InputError(
       fmt::format("{}: {}; allowed here: {}", file.string(), advice(file, kind), in_words(wanted)));
 }

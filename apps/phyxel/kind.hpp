@@ -12,9 +12,10 @@ enum class Kind { missing, folder, scene, mesh, series, hdf5, table, unknown };
 /// not opened.
 Kind kind_of(const std::filesystem::path& file);
 
+/// The kind of a file that a command was given.
 /// @throws InputError if the file is plainly of none of the kinds `wanted`, naming the kind it has,
 /// the command that takes it, and what is allowed. A missing file or an unknown kind is left to the
 /// reader.
-void expect_kind(const std::filesystem::path& file, std::initializer_list<Kind> wanted);
+Kind expect_kind(const std::filesystem::path& file, std::initializer_list<Kind> wanted);
 
 }  // namespace phyxel::app

@@ -73,6 +73,8 @@ TEST_F(SetupLines, ShortStagesAndSilentCommandsLeaveNothing) {
   EXPECT_THAT(run({"check", "scene.toml"}).err, IsEmpty());
   show_all();
   EXPECT_THAT(run({"check", "scene.toml", "--json"}).err, IsEmpty());
+  EXPECT_THAT(run({"info", "scene.toml", "--partition", "2", "--json"}).err, IsEmpty());
+  EXPECT_THAT(run({"info", "scene.toml", "--partition", "2"}).err, Not(IsEmpty()));
   EXPECT_THAT(run({"run", "scene.toml", "--until", "0.001", "--quiet"}).err, IsEmpty());
   const Outcome sample =
       run({"sample", "cube.obj", "--phyxels", "500", "--out", "cube.h5", "--json"});
