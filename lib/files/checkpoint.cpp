@@ -104,7 +104,9 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   out.attribute("/phyxel", "method", std::string(method_name(info.method)));
   out.attribute("/phyxel", "model_digest", fmt::format("{:016x}", info.model_digest));
   out.attribute("/phyxel", "total_energy", info.total_energy);
-  out.attribute("/phyxel", "initial_energy", info.initial_energy);
+  out.attribute("/phyxel", "initial_energy", info.watched.start_energy);
+  out.attribute("/phyxel", "initial_speed", info.watched.start_speed);
+  out.attribute("/phyxel", "peak_energy", info.watched.peak_energy);
   out.attribute("/phyxel", "frames_written", info.frames_written);
   out.attribute("/phyxel", "units", std::string("m, m/s, s, J"));
   out.text("/phyxel/scene", info.scene_text);
@@ -154,7 +156,16 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
   if (error != std::errc() || end != digest.data() + digest.size())
     in.refuse("model_digest is not a number");
   info_.total_energy = in.number_attribute("/phyxel", "total_energy");
-  info_.initial_energy = in.number_attribute("/phyxel", "initial_energy");
+  info_.watched.start_energy = in.number_attribute("/phyxel", "initial_energy");
+  info_.watched.start_speed = std::numeric_limits<double>::quiet_NaN();
+  if (info_.version > 2) {
+    info_.watched.start_speed = in.number_attribute("/phyxel", "initial_speed");
+    info_.watched.peak_energy = in.number_attribute("/phyxel", "peak_energy");
+    if (!(info_.watched.start_speed >= 0) || !(info_.watched.peak_energy >= 0)) {
+      in.refuse(fmt::format("initial_speed = {}, peak_energy = {}; allowed: 0 and more",
+                            info_.watched.start_speed, info_.watched.peak_energy));
+    }
+  }
   info_.frames_written = in.integer_attribute("/phyxel", "frames_written");
   info_.scene_text = in.text("/phyxel/scene");
   if (info_.version > 2) info_.parameters = parameters_in(in, in.text("/phyxel/parameters"));

@@ -151,28 +151,6 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   return d;
 }
 
-bool is_conservative(const Model& model) {
-  for (const Part& part : model.parts) {
-    if (part.material.damping > 0) return false;
-  }
-  for (const Load& load : model.loads) {
-    if (load.ramp > 0) return false;
-  }
-  for (const Motion& motion : model.motions) {
-    if (!motion.stands_still()) return false;
-  }
-  return true;
-}
-
-StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start)
-    : model_(model), start_energy_(start.total_energy()), conservative_(is_conservative(model)) {
-  for (const Part& part : model.parts) {
-    speed_limit_ = std::max(speed_limit_, 3 * pressure_wave_speed(part.material));
-  }
-  speed_limit_ = std::max(speed_limit_, 10 * start.largest_speed);
-  check(start);
-}
-
 std::string describe_phyxel(const Model& model, Index global_id) {
   constexpr double nowhere = -std::numeric_limits<double>::infinity();
   Vec3d at{nowhere, nowhere, nowhere};
@@ -194,40 +172,6 @@ std::string describe_phyxel(const Model& model, Index global_id) {
     begin += part.size;
   }
   return "no phyxel";
-}
-
-void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortener) {
-  const std::string when = fmt::format("at t = {:g} s (step {})", now.time, now.step);
-  const auto began = [&] {
-    if (shortener) return shortener->where_it_began();
-    if (!good_ || good_->fastest_phyxel < 0) return std::string("nothing moved before");
-    return fmt::format("fastest at t = {:g} s, the last good state, was {}, at {:g} m/s",
-                       good_->time, describe_phyxel(model_, good_->fastest_phyxel),
-                       good_->largest_speed);
-  };
-  const char* advice = "; a smaller time.safety, damping, or a stiffer material may help";
-  if (now.bad_phyxel >= 0) {
-    throw DivergedError(fmt::format("the simulation diverged: the state is not finite {}; {}{}",
-                                    when, began(), advice));
-  }
-  if (now.largest_speed > speed_limit_) {
-    throw DivergedError(fmt::format(
-        "the simulation diverged: {}, moves at {:g} m/s {}, more than three times the wave speed "
-        "of its material; {}{}",
-        describe_phyxel(model_, now.fastest_phyxel), now.largest_speed, when, began(), advice));
-  }
-  const double gained = now.total_energy() - start_energy_;
-  const double turnover = std::max({exchanged_, std::abs(now.gravity_energy + now.load_energy)});
-  // Verlet's energy error is bounded by a share of what moves; gaining as much as has ever moved
-  // is no such error.
-  if (conservative_ && now.step > 0 && gained > turnover + 1e-6 * std::abs(start_energy_)) {
-    throw DivergedError(fmt::format(
-        "the simulation diverged: energy has run away, {:g} J gained {} where at most {:g} J were "
-        "in motion; fastest is {}; {}{}",
-        gained, when, turnover, describe_phyxel(model_, now.fastest_phyxel), began(), advice));
-  }
-  exchanged_ = std::max(exchanged_, now.kinetic_energy + now.elastic_energy());
-  good_ = now;
 }
 
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
@@ -17,8 +18,8 @@ constexpr double at_surfaces = 1.1;
 
 /// The limit is found again after so many steps even if no phyxel has stiffened, because the
 /// stiffest place may have moved. The number doubles each time that the limit has stayed the same.
-constexpr std::int64_t least_apart = 256, most_apart = 2048;
-constexpr double same_share = 0.02;  // the accuracy of a limit that was found
+constexpr std::int64_t least_apart = 2, most_apart = 16;  // times the most steps between two looks
+constexpr double same_share = 0.02;                       // the accuracy of a limit that was found
 
 /// The bound of (dt / limit)² that follows from a plane wave in the stiffest phyxel.
 double bound_of_share(double dt, double limit_at_rest, double ratio) {
@@ -40,6 +41,14 @@ StepShortener::StepShortener(const Model& model, Backend& backend, const StepPla
   for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
   // Ranks look together; one of them may have nothing that stiffens.
   if (model.share) active_ = model.share->others->largest(active_) > 0;
+  // A wave moves on by about a spacing in a step, so that it needs as many as there are phyxels
+  // across: small bodies live through everything in a few steps.
+  std::map<Index, Index> size;  // of each body
+  for (const Part& part : model.parts) size[part.body] += part.size;
+  for (const auto& [body, phyxels] : size) {
+    const auto across = static_cast<std::int64_t>(std::cbrt(phyxels));
+    fewest_ = std::clamp(across / 2, std::int64_t{1}, fewest_);
+  }
 }
 
 int StepShortener::look(Solver& solver, int halvings) {
@@ -61,7 +70,7 @@ int StepShortener::look(Solver& solver, int halvings) {
     const double share = share_of_limit(solver);
     const bool stayed = looks.measured >= 0 &&
                         std::abs(share - looks.measured_share) <= same_share * looks.measured_share;
-    looks.apart = stayed ? std::min(2 * looks.apart, most_apart) : least_apart;
+    looks.apart = stayed ? std::min(2 * looks.apart, most_apart * most()) : least_apart * most();
     looks.measured = solver.steps();
     looks.measured_ratio = now.ratio;
     looks.measured_share = share;
@@ -101,7 +110,7 @@ void StepShortener::look_again(const Solver& solver, Looks& looks, double ratio)
   const double most_ratio =
       ratio <= bounded ? bounded
                        : looks.measured_ratio * allowed_share(solver.dt()) / looks.measured_share;
-  std::int64_t wait = fewest;
+  std::int64_t wait = fewest_;
   if (looks.last >= 0 && step > looks.last) {
     const double since = static_cast<double>(step - looks.last);
     // Half the way there, and as fast back as forth; at most twice as long as before.
@@ -109,7 +118,7 @@ void StepShortener::look_again(const Solver& solver, Looks& looks, double ratio)
     const double until = change > 0 ? (most_ratio - ratio) / change / 2 : 2 * since;
     wait = static_cast<std::int64_t>(std::min(until, 2 * since));
   }
-  looks.next = step + std::clamp(wait / fewest * fewest, fewest, most);
+  looks.next = step + std::clamp(wait / fewest_ * fewest_, fewest_, most());
   looks.last = step;
   looks.ratio = ratio;
 }

@@ -57,6 +57,26 @@ inline Model model_of(const Scene& scene, const Cloud& cloud) {
   return build_model(scene, std::span(&cloud, 1));
 }
 
+/// A small irregular block with every term at work.
+inline Scene busy_scene() {
+  Material material = rubber();
+  material.volume_stiffness = 5e4;
+  Scene scene = one_body(material);
+  scene.gravity = {0, 0, -9.81};
+  scene.bodies[0].spin = {0, 3, 1};
+  FixRequest fix;
+  fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 1, 1}};
+  scene.bodies[0].fixed.push_back(fix);
+  LoadRequest load;
+  load.select.box = Selection::Box{{0.65, -1, -1}, {2, 1, 1}};
+  load.force = {0, 3, 0};
+  load.ramp = 0.05;
+  scene.bodies[0].loads.push_back(load);
+  return scene;
+}
+
+inline Model busy_model() { return model_of(busy_scene(), lattice(8, 3, 4, 0.1, 0.2)); }
+
 /// Two built-in bodies that never meet, with their surfels.
 inline Model built_in_bodies(
     const char* first, const char* second,

@@ -23,7 +23,7 @@ std::string Run::with_last_good_state(const char* error, Progress& progress) {
 }
 
 std::shared_ptr<const GoodState> Run::good_state(const Diagnostics& now) const {
-  return std::make_shared<const GoodState>(GoodState{solver_.state(), now});
+  return std::make_shared<const GoodState>(GoodState{solver_.state(), now, watched_});
 }
 
 bool Run::core_is_left() const {
@@ -84,7 +84,7 @@ void Run::write_state() {
     info.model_digest = shared_.digest();
     info.parameters = scene_parameters(scene_);
     info.total_energy = good->diagnostics.total_energy();
-    info.initial_energy = initial_energy_;
+    info.watched = good->watched;
     info.frames_written = recorder_->frames_written();
     recorder_->sync();  // the checkpoint counts the frames
     checkpoint_ =

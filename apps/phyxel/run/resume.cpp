@@ -41,7 +41,7 @@ std::optional<CheckpointReader> Run::find_checkpoint() {
   CheckpointReader checkpoint(file);
   resumed_from_ = file;
   continuation_ = {checkpoint.info().frames_written, checkpoint.state(0, 0).step,
-                   checkpoint.info().initial_energy, file};
+                   checkpoint.info().watched.start_energy, file};
   if (!options_.dry_run) check_continuation(folder, *continuation_, options_.force);
   const Precision precision = checkpoint.info().precision;
   if (precision != scene_.solver.precision) {
@@ -82,7 +82,7 @@ std::optional<Checkpoint> Run::checkpoint_for_all() {
   if (!found) found.emplace();
   const auto share = [](auto& value) { value = ranks().broadcast(std::vector{value}).front(); };
   share(found->info.model_digest);
-  share(found->info.initial_energy);
+  share(found->info.watched);
   share(found->info.frames_written);
   State& state = found->state;
   share(state.step);

@@ -37,6 +37,7 @@ struct RunOptions {
 struct GoodState {
   State state;
   Diagnostics diagnostics;
+  Watched watched;
 };
 
 /// `work()`, which does the same on every rank and fails on all of them, if it does; unless a GPU
@@ -156,6 +157,8 @@ class Run {
   static double torque_balance(const Diagnostics& now);
   double steps_taken() const { return static_cast<double>(solver_.steps() - first_step_); }
 
+  /// What is wrong with a run that came to its end.
+  std::vector<std::string> warnings_of(const Diagnostics& now) const;
   nlohmann::ordered_json summary_of(const Diagnostics& now, std::int64_t bytes,
                                     const Traffic& traffic) const;
 
@@ -182,11 +185,12 @@ class Run {
   StepShortener shortener_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_, now_;
-  std::optional<Recorder> recorder_;       // on the first rank
-  std::string transport_;                  // between ranks
-  std::vector<int> gpus_;                  // of the ranks
-  std::shared_ptr<const GoodState> good_;  // the last one
-  double initial_energy_ = 0, peak_energy_ = 0;
+  std::optional<Recorder> recorder_;                                // on the first rank
+  std::string transport_;                                           // between ranks
+  std::vector<int> gpus_;                                           // of the ranks
+  std::shared_ptr<const GoodState> good_;                           // the last one
+  Watched watched_;                                                 // of the start and of frames
+  double peak_energy_ = 0;                                          // of all that was looked at
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;

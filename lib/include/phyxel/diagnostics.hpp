@@ -42,21 +42,31 @@ class StepShortener;
 /// Stops a run that has become unstable.
 class StabilityWatch {
  public:
-  /// Both must outlive this. @param start of the state the run starts from. @throws as `check`
-  StabilityWatch(const Model& model, const Diagnostics& start);
+  /// The model must outlive this. Of a share: collective. @throws as `check`
+  /// @param start of the state from which steps are made
+  /// @param before what the run that `start` continues was measured against; none: it begins
+  StabilityWatch(const Model& model, const Diagnostics& start,
+                 const std::optional<Watched>& before = std::nullopt);
 
   /// @param shortener whose looks tell where it began; null: the fastest phyxel of the last good
   ///   state is named. Of a share: collective.
   /// @throws DivergedError, saying which phyxel and when, if the state is not finite, if a phyxel
-  ///   moves faster than any wave in its material by far, or if a conservative scene has gained
-  ///   more energy than it has exchanged so far.
+  ///   moves faster by far than waves, gravity, loads and motions can make it, or if a conservative
+  ///   scene has gained more energy than it has exchanged so far.
   void check(const Diagnostics& now, const StepShortener* shortener = nullptr);
+
+  /// What it measures against, with all that was found good so far.
+  const Watched& watched() const { return watched_; }
+  /// The largest speed that is let pass at a time: three times that of waves, or ten times that of
+  /// what drives the model, and what gravity and loads have added [m/s].
+  double speed_limit(double time) const;
 
  private:
   const Model& model_;
-  double start_energy_;
-  double exchanged_ = 0;    // largest kinetic + elastic energy of a state found good [J]
-  double speed_limit_ = 0;  // [m/s]
+  Watched watched_;
+  double wave_speed_ = 0;    ///< Of pressure waves, the fastest part's [m/s].
+  double driven_speed_ = 0;  ///< At the start, and of all motions together [m/s].
+  double acceleration_ = 0;  ///< By gravity and all loads together [m/s²].
   bool conservative_;
   std::optional<Diagnostics> good_;  // the last one found good
 };

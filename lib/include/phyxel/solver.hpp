@@ -134,8 +134,7 @@ class Solver {
 /// halve at the same steps. Laws that cannot stiffen cost nothing.
 class StepShortener {
  public:
-  static constexpr std::int64_t fewest = 16, most = 128;  ///< Steps between two looks.
-  static constexpr int most_halvings = 10;                ///< Of one run.
+  static constexpr int most_halvings = 10;  ///< Of one run.
   /// Of (dt / limit)²: bodies that stiffen fast come to half as much again between two looks.
   static constexpr double largest_share = 0.75;
 
@@ -151,6 +150,11 @@ class StepShortener {
   int look(Solver& solver, int halvings);
   /// Whether any law can stiffen.
   bool active() const { return active_; }
+  /// The fewest steps between two looks: half of those in which a wave crosses the smallest body,
+  /// at most sixteen.
+  std::int64_t fewest() const { return fewest_; }
+  /// The most steps between two looks.
+  std::int64_t most() const { return 8 * fewest_; }
   /// Looks without halving, so that messages know of models that cannot stiffen, too. Collective.
   void see(const Solver& solver);
   /// The first phyxel for which steps were halved, or else the stiffest of the last look: which,
@@ -166,6 +170,7 @@ class StepShortener {
   /// When to look again, after a look that found `ratio`.
   void look_again(const Solver& solver, Looks& looks, double ratio) const;
 
+  static constexpr std::int64_t most_of_fewest = 16;
   struct Seen {
     Stiffening what;
     double time = 0;  ///< [s]
@@ -174,6 +179,7 @@ class StepShortener {
   Backend& backend_;
   double limit_;
   bool active_ = false;
+  std::int64_t fewest_ = most_of_fewest;
   std::optional<Seen> seen_, first_;
 };
 

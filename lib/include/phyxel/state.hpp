@@ -23,6 +23,17 @@ struct Looks {
   bool operator==(const Looks&) const = default;
 };
 
+/// What `StabilityWatch` measures a run against. Checkpoints carry it, so that a resumed run is
+/// judged as the unbroken one.
+struct Watched {
+  double start_energy = 0;  ///< In all, at t = 0 [J].
+  double start_speed = 0;   ///< The largest, at t = 0; NaN: not known [m/s].
+  /// The largest kinetic + elastic energy so far, of the start and of frames alone in checkpoints,
+  /// as a resumed run looks at other steps between them [J].
+  double peak_energy = 0;
+  bool operator==(const Watched&) const = default;
+};
+
 /// State of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.

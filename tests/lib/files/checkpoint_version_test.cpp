@@ -18,7 +18,7 @@ class CheckpointVersions : public test::Folder {
  protected:
   /// A checkpoint as version 2 wrote it, one phyxel; or with another number, or with parameters.
   std::filesystem::path written(std::int64_t version, const std::string& parameters = "",
-                                const Looks& looks = {}) const {
+                                const Looks& looks = {}, double peak_energy = 4.5) const {
     Hdf5Writer out;
     out.group("/phyxel");
     out.attribute("/phyxel", "version", version);
@@ -35,7 +35,11 @@ class CheckpointVersions : public test::Folder {
     out.attribute("/state", "step", std::int64_t{7});
     out.attribute("/state", "time", 0.7);
     out.attribute("/state", "dt", 0.1);
-    if (version > 2) write_looks(out, looks);
+    if (version > 2) {
+      out.attribute("/phyxel", "initial_speed", 3.5);
+      out.attribute("/phyxel", "peak_energy", peak_energy);
+      write_looks(out, looks);
+    }
     const std::vector<Vec3d> values{{1, 2, 3}};
     out.vectors("/state/displacement", values, false);
     out.vectors("/state/velocity", values, false);
@@ -58,6 +62,8 @@ TEST_F(CheckpointVersions, TwoIsReadWithoutParameters) {
   EXPECT_EQ(old.info.version, 2);
   EXPECT_TRUE(old.info.parameters.empty());
   EXPECT_EQ(old.info.model_digest, 0xffu);
+  EXPECT_EQ(old.info.watched.start_energy, 2.5);
+  EXPECT_TRUE(std::isnan(old.info.watched.start_speed));  // which it does not tell
   EXPECT_EQ(old.state.step, 7);
   EXPECT_EQ(old.state.displacement.at(0).y, 2);
 }
@@ -76,6 +82,14 @@ TEST_F(CheckpointVersions, LooksThatNoRunTookAreRefused) {
                              Looks{.measured = -5}, Looks{.apart = -1}, Looks{.measured_ratio = 0},
                              Looks{.measured_share = -1}, Looks{.measured_share = nan}}) {
     EXPECT_THAT(refusal_of(written(3, "", wrong)), HasSubstr("/state/looks"));
+  }
+}
+
+TEST_F(CheckpointVersions, WhatIsWatchedIsReadAndRefusedIfNoRunHadIt) {
+  const Watched expected{2.5, 3.5, 4.5};
+  EXPECT_TRUE(read_checkpoint(written(3)).info.watched == expected);
+  for (const double wrong : {-1.0, std::nan("")}) {
+    EXPECT_THAT(refusal_of(written(3, "", {}, wrong)), HasSubstr("peak_energy"));
   }
 }
 

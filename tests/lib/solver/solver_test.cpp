@@ -16,26 +16,6 @@ namespace {
 
 using namespace phyxel::testing;
 
-/// A small irregular block with every term at work.
-Scene busy_scene() {
-  Material material = rubber();
-  material.volume_stiffness = 5e4;
-  Scene scene = one_body(material);
-  scene.gravity = {0, 0, -9.81};
-  scene.bodies[0].spin = {0, 3, 1};
-  FixRequest fix;
-  fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 1, 1}};
-  scene.bodies[0].fixed.push_back(fix);
-  LoadRequest load;
-  load.select.box = Selection::Box{{0.65, -1, -1}, {2, 1, 1}};
-  load.force = {0, 3, 0};
-  load.ramp = 0.05;
-  scene.bodies[0].loads.push_back(load);
-  return scene;
-}
-
-Model busy_model() { return model_of(busy_scene(), lattice(8, 3, 4, 0.1, 0.2)); }
-
 TEST(StepLimit, EqualsTheLargestEigenvalueOfTheDenseStiffness) {
   Material material = rubber();
   material.volume_stiffness = 2e5;
@@ -384,96 +364,6 @@ TEST(Bodies, DoNotFeelEachOther) {
     for (Index i = both.parts[b].begin; i < both.parts[b].end; ++i) {
       EXPECT_EQ(together.displacement[i], single.displacement[i - both.parts[b].begin]);
     }
-  }
-}
-
-TEST(Watch, NamesThePhyxelAndTheTimeOfABlowUp) {
-  Scene scene = one_body();
-  scene.bodies[0].spin = {0, 0, 1};
-  const Model model = model_of(scene, lattice(5, 4, 4, 0.1, 0.2));
-  const double dt = 1.3 * step_limit(model).largest_step;
-  const auto backend = make_test_backend(model, Precision::single);
-  Solver solver(*backend, initial_state(model, scene, dt));
-  StabilityWatch watch(model, diagnose(model, *backend, 0, dt));
-  try {
-    for (int s = 0; s < 5000; ++s) {
-      solver.step();
-      watch.check(diagnose(model, *backend, solver.steps(), dt));
-    }
-    FAIL() << "an unstable step was not noticed";
-  } catch (const DivergedError& error) {
-    EXPECT_NE(std::string(error.what()).find("phyxel "), std::string::npos) << error.what();
-    EXPECT_NE(std::string(error.what()).find("t = "), std::string::npos) << error.what();
-    EXPECT_EQ(error.code(), ExitCode::diverged);
-  }
-}
-
-/// A motion whose parts cancel in a sum still moves.
-TEST(Watch, OnlyModelsThatKeepTheirEnergyAreConservative) {
-  Scene scene = one_body();
-  EXPECT_TRUE(is_conservative(model_of(scene, lattice(3, 3, 3, 0.1))));
-  MotionRequest motion;
-  motion.select.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}};
-  motion.velocity = {1, 0, 0};
-  motion.amplitude = {-1, 0, 0};
-  motion.frequency = 2;
-  scene.bodies[0].motions.push_back(motion);
-  EXPECT_FALSE(is_conservative(model_of(scene, lattice(3, 3, 3, 0.1))));
-}
-
-/// A body that falls from a wall it is fixed to, and turns over: energy goes from one kind to
-/// another and stays the same, so that the watch, which looks at energy in such scenes alone, lets
-/// it pass.
-TEST(Watch, LetsAStableFallPass) {
-  Scene scene = busy_scene();
-  scene.bodies[0].loads.clear();  // one that grows would turn the look at energy off
-  const Model model = model_of(scene, lattice(8, 3, 4, 0.1, 0.2));
-  ASSERT_TRUE(is_conservative(model));
-  const double dt = 0.8 * step_limit(model).largest_step;
-  const auto backend = make_test_backend(model, Precision::single);
-  Solver solver(*backend, initial_state(model, scene, dt));
-  const Diagnostics start = diagnose(model, *backend, 0, dt);
-  StabilityWatch watch(model, start);
-  double fallen = 0;
-  for (int s = 0; s < 2000; ++s) {
-    solver.step();
-    if (s % 50 == 0) {
-      const Diagnostics now = diagnose(model, *backend, solver.steps(), dt);
-      EXPECT_NO_THROW(watch.check(now));
-      fallen = std::max(fallen, -now.gravity_energy);
-    }
-  }
-  EXPECT_GT(fallen, 0.1 * start.kinetic_energy);  // much has changed hands
-  // The same watch stops a run that has gained what was never in motion.
-  Diagnostics gained = diagnose(model, *backend, solver.steps(), dt);
-  gained.kinetic_energy += 3 * (fallen + start.kinetic_energy);
-  EXPECT_THROW(watch.check(gained), DivergedError);
-}
-
-/// When a whole body is not a number any more, no phyxel is blamed for being the first of a list:
-/// the one that was fastest in the last good state is named, by its global id and place.
-TEST(Watch, BlamesTheFastestOfTheLastGoodStateNotTheFirstPhyxel) {
-  Scene scene = one_body();
-  scene.bodies[0].spin = {0, 0, 1};
-  const Model model = model_of(scene, lattice(5, 4, 4, 0.1));
-  const auto backend = make_test_backend(model, Precision::double_);
-  State state = initial_state(model, scene, 1e-4);
-  state.velocity[41] = {3, 0, 0};
-  backend->upload(state);
-  StabilityWatch watch(model, diagnose(model, *backend, 0, state.dt));
-  for (Vec3d& u : state.displacement) u = {std::nan(""), 0, 0};
-  backend->upload(state);
-  try {
-    watch.check(diagnose(model, *backend, 1, state.dt));
-    FAIL();
-  } catch (const DivergedError& error) {
-    const std::string what = error.what();
-    EXPECT_NE(what.find("the state is not finite at t = 0.0001 s"), std::string::npos) << what;
-    // Phyxel 41 = 1 + 5 (0 + 4 · 2) is at (1.5, 0.5, 2.5) spacings.
-    EXPECT_NE(what.find("was phyxel 41 of body \"body\", at rest at (0.15, 0.05, 0.25) m"),
-              std::string::npos)
-        << what;
-    EXPECT_EQ(what.find("phyxel 0 "), std::string::npos) << what;
   }
 }
 

@@ -1,0 +1,123 @@
+/// `StabilityWatch` stops runs that have become unstable.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/solver.hpp"
+
+namespace phyxel {
+namespace {
+
+/// The ends of a body may move so many times as fast as what drives it.
+constexpr double whip = 10;
+
+/// The largest speed along a motion of any phyxel that it moves [m/s]. Of a share: of its own.
+double largest_speed(const Model& model, const Motion& motion) {
+  double arm = 0;
+  if (motion.rotation != Vec3d{}) {
+    for (const Index i : motion.phyxels) {
+      arm = std::max(arm, norm(model.position[i] - motion.about));
+    }
+  }
+  double speed =
+      norm(motion.velocity) + 2 * std::numbers::pi * motion.frequency * norm(motion.amplitude);
+  if (motion.duration > 0) {
+    // A smoothstep is steepest half the way.
+    speed += 1.5 * (norm(motion.displacement) + norm(motion.rotation) * arm) / motion.duration;
+  }
+  return speed;
+}
+
+/// The largest acceleration by a load of any phyxel that it acts on [m/s²]. Of a share: of its own.
+double largest_acceleration(const Model& model, const Load& load) {
+  double largest = 0;
+  for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+    largest = std::max(largest, norm(load.force[k]) / model.mass[load.phyxels[k]]);
+  }
+  return largest;
+}
+
+double of_all_ranks(const Model& model, double value) {
+  return model.share ? model.share->others->largest(value) : value;
+}
+
+}  // namespace
+
+bool is_conservative(const Model& model) {
+  for (const Part& part : model.parts) {
+    if (part.material.damping > 0) return false;
+  }
+  for (const Load& load : model.loads) {
+    if (load.ramp > 0) return false;
+  }
+  for (const Motion& motion : model.motions) {
+    if (!motion.stands_still()) return false;
+  }
+  return true;
+}
+
+StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start,
+                               const std::optional<Watched>& before)
+    : model_(model),
+      watched_(before.value_or(Watched{start.total_energy(), start.largest_speed})),
+      conservative_(is_conservative(model)) {
+  for (const Part& part : model.parts) {
+    wave_speed_ = std::max(wave_speed_, pressure_wave_speed(part.material));
+  }
+  acceleration_ = norm(model.gravity);
+  for (const Load& load : model.loads) {
+    acceleration_ += of_all_ranks(model, largest_acceleration(model, load));
+  }
+  if (std::isnan(watched_.start_speed)) watched_.start_speed = start.largest_speed;
+  driven_speed_ = watched_.start_speed;
+  for (const Motion& motion : model.motions) {
+    driven_speed_ += of_all_ranks(model, largest_speed(model, motion));
+  }
+  check(start);
+}
+
+double StabilityWatch::speed_limit(double time) const {
+  return std::max(3 * wave_speed_, whip * driven_speed_) + acceleration_ * time;
+}
+
+void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortener) {
+  const std::string when = fmt::format("at t = {:g} s (step {})", now.time, now.step);
+  const auto began = [&] {
+    if (shortener) return shortener->where_it_began();
+    if (!good_ || good_->fastest_phyxel < 0) return std::string("nothing moved before");
+    return fmt::format("fastest at t = {:g} s, the last good state, was {}, at {:g} m/s",
+                       good_->time, describe_phyxel(model_, good_->fastest_phyxel),
+                       good_->largest_speed);
+  };
+  const char* advice = "; a smaller time.safety, damping, or a stiffer material may help";
+  if (now.bad_phyxel >= 0) {
+    throw DivergedError(fmt::format("the simulation diverged: the state is not finite {}; {}{}",
+                                    when, began(), advice));
+  }
+  if (const double limit = speed_limit(now.time); now.largest_speed > limit) {
+    throw DivergedError(fmt::format(
+        "the simulation diverged: {}, moves at {:g} m/s {}, where waves in its material, gravity, "
+        "loads and motions make at most {:g} m/s; {}{}",
+        describe_phyxel(model_, now.fastest_phyxel), now.largest_speed, when, limit, began(),
+        advice));
+  }
+  const double gained = now.total_energy() - watched_.start_energy;
+  const double turnover =
+      std::max({watched_.peak_energy, std::abs(now.gravity_energy + now.load_energy)});
+  // Verlet's energy error is bounded by a share of what moves; gaining as much as has ever moved
+  // is no such error.
+  if (conservative_ && now.step > 0 && gained > turnover + 1e-6 * std::abs(watched_.start_energy)) {
+    throw DivergedError(fmt::format(
+        "the simulation diverged: energy has run away, {:g} J gained {} where at most {:g} J were "
+        "in motion; fastest is {}; {}{}",
+        gained, when, turnover, describe_phyxel(model_, now.fastest_phyxel), began(), advice));
+  }
+  watched_.peak_energy = std::max(watched_.peak_energy, now.kinetic_energy + now.elastic_energy());
+  good_ = now;
+}
+
+}  // namespace phyxel
