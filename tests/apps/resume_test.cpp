@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 
 #include <map>
 #include <thread>
@@ -195,6 +196,24 @@ TEST_F(Resuming, EverySignalThatEndsJobsLeavesACheckpoint) {
     EXPECT_EQ(outcome.code, 75) << sent << outcome.err;
     EXPECT_GT(read_checkpoint(newest("out")).state.step, 0);
     fs::remove_all(folder_ / "out");
+  }
+}
+
+/// The kernel sends XFSZ for a file that grows beyond the limit of its size.
+TEST_F(Resuming, ALimitOfTheSizeOfFilesIsAnErrorOfTheFileThatHitsIt) {
+  write_beam("1000");
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{10'000, before.rlim_max};  // less than a frame
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const pid_t child = start({"run", "beam.toml"});
+  setrlimit(RLIMIT_FSIZE, &before);
+  const Outcome outcome = finish(child);
+  EXPECT_EQ(outcome.code, 74) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("error: out/phyxels_000000.hdf: "));
+  EXPECT_THAT(outcome.err, HasSubstr("File too large"));
+  for (const auto& entry : fs::directory_iterator(folder_ / "out")) {
+    EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
   }
 }
 
