@@ -26,12 +26,9 @@ target_compile_options(phyxel_flags INTERFACE
 # The asan preset names the checks of undefined behaviour that find what address checks do not. Those of pointers, which
 # clang puts at every access to a member, made the solver's kernels compile six times as long: null and stray pointers
 # end a program under the address sanitizer anyway.
-set(PHYXEL_SANITIZE_FLAGS "")
 if(PHYXEL_SANITIZE)
-  set(PHYXEL_SANITIZE_FLAGS -fsanitize=${PHYXEL_SANITIZE} -fno-omit-frame-pointer
-                            -fno-sanitize-recover=all)
   target_compile_options(phyxel_flags INTERFACE
-    "$<$<COMPILE_LANGUAGE:CXX>:${PHYXEL_SANITIZE_FLAGS}>")
+    "$<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${PHYXEL_SANITIZE};-fno-omit-frame-pointer;-fno-sanitize-recover=all>")
   target_link_options(phyxel_flags INTERFACE -fsanitize=${PHYXEL_SANITIZE})
 endif()
 
@@ -87,10 +84,10 @@ function(phyxel_configure_test name)
 endfunction()
 
 # phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds] [PREFIX p]
-# [WHOLE]): a GoogleTest program, one ctest entry a case; or one for all of them, which then share
-# what is costly to make.
+# [TOGETHER filter]): a GoogleTest program, one ctest entry a case, but one for all that match the filter: those share what is
+# costly to make. They must not skip, since ctest names entries, not cases.
 function(phyxel_add_test name)
-  cmake_parse_arguments(arg "WHOLE" "TIMEOUT;PREFIX" "LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT;PREFIX;TOGETHER" "LIBRARIES;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 900)  # sanitizers on a busy machine
   endif()
@@ -105,11 +102,16 @@ function(phyxel_add_test name)
       add_dependencies(phyxel_${label}_tests ${name})
     endforeach()
   endif()
-  if(arg_WHOLE)
-    add_test(NAME ${name} COMMAND ${name})
+  set(others "")
+  if(arg_TOGETHER)
+    add_test(NAME ${name} COMMAND ${name} --gtest_filter=${arg_TOGETHER})
     set_tests_properties(${name} PROPERTIES ${properties})
-    return()
+    if(arg_TOGETHER STREQUAL "*")
+      return()
+    endif()
+    set(others TEST_FILTER "-${arg_TOGETHER}")
   endif()
-  gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 PROPERTIES ${properties})
+  gtest_discover_tests(${name} TEST_PREFIX "${arg_PREFIX}" NO_PRETTY_VALUES DISCOVERY_TIMEOUT 60 ${others}
+                       PROPERTIES ${properties})
   phyxel_one_skip(${name})
 endfunction()

@@ -96,7 +96,7 @@ set(ENV{CMAKE_PREFIX_PATH} "${prefix}:${more}")
 function(build example)
   run(${CMAKE_COMMAND} -S ${EXAMPLES}/${example} -B ${WORK}/build/${example} -G ${GENERATOR}
       -DCMAKE_CXX_COMPILER=${COMPILER}
-      -DCMAKE_BUILD_TYPE=${CONFIG} -DCMAKE_CXX_FLAGS=${FLAGS})
+      -DCMAKE_BUILD_TYPE=${CONFIG})
   run(${CMAKE_COMMAND} --build ${WORK}/build/${example} --config ${CONFIG})
 endfunction()
 
@@ -180,7 +180,7 @@ function(build_with_pkg_config example package)
   endif()
   run(${pkg_config} --static --cflags --libs ${package})
   string(STRIP "${out}" flags)
-  separate_arguments(flags UNIX_COMMAND "${flags} ${FLAGS}")
+  separate_arguments(flags UNIX_COMMAND "${flags}")
   run(${COMPILER} -std=c++20 -O2 ${EXAMPLES}/${example}/main.cpp
       -o ${WORK}/build/${example}/with_pkg_config ${flags} -Wl,-rpath,${prefix}/${LIBDIR})
 endfunction()
