@@ -14,6 +14,7 @@ void for_each_field(AnyLooks& looks, Each&& each) {
   each("next", looks.next);
   each("last", looks.last);
   each("ratio", looks.ratio);
+  each("change", looks.change);
   each("measured", looks.measured);
   each("measured_ratio", looks.measured_ratio);
   each("measured_share", looks.measured_share);
@@ -40,7 +41,7 @@ Looks read_looks(const Hdf5Reader& in) {
   for_each_field(looks, [&](const char* name, auto& field) { read(in, name, field); });
   if (std::min({looks.next, looks.last + 1, looks.measured + 1, looks.apart}) < 0 ||
       std::max({looks.next, looks.last, looks.measured, looks.apart}) > most_counted ||
-      !std::isfinite(looks.ratio) || !(looks.measured_ratio > 0) ||
+      !std::isfinite(looks.ratio) || !(looks.change >= 0) || !(looks.measured_ratio > 0) ||
       !std::isfinite(looks.measured_ratio) || !(looks.measured_share >= 0)) {
     in.refuse("/state/looks: steps that are negative or ratios that are not finite");
   }

@@ -107,6 +107,7 @@ void Looks::halve_step() {
   if (last >= 0) last *= 2;
   if (measured >= 0) measured *= 2;
   measured_share /= 4;
+  change /= 2;
 }
 
 void Solver::halve_step() {

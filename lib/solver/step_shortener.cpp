@@ -16,10 +16,14 @@ namespace {
 /// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
 constexpr double at_surfaces = 1.1;
 
-/// The limit is found again after so many steps even if no phyxel has stiffened, because the
-/// stiffest place may have moved. The number doubles each time that the limit has stayed the same.
-constexpr std::int64_t least_apart = 2, most_apart = 16;  // times the most steps between two looks
-constexpr double same_share = 0.02;                       // the accuracy of a limit that was found
+/// The limit is found again after so many times the fewest steps between two looks, even if no
+/// phyxel has stiffened, because the stiffest place may have moved. The number of steps doubles
+/// each time that the limit has stayed the same.
+constexpr std::int64_t least_apart = 16;
+constexpr std::int64_t most_apart = 2048;
+/// After so many times the fewest steps, half of a change is forgotten.
+constexpr std::int64_t memory = 64;
+constexpr double same_share = 0.02;  // the accuracy of a limit that was found
 
 /// The bound of (dt / limit)² that follows from a plane wave in the stiffest phyxel.
 double bound_of_share(double dt, double limit_at_rest, double ratio) {
@@ -70,7 +74,7 @@ int StepShortener::look(Solver& solver, int halvings) {
     const double share = share_of_limit(solver);
     const bool stayed = looks.measured >= 0 &&
                         std::abs(share - looks.measured_share) <= same_share * looks.measured_share;
-    looks.apart = stayed ? std::min(2 * looks.apart, most_apart * most()) : least_apart * most();
+    looks.apart = stayed ? std::min(2 * looks.apart, most_apart) : least_apart * fewest_;
     looks.measured = solver.steps();
     looks.measured_ratio = now.ratio;
     looks.measured_share = share;
@@ -113,9 +117,11 @@ void StepShortener::look_again(const Solver& solver, Looks& looks, double ratio)
   std::int64_t wait = fewest_;
   if (looks.last >= 0 && step > looks.last) {
     const double since = static_cast<double>(step - looks.last);
-    // Half the way there, and as fast back as forth; at most twice as long as before.
-    const double change = std::abs(ratio - looks.ratio) / since;
-    const double until = change > 0 ? (most_ratio - ratio) / change / 2 : 2 * since;
+    // Half the way there, and as fast back as forth; at most twice as long as before. What changed
+    // fast a while ago, as in a body that swings, soon will again.
+    const double faded = looks.change * std::exp2(-since / static_cast<double>(memory * fewest_));
+    looks.change = std::max(std::abs(ratio - looks.ratio) / since, faded);
+    const double until = looks.change > 0 ? (most_ratio - ratio) / looks.change / 2 : 2 * since;
     wait = static_cast<std::int64_t>(std::min(until, 2 * since));
   }
   looks.next = step + std::clamp(wait / fewest_ * fewest_, fewest_, most());

@@ -1,6 +1,7 @@
 /// The time loop and the step limit.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -154,7 +155,7 @@ class StepShortener {
   /// at most sixteen.
   std::int64_t fewest() const { return fewest_; }
   /// The most steps between two looks.
-  std::int64_t most() const { return 8 * fewest_; }
+  std::int64_t most() const { return std::min<std::int64_t>(32 * fewest_, 128); }
   /// Looks without halving, so that messages know of models that cannot stiffen, too. Collective.
   void see(const Solver& solver);
   /// The first phyxel for which steps were halved, or else the stiffest of the last look: which,

@@ -13,6 +13,7 @@ struct Looks {
   std::int64_t next = 0;       ///< Step of the next look.
   std::int64_t last = -1;      ///< Step of the last one; -1: there has been none.
   double ratio = 1;            ///< Stiffening that it found.
+  double change = 0;           ///< Of the stiffening in a step, the fastest of late.
   std::int64_t measured = -1;  ///< Step at which the limit of the step was found; -1: never.
   double measured_ratio = 1;   ///< Stiffening then.
   double measured_share = 0;   ///< (dt / limit)² then.

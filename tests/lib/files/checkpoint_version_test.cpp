@@ -78,9 +78,10 @@ TEST_F(CheckpointVersions, LooksThatNoRunTookAreRefused) {
   EXPECT_TRUE(read_checkpoint(written(2)).state.looks == Looks{});
   EXPECT_TRUE(read_checkpoint(written(3)).state.looks == Looks{});
   const double nan = std::nan("");
-  for (const Looks& wrong : {Looks{.next = -1}, Looks{.last = -2}, Looks{.ratio = nan},
-                             Looks{.measured = -5}, Looks{.apart = -1}, Looks{.measured_ratio = 0},
-                             Looks{.measured_share = -1}, Looks{.measured_share = nan}}) {
+  for (const Looks& wrong :
+       {Looks{.next = -1}, Looks{.last = -2}, Looks{.ratio = nan}, Looks{.change = nan},
+        Looks{.measured = -5}, Looks{.apart = -1}, Looks{.measured_ratio = 0},
+        Looks{.measured_share = -1}, Looks{.measured_share = nan}}) {
     EXPECT_THAT(refusal_of(written(3, "", wrong)), HasSubstr("/state/looks"));
   }
 }

@@ -96,6 +96,7 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     state.looks = {.next = 130,
                    .last = 114,
                    .ratio = 4.0 / 3,
+                   .change = 1.0 / 7,
                    .measured = 98,
                    .measured_ratio = 1.1,
                    .measured_share = 0.7,

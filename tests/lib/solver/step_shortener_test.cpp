@@ -161,9 +161,9 @@ TEST(StepShortener, LooksSeldomAtABodyThatKeepsItsShape) {
     EXPECT_EQ(shortener.look(solver, 0), 0);
     if (solver.looks().last != last) ++looks, last = solver.looks().last;
   }
-  // The first, then after 1, 2, 4 and 8 steps, and after as many each.
+  // The first, then after 1, 2, 4, 8, 16 and 32 steps, and after as many each.
   EXPECT_EQ(shortener.fewest(), 1);
-  EXPECT_EQ(looks, 1 + 3 + (plan.steps - 1 - 7) / shortener.most());
+  EXPECT_EQ(looks, 1 + 5 + (plan.steps - 1 - 31) / shortener.most());
 }
 
 /// Velocities move to t - dt/4 by the forces at t, by which those at t are found, too: energy at t
@@ -181,7 +181,12 @@ TEST(StepShortener, HalvesAStepWithoutAJump) {
   for (int s = 0; s < 200; ++s) solver.step();
   const Diagnostics before = diagnose(model, *backend, solver.now());
   const double time = solver.time();
+  solver.looks() = {
+      .next = 210, .last = 190, .change = 0.5, .measured = 180, .measured_share = 0.8};
   solver.halve_step();
+  const Looks halved{
+      .next = 420, .last = 380, .change = 0.25, .measured = 360, .measured_share = 0.2};
+  EXPECT_TRUE(solver.looks() == halved);
   const Diagnostics after = diagnose(model, *backend, solver.now());
   EXPECT_EQ(solver.time(), time);
   EXPECT_EQ(solver.steps(), 400);
