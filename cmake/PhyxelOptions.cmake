@@ -84,8 +84,8 @@ function(phyxel_configure_test name)
 endfunction()
 
 # phyxel_add_test(NAME source... [LIBRARIES lib...] [LABELS label...] [TIMEOUT seconds] [PREFIX p]
-# [TOGETHER filter]): a GoogleTest program, one ctest entry a case, but one for all that match the filter: those share what is
-# costly to make. They must not skip, since ctest names entries, not cases.
+# [TOGETHER filter]): a GoogleTest program with one ctest entry a case. The cases that match the filter share one entry, and
+# with it their costly set-up; they must never skip, since ctest names entries, not cases.
 function(phyxel_add_test name)
   cmake_parse_arguments(arg "" "TIMEOUT;PREFIX;TOGETHER" "LIBRARIES;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)

@@ -51,12 +51,12 @@ Facts plan_facts(const HaloPlan& plan) {
 }  // namespace
 
 Facts partition_facts(const std::filesystem::path& file, int parts, const std::string& partitioner,
-                      std::FILE* told) {
+                      std::FILE* progress) {
   const bool best = partitioner == "auto";
   Partitioner chosen = best ? Partitioner::metis : partitioner_of(partitioner);
   expect_kind(file, {Kind::scene});
   const Model model = [&] {
-    const SetupProgress progress(told);
+    const SetupProgress shown(progress);
     return build_model(read_scene(file));
   }();
   const Graph phyxels = phyxel_graph(model);

@@ -12,7 +12,7 @@ enum class Kind { missing, folder, scene, mesh, series, hdf5, table, unknown };
 /// not opened.
 Kind kind_of(const std::filesystem::path& file);
 
-/// The kind of a file that a command was given.
+/// The kind of a command's input file, checked.
 /// @throws InputError if the file is plainly of none of the kinds `wanted`, naming the kind it has,
 /// the command that takes it, and what is allowed. A missing file or an unknown kind is left to the
 /// reader.

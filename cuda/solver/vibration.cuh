@@ -119,8 +119,8 @@ __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
   if (threadIdx.x == 0) add_exactly(words, shared[0]);
 }
 
-/// Lanczos' vectors of M^-1/2 K M^-1/2 on the device, from a start vector that does not depend on
-/// the order of tiles. What K is, those that inherit this say.
+/// The vectors of Lanczos' iteration on M^-1/2 K M^-1/2, on the device. The start vector does not
+/// depend on the order of tiles. Derived classes apply the stiffness K.
 template <class Real, class StateReal>
 class CudaLanczosVectors : public Vibration {
  public:
@@ -184,7 +184,7 @@ class CudaLanczosVectors : public Vibration {
   DeviceArray<Real> previous_, current_, next_, force_;
 };
 
-/// At rest, by the linear law that every material has there.
+/// The stiffness at rest, by the linear law that every material has there.
 template <class Real, class StateReal>
 class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;
@@ -232,8 +232,8 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
 };
 
-/// At the present displacements, by differences of forces there. The displacements are
-/// back when this object is gone; velocities are not touched.
+/// The stiffness at the present displacements, by differences of forces there. The destructor
+/// restores the displacements; velocities are not touched.
 template <class Real, class StateReal>
 class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;

@@ -12,37 +12,38 @@
 namespace phyxel {
 namespace {
 
-/// The ends of a body may move so many times as fast as what drives it.
+/// A phyxel may move at this multiple of the driving speed, because free ends whip.
 constexpr double whip = 10;
 
-/// The largest speed along a motion of any phyxel that it moves [m/s]. Of a share: of its own.
+double largest_over_ranks(const Model& model, double value) {
+  return model.share ? model.share->others->largest(value) : value;
+}
+
+/// Upper bound of the speeds that a motion prescribes [m/s]. Of a share: collective.
 double largest_speed(const Model& model, const Motion& motion) {
   double arm = 0;
   if (motion.rotation != Vec3d{}) {
     for (const Index i : motion.phyxels) {
       arm = std::max(arm, norm(model.position[i] - motion.about));
     }
+    arm = largest_over_ranks(model, arm);
   }
   double speed =
       norm(motion.velocity) + 2 * std::numbers::pi * motion.frequency * norm(motion.amplitude);
   if (motion.duration > 0) {
-    // A smoothstep is steepest half the way.
+    // The slope of a smoothstep is largest, 1.5, at half the way.
     speed += 1.5 * (norm(motion.displacement) + norm(motion.rotation) * arm) / motion.duration;
   }
   return speed;
 }
 
-/// The largest acceleration by a load of any phyxel that it acts on [m/s²]. Of a share: of its own.
+/// Largest acceleration of a single phyxel by a load [m/s²]. Of a share: collective.
 double largest_acceleration(const Model& model, const Load& load) {
   double largest = 0;
   for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
     largest = std::max(largest, norm(load.force[k]) / model.mass[load.phyxels[k]]);
   }
-  return largest;
-}
-
-double of_all_ranks(const Model& model, double value) {
-  return model.share ? model.share->others->largest(value) : value;
+  return largest_over_ranks(model, largest);
 }
 
 }  // namespace
@@ -70,18 +71,18 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start,
   }
   acceleration_ = norm(model.gravity);
   for (const Load& load : model.loads) {
-    acceleration_ += of_all_ranks(model, largest_acceleration(model, load));
+    acceleration_ += largest_acceleration(model, load);
   }
   if (std::isnan(watched_.start_speed)) watched_.start_speed = start.largest_speed;
-  driven_speed_ = watched_.start_speed;
+  driving_speed_ = watched_.start_speed;
   for (const Motion& motion : model.motions) {
-    driven_speed_ += of_all_ranks(model, largest_speed(model, motion));
+    driving_speed_ += largest_speed(model, motion);
   }
   check(start);
 }
 
 double StabilityWatch::speed_limit(double time) const {
-  return std::max(3 * wave_speed_, whip * driven_speed_) + acceleration_ * time;
+  return std::max(3 * wave_speed_, whip * driving_speed_) + acceleration_ * time;
 }
 
 void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortener) {
@@ -100,8 +101,8 @@ void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortene
   }
   if (const double limit = speed_limit(now.time); now.largest_speed > limit) {
     throw DivergedError(fmt::format(
-        "the simulation diverged: {}, moves at {:g} m/s {}, where waves in its material, gravity, "
-        "loads and motions make at most {:g} m/s; {}{}",
+        "the simulation diverged: {}, moves at {:g} m/s {}, above the limit of {:g} m/s that wave "
+        "speed, gravity, loads and motions set; {}{}",
         describe_phyxel(model_, now.fastest_phyxel), now.largest_speed, when, limit, began(),
         advice));
   }
@@ -116,7 +117,7 @@ void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortene
         "in motion; fastest is {}; {}{}",
         gained, when, turnover, describe_phyxel(model_, now.fastest_phyxel), began(), advice));
   }
-  watched_.peak_energy = std::max(watched_.peak_energy, now.kinetic_energy + now.elastic_energy());
+  watched_.peak_energy = std::max(watched_.peak_energy, now.kinetic_and_elastic_energy());
   good_ = now;
 }
 

@@ -16,12 +16,12 @@ namespace {
 /// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
 constexpr double at_surfaces = 1.1;
 
-/// The limit is found again after so many times the fewest steps between two looks, even if no
-/// phyxel has stiffened, because the stiffest place may have moved. The number of steps doubles
-/// each time that the limit has stayed the same.
+/// Steps after which the limit is found again, as a multiple of the fewest steps between two looks.
+/// It is found even if no phyxel has stiffened, because the stiffest place may have moved.
 constexpr std::int64_t least_apart = 16;
+/// The number of steps doubles up to this one each time that the limit has stayed the same.
 constexpr std::int64_t most_apart = 2048;
-/// After so many times the fewest steps, half of a change is forgotten.
+/// Half-life of the peak rate of stiffening, as a multiple of the same.
 constexpr std::int64_t memory = 64;
 constexpr double same_share = 0.02;  // the accuracy of a limit that was found
 
@@ -45,8 +45,9 @@ StepShortener::StepShortener(const Model& model, Backend& backend, const StepPla
   for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
   // Ranks look together; one of them may have nothing that stiffens.
   if (model.share) active_ = model.share->others->largest(active_) > 0;
-  // A wave moves on by about a spacing in a step, so that it needs as many as there are phyxels
-  // across: small bodies live through everything in a few steps.
+  if (!active_) return;
+  // A wave travels about one spacing in a step, and so crosses a body in as many steps as the body
+  // has phyxels across: a small one deforms fully within a few steps.
   std::map<Index, Index> size;  // of each body
   for (const Part& part : model.parts) size[part.body] += part.size;
   for (const auto& [body, phyxels] : size) {
@@ -117,8 +118,8 @@ void StepShortener::look_again(const Solver& solver, Looks& looks, double ratio)
   std::int64_t wait = fewest_;
   if (looks.last >= 0 && step > looks.last) {
     const double since = static_cast<double>(step - looks.last);
-    // Half the way there, and as fast back as forth; at most twice as long as before. What changed
-    // fast a while ago, as in a body that swings, soon will again.
+    // Half the way there, and as fast back as forth; at most twice as long as before. The peak rate
+    // fades slowly, because a body that swings stiffens fast again and again.
     const double faded = looks.change * std::exp2(-since / static_cast<double>(memory * fewest_));
     looks.change = std::max(std::abs(ratio - looks.ratio) / since, faded);
     const double until = looks.change > 0 ? (most_ratio - ratio) / looks.change / 2 : 2 * since;

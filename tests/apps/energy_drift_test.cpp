@@ -53,7 +53,9 @@ TEST_F(EnergyDrift, IsAWarningOfTheSummaryAndOfItsFile) {
   ASSERT_EQ(coarse.code, 0) << coarse.err;
   const auto told = nlohmann::json::parse(text_of(folder_ / "out" / "run.json"));
   EXPECT_GT(told["energy_drift"], 0.2);
-  EXPECT_THAT(coarse.out, HasSubstr("warning     energy has drifted by 28% of what was in motion"));
+  EXPECT_THAT(
+      coarse.out,
+      HasSubstr("warning     energy has drifted by 28% of the largest kinetic + elastic energy"));
   ASSERT_EQ(told["warnings"].size(), 1u);
   EXPECT_THAT(told["warnings"][0].get<std::string>(), HasSubstr("a smaller time.safety may help"));
 

@@ -10,7 +10,7 @@
 
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/recorder.hpp"
-#include "support/program.hpp"
+#include "support/beam_program.hpp"
 
 namespace phyxel {
 namespace {
@@ -20,32 +20,13 @@ using test::Outcome;
 using test::text_of;
 using ::testing::HasSubstr;
 
-class Resuming : public test::Program {
+class Resuming : public test::BeamProgram {
  protected:
+  /// The beam on the CPU; `more` goes behind the keys of its output.
   void write_beam(const std::string& end, const std::string& more = "") const {
-    write("beam.toml", R"(
-gravity = [0.0, 0.0, -9.81]
-[time]
-end = )" + end + R"(
-[solver]
-device = "cpu"
-threads = 1
-[output]
-directory = "out"
-frames_per_second = 50
-)" + more + R"(
-[[body]]
-name = "beam"
-shape = "beam"
-size = [0.6, 0.2, 0.2]
-spacing = 0.05
-[body.material]
-young = 2e5
-poisson = 0.3
-density = 1000
-[[body.fixed]]
-region = "x-"
-)");
+    BeamProgram::write_beam(end);
+    replace_in_beam("threads = 1", "device = \"cpu\"\nthreads = 1");
+    replace_in_beam("frames_per_second = 50\n", "frames_per_second = 50\n" + more);
   }
   /// Every file below a folder, by its path.
   std::map<std::string, std::string> files_of(const std::string& directory) const {
@@ -219,9 +200,7 @@ TEST_F(Resuming, ALimitOfTheSizeOfFilesIsAnErrorOfTheFileThatHitsIt) {
 
 TEST_F(Resuming, ASignalDuringSetUpEndsItWithNothingWritten) {
   write_beam("1");
-  std::string scene = text_of(folder_ / "beam.toml");
-  scene.replace(scene.find("spacing = 0.05"), 14, "spacing = 0.004");  // seconds of set-up
-  write("beam.toml", scene);
+  replace_in_beam("spacing = 0.05", "spacing = 0.004");  // seconds of set-up
   const pid_t child = start({"run", "beam.toml"});
   std::this_thread::sleep_for(std::chrono::milliseconds(400));
   kill(child, SIGTERM);

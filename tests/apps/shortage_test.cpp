@@ -1,4 +1,4 @@
-/// What the program does where memory, disks and folders give way.
+/// The program when memory runs out, disks fill up or folders vanish.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>

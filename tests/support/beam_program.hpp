@@ -1,4 +1,4 @@
-/// The program and a scene of a small beam.
+/// A fixture that runs the program on a small beam.
 #pragma once
 
 #include <string>
@@ -7,10 +7,11 @@
 
 namespace phyxel::test {
 
+/// Runs the program on a scene of one beam, beam.toml.
 class BeamProgram : public Program {
  protected:
-  /// A small beam that swings; `end` seconds, `extra` goes on top of the file. One thread steps:
-  /// where there is a second core, files are written meanwhile.
+  /// Writes a small beam that swings for `end` seconds; `extra` goes on top of the file. One thread
+  /// steps, so that a second core can write files meanwhile.
   void write_beam(const std::string& end = "0.2", const std::string& extra = "") const {
     write("beam.toml", extra + R"(
 gravity = [0.0, 0.0, -9.81]

@@ -73,8 +73,8 @@ class Drift {
   void look(const Diagnostics& first, const Diagnostics& now) {
     stray_ = std::max(stray_, std::abs(now.total_energy() - first.total_energy()));
     if (!std::isfinite(now.total_energy())) stray_ = HUGE_VAL;
-    motion_ = std::max({motion_, first.kinetic_energy + first.elastic_energy(),
-                        now.kinetic_energy + now.elastic_energy()});
+    motion_ =
+        std::max({motion_, first.kinetic_and_elastic_energy(), now.kinetic_and_elastic_energy()});
   }
   double share() const { return stray_ / motion_; }
 

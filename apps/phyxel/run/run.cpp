@@ -96,8 +96,10 @@ void Run::execute() {
   const bool finished = begin_ && solver_.steps() >= plan_.steps;
   if (finished && !summary_is_missing()) return say_finished_already();
   now_ = start_diagnostics_;
-  watched_ = begin_ ? begin_->info.watched : Watched{now_.total_energy(), now_.largest_speed};
-  peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_energy + now_.elastic_energy());
+  watched_ =
+      begin_ ? begin_->info.watched
+             : Watched{now_.total_energy(), now_.largest_speed, now_.kinetic_and_elastic_energy()};
+  peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
   if (finished) checkpoint_ = resumed_from_;
   if (!finished) step_to_end();
   draw_and_sum_up();
@@ -105,8 +107,7 @@ void Run::execute() {
 
 void Run::step_to_end() {
   StabilityWatch watch = alike([&] { return StabilityWatch(model(), now_, watched_); });
-  watched_.start_speed = watch.watched().start_speed;
-  if (!begin_) watched_ = watch.watched();
+  watched_.start_speed = watch.watched().start_speed;  // a checkpoint of version 2 knows none
   good_ = good_state(now_);
   if (!begin_) {
     // Without a rate only the last frame is wanted.
@@ -166,10 +167,8 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     shortener_.see(solver_);
     show_progress(progress, now_);
     peak_energy_ = watch.watched().peak_energy;
-    if (frame) {
-      const double energy = now_.kinetic_energy + now_.elastic_energy();
-      watched_.peak_energy = std::max(watched_.peak_energy, energy);
-    }
+    if (frame)
+      watched_.peak_energy = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
     auto good = good_state(now_);
     look_seconds = seconds_since(look_start);
     if (frame) write_frame(good);

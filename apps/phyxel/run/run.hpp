@@ -157,7 +157,7 @@ class Run {
   static double torque_balance(const Diagnostics& now);
   double steps_taken() const { return static_cast<double>(solver_.steps() - first_step_); }
 
-  /// What is wrong with a run that came to its end.
+  /// Warnings about the final state of a run, beside the model's.
   std::vector<std::string> warnings_of(const Diagnostics& now) const;
   nlohmann::ordered_json summary_of(const Diagnostics& now, std::int64_t bytes,
                                     const Traffic& traffic) const;
@@ -185,12 +185,12 @@ class Run {
   StepShortener shortener_;
   std::int64_t first_step_ = 0;
   Diagnostics start_diagnostics_, now_;
-  std::optional<Recorder> recorder_;                                // on the first rank
-  std::string transport_;                                           // between ranks
-  std::vector<int> gpus_;                                           // of the ranks
-  std::shared_ptr<const GoodState> good_;                           // the last one
-  Watched watched_;                                                 // of the start and of frames
-  double peak_energy_ = 0;                                          // of all that was looked at
+  std::optional<Recorder> recorder_;       // on the first rank
+  std::string transport_;                  // between ranks
+  std::vector<int> gpus_;                  // of the ranks
+  std::shared_ptr<const GoodState> good_;  // the last one
+  Watched watched_;                        // for checkpoints: start and frames
+  double peak_energy_ = 0;                 // of all states looked at
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;

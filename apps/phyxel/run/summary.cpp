@@ -12,12 +12,12 @@
 namespace phyxel::app {
 namespace {
 
-/// Of energy, beyond which a run warns: bodies that ring at the very limit of the step come to 9%,
-/// all other hard cases stay below 2%.
+/// Relative energy drift above which a run warns. Bodies that ring at the very limit of the step
+/// reach 9%; all other hard cases stay below 2%.
 constexpr double largest_drift = 0.1;
 
-/// What rounding makes of a body at rest [J]: strains of 1e-7.
-double noise_of(const Model& model) {
+/// Energy that rounding gives a body at rest [J]: that of strains of 1e-7.
+double rounding_energy(const Model& model) {
   double energy = 0;
   for (const Part& part : model.parts) {
     const double speed = pressure_wave_speed(part.material);
@@ -111,14 +111,14 @@ double Run::torque_balance(const Diagnostics& now) {
 
 std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
   std::vector<std::string> warnings;
-  // Implicit steps may lose energy: they damp what they do not resolve.
+  // Implicit steps may lose energy: they damp modes that they do not resolve.
   const double wrong = steps_explicitly() ? std::abs(energy_drift(now)) : energy_drift(now);
   if (scene_.solver.method != Method::equilibrium && is_conservative(model()) &&
       wrong > largest_drift &&
-      std::abs(now.total_energy() - watched_.start_energy) > noise_of(model())) {
+      std::abs(now.total_energy() - watched_.start_energy) > rounding_energy(model())) {
     warnings.push_back(fmt::format(
-        "energy has drifted by {:.2g}% of what was in motion, in a scene that keeps it: "
-        "the result is not to be trusted; a smaller time.safety may help",
+        "energy has drifted by {:.2g}% of the largest kinetic + elastic energy, in a scene that "
+        "conserves energy: do not trust the result; a smaller time.safety may help",
         100 * energy_drift(now)));
   }
   return warnings;

@@ -24,7 +24,7 @@ struct CheckpointInfo {
   /// Values of the scene by name (`scene_parameters`), which a resumed run must have, too.
   std::vector<Parameter> parameters;
   double total_energy = 0;          ///< [J], for the drift of the continued run.
-  Watched watched;                  ///< Of version 2 the initial energy alone.
+  Watched watched;                  ///< Version 2 holds the start energy only.
   std::int64_t frames_written = 0;  ///< Frames on disk at that time.
 };
 

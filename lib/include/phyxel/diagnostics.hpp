@@ -43,8 +43,8 @@ class StepShortener;
 class StabilityWatch {
  public:
   /// The model must outlive this. Of a share: collective. @throws as `check`
-  /// @param start of the state from which steps are made
-  /// @param before what the run that `start` continues was measured against; none: it begins
+  /// @param start diagnostics of the state from which the run steps
+  /// @param before reference values of the run that `start` continues; none: the run begins here
   StabilityWatch(const Model& model, const Diagnostics& start,
                  const std::optional<Watched>& before = std::nullopt);
 
@@ -55,18 +55,18 @@ class StabilityWatch {
   ///   scene has gained more energy than it has exchanged so far.
   void check(const Diagnostics& now, const StepShortener* shortener = nullptr);
 
-  /// What it measures against, with all that was found good so far.
+  /// The reference values; every state that `check` finds good updates the peak energy.
   const Watched& watched() const { return watched_; }
-  /// The largest speed that is let pass at a time: three times that of waves, or ten times that of
-  /// what drives the model, and what gravity and loads have added [m/s].
+  /// The speed limit at a time [m/s]: three times the wave speed or, if larger, ten times the
+  /// driving speed, plus the speed that gravity and loads can have added by then.
   double speed_limit(double time) const;
 
  private:
   const Model& model_;
   Watched watched_;
-  double wave_speed_ = 0;    ///< Of pressure waves, the fastest part's [m/s].
-  double driven_speed_ = 0;  ///< At the start, and of all motions together [m/s].
-  double acceleration_ = 0;  ///< By gravity and all loads together [m/s²].
+  double wave_speed_ = 0;     ///< Pressure wave speed of the fastest part [m/s].
+  double driving_speed_ = 0;  ///< Largest speeds of the start and of all motions, summed [m/s].
+  double acceleration_ = 0;   ///< Largest accelerations by gravity and all loads, summed [m/s²].
   bool conservative_;
   std::optional<Diagnostics> good_;  // the last one found good
 };

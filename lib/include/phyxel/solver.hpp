@@ -151,8 +151,8 @@ class StepShortener {
   int look(Solver& solver, int halvings);
   /// Whether any law can stiffen.
   bool active() const { return active_; }
-  /// The fewest steps between two looks: half of those in which a wave crosses the smallest body,
-  /// at most sixteen.
+  /// The fewest steps between two looks: half the number of steps in which a wave crosses the
+  /// smallest body, from 1 to 16.
   std::int64_t fewest() const { return fewest_; }
   /// The most steps between two looks.
   std::int64_t most() const { return std::min<std::int64_t>(32 * fewest_, 128); }

@@ -7,13 +7,13 @@
 
 namespace phyxel {
 
-/// What `StepShortener` has seen of bodies that stiffen. A state carries it, so that a resumed run
-/// looks at the same steps as the unbroken one, and finds the same.
+/// Record of the looks that `StepShortener` takes at bodies that stiffen. A state carries the
+/// record, so that a resumed run looks at the same steps as the unbroken one, and finds the same.
 struct Looks {
   std::int64_t next = 0;       ///< Step of the next look.
   std::int64_t last = -1;      ///< Step of the last one; -1: there has been none.
   double ratio = 1;            ///< Stiffening that it found.
-  double change = 0;           ///< Of the stiffening in a step, the fastest of late.
+  double change = 0;           ///< Recent peak of the stiffening's rate of change [1/step].
   std::int64_t measured = -1;  ///< Step at which the limit of the step was found; -1: never.
   double measured_ratio = 1;   ///< Stiffening then.
   double measured_share = 0;   ///< (dt / limit)² then.
@@ -24,13 +24,13 @@ struct Looks {
   bool operator==(const Looks&) const = default;
 };
 
-/// What `StabilityWatch` measures a run against. Checkpoints carry it, so that a resumed run is
-/// judged as the unbroken one.
+/// Reference values by which `StabilityWatch` judges a run. Checkpoints carry them, so that a
+/// resumed run is judged as the unbroken one.
 struct Watched {
-  double start_energy = 0;  ///< In all, at t = 0 [J].
-  double start_speed = 0;   ///< The largest, at t = 0; NaN: not known [m/s].
-  /// The largest kinetic + elastic energy so far, of the start and of frames alone in checkpoints,
-  /// as a resumed run looks at other steps between them [J].
+  double start_energy = 0;  ///< Total energy at t = 0 [J].
+  double start_speed = 0;   ///< Largest speed at t = 0 [m/s]; NaN: unknown.
+  /// Largest kinetic + elastic energy so far [J]. A checkpoint counts the start and the frames
+  /// only, because a resumed run looks at other steps between frames than the unbroken run did.
   double peak_energy = 0;
   bool operator==(const Watched&) const = default;
 };
@@ -80,9 +80,11 @@ struct Diagnostics {
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// [J], of the deformation.
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
+  /// [J], without the potentials of gravity and loads.
+  double kinetic_and_elastic_energy() const { return kinetic_energy + elastic_energy(); }
   /// [J], constant where nothing damps, moves or grows (see `is_conservative`).
   double total_energy() const {
-    return kinetic_energy + elastic_energy() + gravity_energy + load_energy;
+    return kinetic_and_elastic_energy() + gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.
