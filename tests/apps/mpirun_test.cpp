@@ -259,6 +259,33 @@ TEST_F(Mpirun, CheckTellsThePlanOnce) {
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
+/// Every rank judges a resumed run by the start of the run, not by values of its own: this body
+/// flies at five times the wave speed, of which only the first speed in the checkpoint tells.
+TEST_F(Mpirun, AFastBodyGoesOnOnAllRanks) {
+  write("scene.toml", R"(
+[time]
+end = 0.05
+[output]
+directory = "out"
+frames_per_second = 100
+[[body]]
+name = "bullet"
+shape = "beam"
+size = [0.4, 0.2, 0.2]
+spacing = 0.1
+velocity = [50, 0, 0]
+[body.material]
+young = 1e5
+poisson = 0
+density = 1000
+)");
+  ASSERT_EQ(run_on(2, {"run", "scene.toml", "--device", "cpu"}).code, 0);
+  const Outcome outcome =
+      run_on(2, {"run", "scene.toml", "--device", "cpu", "--until", "0.1", "--resume", "auto"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("written     11 frames"));
+}
+
 TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {
   write_scene("1.5");
   const std::vector<std::string> arguments{"run", "scene.toml", "--out"};

@@ -166,6 +166,31 @@ TEST(StepShortener, LooksSeldomAtABodyThatKeepsItsShape) {
   EXPECT_EQ(looks, 1 + 5 + (plan.steps - 1 - 31) / shortener.most());
 }
 
+/// A body that stiffened fast a while ago is looked at soon, though it is calm now; half of that is
+/// forgotten in 64 steps.
+TEST(StepShortener, RemembersHowFastABodyStiffened) {
+  Scene scene = spun_scene();
+  scene.bodies[0].spin = {0, 0, 0.1};
+  const Model model = model_of(scene, lattice(3, 3, 3, 0.1));
+  const auto backend = make_test_backend(model, Precision::double_, 1);
+  const StepPlan plan = plan_of(model);
+  Solver solver(model, *backend, initial_state(model, scene, plan.dt), Method::verlet);
+  StepShortener shortener(model, *backend, plan);
+  const auto step = [&](int steps) {
+    for (int s = 0; s < steps; ++s, solver.step()) shortener.look(solver, 0);
+  };
+  const auto interval = [&] { return solver.looks().next - solver.looks().last; };
+  step(500);
+  ASSERT_EQ(interval(), shortener.most());
+  solver.looks().change = 0.05;
+  step(static_cast<int>(solver.looks().next - solver.steps()) + 1);
+  // 0.05 has faded over 32 steps to 0.035; half the way to a stiffening of 1/(1.1 0.8²) takes
+  // 5.9 steps, cut to whole ones.
+  EXPECT_EQ(interval(), 5);
+  step(1000);
+  EXPECT_EQ(interval(), shortener.most());
+}
+
 /// Velocities move to t - dt/4 by the forces at t, by which those at t are found, too: energy at t
 /// is what it was, and so are momenta.
 TEST(StepShortener, HalvesAStepWithoutAJump) {
