@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "device.hpp"
 #include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "phyxel/checkpoint.hpp"
@@ -20,8 +21,15 @@ namespace fs = std::filesystem;
 using test::Outcome;
 using test::text_of;
 
-class FarAway : public test::Program {
+/// On the CPU, and on a GPU where there is one: frames are made of what a device has computed.
+class FarAway : public test::Program, public ::testing::WithParamInterface<const char*> {
  protected:
+  void SetUp() override {
+    Program::SetUp();
+    if (GetParam() == std::string("cuda") && cuda_devices().empty()) {
+      GTEST_SKIP() << "no CUDA device";
+    }
+  }
   /// A beam in float and the horn bug, which has surfels.
   std::string scene(const std::string& body) const {
     return R"(
@@ -29,7 +37,8 @@ class FarAway : public test::Program {
 end = 0.1
 [solver]
 threads = 1
-device = "cpu"
+device = ")" +
+           std::string(GetParam()) + R"("
 precision = "float"
 [output]
 directory = "out"
@@ -85,7 +94,7 @@ std::size_t coinciding(std::vector<Vec3d> points) {
   return same;
 }
 
-TEST_F(FarAway, FramesKeepTheDistancesBetweenNeighbours) {
+TEST_P(FarAway, FramesKeepTheDistancesBetweenNeighbours) {
   const Model near = build_model(read_scene(write("near.toml", scene(""))));
   write("far.toml", scene("translation = [1e7, -1e7, 1e7]"));
   const Outcome outcome = run({"run", "far.toml"});
@@ -117,7 +126,7 @@ TEST_F(FarAway, FramesKeepTheDistancesBetweenNeighbours) {
 
 /// Floats do for a body near the origin, and frames of a run in float hold nothing else, as they
 /// did before frames knew of bodies far away.
-TEST_F(FarAway, FramesNearTheOriginStayFloat) {
+TEST_P(FarAway, FramesNearTheOriginStayFloat) {
   write("near.toml", scene("translation = [3, 0, 0]"));
   ASSERT_EQ(run({"run", "near.toml", "--until", "0.02"}).code, 0);
   for (const char* family : {"phyxels", "surface"}) {
@@ -131,7 +140,7 @@ TEST_F(FarAway, FramesNearTheOriginStayFloat) {
 
 /// Bodies that fly off: the first frames are of float, the last ones of double, and which are is
 /// the same on two ranks and after a stop between the two.
-TEST_F(FarAway, FramesTurnToDoubleAtTheSameTimeOnRanksAndAfterRestarts) {
+TEST_P(FarAway, FramesTurnToDoubleAtTheSameTimeOnRanksAndAfterRestarts) {
   // Floats do for phyxels 0.05 m apart up to 0.05e-3 m / 2^-23 = 420 m, and for surfels that are
   // closer not as far; 600 m are flown.
   write("thrown.toml", scene("velocity = [6000, 0, 0]"));
@@ -156,7 +165,7 @@ TEST_F(FarAway, FramesTurnToDoubleAtTheSameTimeOnRanksAndAfterRestarts) {
   EXPECT_TRUE(frames_of("ranks") == frames);
 }
 
-TEST_F(FarAway, FramesAreTheSameBytesOnTwoRanks) {
+TEST_P(FarAway, FramesAreTheSameBytesOnTwoRanks) {
   PHYXEL_NEEDS_TOOL(std::string(PHYXEL_MPIRUN) != "", "mpirun");
   write("far.toml", scene("translation = [1e7, -1e7, 1e7]"));
   ASSERT_EQ(run({"run", "far.toml", "--out", "one"}).code, 0);
@@ -164,6 +173,9 @@ TEST_F(FarAway, FramesAreTheSameBytesOnTwoRanks) {
   ASSERT_EQ(ranks.code, 0) << ranks.err;
   EXPECT_TRUE(frames_of("one") == frames_of("two"));
 }
+
+INSTANTIATE_TEST_SUITE_P(Frames, FarAway, ::testing::Values("cpu", "cuda"),
+                         [](const auto& device) { return std::string(device.param); });
 
 }  // namespace
 }  // namespace phyxel
