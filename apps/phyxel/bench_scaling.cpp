@@ -50,8 +50,7 @@ Scene cube_scene(Index phyxels) {
   body.source.shape.spacing = 1 / std::round(std::cbrt(phyxels));
   body.source.shape.jitter = 0.1;
   body.source.shape.surface = false;
-  body.material = {
-      .young = 1e5, .poisson = 0.3, .density = 1000, .strain = Strain::green, .hourglass = 0};
+  body.material = {.young = 1e5, .poisson = 0.3, .density = 1000, .hourglass = 0};
   scene.bodies.push_back(body);
   return scene;
 }

@@ -129,14 +129,17 @@ Facts scene_facts(const fs::path& file) {
   Facts bodies = Facts::array();
   for (const BodyRequest& body : scene.bodies) {
     const BodySource& source = body.source;
-    bodies.push_back({{"name", body.name},
-                      {"from", !source.shape.name.empty() ? source.shape.name
-                               : !source.mesh.empty()     ? source.mesh.string()
-                               : !source.file.empty()     ? source.file.string()
-                                                          : source.cloud},
-                      {"E [Pa]", body.material.young},
-                      {"nu", body.material.poisson},
-                      {"rho [kg/m^3]", body.material.density}});
+    Facts facts{{"name", body.name},
+                {"from", !source.shape.name.empty() ? source.shape.name
+                         : !source.mesh.empty()     ? source.mesh.string()
+                         : !source.file.empty()     ? source.file.string()
+                                                    : source.cloud},
+                {"law", body.material.law}};
+    if (has_parameter(body.material.law, "young")) facts["E [Pa]"] = body.material.young;
+    if (has_parameter(body.material.law, "poisson")) facts["nu"] = body.material.poisson;
+    for (const auto& [name, value] : body.material.parameters) facts[name] = value;
+    facts["rho [kg/m^3]"] = body.material.density;
+    bodies.push_back(facts);
   }
   return {{"file", file.string()},
           {"kind", "scene"},

@@ -7,17 +7,26 @@
 
 #include "device_option.hpp"
 #include "kind.hpp"
+#include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 
 namespace phyxel::app {
 namespace {
 
+/// "E = 1e+06 Pa, nu = 0.3, ", of laws that have them.
+std::string moduli_of(const Material& m) {
+  std::string text;
+  if (m.custom_law || has_parameter(m.law, "young")) text += fmt::format("E = {:g} Pa, ", m.young);
+  if (m.custom_law || has_parameter(m.law, "poisson"))
+    text += fmt::format("nu = {:g}, ", m.poisson);
+  return text;
+}
+
 std::string terms_of(const Part& part) {
   const Material& m = part.material;
-  std::string terms = m.law == Law::neo_hooke     ? "neo-Hookean law"
-                      : m.law == Law::corotated   ? "corotated law"
-                      : m.strain == Strain::green ? "Green strain"
-                                                  : "Cauchy strain";
+  std::string terms = m.custom_law ? m.custom_law->name() : m.law;
+  for (const auto& [name, value] : m.parameters) terms += fmt::format(", {} = {:g}", name, value);
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.hourglass.value_or(0) > 0) {
@@ -125,8 +134,8 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
         part.size, part.surfels, part.mass, part.volume,
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
-    text += fmt::format("              E = {:g} Pa, nu = {:g}, rho = {:g} kg/m^3; {}\n", m.young,
-                        m.poisson, m.density, terms_of(part));
+    text += fmt::format("              {}rho = {:g} kg/m^3; {}\n", moduli_of(m), m.density,
+                        terms_of(part));
   }
   if (shown < model.parts.size()) {
     text += fmt::format("              and {} more bodies\n", model.parts.size() - shown);

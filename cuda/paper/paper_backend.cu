@@ -8,6 +8,7 @@
 #include "kernels.cuh"
 #include "paper_backend.hpp"
 #include "paper_model.hpp"
+#include "phyxel/physics/laws/st_venant_kirchhoff.hpp"
 
 namespace phyxel::paper {
 namespace {
@@ -70,7 +71,7 @@ class GpuBackend final : public PaperBackend {
       : model_(model),
         device_(use_cuda_device(options.device)),
         dense_(options.store == ForceStore::dense),
-        green_(model.parts[0].material.strain == Strain::green),
+        green_(model.parts[0].material.law == StVenantKirchhoff<double>::name),
         block_(options.block),
         n_(model.size()) {
     subject_ = "body \"" + model.parts[0].name + "\", " + std::to_string(n_) + " phyxels";

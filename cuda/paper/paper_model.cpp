@@ -6,6 +6,7 @@
 
 #include "paper_backend.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/laws/st_venant_kirchhoff.hpp"
 #include "phyxel/physics/weight.hpp"
 
 namespace phyxel::paper {
@@ -125,8 +126,11 @@ void check_paper_model(const Model& model) {
                     "none of them",
                     part.name));
   }
-  if (part.material.law != Law::hooke || part.material.custom_law) {
-    refuse(fmt::format("body \"{}\" has another law; allowed: law = \"hooke\"", part.name));
+  const std::string& law = part.material.law;
+  if (part.material.custom_law ||
+      (law != StVenantKirchhoff<double>::name && law != SmallStrain<double>::name)) {
+    refuse(fmt::format("body \"{}\" has another law than the paper; allowed: {}, {}", part.name,
+                       StVenantKirchhoff<double>::name, SmallStrain<double>::name));
   }
   if (part.closure > 0) {
     refuse(fmt::format("body \"{}\" has closed gradients; allowed: closure = 0", part.name));

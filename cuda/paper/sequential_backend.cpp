@@ -8,9 +8,9 @@
 #include "paper_backend.hpp"
 #include "paper_model.hpp"
 #include "phyxel/physics/force.hpp"
+#include "phyxel/physics/laws/st_venant_kirchhoff.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/strain.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/surfel.hpp"
 #include "phyxel/physics/weight.hpp"
 
@@ -208,8 +208,8 @@ class SequentialBackend final : public PaperBackend {
 
   template <class Apply>
   void for_law(Apply&& apply) const {
-    const bool green = model_.parts[0].material.strain == Strain::green;
-    green ? apply(GreenHooke<Real>{hooke_}) : apply(CauchyHooke<Real>{hooke_});
+    const bool green = model_.parts[0].material.law == StVenantKirchhoff<double>::name;
+    green ? apply(StVenantKirchhoff<Real>{hooke_}) : apply(SmallStrain<Real>{hooke_});
   }
 
   M gradient_of(Index i) const {

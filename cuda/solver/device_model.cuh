@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -12,6 +13,7 @@
 #include "device.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "setup/device_tiling.hpp"
 #include "setup/primitives.cuh"
 #include "solver/crossings.cuh"
@@ -100,13 +102,18 @@ class DeviceModel {
   /// What sums need of each tile's body. @param lag of the velocities, as `Instant` [s]
   const TileMaterial* materials(double lag) {
     if (lag == materials_lag_) return materials_.data();
-    std::vector<TileMaterial> materials;
-    for (const Index part : tiling_.part) {
-      const Material& m = model_.parts[part].material;
-      materials.push_back({m.lame_lambda(), m.lame_mu(), m.volume_stiffness,
-                           hourglass_stiffness(model_, model_.parts[part]),
-                           damped_flow(m.damping, lag), origin_of(part), m.elasticity()});
-    }
+    const std::vector<TileMaterial> materials = for_tiles<TileMaterial>([&](const Part& part) {
+      const Material& m = part.material;
+      const ChosenLaw law = chosen_law(m);
+      TileMaterial tile{};
+      std::copy(law.constants.begin(), law.constants.end(), tile.law);
+      tile.law_index = law.index;
+      tile.volume_stiffness = m.volume_stiffness;
+      tile.hourglass = hourglass_stiffness(model_, part);
+      tile.flow = damped_flow(m.damping, lag);
+      tile.origin = part.origin;
+      return tile;
+    });
     materials_.upload(materials.data());
     materials_lag_ = lag;
     return materials_.data();
@@ -125,21 +132,24 @@ class DeviceModel {
   double dt() const { return dt_; }
   void send_constants(double dt) {
     dt_ = dt;
-    std::vector<BodyConstants> tiles;
-    for (const Index p : tiling_.part) tiles.push_back(constants_of(model_.parts[p], dt));
-    tiles_.upload(tiles.data());
+    tiles_.upload(
+        for_tiles<BodyConstants>([&](const Part& part) { return constants_of(part, dt); }).data());
   }
-  /// For small displacements, whatever the law: Cauchy's strain, with the volume's stiffness added
-  /// to λ.
+  /// The constants of the linear law that each tile's law is at small displacements, volume
+  /// conservation included.
   DeviceArray<BodyConstants> rest_constants() const {
-    std::vector<BodyConstants> constants;
-    for (const Index p : tiling_.part) {
-      const Part& part = model_.parts[p];
-      constants.push_back(constants_of(part, 0));
-      constants.back().lambda =
-          static_cast<Real>(part.material.lame_lambda() + part.material.volume_stiffness);
-    }
-    return sent(constants, "tiles of " + subject_);
+    return sent(for_tiles<BodyConstants>([&](const Part& part) {
+                  BodyConstants constants = constants_of(part, 0);
+                  const ChosenLaw law = chosen_law(part.material);
+                  Laws::with<double>(law.index, law.constants.data(), [&](const auto& own) {
+                    const auto linear = own.at_rest(part.material.volume_stiffness);
+                    double values[constants_of_law<decltype(linear), double>];
+                    std::memcpy(values, &linear, sizeof(linear));
+                    std::copy(std::begin(values), std::end(values), constants.law);
+                  });
+                  return constants;
+                }),
+                "tiles of " + subject_);
   }
   void make_loads() {
     load_ = {3 * places(), "loads of " + subject_};
@@ -387,15 +397,24 @@ class DeviceModel {
     const Material& m = part.material;
     const DampedFlow flow = damped_flow(m.damping, dt);
     const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
-    return {static_cast<Real>(m.lame_lambda()),
-            static_cast<Real>(m.lame_mu()),
-            static_cast<Real>(m.volume_stiffness),
-            static_cast<Real>(hourglass_stiffness(model_, part)),
-            static_cast<Real>(h > 0 ? 1 / (h * h) : 0),
-            static_cast<StateReal>(flow.keep),
-            static_cast<StateReal>(flow.gain),
-            m.damping > 0,
-            m.elasticity()};
+    const ChosenLaw law = chosen_law(m);
+    BodyConstants tile{};
+    for (int k = 0; k < law_numbers; ++k) tile.law[k] = static_cast<Real>(law.constants[k]);
+    tile.hourglass = static_cast<Real>(hourglass_stiffness(model_, part));
+    tile.inverse_h_squared = static_cast<Real>(h > 0 ? 1 / (h * h) : 0);
+    tile.keep = static_cast<StateReal>(flow.keep);
+    tile.gain = static_cast<StateReal>(flow.gain);
+    tile.damped = m.damping > 0;
+    tile.law_index = law.index;
+    return tile;
+  }
+  /// make(part) of each tile's part.
+  template <class Tile, class Make>
+  std::vector<Tile> for_tiles(Make&& make) const {
+    std::vector<Tile> parts, tiles;
+    for (const Part& part : model_.parts) parts.push_back(make(part));
+    for (const Index part : tiling_.part) tiles.push_back(parts[part]);
+    return tiles;
   }
 
   const Model& model_;

@@ -14,10 +14,11 @@ namespace phyxel::cuda {
 
 /// What the sums need of a tile's body.
 struct TileMaterial {
-  double lambda, mu, volume_stiffness, hourglass;
+  double law[law_numbers];  ///< As `ChosenLaw::constants`.
+  int law_index;            ///< In `Laws`.
+  double volume_stiffness, hourglass;
   DampedFlow flow;      ///< From the time of the velocities to that of the displacements.
   Vec3<double> origin;  ///< What positions are taken from [m].
-  Elasticity elasticity;
 };
 
 /// Everything that adds up, in the order of `Totals::for_each_sum`.
@@ -146,9 +147,9 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       t.sum[gravity_energy] = -mass * dot(gravity, u);
       t.sum[load_energy] = -dot(load, u);
       const double volume = f.moment_constants[6 * f.places + place];
-      const Hooke<double> hooke{m.lambda, m.mu};
-      t.sum[strain_energy] = volume * with_law(m.elasticity, hooke,
-                                               [&](const auto& law) { return law.energy(grad_u); });
+      t.sum[strain_energy] = volume * Laws::with<double>(m.law_index, m.law, [&](const auto& law) {
+                               return law.energy(grad_u);
+                             });
       const VolumeConservation<double> conservation{m.volume_stiffness};
       if (m.volume_stiffness > 0) t.sum[volume_energy] = volume * conservation.energy(grad_u);
       if (m.hourglass > 0) {
@@ -171,7 +172,7 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
 }
 
 /// A thread a tile: adds it to `all`.
-__global__ inline void add_tiles(const TileTotals* tiles, int count, ExactTotals* all) {
+static __global__ void add_tiles(const TileTotals* tiles, int count, ExactTotals* all) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   const TileTotals& t = tiles[k];
@@ -184,7 +185,7 @@ __global__ inline void add_tiles(const TileTotals* tiles, int count, ExactTotals
   atomicMin(&all->first_bad, t.first_bad);
 }
 /// After `add_tiles`: who is the fastest.
-__global__ inline void find_fastest(const TileTotals* tiles, int count, ExactTotals* all) {
+static __global__ void find_fastest(const TileTotals* tiles, int count, ExactTotals* all) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   if (tiles[k].largest_speed == __longlong_as_double(static_cast<long long>(all->speed_bits))) {

@@ -11,8 +11,8 @@
 #include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/strain.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/peers.cuh"
@@ -20,15 +20,18 @@
 
 namespace phyxel::cuda {
 
+/// The constants of any law, and the stiffness of volume conservation.
+inline constexpr int law_numbers = Laws::most_constants + 1;
+
 /// What the scene says of a tile's body, in the working precision.
 template <class Real, class StateReal>
 struct TileConstants {
-  Real lambda, mu, volume_stiffness;  ///< [Pa]
-  Real hourglass;                     ///< κ [N/m], 0: none.
-  Real inverse_h_squared;             ///< [1/m²], where the body has one support.
-  StateReal keep, gain;               ///< Damped Verlet's factors; gain is the step where undamped.
-  bool damped;                        ///< For kernels that serve bodies of any law.
-  Elasticity elasticity;              ///< Likewise.
+  Real law[law_numbers];   ///< As `ChosenLaw::constants`.
+  Real hourglass;          ///< κ [N/m], 0: none.
+  Real inverse_h_squared;  ///< [1/m²], where the body has one support.
+  StateReal keep, gain;    ///< Damped Verlet's factors; gain is the step where undamped.
+  bool damped;             ///< For kernels that serve damped bodies and others.
+  int law_index;           ///< In `Laws`, for kernels that serve bodies of any law.
 };
 
 /// `TileLists` in device memory.
@@ -58,37 +61,25 @@ struct Fields {
   std::size_t places;
 };
 
-template <class Real, Elasticity elasticity, bool volume, class Constants>
-__device__ auto law_of(const Constants& body) {
-  const Hooke<Real> hooke{body.lambda, body.mu};
-  using Elastic = ElasticLaw<elasticity, Real>;
-  if constexpr (volume) {
-    return SumOf<Elastic, VolumeConservation<Real>>{Elastic{hooke}, {body.volume_stiffness}};
-  } else {
-    return Elastic{hooke};
-  }
-}
+/// A law that is chosen at run time, tile by tile: for resident kernels that serve bodies of
+/// several laws.
+struct AnyLaw {};
 
-/// The stress of a tile's body, whatever its law. @tparam any not Hooke's alone
-template <class Real, bool any, class Constants>
+/// P of a tile's body [Pa], by its law and, if it has any, volume conservation.
+/// @tparam Law one of `Laws`, or `AnyLaw`
+template <class Law, class Real, class Constants>
 __device__ Mat3<Real> first_piola_stress_of(const Constants& body, const Mat3<Real>& grad_u) {
-  const bool volume = body.volume_stiffness > Real(0);
-  const auto stress = [&]<Elasticity elasticity>() {
-    return volume ? law_of<Real, elasticity, true>(body).first_piola_stress(grad_u)
-                  : law_of<Real, elasticity, false>(body).first_piola_stress(grad_u);
+  const auto stress = [&](const auto& law) {
+    using Own = std::decay_t<decltype(law)>;
+    const VolumeConservation<Real> volume{body.law[constants_of_law<Own, Real>]};
+    if (!(volume.stiffness > Real(0))) return law.first_piola_stress(grad_u);
+    return SumOf<Own, VolumeConservation<Real>>{law, volume}.first_piola_stress(grad_u);
   };
-  if constexpr (any) {
-    if (body.elasticity == Elasticity::neo_hooke) {
-      return stress.template operator()<Elasticity::neo_hooke>();
-    }
-    if (body.elasticity == Elasticity::corotated) {
-      return stress.template operator()<Elasticity::corotated>();
-    }
+  if constexpr (std::is_same_v<Law, AnyLaw>) {
+    return Laws::with<Real>(body.law_index, body.law, stress);
+  } else {
+    return stress(make_law<Law, Real>(body.law));
   }
-  if (body.elasticity == Elasticity::green_hooke) {
-    return stress.template operator()<Elasticity::green_hooke>();
-  }
-  return stress.template operator()<Elasticity::cauchy_hooke>();
 }
 
 /// The velocity after a step. `force` is all but gravity; damping by the body's factors.
@@ -223,8 +214,9 @@ enum class Beyond { nothing, hourglass, closing };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-template <class Real, class StateReal, Elasticity elasticity, bool volume, Beyond beyond,
-          bool only_gradient, class Others = Alone>
+/// @tparam Law one of `Laws`, or its sum with `VolumeConservation`
+template <class Real, class StateReal, class Law, Beyond beyond, bool only_gradient,
+          class Others = Alone>
 __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
@@ -282,7 +274,7 @@ __global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
-    const auto law = law_of<Real, elasticity, volume>(body);
+    const Law law = make_law<Law, Real>(body.law);
     const Mat3<Real> stress = law.first_piola_stress(grad_u);
     Mat3<Real> q = pair_stress(c[6 * f.places], stress, inverse_moment);
     if constexpr (beyond == Beyond::closing) {

@@ -24,7 +24,10 @@ class Passes {
         direct_(halo ? halo->in_passes() : nullptr),
         interior_(m_.boundary_tiles(), m_.tiles(), *this),
         boundary_(0, m_.boundary_tiles(), *this),
-        meeting_(0, direct_ ? m_.tiles() : 0, *this) {}
+        meeting_(0, direct_ ? m_.tiles() : 0, *this) {
+    linear_ = runs_of<Pass1<Alone>>(0, m_.tiles(),
+                                    [&](const Material& m) { return linear_pass_1_of(m); });
+  }
 
   /// What ghosts are not needed for is launched before they are waited for.
   void stress() const {
@@ -62,19 +65,13 @@ class Passes {
     halo_->exchange(records);
   }
 
-  /// Pass 1 of every body by the linear law of `constants`, which volume conservation is part of.
+  /// Pass 1 of every body by the linear law that it has at rest, which volume conservation is part
+  /// of. @param constants of `DeviceModel::rest_constants`
   void linear_stress(const TileConstants<Real, StateReal>* constants) const {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
-    constexpr Elasticity linear = Elasticity::cauchy_hooke;
-    launch_pass_1<Alone>(
-        fields,
-        {m_.closed()   ? pass_1<Real, StateReal, linear, false, Beyond::closing, false>
-         : fields.pull ? pass_1<Real, StateReal, linear, false, Beyond::hourglass, false>
-                       : pass_1<Real, StateReal, linear, false, Beyond::nothing, false>,
-         0, m_.tiles()},
-        {}, {});
+    for (const auto& run : linear_) launch_pass_1<Alone>(fields, run, {}, {});
     send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
@@ -104,10 +101,10 @@ class Passes {
   /// Those of `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    constexpr Elasticity any = Elasticity::green_hooke;
+    using Any = StVenantKirchhoff<Real>;  // gradients know no law
     launch_pass_1<Alone>(m_.fields(),
-                         {m_.closed() ? pass_1<Real, StateReal, any, false, Beyond::closing, true>
-                                      : pass_1<Real, StateReal, any, false, Beyond::nothing, true>,
+                         {m_.closed() ? pass_1<Real, StateReal, Any, Beyond::closing, true>
+                                      : pass_1<Real, StateReal, Any, Beyond::nothing, true>,
                           0, tiles},
                          gradients, {});
   }
@@ -119,27 +116,34 @@ class Passes {
     Kernel kernel;
     Index first_tile, tiles;
   };
-  /// The launches of a step that serve tiles side by side.
-  template <class Others1, class Others2>
-  struct Runs {
-    Runs(Index begin, Index end, const Passes& passes) : of(passes) {
-      for (Index tile = begin; tile < end; ++tile) {
-        const Material& material = of.m_.model().parts[of.m_.tiling().part[tile]].material;
-        add(pass_1, of.template pass_1_of<Others1>(material), tile);
-        add(pass_2,
-            of.m_.own_supports() ? of.template pass_2_of<true, Others2>(material)
-                                 : of.template pass_2_of<false, Others2>(material),
-            tile);
-      }
-    }
-    template <class Kernel>
-    static void add(std::vector<Run<Kernel>>& runs, Kernel kernel, Index tile) {
+  /// The launches that serve tiles [begin, end), with the kernel that `kernel_of` gives for each
+  /// part's material.
+  template <class Kernel, class KernelOf>
+  std::vector<Run<Kernel>> runs_of(Index begin, Index end, KernelOf&& kernel_of) const {
+    std::vector<Kernel> of_part;
+    for (const Part& part : m_.model().parts) of_part.push_back(kernel_of(part.material));
+    std::vector<Run<Kernel>> runs;
+    for (Index tile = begin; tile < end; ++tile) {
+      const Kernel kernel = of_part[m_.tiling().part[tile]];
       if (!runs.empty() && runs.back().kernel == kernel) {
         ++runs.back().tiles;
       } else {
         runs.push_back({kernel, tile, 1});
       }
     }
+    return runs;
+  }
+  /// The launches of a step that serve tiles side by side.
+  template <class Others1, class Others2>
+  struct Runs {
+    Runs(Index begin, Index end, const Passes& passes)
+        : of(passes),
+          pass_1(of.template runs_of<Pass1<Others1>>(
+              begin, end, [&](const Material& m) { return of.template pass_1_of<Others1>(m); })),
+          pass_2(of.template runs_of<Pass2<Others2>>(begin, end, [&](const Material& m) {
+            return of.m_.own_supports() ? of.template pass_2_of<true, Others2>(m)
+                                        : of.template pass_2_of<false, Others2>(m);
+          })) {}
     void stress(const Others1& others) const {
       for (const auto& run : pass_1) {
         of.template launch_pass_1<Others1>(of.m_.fields(), run, {}, others);
@@ -179,23 +183,24 @@ class Passes {
   }
   template <Beyond beyond, class Others>
   static Pass1<Others> pass_1_of(const Material& m) {
-    switch (m.elasticity()) {
-      case Elasticity::green_hooke:
-        return pass_1_of<Elasticity::green_hooke, beyond, Others>(m);
-      case Elasticity::cauchy_hooke:
-        return pass_1_of<Elasticity::cauchy_hooke, beyond, Others>(m);
-      case Elasticity::corotated:
-        return pass_1_of<Elasticity::corotated, beyond, Others>(m);
-      case Elasticity::neo_hooke:
-        break;
-    }
-    return pass_1_of<Elasticity::neo_hooke, beyond, Others>(m);
+    return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
+      using WithVolume = SumOf<Law, VolumeConservation<Real>>;
+      return m.volume_stiffness > 0
+                 ? Pass1<Others>(cuda::pass_1<Real, StateReal, WithVolume, beyond, false, Others>)
+                 : cuda::pass_1<Real, StateReal, Law, beyond, false, Others>;
+    });
   }
-  template <Elasticity elasticity, Beyond beyond, class Others>
-  static Pass1<Others> pass_1_of(const Material& m) {
-    return m.volume_stiffness > 0
-               ? cuda::pass_1<Real, StateReal, elasticity, true, beyond, false, Others>
-               : cuda::pass_1<Real, StateReal, elasticity, false, beyond, false, Others>;
+  /// Pass 1 by the linear law that a material has at rest.
+  Pass1<Alone> linear_pass_1_of(const Material& m) const {
+    return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
+      using Linear = decltype(std::declval<Law>().at_rest(Real()));
+      if (m_.closed()) {
+        return Pass1<Alone>(cuda::pass_1<Real, StateReal, Linear, Beyond::closing, false>);
+      }
+      return m_.fields().pull
+                 ? Pass1<Alone>(cuda::pass_1<Real, StateReal, Linear, Beyond::hourglass, false>)
+                 : cuda::pass_1<Real, StateReal, Linear, Beyond::nothing, false>;
+    });
   }
   template <bool own_supports, class Others>
   Pass2<Others> pass_2_of(const Material& m) const {
@@ -241,7 +246,8 @@ class Passes {
   const DeviceHalo<Real, StateReal>* halo_;
   const DirectExchange<Real, StateReal>* direct_;
   Runs<Alone, Alone> interior_, boundary_;
-  Runs<Meeting1, Meeting2> meeting_;  // all tiles, where passes exchange by themselves
+  std::vector<Run<Pass1<Alone>>> linear_;  // all tiles, by the laws at rest
+  Runs<Meeting1, Meeting2> meeting_;       // all tiles, where passes exchange by themselves
 };
 
 }  // namespace phyxel::cuda

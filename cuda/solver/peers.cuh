@@ -100,7 +100,7 @@ __global__ void store_at_peers(const __grid_constant__ Records records, const Re
   tell_if_last(signals, gridDim.x);
 }
 /// One block.
-__global__ inline void wait_for_peers(const __grid_constant__ Signals signals) {
+static __global__ void wait_for_peers(const __grid_constant__ Signals signals) {
   wait_for_flags(signals, true);
   if (threadIdx.x == 0) mark_received(signals);
 }

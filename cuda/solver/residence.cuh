@@ -111,11 +111,20 @@ class Residence {
   }
   template <class Post>
   void use_post(const ResidentPlan& plan) {
-    const auto is_hooke = [](const Part& part) { return part.material.law == Law::hooke; };
+    // Without hourglass control the default law alone has a kernel of its own; others may have it.
+    const auto kernel_of = [&]<class Law>(std::type_identity<Law>) {
+      constexpr bool controlled = !std::is_same_v<Law, StVenantKirchhoff<Real>>;
+      return hourglass()
+                 ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, Law, true>)
+                 : reinterpret_cast<const void*>(
+                       resident_steps<Real, StateReal, Post, Law, controlled>);
+    };
     const auto& parts = m_.model().parts;
-    kernel_ = hourglass() || !std::all_of(parts.begin(), parts.end(), is_hooke)
-                  ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, true>)
-                  : reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, false>);
+    const int law = chosen_law(parts.front().material).index;
+    const auto is_alike = [&](const Part& part) { return chosen_law(part.material).index == law; };
+    kernel_ = std::all_of(parts.begin(), parts.end(), is_alike)
+                  ? Laws::with_type<Real>(law, kernel_of)
+                  : kernel_of(std::type_identity<AnyLaw>{});
     threads_ = Post::threads;
     shared_bytes_ = ResidentMemory<Real>::bytes(
         plan.most_slots, plan.longest[0], second_longest(plan), hourglass(),

@@ -480,8 +480,9 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
 }
 
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
-/// @tparam more some bodies have hourglass control, or a law that is not Hooke's
-template <class Real, class StateReal, class Post, bool more>
+/// @tparam Law that of all bodies, or `AnyLaw`. @tparam controlled some bodies may have hourglass
+///   control
+template <class Real, class StateReal, class Post, class Law, bool controlled>
 __global__ void __launch_bounds__(Post::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
@@ -497,7 +498,7 @@ __global__ void __launch_bounds__(Post::threads)
   }
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
-  const bool hourglass = more && r.weights;
+  const bool hourglass = controlled && r.weights;
   const ResidentMemory<Real> memory(shared, r, hourglass);
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_pairs(r, slice.rows[0], memory.pairs);
@@ -564,7 +565,7 @@ __global__ void __launch_bounds__(Post::threads)
         }
         set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
-      q = pair_stress(volume, first_piola_stress_of<Real, more>(body, grad_u), inverse_moment);
+      q = pair_stress(volume, first_piola_stress_of<Law>(body, grad_u), inverse_moment);
       if (hourglass) {
         q = with_hourglass(q, body.hourglass, grad_u);
         pull = pull_force(body.hourglass, pull);

@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "phyxel/physics/stiffening.hpp"
 #include "solver/diagnose.cuh"
 #include "solver/stiffest.hpp"
 
@@ -40,9 +39,8 @@ __global__ void find_stiffest(const __grid_constant__ Fields<Real, StateReal> f,
     Mat3<double> grad_u;
     for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient[e * f.places + place];
     const PrincipalStretches<double> s = principal_stretches(grad_u);
-    TileStiffening here{
-        stiffening(m.elasticity, Hooke<double>{m.lambda, m.mu}, m.volume_stiffness, s), s.largest,
-        number_at[place]};
+    TileStiffening here{stiffening(m.law_index, m.law, m.volume_stiffness, s), s.largest,
+                        number_at[place]};
     // What is not a number counts as infinite.
     if (!(here.ratio < HUGE_VAL)) here.ratio = HUGE_VAL;
     if (!(here.stretch < HUGE_VAL)) here.stretch = HUGE_VAL;

@@ -2,7 +2,7 @@
 /// stretched by half its length, and the force that takes is compared with the law's own answer.
 #include <cmath>
 #include <cstdio>
-#include <phyxel/physics/stress.hpp>
+#include <phyxel/physics/laws.hpp>
 #include <phyxel/phyxel.hpp>
 
 namespace {

@@ -70,10 +70,13 @@ std::uint64_t model_digest(const Model& model) {
     const Material& m = part.material;
     add(state.get(), std::vector<char>(part.neighbourhood.begin(), part.neighbourhood.end()));
     add(state.get(), std::vector<Index>{part.size});
-    add(state.get(),
-        std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness, m.damping,
-                            m.strain == Strain::green ? 1.0 : 0.0, m.hourglass.value_or(0),
-                            static_cast<double>(m.law), part.closure});
+    add(state.get(), std::vector<double>{m.young, m.poisson, m.density, m.volume_stiffness,
+                                         m.damping, m.hourglass.value_or(0), part.closure});
+    add(state.get(), std::vector<char>(m.law.begin(), m.law.end()));
+    for (const auto& [name, value] : m.parameters) {
+      add(state.get(), std::vector<char>(name.begin(), name.end()));
+      add(state.get(), std::vector<double>{value});
+    }
     if (m.custom_law) {
       const std::string name = m.custom_law->name();
       add(state.get(), std::vector<char>(name.begin(), name.end()));

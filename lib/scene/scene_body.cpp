@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/shapes.hpp"
 #include "scene/scene_error.hpp"
 
@@ -124,16 +125,42 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   if (thinnest > 0.999 * spacing) shape.placement = ShapeRequest::Placement::nodes;
 }
 
+/// Reads the law and its parameters. A parameter that is not said is that of `material`, which has
+/// the body's where the table is an inclusion's; `inherits` says whether it is.
+void read_law(const SceneTable& table, Material& material, bool inherits) {
+  const std::string of_body = material.law;
+  table.read("law", material.law);
+  std::map<std::string, double> parameters;
+  for (const LawEntry& entry : law_table()) {
+    const bool is_it = material.law == entry.name;
+    for (const LawParameter& parameter : entry.parameters) {
+      const std::string name = parameter.name;
+      if (!is_it) {
+        if (!table.has(parameter.name) || has_parameter(material.law, name)) continue;
+        table.refuse(parameter.name,
+                     fmt::format("found, which law \"{}\" does not have; allowed with law = \"{}\"",
+                                 material.law, entry.name));
+      }
+      const bool has_bodys = inherits && has_parameter(of_body, name);
+      if (parameter.required() && !has_bodys) table.expect(parameter.name);
+      if (name == young_modulus.name) {
+        table.read(parameter.name, material.young);
+      } else if (name == poisson_ratio.name) {
+        table.read(parameter.name, material.poisson);
+      } else {
+        const auto bodys = material.parameters.find(name);
+        if (bodys != material.parameters.end()) parameters.insert(*bodys);
+        if (table.has(parameter.name)) table.read(parameter.name, parameters[name]);
+      }
+    }
+  }
+  material.parameters = std::move(parameters);
+}
+
 Material read_material(const SceneTable& table) {
   Material material;
-  table.read("young", material.young);
-  table.read("poisson", material.poisson);
+  read_law(table, material, false);
   table.read("density", material.density);
-  table.read_choice("law", material.law);
-  table.read_choice("strain", material.strain);
-  if (material.law != Law::hooke && table.has("strain")) {
-    table.refuse("strain", "found, but only law = \"hooke\" uses it; allowed: one of them");
-  }
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
   table.read("hourglass", material.hourglass);
@@ -187,10 +214,8 @@ Selection read_selection(const SceneTable& table) {
 
 InclusionRequest read_inclusion(const SceneTable& table, Material material) {
   const Selection select = read_selection(table);
-  table.read("young", material.young);
-  table.read("poisson", material.poisson);
+  read_law(table, material, true);
   table.read("density", material.density);
-  table.read_choice("law", material.law);
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
   return {select, material};

@@ -1,6 +1,10 @@
 /// All sections and keys of a scene file: one entry each.
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdint>
 
+#include "phyxel/law_table.hpp"
 #include "scene/scene_schema.hpp"
 
 namespace phyxel {
@@ -27,6 +31,40 @@ Range strictly_between(double low, double high) { return {low, high, true}; }
 Range within(double size) { return {-size, size, false}; }
 Range length() { return {shortest, longest, false}; }
 Range time_span() { return {1e-18, 1e9, false}; }
+
+std::vector<std::string> law_names() {
+  std::vector<std::string> names;
+  for (const LawEntry& law : law_table()) names.emplace_back(law.name);
+  return names;
+}
+
+std::string law_meanings() {
+  std::string all = "How stress follows from strain; at small strains all are Hooke's law.";
+  for (const LawEntry& law : law_table()) all += fmt::format(" \"{}\": {}.", law.name, law.meaning);
+  return all;
+}
+
+/// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
+/// a parameter share its key.
+std::vector<SceneKey> law_keys(const std::string& section) {
+  std::vector<SceneKey> keys;
+  for (const LawEntry& law : law_table()) {
+    for (const LawParameter& p : law.parameters) {
+      const auto is_it = [&](const SceneKey& key) { return key.name == p.name; };
+      if (!is_own_parameter(p) || std::any_of(keys.begin(), keys.end(), is_it)) continue;
+      std::string otherwise = fmt::format("law \"{}\" needs it", law.name);
+      if (section != "body.material") {
+        otherwise = "the body's";
+      } else if (!p.required()) {
+        otherwise = fmt::format("{:g}", p.fallback);
+      }
+      keys.push_back({.section = section, .name = p.name, .unit = p.unit, .otherwise = otherwise,
+                      .range = {p.low, p.high, p.open},
+                      .meaning = fmt::format("With law = \"{}\": {}", law.name, p.meaning)});
+    }
+  }
+  return keys;
+}
 
 std::vector<SceneSection> make_sections() {
   return {
@@ -241,22 +279,15 @@ std::vector<SceneKey> body_keys() {
       {.section = "body", .name = "load", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Forces on phyxels."},
 
-      {.section = "body.material", .name = "young", .unit = "Pa", .required = true,
+      {.section = "body.material", .name = "young", .unit = "Pa", .otherwise = "required by laws that have it",
        .range = between(1e-12, stiffest), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
-      {.section = "body.material", .name = "poisson", .required = true,
+      {.section = "body.material", .name = "poisson", .otherwise = "required by laws that have it",
        .range = strictly_between(-1, 0.5),
        .meaning = "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."},
       {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
        .range = between(1e-12, stiffest), .meaning = "Mass density at rest: water 1000."},
       {.section = "body.material", .name = "law", .type = KeyType::choice,
-       .fallback = "\"hooke\"", .words = {"hooke", "neo-hookean", "corotated"},
-       .meaning = "\"hooke\": stress in proportion to `strain`, which gives way under strong "
-           "compression; \"neo-hookean\" (Smith et al. 2018) does not, not even turned inside out; "
-           "nor does \"corotated\", whose stress is in proportion to stretch however large."},
-      {.section = "body.material", .name = "strain", .type = KeyType::choice,
-       .fallback = "\"green\"", .words = {"green", "cauchy"},
-       .meaning = "\"green\" is right under any rotation; \"cauchy\" is cheaper, and only right "
-           "for small rotations."},
+       .fallback = "\"st-venant-kirchhoff\"", .words = law_names(), .meaning = law_meanings()},
       {.section = "body.material", .name = "volume_stiffness", .unit = "Pa", .fallback = "0",
        .range = between(0, stiffest),
        .meaning = "Extra resistance to a change of volume (Müller et al. 2004); 0: none."},
@@ -276,7 +307,7 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.inclusion", .name = "density", .unit = "kg/m^3", .otherwise = "the body's",
        .range = between(1e-12, stiffest), .meaning = "Mass density at rest."},
       {.section = "body.inclusion", .name = "law", .type = KeyType::choice,
-       .otherwise = "the body's", .words = {"hooke", "neo-hookean", "corotated"},
+       .otherwise = "the body's", .words = law_names(),
        .meaning = "As in `[body.material]`."},
       {.section = "body.inclusion", .name = "volume_stiffness", .unit = "Pa",
        .otherwise = "the body's", .range = between(0, stiffest), .meaning = "As in `[body.material]`."},
@@ -375,7 +406,8 @@ std::span<const SceneSection> scene_sections() {
 std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {
     std::vector<SceneKey> keys;
-    for (const auto& part : {top_keys(), run_keys(), body_keys(), boundary_keys()}) {
+    for (const auto& part : {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
+                             law_keys("body.inclusion"), boundary_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "phyxel/custom_law.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/scene.hpp"
 
 namespace phyxel {
@@ -79,11 +80,11 @@ void visit_source(const BodySource& source, Visit&& visit) {
 
 template <class Visit>
 void visit_material(const char* section, const Material& m, Visit&& visit) {
-  visit(section, "young", m.young);
-  visit(section, "poisson", m.poisson);
+  if (m.custom_law || has_parameter(m.law, "young")) visit(section, "young", m.young);
+  if (m.custom_law || has_parameter(m.law, "poisson")) visit(section, "poisson", m.poisson);
   visit(section, "density", m.density);
-  visit(section, "law", word(m.law));
-  visit("body.material", "strain", word(m.strain));
+  visit(section, "law", m.law);
+  for (const auto& [name, value] : m.parameters) visit(section, name.c_str(), value);
   visit(section, "volume_stiffness", m.volume_stiffness);
   visit(section, "damping", m.damping);
 }

@@ -251,7 +251,14 @@ void SceneTable::check() const {
                                  allowed_words(*key)));
   }
   for (const SceneKey* key : keys_of(section_)) {
-    if (!key->required || has(key->name.c_str())) continue;
+    if (key->required) expect(key->name.c_str());
+  }
+}
+
+void SceneTable::expect(const char* name) const {
+  if (has(name)) return;
+  for (const SceneKey* key : keys_of(section_)) {
+    if (key->name != name) continue;
     throw InputError(fmt::format("{}: key {}: missing; needed: {}", where(), path_of(key->name),
                                  allowed_words(*key)));
   }

@@ -57,6 +57,8 @@ class SceneTable {
   [[noreturn]] void refuse(const char* name, const std::string& problem) const;
   /// Throws unless exactly one of `names` is there.
   void expect_one_of(const std::vector<const char*>& names) const;
+  /// Throws an InputError unless the key is there.
+  void expect(const char* name) const;
   /// Throws if only one of the two is there.
   void expect_together(const char* a, const char* b) const;
   /// Throws if both are there.

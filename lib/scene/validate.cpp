@@ -6,20 +6,34 @@
 #include <type_traits>
 
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "scene/scene_parameters.hpp"
 #include "scene/scene_schema.hpp"
 
 namespace phyxel {
 namespace {
 
-const SceneKey& key_of(std::string_view section, std::string_view name) {
+/// The key of a name, or null: a parameter that no law has.
+const SceneKey* key_of(std::string_view section, std::string_view name) {
   using Table = std::map<std::pair<std::string_view, std::string_view>, const SceneKey*>;
   static const Table table = [] {
     Table all;
     for (const SceneKey& key : scene_keys()) all[{key.section, key.name}] = &key;
     return all;
   }();
-  return *table.at({section, name});
+  const auto at = table.find({section, name});
+  return at == table.end() ? nullptr : at->second;
+}
+
+/// Checks that a material's law exists and has the parameters that are given.
+void check_law(const BodyRequest& body, const Material& material, const std::string& where) {
+  if (material.custom_law) return;
+  try {
+    chosen_law(material);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}{}material of body \"{}\": {}", where,
+                                 where.empty() ? "" : ": ", body.name, error.what()));
+  }
 }
 
 /// "scene.toml:7:1: key body.material.young of body "beam""
@@ -31,10 +45,10 @@ std::string place_of(const ParameterOwner& owner, const SceneKey& key) {
                     : fmt::format("{}key {}", where, path);
 }
 
-void check_number(const ParameterOwner& owner, const SceneKey& key, double value) {
-  if (key.range.contains(value)) return;
+void check_number(const ParameterOwner& owner, const SceneKey* key, double value) {
+  if (!key || key->range.contains(value)) return;
   throw InputError(
-      fmt::format("{}: {} found; allowed: {}", place_of(owner, key), value, allowed_words(key)));
+      fmt::format("{}: {} found; allowed: {}", place_of(owner, *key), value, allowed_words(*key)));
 }
 
 void check_one_choice(const BodyRequest& body, const Selection& select) {
@@ -67,6 +81,10 @@ void validate(const Scene& scene) {
     }
   });
   for (const BodyRequest& body : scene.bodies) {
+    check_law(body, body.material, body.where);
+    for (const InclusionRequest& inclusion : body.inclusions) {
+      check_law(body, inclusion.material, inclusion.select.where);
+    }
     detail::visit_lists(body, [&](std::size_t, const char*, const Selection& select, auto&&) {
       check_one_choice(body, select);
     });

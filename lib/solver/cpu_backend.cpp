@@ -15,11 +15,11 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/strain.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/cpu_layout.hpp"
@@ -360,6 +360,7 @@ class CpuBackend final : public Backend {
   /// Neighbouring bodies of one material: one loop over all of them.
   struct Run {
     Material material;
+    ChosenLaw law;     ///< Unused with a custom law.
     double hourglass;  ///< κ [N/m]
     PackRange range;
   };
@@ -374,7 +375,8 @@ class CpuBackend final : public Backend {
       if (!runs.empty() && runs.back().material == material && runs.back().hourglass == hourglass) {
         runs.back().range.end = range.end;
       } else {
-        runs.push_back({material, hourglass, range});
+        const ChosenLaw law = material.custom_law ? ChosenLaw{} : chosen_law(material);
+        runs.push_back({material, law, hourglass, range});
       }
     }
     return runs;
@@ -470,7 +472,6 @@ class CpuBackend final : public Backend {
   static void for_each_law(const std::vector<Run>& runs, Apply&& apply) {
     for (const Run& run : runs) {
       const Material& m = run.material;
-      const Hooke<P> hooke{P(m.lame_lambda()), P(m.lame_mu())};
       const VolumeConservation<P> volume{P(m.volume_stiffness)};
       const auto apply_to = [&](const auto& law) {
         using Law = std::decay_t<decltype(law)>;
@@ -478,7 +479,7 @@ class CpuBackend final : public Backend {
                                : apply(law, run);
       };
       if (!m.custom_law) {
-        with_law(m.elasticity(), hooke, apply_to);
+        Laws::with<P>(run.law.index, run.law.constants.data(), apply_to);
         continue;
       }
       FirstError error;

@@ -6,14 +6,13 @@
 #include <cmath>
 #include <limits>
 
-#include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/hourglass.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/first_error.hpp"
 #include "solver/hourglass.hpp"
+#include "solver/part_law.hpp"
 #include "solver/totals.hpp"
 
 namespace phyxel {
@@ -25,19 +24,11 @@ bool all_finite(const Mat3d& m) {
   return std::isfinite(sum);
 }
 
-/// Calls apply(law) with the material's law, a caller's own or one of ours.
-template <class Apply>
-auto with_law_of(const Material& material, Apply&& apply) {
-  if (material.custom_law) return apply(*material.custom_law);
-  const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
-  return with_law(material.elasticity(), hooke, apply);
-}
-
-Mat3d first_piola_stress(const Material& material, const Mat3d& grad_u) {
-  Mat3d p = with_law_of(material, [&](const auto& law) { return law.first_piola_stress(grad_u); });
-  if (material.volume_stiffness > 0) {
-    p += VolumeConservation<double>{material.volume_stiffness}.first_piola_stress(grad_u);
-  }
+/// P of the law and of volume conservation [Pa].
+Mat3d first_piola_stress(const PartLaw& law, const VolumeConservation<double>& volume,
+                         const Mat3d& grad_u) {
+  Mat3d p = law.first_piola_stress(grad_u);
+  if (volume.stiffness > 0) p += volume.first_piola_stress(grad_u);
   return p;
 }
 
@@ -61,7 +52,7 @@ double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
 }  // namespace
 
 double pressure_wave_speed(const Material& m) {
-  return std::sqrt((m.lame_lambda() + 2 * m.lame_mu() + m.volume_stiffness) / m.density);
+  return std::sqrt(wave_stiffness_at_rest(m) / m.density);
 }
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
@@ -103,6 +94,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     Totals own;
     for (const Part& part : model.parts) {
       const Material& m = part.material;
+      const PartLaw law(m);
       const VolumeConservation<double> volume_law{m.volume_stiffness};
       const double kappa = hourglass_stiffness(model, part);
       const DampedFlow half = damped_flow(m.damping, now.lag);
@@ -123,9 +115,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         own.momentum.add(p);
         own.angular_momentum.add(cross(x, p));
         own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
-        const auto energy = [&] {
-          return with_law_of(m, [&](const auto& law) { return law.energy(gradient[i]); });
-        };
+        const auto energy = [&] { return law.energy(gradient[i]); };
         own.strain_energy.add(model.volume[i] * (m.custom_law ? error.caught(energy) : energy()));
         if (m.volume_stiffness > 0) {
           own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
@@ -181,9 +171,11 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
   if (von_mises) von_mises->resize(gradient.size());
   if (volume_ratio) volume_ratio->resize(gradient.size());
   for (const Part& part : model.parts) {
+    const PartLaw law(part.material);
+    const VolumeConservation<double> volume{part.material.volume_stiffness};
     for (Index i = part.begin; i < part.end; ++i) {
       const Mat3d& g = gradient[i];
-      if (von_mises) (*von_mises)[i] = von_mises_stress(first_piola_stress(part.material, g), g);
+      if (von_mises) (*von_mises)[i] = von_mises_stress(first_piola_stress(law, volume, g), g);
       if (volume_ratio) (*volume_ratio)[i] = 1 + volume_change(g);
     }
   }

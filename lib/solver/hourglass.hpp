@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "phyxel/law_table.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/hourglass.hpp"
 
@@ -13,9 +14,9 @@ namespace phyxel {
 inline double hourglass_stiffness(const Model& model, const Part& part) {
   const double strength = part.material.hourglass.value_or(0);
   if (!(strength > 0) || part.begin == part.end) return 0;
-  double young = part.material.young, volume = 0, size = 0;
+  double young = hourglass_modulus(part.material), volume = 0, size = 0;
   for (const Part& other : model.parts_of_body(part)) {
-    young = std::min(young, other.material.young);
+    young = std::min(young, hourglass_modulus(other.material));
     volume += other.volume;
     size += other.size;
   }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/solver.hpp"
 #include "scene/scene_error.hpp"
 
@@ -25,11 +26,13 @@ constexpr double most_hourglass = 1e4;         // of Young's modulus
 void refuse_absurd_stiffness(const Model& model) {
   for (const Part& part : model.parts) {
     const Material& m = part.material;
-    if (m.volume_stiffness > most_volume_stiffness * m.young) {
-      throw InputError(fmt::format(
-          "body \"{}\": volume_stiffness = {:g} Pa with young = {:g} Pa: allowed is at most {:g} "
-          "times young; stiffer bodies need steps too short to reach the end",
-          part.name, m.volume_stiffness, m.young, most_volume_stiffness));
+    const double modulus = hourglass_modulus(m);
+    if (m.volume_stiffness > most_volume_stiffness * modulus) {
+      throw InputError(
+          fmt::format("body \"{}\": volume_stiffness = {:g} Pa with a modulus of {:g} Pa: allowed "
+                      "is at most {:g} "
+                      "times that; stiffer bodies need steps too short to reach the end",
+                      part.name, m.volume_stiffness, modulus, most_volume_stiffness));
     }
     if (m.hourglass.value_or(0) > most_hourglass) {
       throw InputError(

@@ -1,14 +1,12 @@
 /// How much stiffer than at rest a deformed model is.
-#include "phyxel/physics/stiffening.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "phyxel/custom_law.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/part_law.hpp"
 #include "solver/stiffest.hpp"
 
 namespace phyxel {
@@ -44,15 +42,14 @@ double wave_stiffness_of(const CustomLaw& law, const Mat3d& grad_u) {
   return largest;
 }
 
-double stiffening_of(const Material& material, const Mat3d& grad_u,
-                     const PrincipalStretches<double>& stretches) {
-  const Hooke<double> hooke{material.lame_lambda(), material.lame_mu()};
-  if (!material.custom_law) {
-    return stiffening(material.elasticity(), hooke, material.volume_stiffness, stretches);
+double stiffening_of(const PartLaw& law, double volume_stiffness, const Mat3d& grad_u,
+                     const PrincipalStretches<double>& stretches, double at_rest) {
+  if (!law.custom()) {
+    return stiffening(law.chosen().index, law.chosen().constants.data(), volume_stiffness,
+                      stretches);
   }
-  const VolumeConservation<double> volume{material.volume_stiffness};
-  return (wave_stiffness_of(*material.custom_law, grad_u) + wave_stiffness(volume, stretches)) /
-         (wave_stiffness_at_rest(hooke) + material.volume_stiffness);
+  const VolumeConservation<double> volume{volume_stiffness};
+  return (wave_stiffness_of(*law.custom(), grad_u) + volume.wave_stiffness(stretches)) / at_rest;
 }
 
 /// Largest over the phyxels of this rank.
@@ -64,10 +61,14 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
   {
     Stiffest own;
     for (const Part& part : model.parts) {
+      const PartLaw law(part.material);
+      const double volume = part.material.volume_stiffness,
+                   at_rest = wave_stiffness_at_rest(part.material);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const PrincipalStretches<double> s = principal_stretches(gradient[i]);
-        own.look_at(stiffening_of(part.material, gradient[i], s), s.largest, model.number(i));
+        own.look_at(stiffening_of(law, volume, gradient[i], s, at_rest), s.largest,
+                    model.number(i));
       }
     }
 #pragma omp critical
@@ -79,8 +80,8 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
 }  // namespace
 
 bool stiffens(const Material& material) {
-  return material.custom_law || material.elasticity() != Elasticity::cauchy_hooke ||
-         material.volume_stiffness > 0;
+  return material.custom_law || material.volume_stiffness > 0 ||
+         !law_table()[chosen_law(material).index].is_linear;
 }
 
 Stiffening find_stiffening(const Model& model, Backend& backend) {

@@ -40,7 +40,7 @@ velocity = [1, 0, 0]
 young = 1e5
 poisson = 0
 density = 1000
-strain = "cauchy"
+law = "small-strain"
 [[body.fixed]]
 box = [[-1, -1, -1], [0.1, 1, 1]]
 )");

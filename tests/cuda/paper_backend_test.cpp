@@ -12,7 +12,7 @@
 #include "paper/paper_model.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/hooke.hpp"
 #include "phyxel/solver.hpp"
 #include "support/clouds.hpp"
 #include "support/paper_reference.hpp"
@@ -55,10 +55,11 @@ bool no_gpu() {
 }
 
 /// A box of phyxels moved by up to 0.3 spacings, held at one end, with surfels all over it.
-Model random_cloud(int nx, int ny, int nz, std::uint64_t seed, Strain strain = Strain::green) {
+Model random_cloud(int nx, int ny, int nz, std::uint64_t seed,
+                   const char* law = "st-venant-kirchhoff") {
   Scene scene = testing::one_body(testing::rubber());
   scene.gravity = {0, 0, -9.81};
-  scene.bodies[0].material.strain = strain;
+  scene.bodies[0].material.law = law;
   scene.bodies[0].fixed.push_back({.select = {.indices = {{0, 1, 9, 10, 81}}}});
   use_paper_rules(scene.bodies[0]);
   Cloud cloud = testing::lattice(nx, ny, nz, 0.1, 0.3, seed);
@@ -80,7 +81,7 @@ const Model& model_named(std::string name) {
     Model model = name == "random"          ? random_cloud(9, 9, 9, 1)
                   : name == "random_2"      ? random_cloud(7, 13, 8, 2)
                   : name == "random_3"      ? random_cloud(20, 6, 5, 3)
-                  : name == "random_cauchy" ? random_cloud(9, 9, 9, 4, Strain::cauchy)
+                  : name == "random_cauchy" ? random_cloud(9, 9, 9, 4, "small-strain")
                                             : paper_model(body_scene(name));
     found = models.emplace(name, std::move(model)).first;
   }

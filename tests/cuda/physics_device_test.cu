@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "phyxel/physics/force.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/strain.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "phyxel/physics/surfel.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -82,18 +82,18 @@ PHYXEL_HD void evaluate_formulas(const Inputs<Real>& in, Outputs<Real>& out) {
   const Hooke<Real> hooke{in.lambda, in.mu};
   out.add(hooke.stress(cauchy_strain(g)));
   out.add(hooke.energy(cauchy_strain(g)));
-  const GreenHooke<Real> green{hooke};
+  const StVenantKirchhoff<Real> green{hooke};
   out.add(green.energy(g));
   out.add(green.first_piola_stress(g));
-  const CauchyHooke<Real> cauchy{hooke};
+  const SmallStrain<Real> cauchy{hooke};
   out.add(cauchy.energy(g));
   out.add(cauchy.first_piola_stress(g));
-  out.add(NeoHooke<Real>{hooke}.first_piola_stress(g));  // its energy takes a library's logarithm
+  out.add(NeoHookean<Real>{hooke}.first_piola_stress(g));  // its energy takes a library's logarithm
   const VolumeConservation<Real> conservation{in.stiffness};
   out.add(volume_change(g));
   out.add(conservation.energy(g));
   out.add(conservation.first_piola_stress(g));
-  const SumOf<GreenHooke<Real>, VolumeConservation<Real>> both{green, conservation};
+  const SumOf<StVenantKirchhoff<Real>, VolumeConservation<Real>> both{green, conservation};
   out.add(both.energy(g));
   out.add(both.first_piola_stress(g));
 

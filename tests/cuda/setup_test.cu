@@ -9,6 +9,7 @@
 #include "partition/partition.hpp"
 #include "partition/share.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/solver.hpp"
 #include "setup/device_tiling.hpp"
 #include "setup/primitives.cuh"
@@ -249,9 +250,9 @@ TEST(SetupOnGpu, ListsLeftThereAreMissedOnTheCpu) {
 /// differences the forces in double.
 TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
   for (const bool volume : {false, true}) {
-    for (const Strain strain : {Strain::green, Strain::cauchy}) {
+    for (const LawEntry& law : law_table()) {
       Bodies b = overlapping();
-      b.scene.bodies[1].material.strain = strain;
+      b.scene.bodies[1].material.law = law.name;
       if (volume) b.scene.bodies[1].material.volume_stiffness = 3e6;
       if (volume) b.scene.bodies[1].material.hourglass = 5;  // so that it sets the limit
       const Model model = build_model(b.scene, b.clouds);

@@ -5,7 +5,7 @@
 
 #include "phyxel/custom_law.hpp"
 #include "phyxel/material.hpp"
-#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/laws/neo_hookean.hpp"
 
 namespace phyxel::testing {
 
@@ -21,7 +21,7 @@ class Repeated final : public CustomLaw {
   }
 
  private:
-  NeoHooke<double> law_;
+  NeoHookean<double> law_;
   double factor_;
 };
 

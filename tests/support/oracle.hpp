@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <string>
 #include <vector>
 
 namespace oracle {
@@ -14,8 +15,9 @@ using M3 = Eigen::Matrix3d;
 
 struct Material {
   double young = 0, poisson = 0, volume_stiffness = 0;
-  bool green = true;
-  bool neo_hooke = false, corotated = false;
+  std::string law = "st-venant-kirchhoff";
+  /// True if its strain is Green's.
+  bool green() const { return law == "st-venant-kirchhoff"; }
 };
 
 struct Body : Material {
@@ -76,7 +78,7 @@ inline M3 grad_u(const Body& b, const std::vector<V3>& u, int i) {
 
 inline M3 strain(const Material& b, const M3& g) {
   const M3 linear = 0.5 * (g + g.transpose());
-  return b.green ? M3(linear + 0.5 * g.transpose() * g) : linear;
+  return b.green() ? M3(linear + 0.5 * g.transpose() * g) : linear;
 }
 
 /// Equation (5) of Farias et al. 2008, in its 6x6 engineering layout.
@@ -189,9 +191,9 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
     const Material& m = material_of(b, i);
     const M3 g = closed_grad_u(b, u, i), e = strain(m, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    const double elastic = m.corotated   ? Corotated(m).energy(M3::Identity() + g)
-                           : m.neo_hooke ? NeoHooke(m).energy(M3::Identity() + g)
-                                         : 0.5 * e.cwiseProduct(stress(m, e)).sum();
+    const double elastic = m.law == "corotated"     ? Corotated(m).energy(M3::Identity() + g)
+                           : m.law == "neo-hookean" ? NeoHooke(m).energy(M3::Identity() + g)
+                                                    : 0.5 * e.cwiseProduct(stress(m, e)).sum();
     total += b.v[i] * (elastic + 0.5 * m.volume_stiffness * dj * dj);
   }
   return total;
@@ -205,9 +207,9 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     const M3 fit = grad_u(b, u, i);
     const Material& m = material_of(b, i);
     M3 p = stress(m, strain(m, g));
-    if (m.green) p = j * p;
-    if (m.neo_hooke) p = NeoHooke(m).stress(j, cofactor(j));
-    if (m.corotated) p = Corotated(m).stress(j);
+    if (m.green()) p = j * p;
+    if (m.law == "neo-hookean") p = NeoHooke(m).stress(j, cofactor(j));
+    if (m.law == "corotated") p = Corotated(m).stress(j);
     if (m.volume_stiffness > 0) p += m.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
       V3 push = -b.v[i] * p * grad_of(b, a, i, n);

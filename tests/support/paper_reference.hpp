@@ -36,7 +36,7 @@ inline oracle::Body oracle_body(const Model& model) {
   }
   body.young = model.parts[0].material.young;
   body.poisson = model.parts[0].material.poisson;
-  body.green = model.parts[0].material.strain == Strain::green;
+  body.law = model.parts[0].material.law;
   return body;
 }
 
@@ -53,7 +53,7 @@ inline std::vector<Vec3d> oracle_pair_forces(const oracle::Body& b,
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {
     const oracle::M3 g = oracle::grad_u(b, u, i), j = oracle::M3::Identity() + g;
     oracle::M3 p = oracle::stress(b, oracle::strain(b, g));
-    if (b.green) p = j * p;
+    if (b.green()) p = j * p;
     const oracle::M3 a = oracle::inverse_moment(b, i);
     for (const int n : b.neighbours[i]) {
       const oracle::V3 x = b.x[n] - b.x[i];

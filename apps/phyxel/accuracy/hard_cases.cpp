@@ -10,6 +10,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/solver.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
@@ -98,7 +99,7 @@ Cloud box_of(int nx, int ny, int nz, double spacing) {
   }
   return cloud;
 }
-Scene scene_of(const Cloud&, Law law = Law::hooke) {
+Scene scene_of(const Cloud&, const char* law = StVenantKirchhoff<double>::name) {
   BodyRequest body;
   body.name = "body";
   body.where = "phyxel accuracy";
@@ -259,7 +260,7 @@ double contrast(const Machine& machine) {
 
 // --- large deformation ---------------------------------------------------------------------------
 
-Scene block(Law law, double damping) {
+Scene block(const char* law, double damping) {
   Scene scene;
   BodyRequest body;
   body.name = "block";
@@ -276,7 +277,7 @@ Scene block(Law law, double damping) {
 }
 
 /// Of a block at rest but for rotation and translation: what of its energy is left.
-double sprung_back(Law law, double safety, const std::function<Vec3d(Vec3d)>& start,
+double sprung_back(const char* law, double safety, const std::function<Vec3d(Vec3d)>& start,
                    const Machine& machine) {
   Trial trial(block(law, 30), machine);
   const double dt = trial.step_at(safety);
@@ -294,10 +295,14 @@ double sprung_back(Law law, double safety, const std::function<Vec3d(Vec3d)>& st
   return last.elastic_energy() / trial.first().elastic_energy();
 }
 Vec3d flattened(Vec3d x) { return {-0.9 * x.x, 0, 0}; }
-double flattened_hooke(const Machine& m) { return sprung_back(Law::hooke, 0.8, flattened, m); }
-double flattened_neo(const Machine& m) { return sprung_back(Law::neo_hooke, 0.2, flattened, m); }
+double flattened_hooke(const Machine& m) {
+  return sprung_back(StVenantKirchhoff<double>::name, 0.8, flattened, m);
+}
+double flattened_neo(const Machine& m) {
+  return sprung_back(NeoHookean<double>::name, 0.2, flattened, m);
+}
 double flattened_corotated(const Machine& m) {
-  return sprung_back(Law::corotated, 0.8, flattened, m);
+  return sprung_back(Corotated<double>::name, 0.8, flattened, m);
 }
 /// Mirrored, with an irregularity of a hundredth, since no side is the right one of a mirror.
 Vec3d mirrored(Vec3d x) {
@@ -306,16 +311,18 @@ Vec3d mirrored(Vec3d x) {
   const double a = jolt(), b = jolt();
   return {-2 * x.x + a, b, jolt()};
 }
-double inside_out_neo(const Machine& m) { return sprung_back(Law::neo_hooke, 0.2, mirrored, m); }
+double inside_out_neo(const Machine& m) {
+  return sprung_back(NeoHookean<double>::name, 0.2, mirrored, m);
+}
 double inside_out_corotated(const Machine& m) {
-  return sprung_back(Law::corotated, 0.4, mirrored, m);
+  return sprung_back(Corotated<double>::name, 0.4, mirrored, m);
 }
 
 /// A column, stretched by a fifth, so that it does not buckle into a helix, and one end turned
 /// three times: its middle, by symmetry, by half of that.
 double twist(const Machine& machine) {
   Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 3}, 1, 0.1));
-  scene.bodies[0].material.law = Law::neo_hooke;
+  scene.bodies[0].material.law = NeoHookean<double>::name;
   scene.bodies[0].motions.push_back({.select = {.region = "x+"},
                                      .displacement = {0.2, 0, 0},
                                      .rotation = {3 * 360, 0, 0},
@@ -340,7 +347,7 @@ double impact(const Machine& machine) {
   Discretisation d = best;
   d.across = 4;
   Scene scene = clamped(bar(d, 1, 0.2, 0));
-  scene.bodies[0].material.law = Law::corotated;
+  scene.bodies[0].material.law = Corotated<double>::name;
   const double c = std::sqrt(E / rho);
   scene.bodies[0].velocity = {-0.1 * c, 0, 0};
   Trial trial(scene, machine);

@@ -5,6 +5,7 @@
 #include "accuracy/bar.hpp"
 #include "compose.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/solver.hpp"
 #include "png_file.hpp"
 
@@ -18,7 +19,7 @@ FrameData swung(const Discretisation& d) {
   Scene scene = clamped(bar(d, 1, 0.2));
   Material& material = scene.bodies[0].material;
   material.young = 2.5e5;
-  material.law = Law::neo_hooke;
+  material.law = NeoHookean<double>::name;
   scene.gravity = {0, 0, -9.81};
   const Cloud cloud = cloud_of(scene, d);
   const Model model = build_model(scene, std::span(&cloud, 1));

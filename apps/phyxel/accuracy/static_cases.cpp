@@ -7,6 +7,7 @@
 #include "accuracy/bar.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "stopwatch.hpp"
 
 namespace phyxel::app {
@@ -204,7 +205,7 @@ Solution elastica(const Discretisation& d) {
 /// Energy [J] of a column whose end is turned about its axis.
 double energy_of_twist(const Discretisation& d, double degrees, Solution& total) {
   Scene scene = clamped(bar(d, 1, 0.2));
-  scene.bodies[0].material.law = Law::neo_hooke;
+  scene.bodies[0].material.law = NeoHookean<double>::name;
   scene.bodies[0].motions.push_back(
       {.select = {.region = "x+"}, .rotation = {degrees, 0, 0}, .duration = 1});
   const Rest rest = rest_of(scene, d);

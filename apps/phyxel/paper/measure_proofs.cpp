@@ -8,7 +8,8 @@
 #include "paper.hpp"
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
-#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/hooke.hpp"
+#include "phyxel/physics/strain.hpp"
 #include "phyxel/solver.hpp"
 
 namespace phyxel::app {

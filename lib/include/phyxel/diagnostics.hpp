@@ -22,8 +22,7 @@ inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t s
 /// The stiffest phyxel of a backend's present displacements, of all ranks: collective.
 Stiffening find_stiffening(const Model& model, Backend& backend);
 
-/// Whether a material can become stiffer than it is at rest: all can, but for Hooke's law in
-/// Cauchy's strain.
+/// True if a material can become stiffer than it is at rest: all can but linear laws.
 bool stiffens(const Material& material);
 
 /// A phyxel in words: its global id, its body and where it is at rest [m]. Of a share: collective.
@@ -34,7 +33,7 @@ std::string describe_phyxel(const Model& model, Index global_id);
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
                    std::vector<double>* volume_ratio);
 
-/// Speed of pressure waves, sqrt((λ + 2μ + k_v) / ρ) [m/s].
+/// The speed of pressure waves at rest [m/s]: sqrt((λ + 2μ + k_v) / ρ) of Hooke's law.
 double pressure_wave_speed(const Material& material);
 
 class StepShortener;

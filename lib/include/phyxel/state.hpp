@@ -61,7 +61,7 @@ struct SurfelState {
 
 /// The phyxel that is stiffest against its own state at rest.
 struct Stiffening {
-  /// Upper bound of the stiffness of plane waves over that at rest (physics/stiffening.hpp);
+  /// Upper bound of the stiffness of plane waves over that at rest (physics/laws.hpp);
   /// infinite if a displacement is not finite.
   double ratio = 1;
   double stretch = 1;  ///< Its largest principal stretch.

@@ -66,7 +66,7 @@ Mat3d some_gradient() {
 }
 Material linear_rubber() {
   Material material = rubber();
-  material.strain = Strain::cauchy;
+  material.law = "small-strain";
   return material;
 }
 

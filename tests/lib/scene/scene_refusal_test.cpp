@@ -148,7 +148,8 @@ const std::vector<Malformed>& malformed() {
       {of_material("young = 1\npoisson = -1\ndensity = 1\n"), "7:11", "-1 < poisson < 0.5"},
       {of_material("young = 1\npoisson = 0\ndensity = -1\n"), "8:11",
        "1e-12 <= density <= 1e+18 [kg/m^3]"},
-      {of_material("young = 1\npoisson = 0\ndensity = 1\nstrain = 'gren'\n"), "9:10", "\"green\"?"},
+      {of_material("young = 1\npoisson = 0\ndensity = 1\nlaw = 'corotate'\n"), "9:7",
+       "\"corotated\"?"},
       {of_material("young = 1\npoisson = 0\ndensity = 1\ndamping = -1\n"), "9:11",
        "0 <= damping <= 1e+12"},
       // [body.neighbours], [body.array]

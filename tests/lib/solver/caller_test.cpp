@@ -9,7 +9,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/solver.hpp"
 #include "support/clouds.hpp"
 #include "support/laws.hpp"
@@ -85,7 +85,7 @@ TEST(CustomLaw, ThatRepeatsNeoHookeGivesItsAnswers) {
   Material material = rubber();
   material.volume_stiffness = 2e5;
   material.hourglass = 0.1;
-  material.law = Law::neo_hooke;
+  material.law = "neo-hookean";
   const Model built_in = irregular_model(material);
   material.custom_law = std::make_shared<Repeated>(material);
   const Model custom = irregular_model(material);
@@ -134,7 +134,7 @@ TEST(CustomLaw, ForceIsMinusTheGradientOfTheReportedEnergy) {
 
 TEST(CustomLaw, StepLimitIsThatOfTheLaw) {
   Material material = rubber();
-  material.law = Law::neo_hooke;
+  material.law = "neo-hookean";
   const double built_in = step_limit(irregular_model(material)).omega_max;
   material.custom_law = std::make_shared<Repeated>(material, 4);
   const Model stiff = irregular_model(material);

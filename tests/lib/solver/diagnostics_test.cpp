@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "phyxel/physics/stress.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 /// A neo-Hookean cube that flies apart: spun so fast that it stretches by half.
 Scene spun_scene(Precision precision = Precision::double_) {
   Material material = rubber();
-  material.law = Law::neo_hooke;
+  material.law = "neo-hookean";
   material.young = 2e4;
   Scene scene = one_body(material);
   scene.solver.precision = precision;
@@ -321,7 +321,7 @@ TEST(StepShortener, NamesWhereItBeganWhenNoStepIsShortEnough) {
 /// Hooke's law in Cauchy's strain is linear: nothing is looked at, nothing is halved.
 TEST(StepShortener, LeavesLinearMaterialsAlone) {
   Scene scene = one_body();
-  scene.bodies[0].material.strain = Strain::cauchy;
+  scene.bodies[0].material.law = "small-strain";
   const Model linear = model_of(scene, lattice(3, 3, 3, 0.1));
   scene.bodies[0].material.volume_stiffness = 1e5;
   const Model stiffening_one = model_of(scene, lattice(3, 3, 3, 0.1));

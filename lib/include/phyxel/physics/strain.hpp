@@ -43,4 +43,26 @@ PHYXEL_HD Sym3<Real> cauchy_strain(const Mat3<Real>& g) {
           g(1, 1), half * (g(1, 2) + g(2, 1)), g(2, 2)};
 }
 
+namespace detail {
+/// The sum of the principal minors: the second invariant of a tensor.
+template <class Real>
+PHYXEL_HD Real minors(const Mat3<Real>& g) {
+  return minor(g(0, 0), g(1, 1), g(0, 1), g(1, 0)) + minor(g(0, 0), g(2, 2), g(0, 2), g(2, 0)) +
+         minor(g(1, 1), g(2, 2), g(1, 2), g(2, 1));
+}
+/// Σ g(a, b)².
+template <class Real>
+PHYXEL_HD Real squares(const Mat3<Real>& g) {
+  Real sum = g(0, 0) * g(0, 0);
+  for (int e = 1; e < 9; ++e) sum = fused(g(e / 3, e % 3), g(e / 3, e % 3), sum);
+  return sum;
+}
+}  // namespace detail
+
+/// det F - 1 from ∇u, without cancellation: tr G + ½(tr² G - tr G²) + det G.
+template <class Real>
+PHYXEL_HD Real volume_change(const Mat3<Real>& g) {
+  return g(0, 0) + g(1, 1) + g(2, 2) + detail::minors(g) + determinant(g);
+}
+
 }  // namespace phyxel

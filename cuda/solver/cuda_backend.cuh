@@ -1,9 +1,11 @@
+/// The production solver on one GPU: decides how steps are launched.
+#pragma once
+
 #include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "phyxel/custom_law.hpp"
 #include "solver/boundary.cuh"
 #include "solver/cuda_backend.hpp"
 #include "solver/device_model.cuh"
@@ -15,10 +17,7 @@
 #include "solver/vibration.cuh"
 #include "timeline.hpp"
 
-namespace phyxel {
-namespace {
-
-using namespace cuda;
+namespace phyxel::cuda {
 
 template <class Real, class StateReal>
 class CudaBackend final : public Backend {
@@ -344,29 +343,4 @@ class CudaBackend final : public Backend {
   mutable unsigned batches_ = 0;
 };
 
-}  // namespace
-
-std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
-                                           CudaPath path, Transport transport) {
-  if (model.share && (model.share->place.size() != static_cast<std::size_t>(model.size()) ||
-                      model.share->rings != 1)) {
-    throw InputError("a GPU steps shares that are cut between tiles and have one ring of ghosts");
-  }
-  for (const Part& part : model.parts) {
-    if (!part.material.custom_law) continue;
-    throw InputError("body \"" + part.name + "\" has a law of the caller's own, \"" +
-                     part.material.custom_law->name() +
-                     "\", which no GPU knows: allowed is the CPU");
-  }
-  switch (precision) {
-    case Precision::single:
-      return std::make_unique<CudaBackend<float, float>>(model, device, path, transport);
-    case Precision::mixed:
-      return std::make_unique<CudaBackend<float, double>>(model, device, path, transport);
-    case Precision::double_:
-      break;
-  }
-  return std::make_unique<CudaBackend<double, double>>(model, device, path, transport);
-}
-
-}  // namespace phyxel
+}  // namespace phyxel::cuda

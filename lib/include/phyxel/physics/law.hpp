@@ -1,0 +1,148 @@
+/// The parts that every constitutive law is made of. A law is a struct in a file of its own under
+/// `physics/laws/`, a template on the scalar (`float`, `double` or a SIMD pack), named once in the
+/// list of `physics/laws.hpp`. It has
+///
+///   static constexpr const char* name, *meaning;    its word in scenes, and a sentence about it
+///   static constexpr LawParameter parameters[];     the parameters that a user gives
+///   static std::array<double, N> constants(std::span<const double> parameters);
+///   its N constants [mostly Pa] as the only data members, each a `Real`
+///   energy(grad_u)               the strain energy density ψ [J/m³ of the body at rest]
+///   first_piola_stress(grad_u)   its derivative ∂ψ/∂∇u [Pa]
+///   wave_stiffness(stretches)    an upper bound of ρc² over all plane waves [Pa]
+///   at_rest(volume_stiffness)    the linear law that it is at small displacements
+///
+/// of which all but `constants` run on GPUs too.
+///
+/// On `wave_stiffness`: a plane wave of direction b (at rest) and polarisation a has the
+/// displacement gradient a bᵀ and sees the stiffness a bᵀ : ∂P/∂F : a bᵀ, the quadratic form of the
+/// acoustic tensor; geometric stress is part of it. On a lattice of phyxels the fastest mode is
+/// such a wave, so the largest eigenvalue of M⁻¹K grows as the largest stiffness of all waves does.
+/// (The largest eigenvalue of ∂P/∂F itself would not do: at rest it belongs to a change of volume,
+/// 3λ + 2μ, and grows less.)
+#pragma once
+
+#include <array>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <type_traits>
+
+#include "phyxel/physics/stretches.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// One parameter of a law, as users give it: the entry behind the key of a scene, the keyword in
+/// Python, the reference page and the digest.
+struct LawParameter {
+  const char* name;     ///< The key in scenes, e.g. "yield_stress".
+  const char* unit;     ///< In SI, e.g. "Pa"; "" for a pure number.
+  double low, high;     ///< The allowed range.
+  bool open;            ///< True if `low` and `high` themselves are excluded.
+  const char* meaning;  ///< One sentence for the reference of scenes.
+  /// The value of a parameter that the user leaves out; NaN: the parameter is required.
+  double fallback = std::numeric_limits<double>::quiet_NaN();
+  /// A required parameter's value in measurements of speed, where E = 1e6 Pa.
+  double typical = 0;
+
+  /// True if the user has to give it.
+  constexpr bool required() const { return fallback != fallback; }
+};
+
+/// Young's modulus, which most laws have.
+inline constexpr LawParameter young_modulus{
+    "young", "Pa", 1e-12, 1e18, false, "Young's modulus E: rubber 1e6, jelly 1e4."};
+/// Poisson's ratio, which most laws have.
+inline constexpr LawParameter poisson_ratio{
+    "poisson", "",   -1,
+    0.5,       true, "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."};
+
+/// The number of constants of a law.
+template <class Law, class Real>
+inline constexpr int constants_of_law = static_cast<int>(sizeof(Law) / sizeof(Real));
+
+/// The law whose constants stand at `constants`, in the order of its members. `Real` is the scalar
+/// of the law.
+template <class Law, class Real, class Constant>
+PHYXEL_HD Law make_law(const Constant* constants) {
+  static_assert(std::is_trivially_copyable_v<Law> && sizeof(Law) % sizeof(Real) == 0);
+  Real values[constants_of_law<Law, Real>];
+  for (int k = 0; k < constants_of_law<Law, Real>; ++k) values[k] = static_cast<Real>(constants[k]);
+  Law law;
+  memcpy(&law, values, sizeof(Law));
+  return law;
+}
+
+/// Two laws that act side by side: energies, stresses and stiffnesses add.
+template <class First, class Second>
+struct SumOf {
+  First first;
+  Second second;
+
+  /// ψ of both [J/m³].
+  template <class Real>
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    return first.energy(grad_u) + second.energy(grad_u);
+  }
+  /// P of both [Pa].
+  template <class Real>
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    return first.first_piola_stress(grad_u) + second.first_piola_stress(grad_u);
+  }
+  /// An upper bound of ρc² [Pa].
+  template <class Real>
+  PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
+    return first.wave_stiffness(s) + second.wave_stiffness(s);
+  }
+};
+
+/// A list of laws, from which the dispatch of every device follows. A law goes by its index here
+/// wherever it is chosen at run time.
+template <template <class> class... Law>
+struct LawList {
+  static constexpr int size = sizeof...(Law);
+  /// The number of constants of the law that has the most.
+  static constexpr int most_constants = [] {
+    int most = 0;
+    ((most = most < constants_of_law<Law<double>, double> ? constants_of_law<Law<double>, double>
+                                                          : most),
+     ...);
+    return most;
+  }();
+
+  /// Calls apply(law) with the law of an index, made of `constants`.
+  template <class Real, class Constant, class Apply>
+  PHYXEL_HD static auto with(int index, const Constant* constants, Apply&& apply) {
+    return with_from<0, Real, Law...>(index, constants, apply);
+  }
+  /// Calls apply(std::type_identity<Law<Real>>) with the type of an index.
+  template <class Real, class Apply>
+  static auto with_type(int index, Apply&& apply) {
+    return with_type_from<0, Real, Law...>(index, apply);
+  }
+  /// Calls apply(std::type_identity<Law<Real>>) for every law.
+  template <class Real, class Apply>
+  static void for_each(Apply&& apply) {
+    (apply(std::type_identity<Law<Real>>{}), ...);
+  }
+
+ private:
+  template <int first, class Real, template <class> class Here, template <class> class... Rest,
+            class Constant, class Apply>
+  PHYXEL_HD static auto with_from(int index, const Constant* constants, Apply& apply) {
+    if constexpr (sizeof...(Rest) > 0) {
+      if (index != first) return with_from<first + 1, Real, Rest...>(index, constants, apply);
+    }
+    return apply(make_law<Here<Real>, Real>(constants));
+  }
+  template <int first, class Real, template <class> class Here, template <class> class... Rest,
+            class Apply>
+  static auto with_type_from(int index, Apply& apply) {
+    if constexpr (sizeof...(Rest) > 0) {
+      if (index != first) return with_type_from<first + 1, Real, Rest...>(index, apply);
+    }
+    return apply(std::type_identity<Here<Real>>{});
+  }
+};
+
+}  // namespace phyxel

@@ -1,0 +1,140 @@
+#include "phyxel/law_table.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+template <class Law>
+constexpr bool is_linear() {
+  if constexpr (requires { Law::is_linear; }) return Law::is_linear;
+  return false;
+}
+
+std::vector<LawEntry> make_table() {
+  std::vector<LawEntry> table;
+  Laws::for_each<double>([&]<class Law>(std::type_identity<Law>) {
+    table.push_back({Law::name, Law::meaning, Law::parameters, is_linear<Law>()});
+  });
+  return table;
+}
+
+int index_of(const std::string& name) {
+  const std::span<const LawEntry> table = law_table();
+  const auto at =
+      std::find_if(table.begin(), table.end(), [&](const LawEntry& e) { return name == e.name; });
+  if (at != table.end()) return static_cast<int>(at - table.begin());
+  std::vector<std::string> names;
+  for (const LawEntry& entry : table) names.emplace_back(entry.name);
+  throw InputError(fmt::format("law \"{}\" found{}; allowed: {}", name, did_you_mean(name, names),
+                               fmt::join(names, ", ")));
+}
+
+bool is_allowed(const LawParameter& parameter, double value) {
+  return parameter.open ? parameter.low < value && value < parameter.high
+                        : parameter.low <= value && value <= parameter.high;
+}
+
+/// The parameters of a law in the order of its table.
+std::vector<double> values_of(const LawEntry& law, const Material& material) {
+  std::vector<double> values;
+  for (const auto& [name, value] : material.parameters) {
+    const auto is_it = [&name = name](const LawParameter& p) { return name == p.name; };
+    if (std::none_of(law.parameters.begin(), law.parameters.end(), is_it)) {
+      std::vector<std::string> names;
+      for (const LawParameter& p : law.parameters) names.emplace_back(p.name);
+      throw InputError(fmt::format("{} = {:g} found, which law \"{}\" does not have; allowed: {}",
+                                   name, value, law.name, fmt::join(names, ", ")));
+    }
+  }
+  for (const LawParameter& parameter : law.parameters) {
+    const std::string name = parameter.name;
+    double value = parameter.fallback;
+    if (name == "young") {
+      value = material.young;
+    } else if (name == "poisson") {
+      value = material.poisson;
+    } else if (const auto at = material.parameters.find(name); at != material.parameters.end()) {
+      value = at->second;
+    } else if (parameter.required()) {
+      throw InputError(fmt::format("{} is missing, which law \"{}\" needs", name, law.name));
+    }
+    if (!is_allowed(parameter, value)) {
+      const char* const less = parameter.open ? "<" : "<=";
+      throw InputError(fmt::format("{} = {:g} found; allowed: {:g} {} {} {} {:g}{}{}{}", name,
+                                   value, parameter.low, less, name, less, parameter.high,
+                                   *parameter.unit ? " [" : "", parameter.unit,
+                                   *parameter.unit ? "]" : ""));
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
+}  // namespace
+
+std::span<const LawEntry> law_table() {
+  static const std::vector<LawEntry> table = make_table();
+  return table;
+}
+
+bool is_own_parameter(const LawParameter& parameter) {
+  return parameter.name != std::string_view(young_modulus.name) &&
+         parameter.name != std::string_view(poisson_ratio.name);
+}
+
+bool has_parameter(std::string_view law, std::string_view parameter) {
+  for (const LawEntry& entry : law_table()) {
+    if (law != entry.name) continue;
+    for (const LawParameter& p : entry.parameters) {
+      if (parameter == p.name) return true;
+    }
+  }
+  return false;
+}
+
+ChosenLaw chosen_law(const Material& material) {
+  ChosenLaw chosen;
+  chosen.index = index_of(material.law);
+  const std::vector<double> values = values_of(law_table()[chosen.index], material);
+  Laws::with_type<double>(chosen.index, [&]<class Law>(std::type_identity<Law>) {
+    const auto constants = Law::constants(values);
+    static_assert(std::tuple_size_v<decltype(constants)> == constants_of_law<Law, double>);
+    std::copy(constants.begin(), constants.end(), chosen.constants.begin());
+    chosen.constants[constants.size()] = material.volume_stiffness;
+  });
+  return chosen;
+}
+
+double hourglass_modulus(const Material& material) {
+  if (material.custom_law) return material.young;
+  const int index = index_of(material.law);
+  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
+    if constexpr (requires(std::vector<double> v) { Law::hourglass_modulus(v); }) {
+      return Law::hourglass_modulus(values_of(law_table()[index], material));
+    } else {
+      return material.young;
+    }
+  });
+}
+
+double wave_stiffness_at_rest(const Material& material) {
+  if (material.custom_law) {
+    return lame_lambda(material.young, material.poisson) +
+           2 * lame_mu(material.young, material.poisson) + material.volume_stiffness;
+  }
+  const ChosenLaw law = chosen_law(material);
+  return material.volume_stiffness +
+         Laws::with<double>(law.index, law.constants.data(), [](const auto& elastic) {
+           return elastic.wave_stiffness(PrincipalStretches<double>{1, 1, 1});
+         });
+}
+
+}  // namespace phyxel

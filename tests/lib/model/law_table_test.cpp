@@ -1,0 +1,106 @@
+/// The list of laws: what every law promises, and what is refused of a material.
+#include "phyxel/law_table.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+
+#include "phyxel/error.hpp"
+#include "support/clouds.hpp"
+
+namespace phyxel {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::rubber;
+
+/// The message of the refusal of a scene with this material.
+std::string refusal_of(const Material& material) {
+  try {
+    validate(testing::one_body(material));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(LawTable, EveryLawHasANameOfItsOwnAndParametersThatAreToldApart) {
+  std::set<std::string> names;
+  for (const LawEntry& law : law_table()) {
+    EXPECT_TRUE(names.insert(law.name).second) << law.name;
+    EXPECT_NE(std::string(law.meaning), "");
+    std::set<std::string> parameters;
+    for (const LawParameter& p : law.parameters) {
+      EXPECT_TRUE(parameters.insert(p.name).second) << law.name << ": " << p.name;
+      EXPECT_LT(p.low, p.high) << law.name << ": " << p.name;
+    }
+  }
+  EXPECT_EQ(law_table().size(), static_cast<std::size_t>(Laws::size));
+}
+
+/// The constants are those of the law's own order, and volume conservation stands behind them.
+TEST(LawTable, ConstantsAreLamesParametersAndTheStiffnessOfVolumeConservation) {
+  Material material = rubber();
+  material.volume_stiffness = 4e4;
+  for (const char* name : {"st-venant-kirchhoff", "small-strain", "neo-hookean", "corotated"}) {
+    material.law = name;
+    const ChosenLaw law = chosen_law(material);
+    EXPECT_EQ(std::string(law_table()[law.index].name), name);
+    EXPECT_EQ(law.constants[0], material.lame_lambda());
+    EXPECT_EQ(law.constants[1], material.lame_mu());
+    EXPECT_EQ(law.constants[2], 4e4);
+    // λ + 2μ + k_v; a law adds it up in its own order.
+    const double expected = material.lame_lambda() + 2 * material.lame_mu() + 4e4;
+    EXPECT_NEAR(wave_stiffness_at_rest(material), expected, 1e-15 * expected);
+    EXPECT_EQ(hourglass_modulus(material), material.young);
+  }
+}
+
+/// The linear law at rest has the stress of the law at small strains, volume conservation included.
+TEST(LawTable, TheLawAtRestIsTheTangentAtRest) {
+  for (const LawEntry& entry : law_table()) {
+    Material material = rubber();
+    material.law = entry.name;
+    for (const LawParameter& p : entry.parameters) {
+      if (p.required() && is_own_parameter(p)) material.parameters[p.name] = p.typical;
+    }
+    material.volume_stiffness = 3e4;
+    const ChosenLaw chosen = chosen_law(material);
+    Laws::with<double>(chosen.index, chosen.constants.data(), [&](const auto& law) {
+      const auto linear = law.at_rest(material.volume_stiffness);
+      const VolumeConservation<double> volume{material.volume_stiffness};
+      const double step = 1e-7;
+      for (int e = 0; e < 9; ++e) {
+        Mat3d g{};
+        g(e / 3, e % 3) = step;
+        const Mat3d p = law.first_piola_stress(g) + volume.first_piola_stress(g),
+                    q = linear.first_piola_stress(g);
+        // Terms of second order are a ten-millionth of the stress of a modulus of 1e5 Pa.
+        for (int k = 0; k < 9; ++k) {
+          EXPECT_NEAR(p(k / 3, k % 3), q(k / 3, k % 3), 1e-6 * 2e5 * step) << entry.name;
+        }
+      }
+    });
+  }
+}
+
+TEST(LawTable, RefusesWhatALawDoesNotHave) {
+  Material material = rubber();
+  EXPECT_EQ(refusal_of(material), "accepted");
+  material.law = "corotate";
+  EXPECT_THAT(refusal_of(material), HasSubstr("law \"corotate\" found"));
+  EXPECT_THAT(refusal_of(material), HasSubstr("corotated"));
+  material = rubber();
+  material.parameters["yield"] = 1;
+  EXPECT_THAT(refusal_of(material),
+              HasSubstr("yield = 1 found, which law \"st-venant-kirchhoff\" does not have"));
+  material = rubber();
+  material.poisson = 0.5;
+  EXPECT_THAT(refusal_of(material), HasSubstr("poisson"));
+  EXPECT_THROW(chosen_law(material), InputError);
+}
+
+}  // namespace
+}  // namespace phyxel
