@@ -65,14 +65,28 @@ class Boundary {
     return !paths_.empty() ||
            std::any_of(loads_.begin(), loads_.end(), [](const auto& l) { return l.of->ramp > 0; });
   }
-  /// Sets the loads of a time [s]; again only while one of them still grows.
+  /// Sets the caller's own forces [N], shape [3, places]; none: an empty list. They act from the
+  /// next launch on.
+  void set_external(const std::vector<Real>& force) {
+    m_.set_external(force);
+    load_scales_ = -1;
+    sum_loads(time_);
+  }
+  /// Sets the applied forces of a time [s]; again only while a load still grows.
   void sum_loads(double time) {
-    if (loads_.empty()) return;
+    time_ = time;
+    if (!m_.loads()) return;
     double scales = 0;
     for (const Loading& load : loads_) scales += load.of->scale_at(time);
     if (scales == load_scales_) return;
     load_scales_ = scales;
-    PHYXEL_CUDA(cudaMemsetAsync(m_.loads(), 0, 3 * m_.places() * sizeof(Real), m_.stream()));
+    const std::size_t bytes = 3 * m_.places() * sizeof(Real);
+    if (m_.fields().external) {
+      PHYXEL_CUDA(cudaMemcpyAsync(m_.loads(), m_.fields().external, bytes, cudaMemcpyDeviceToDevice,
+                                  m_.stream()));
+    } else {
+      PHYXEL_CUDA(cudaMemsetAsync(m_.loads(), 0, bytes, m_.stream()));
+    }
     for (const Loading& load : loads_) {
       m_.launch_each("add_load", add_load<Real>, static_cast<int>(load.places.size()), m_.loads(),
                      m_.places(), load.places.data(), load.force.data(),
@@ -163,7 +177,7 @@ class Boundary {
   DeviceModel<Real, StateReal>& m_;
   std::vector<Moved> paths_;
   std::vector<Loading> loads_;
-  double load_scales_ = -1;
+  double load_scales_ = -1, time_ = 0;  // of the last sum
   DeviceArray<Index> held_;
   DeviceArray<char> moved_;
 };

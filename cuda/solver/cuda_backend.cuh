@@ -26,7 +26,7 @@ class CudaBackend final : public Backend {
       : m_(model, device),
         halo_(m_.share() ? std::make_unique<DeviceHalo<Real, StateReal>>(m_, transport) : nullptr),
         boundary_(m_),
-        passes_(m_, halo_.get()) {
+        passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())) {
     bool recordable = path == CudaPath::automatic && !boundary_.changes();
     if (recordable && !m_.share()) residence_ = Residence<Real, StateReal>::of(m_);
     recordable = recordable && !residence_ && m_.size() <= most_recorded;
@@ -55,7 +55,7 @@ class CudaBackend final : public Backend {
   void upload(const State& state) override {
     check_sizes(state, size());
     settle();
-    passes_.receive_displacements();
+    passes_->receive_displacements();
     m_.wait();
     if (m_.share()) m_.share()->others->largest(0);  // the others have come as far
     fresh_ = true;
@@ -63,15 +63,41 @@ class CudaBackend final : public Backend {
   }
   void download(State& state) const override {
     settle();
-    passes_.receive_displacements();
+    passes_->receive_displacements();
     m_.wait();
     m_.take(state);
   }
 
+  void set_external_forces(std::span<const Vec3d> force) override {
+    if (!force.empty() && force.size() != static_cast<std::size_t>(size())) {
+      throw InputError(std::to_string(force.size()) + " external forces for " +
+                       std::to_string(size()) + " phyxels: allowed are " + std::to_string(size()) +
+                       " or none");
+    }
+    settle();
+    m_.wait();  // steps under way may read the forces that were set before
+    const bool had_loads = m_.fields().load;
+    std::vector<Real> values(force.empty() ? 0 : 3 * m_.places(), Real(0));
+    for (Index i = 0; i < static_cast<Index>(force.size()); ++i) {
+      const auto place = static_cast<std::size_t>(m_.tiling().place[i]);
+      const Vec3<Real> f = to<Real>(force[i]);
+      values[place] = f.x;
+      values[m_.places() + place] = f.y;
+      values[2 * m_.places() + place] = f.z;
+    }
+    external_force_.assign(force.begin(), force.end());
+    boundary_.set_external(values);
+    if (had_loads == static_cast<bool>(m_.fields().load)) return;
+    // Kernels that add applied forces take the place of others, or the other way round.
+    passes_ = std::make_unique<Passes<Real, StateReal>>(m_, halo_.get());
+    for (StepGraph& graph : graphs_) graph.forget();
+  }
+  std::span<const Vec3d> external_forces() const override { return external_force_; }
+
   void stress() override {
     if (steps_may_wait()) return;
     m_.use_device();
-    passes_.stress();
+    passes_->stress();
   }
 
   void advance(double time, double dt) override {
@@ -88,12 +114,12 @@ class CudaBackend final : public Backend {
     m_.use_device();
     boundary_.sum_loads(time);
     if (fresh_ || boundary_.changes()) {
-      passes_.advance(dt);
+      passes_->advance(dt);
       boundary_.follow_paths(time, dt);
       if (fresh_) boundary_.put_held_at_rest();
-      passes_.send_displacements();
+      passes_->send_displacements();
     } else {
-      passes_.advance_and_send(dt);
+      passes_->advance_and_send(dt);
     }
     if (halo_) halo_->count_steps(1);
     fresh_ = false;
@@ -109,9 +135,9 @@ class CudaBackend final : public Backend {
   std::optional<Diagnostics> diagnostics(const Instant& now) override {
     settle();
     boundary_.sum_loads(now.time);
-    const DeviceArray<Real> forces = passes_.forces(),
-                            gradients = m_.fields().pull ? passes_.gradients_and_residuals()
-                                                         : passes_.gradients();
+    const DeviceArray<Real> forces = passes_->forces(),
+                            gradients = m_.fields().pull ? passes_->gradients_and_residuals()
+                                                         : passes_->gradients();
     const Index tiles = m_.tiles();
     const DeviceArray<TileTotals> each(static_cast<std::size_t>(tiles), "sums of " + m_.subject());
     ExactTotals none{};
@@ -140,7 +166,7 @@ class CudaBackend final : public Backend {
     if (stiffest_.size() == 0 && tiles > 0) {
       stiffest_ = DeviceArray<TileStiffening>(static_cast<std::size_t>(tiles), gradients_name());
     }
-    passes_.put_gradients({gradients.data(), m_.places(), nullptr}, tiles);
+    passes_->put_gradients({gradients.data(), m_.places(), nullptr}, tiles);
     std::vector<TileStiffening> found(static_cast<std::size_t>(tiles));
     if (tiles > 0) {
       find_stiffest<<<tiles, diagnose_threads, 0, m_.stream()>>>(
@@ -160,7 +186,7 @@ class CudaBackend final : public Backend {
 
   void internal_forces(std::vector<Vec3d>& force) override {
     settle();
-    const DeviceArray<Real> forces = passes_.forces();
+    const DeviceArray<Real> forces = passes_->forces();
     wait();
     const std::vector<Real> values = fetched(forces);
     force.resize(static_cast<std::size_t>(size()));
@@ -172,7 +198,7 @@ class CudaBackend final : public Backend {
 
   void displacement_gradients(std::vector<Mat3d>& gradient) override {
     settle();
-    const DeviceArray<Real> gradients = passes_.gradients();
+    const DeviceArray<Real> gradients = passes_->gradients();
     wait();
     const std::vector<Real> values = fetched(gradients);
     gradient.resize(static_cast<std::size_t>(size()));
@@ -186,7 +212,7 @@ class CudaBackend final : public Backend {
 
   void fit_residuals(std::vector<double>& residual) override {
     settle();
-    const DeviceArray<Real> rows = passes_.gradients_and_residuals();
+    const DeviceArray<Real> rows = passes_->gradients_and_residuals();
     wait();
     const std::vector<Real> values = fetched(rows);
     residual.resize(static_cast<std::size_t>(size()));
@@ -197,12 +223,12 @@ class CudaBackend final : public Backend {
 
   std::unique_ptr<Vibration> vibration() override {
     settle();
-    passes_.receive_displacements();
-    return std::make_unique<CudaVibration<Real, StateReal>>(m_, passes_);
+    passes_->receive_displacements();
+    return std::make_unique<CudaVibration<Real, StateReal>>(m_, *passes_);
   }
   std::unique_ptr<Vibration> vibration_at_present(double distance) override {
     settle();
-    return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, passes_, distance);
+    return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, *passes_, distance);
   }
 
   void update_surfels() override {
@@ -215,7 +241,7 @@ class CudaBackend final : public Backend {
       close_step(Then::surfels);
     } else {
       settle();
-      surfels_->launch(passes_);
+      surfels_->launch(*passes_);
     }
   }
   void advect_surfels(SurfelState& out) override {
@@ -285,9 +311,9 @@ class CudaBackend final : public Backend {
     }
     const auto launch = [&](int count) {
       for (int s = 0; s < count; ++s) {
-        passes_.stress();
-        passes_.advance_and_send(m_.dt());
-        if (surfels) surfels_->launch(passes_);
+        passes_->stress();
+        passes_->advance_and_send(m_.dt());
+        if (surfels) surfels_->launch(*passes_);
       }
     };
     // Surfels of a share are brought together by the host.
@@ -325,8 +351,9 @@ class CudaBackend final : public Backend {
   DeviceModel<Real, StateReal> m_;
   std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // of a share
   Boundary<Real, StateReal> boundary_;
-  Passes<Real, StateReal> passes_;
+  std::unique_ptr<Passes<Real, StateReal>> passes_;
   std::unique_ptr<Residence<Real, StateReal>> residence_;
+  std::vector<Vec3d> external_force_;
   std::optional<SurfelAdvection<Real, StateReal>> surfels_;  // once they have been asked for
   bool has_surfels_ = false;                                 // this or another rank
   bool recorded_ = false;                                    // steps go through a graph

@@ -151,9 +151,24 @@ class DeviceModel {
                 }),
                 "tiles of " + subject_);
   }
+  /// Makes room for applied forces. They are not set.
   void make_loads() {
+    if (load_.size()) return;
     load_ = {3 * places(), "loads of " + subject_};
     fields_.load = load_.data();
+  }
+  /// The caller's forces [N] as they are in `loads`, shape [3, places], whose energy is not
+  /// counted; none: an empty list. Without loads of the scene's own, `loads` is empty then, too.
+  void set_external(const std::vector<Real>& force) {
+    external_ = {};
+    if (force.empty()) {
+      if (model_.loads.empty()) load_ = {};
+    } else {
+      make_loads();
+      external_ = sent(force, "external forces of " + subject_);
+    }
+    fields_.load = load_.data();
+    fields_.external = external_.data();
   }
   Real* loads() const { return load_.data(); }  ///< [3, places], or null.
 
@@ -257,6 +272,7 @@ class DeviceModel {
     if (own_supports_) list.push_back({"supports", supports_.bytes()});
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
     if (load_.size()) list.push_back({"loads", load_.bytes()});
+    if (external_.size()) list.push_back({"external forces", external_.bytes()});
     if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
     if (closed()) {
       list.push_back(
@@ -431,7 +447,8 @@ class DeviceModel {
   AllFields fields_{};
   DeviceLists lists_{}, second_lists_{};
   DeviceArray<std::byte> points_, stresses_, closing_stresses_;
-  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, pull_, closing_;
+  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, external_, pull_,
+      closing_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;  // with the damped flow over that lag [s]

@@ -145,7 +145,9 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       put3(t.sum + momentum, p);
       put3(t.sum + angular_momentum, cross(x, p));
       t.sum[gravity_energy] = -mass * dot(gravity, u);
-      t.sum[load_energy] = -dot(load, u);
+      const Vec3<double> external =
+          f.external ? to<double>(column3(f.external, f.places, place)) : Vec3<double>{};
+      t.sum[load_energy] = -dot(load - external, u);
       const double volume = f.moment_constants[6 * f.places + place];
       t.sum[strain_energy] = volume * Laws::with<double>(m.law_index, m.law, [&](const auto& law) {
                                return law.energy(grad_u);

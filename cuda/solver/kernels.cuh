@@ -50,7 +50,7 @@ struct Fields {
   const Real* inverse_h_squared;  ///< [places], or null where each body has one support.
   const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
   const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m: held; 0: nobody.
-  const Real* load;               ///< [3, places], or null.
+  const Real* load;               ///< Applied forces, [3, places], or null.
   Real* pull;                     ///< Of hourglass control: [3, places], or null.
   const Real* closing;            ///< ĉ of closed gradients [1/m]: [3, places], or null.
   ClosingStresses<Real> closing_stresses;
@@ -59,6 +59,7 @@ struct Fields {
   const TileConstants<Real, StateReal>* tiles;
   Vec3<StateReal> gravity;
   std::size_t places;
+  const Real* external;  ///< The caller's share of `load`, [3, places], or null.
 };
 
 /// A law that is chosen at run time, tile by tile: for resident kernels that serve bodies of

@@ -211,7 +211,7 @@ class Passes {
                    : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others, true>;
       }
     }
-    const bool more = !m_.model().loads.empty() || m_.fields().pull;
+    const bool more = m_.fields().load || m_.fields().pull;
     if (m.damping > 0) {
       return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
                   : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;

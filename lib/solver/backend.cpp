@@ -21,7 +21,7 @@ void check_sizes(const State& state, Index phyxels) {
 
 void Backend::set_external_forces(std::span<const Vec3d> force) {
   if (force.empty()) return;
-  throw InputError(name() + ": forces of the caller's own are for the CPU: allowed are none here");
+  throw InputError(name() + ": takes no external forces: allowed are none");
 }
 
 }  // namespace phyxel

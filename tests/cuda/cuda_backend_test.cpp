@@ -454,6 +454,27 @@ TEST(CudaMemory, TermsThatAreOffTakeNone) {
       ::testing::IsSupersetOf({"loads", "supports", "inverse neighbour lists", "displacements"}));
 }
 
+/// Resident steps and launches add the caller's forces alike, before and after they change.
+TEST(CudaExternalForces, AreTheSameBitsResidentAndByLaunches) {
+  const Model model = model_of(one_body(), lattice(9, 5, 4, 0.1, 0.1));
+  for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
+    const auto resident = make_cuda_backend(model, precision),
+               launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
+    const State start = state_of(std::vector<Vec3d>(static_cast<std::size_t>(model.size())));
+    Solver one(*resident, start), other(*launched, start);
+    for (const double size : {2.0, -1.0, 0.0}) {
+      std::vector<Vec3d> force;
+      for (const Vec3d& x : model.position) force.push_back({size * x.y, size, -size * x.x});
+      if (size == 0) force.clear();
+      resident->set_external_forces(force);
+      launched->set_external_forces(force);
+      for (int k = 0; k < 25; ++k) one.step(), other.step();
+      EXPECT_EQ(one.state().displacement, other.state().displacement);
+      EXPECT_EQ(one.state().velocity, other.state().velocity);
+    }
+  }
+}
+
 TEST(CudaRefusal, OfWhatIsTheCallersOwn) {
   const auto refusal_of = [](auto&& work) -> std::string {
     try {
@@ -471,9 +492,6 @@ TEST(CudaRefusal, OfWhatIsTheCallersOwn) {
   EXPECT_THAT(refusal_of([&] { make_test_backend(custom, Precision::single); }),
               HasSubstr("body \"body\" has a law of the caller's own, \"repeated"));
   const auto backend = make_test_backend(ours, Precision::single);
-  EXPECT_THAT(refusal_of([&] { backend->set_external_forces(ours.position); }),
-              HasSubstr("forces of the caller's own are for the CPU"));
-  EXPECT_EQ(refusal_of([&] { backend->set_external_forces({}); }), "");
   EXPECT_FALSE(backend->view());
 }
 

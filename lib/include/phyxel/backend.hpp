@@ -91,7 +91,8 @@ class Backend {
   /// it out, and a `StabilityWatch` knows nothing of them.
   /// @param force [N], shape [n], copied; of a share's ghosts it is not looked at. Empty: none, and
   ///   then they cost nothing.
-  /// @throws InputError if there are neither n nor none, or this backend takes none (a GPU's)
+  /// @throws InputError if there are neither n nor none, or this backend takes none (those of the
+  ///   2008 program)
   virtual void set_external_forces(std::span<const Vec3d> force);
   /// Those that act [N], shape [n] or empty.
   virtual std::span<const Vec3d> external_forces() const { return {}; }

@@ -1,4 +1,4 @@
-/// What a caller brings along: laws and forces of its own, and views of the state.
+/// Laws of the caller's own, and views of the state.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -255,94 +255,11 @@ TEST(CustomLaw, IsOfTheModelsDigest) {
   EXPECT_NE(digest_of(1), model_digest(irregular_model(rubber())));
 }
 
-/// A block held at one end; with a load on its other end, in the scene.
-Scene held_block(bool loaded) {
+TEST(StateView, ShowsWhatADownloadCopies) {
+  const Cloud block = lattice(7, 3, 4, 0.1, 0.1);
   Scene scene = one_body();
   scene.gravity = {0, 0, -9.81};
   scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {0.1, 1, 1}}}});
-  if (loaded) {
-    LoadRequest load;
-    load.select.box = Selection::Box{{0.5, -1, -1}, {2, 1, 1}};
-    load.force = {0, 3, 1};
-    scene.bodies[0].loads.push_back(load);
-  }
-  return scene;
-}
-const Cloud block = lattice(7, 3, 4, 0.1, 0.1);
-
-/// The forces of that load, for a model without it.
-std::vector<Vec3d> load_of(const Model& loaded) {
-  std::vector<Vec3d> force(loaded.position.size());
-  const Load& load = loaded.loads.at(0);
-  for (std::size_t k = 0; k < load.phyxels.size(); ++k) force[load.phyxels[k]] = load.force[k];
-  return force;
-}
-
-TEST(ExternalForces, ActLikeALoadToTheLastBit) {
-  const Scene with_load = held_block(true);
-  const Model loaded = model_of(with_load, block), free = model_of(held_block(false), block);
-  for (const Precision precision : all_precisions) {
-    const double dt = 1e-3;
-    const auto expected = make_cpu_backend(loaded, precision),
-               got = make_cpu_backend(free, precision);
-    const State start = initial_state(loaded, with_load, dt);
-    Solver one(*expected, start), other(*got, start);
-    got->set_external_forces(load_of(loaded));
-    for (int k = 0; k < 50; ++k) one.step(), other.step();
-    EXPECT_EQ(one.state().displacement, other.state().displacement);
-    EXPECT_EQ(one.state().velocity, other.state().velocity);
-    const Diagnostics a = diagnose(loaded, *expected, one.now()),
-                      b = diagnose(free, *got, other.now());
-    EXPECT_EQ(a.kinetic_energy, b.kinetic_energy);  // velocities at t know of all forces
-    EXPECT_EQ(a.internal_force, b.internal_force);
-    EXPECT_NE(a.load_energy, 0);
-    EXPECT_EQ(b.load_energy, 0);
-  }
-}
-
-TEST(ExternalForces, CountInEquilibriaAndImplicitSteps) {
-  Scene with_load = held_block(true);
-  const Model loaded = model_of(with_load, block), free = model_of(held_block(false), block);
-  const auto expected = make_cpu_backend(loaded, Precision::double_),
-             got = make_cpu_backend(free, Precision::double_);
-  got->set_external_forces(load_of(loaded));
-  EXPECT_EQ(find_equilibrium(loaded, *expected).state.displacement,
-            find_equilibrium(free, *got).state.displacement);
-  with_load.solver.method = Method::implicit;
-  const State start = initial_state(loaded, with_load, 0.01);
-  Solver one(loaded, *expected, start, Method::implicit),
-      other(free, *got, start, Method::implicit);
-  one.step(), other.step();
-  EXPECT_EQ(one.state().displacement, other.state().displacement);
-}
-
-TEST(ExternalForces, EndWhenNoneAreSet) {
-  const Model model = model_of(one_body(), block);
-  const auto backend = make_cpu_backend(model, Precision::double_);
-  Solver solver(*backend, state_of(std::vector<Vec3d>(model.position.size())));
-  std::vector<Vec3d> force;
-  for (const double mass : model.mass) force.push_back({mass, 0, 0});  // 1 m/s²
-  backend->set_external_forces(force);
-  solver.step();
-  backend->set_external_forces({});
-  solver.step();
-  for (const Vec3d& v : solver.state().velocity) EXPECT_NEAR(v.x, solver.dt(), 1e-12 * solver.dt());
-  EXPECT_TRUE(backend->external_forces().empty());
-}
-
-TEST(ExternalForces, OfAnotherNumberAreRefused) {
-  const Model model = model_of(one_body(), block);
-  const auto backend = make_cpu_backend(model, Precision::double_);
-  try {
-    backend->set_external_forces(std::vector<Vec3d>(3));
-    FAIL() << "three forces were taken";
-  } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "3 external forces for 84 phyxels: allowed are 84 or none");
-  }
-}
-
-TEST(StateView, ShowsWhatADownloadCopies) {
-  Scene scene = held_block(true);
   scene.bodies.push_back(scene.bodies[0]);  // of which the second begins in a pack of its own
   scene.bodies[1].name = "second";
   const Cloud clouds[] = {block, block};
