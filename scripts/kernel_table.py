@@ -53,9 +53,20 @@ def ptx_kernels(data):
     found = {}
     for text in re.findall(rb"\.version \d+\.\d+\n.*?\.target sm_90.*?\0", data, re.DOTALL):
         ptx = text.decode("utf-8", "replace")
-        for entry in re.finditer(r"\.entry (\w+)\((.*?)\n\}\n", ptx, re.DOTALL):
-            found[entry.group(1)] = instructions(entry.group(2).split("\n)", 1)[-1])
+        for entry in re.finditer(r"\.entry (\w+)\(", ptx):
+            begin = ptx.index("\n{", entry.end()) + 2
+            found[entry.group(1)] = instructions(ptx[begin:end_of_block(ptx, begin)])
     return found
+
+
+def end_of_block(ptx, begin):
+    """Where the block ends whose first character after the brace is at `begin`."""
+    depth = 1
+    for brace in re.finditer(r"[{}]", ptx[begin:]):
+        depth += 1 if brace.group() == "{" else -1
+        if depth == 0:
+            return begin + brace.start()
+    raise ValueError("a block in PTX has no end")
 
 
 def sections_of(elf):
