@@ -12,7 +12,8 @@ namespace phyxel {
 ///   OutputError if writing fails.
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite);
 
-/// Reads what `write_body` wrote. @throws InputError naming the file and what is wrong with it.
+/// Reads a file written by `write_body`. @throws InputError naming the file and what is wrong with
+/// it.
 Cloud read_body(const std::filesystem::path& file);
 
 }  // namespace phyxel

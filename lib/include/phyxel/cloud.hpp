@@ -27,7 +27,7 @@ struct Cloud {
   Surface surface;              ///< Surfels; may be empty.
   /// Named groups of phyxels (sorted indices) that scenes can select, e.g. "mouth".
   std::map<std::string, std::vector<Index>> regions;
-  std::vector<std::string> warnings;  ///< Of what made it, for the summary.
+  std::vector<std::string> warnings;  ///< Warnings of the generator or sampler, for the summary.
 };
 
 /// Area-weighted vertex normals of a triangulated surface, outward for outward triangles.
@@ -37,11 +37,11 @@ std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
 /// Volume enclosed by a closed surface [m^3] (divergence theorem); negative if inside out.
 double enclosed_volume(const Surface& surface);
 
-/// Puts phyxel order[k] at place k; regions follow.
+/// Permutes the phyxels: phyxel order[k] becomes phyxel k. Regions are renumbered.
 void reorder(Cloud& cloud, const std::vector<Index>& order);
 
 /// Reorders the phyxels along a Morton (Z-order) curve, so that neighbours in space are
-/// neighbours in memory; regions follow. Every generator and sampler ends with this.
+/// neighbours in memory; regions are renumbered. Every generator and sampler calls it last.
 void order_along_curve(Cloud& cloud);
 
 }  // namespace phyxel

@@ -1,4 +1,4 @@
-/// Energies, momenta and the watch over them.
+/// Energies, momenta and the detection of unstable runs.
 #pragma once
 
 #include <optional>
@@ -14,18 +14,18 @@ namespace phyxel {
 /// double and exactly, so they do not depend on the number of threads or ranks; a device that sums
 /// itself has its own. Of a share, those of the whole model: collective.
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now);
-/// The same after so many of Verlet's steps.
+/// Diagnostics after `step` Verlet steps of size `dt` [s].
 inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
   return diagnose(model, backend, {step, static_cast<double>(step) * dt, dt / 2});
 }
 
-/// The stiffest phyxel of a backend's present displacements, of all ranks: collective.
+/// The phyxel that is stiffest at the backend's present displacements, over all ranks. Collective.
 Stiffening find_stiffening(const Model& model, Backend& backend);
 
 /// True if a material can become stiffer than it is at rest: all can but linear laws.
 bool stiffens(const Material& material);
 
-/// A phyxel in words: its global id, its body and where it is at rest [m]. Of a share: collective.
+/// A description of a phyxel: global id, body and rest position [m]. Collective on a share.
 std::string describe_phyxel(const Model& model, Index global_id);
 
 /// Von Mises equivalent of the Cauchy stress [Pa] and det F of every phyxel, shape [n]; either
@@ -38,7 +38,7 @@ double pressure_wave_speed(const Material& material);
 
 class StepShortener;
 
-/// Stops a run that has become unstable.
+/// Detects unstable runs and stops them.
 class StabilityWatch {
  public:
   /// The model must outlive this. Of a share: collective. @throws as `check`
@@ -70,7 +70,7 @@ class StabilityWatch {
   std::optional<Diagnostics> good_;  // the last one found good
 };
 
-/// Whether total energy is a constant of this model: no damping, no motion and no growing load.
+/// True if the model conserves total energy: it has no damping, no motion and no growing load.
 bool is_conservative(const Model& model);
 
 }  // namespace phyxel

@@ -1,4 +1,4 @@
-/// Where a scene comes to rest, without stepping there.
+/// Equilibrium states, found by Newton's method instead of time steps.
 #pragma once
 
 #include <cstdint>
@@ -10,37 +10,37 @@
 
 namespace phyxel {
 
-/// How far a search by Newton's method has come.
+/// Progress of Newton's method.
 struct NewtonProgress {
-  int step = 0;          ///< Newton's steps accepted so far.
-  int iteration = 0;     ///< Conjugate gradients' iteration of the step under way; 0: none yet.
-  double residual = 0;   ///< Of the last accepted step, of what is applied.
-  double tolerance = 0;  ///< Below which the residual counts as rest.
-  double inner_residual = 1;  ///< Of the linear equations, of theirs at the start.
-  double energy = 0;          ///< Of the last accepted step [J]: deformation, loads, inertia.
+  int step = 0;          ///< Newton steps accepted so far.
+  int iteration = 0;     ///< Iteration of conjugate gradients within the present step; 0: none yet.
+  double residual = 0;   ///< Relative residual of the last accepted step.
+  double tolerance = 0;  ///< Relative residual at which the search ends.
+  double inner_residual = 1;  ///< Residual of the linear system over its initial residual.
+  double energy = 0;  ///< Energy of the last accepted step [J]: deformation, loads, inertia.
 };
 
 /// Called after every evaluation of the forces, on all ranks at the same ones.
 /// @returns whether to go on; one rank's `false` stops all
 using NewtonObserver = std::function<bool(const NewtonProgress&)>;
 
-/// When a search ends, and where it begins.
+/// Stopping criteria and start of a search for equilibrium.
 struct EquilibriumOptions {
   /// Of the residual force over what is applied: loads, weight and reactions, all by their
   /// Euclidean norms over all phyxels.
   double tolerance = 1e-8;
   int most_steps = 200;               ///< Newton's.
-  NewtonObserver observer = nullptr;  ///< Null: nobody watches.
+  NewtonObserver observer = nullptr;  ///< Null: no observer.
   /// Displacements [m] of an interrupted search, which goes on to the bit; null: at rest.
   const std::vector<Vec3d>* start = nullptr;
 };
 
-/// What a search has found.
+/// Result of a search for equilibrium.
 struct Equilibrium {
   State state;                   ///< At rest; step and time are zero.
-  double residual = 0;           ///< What is left of it.
-  int steps = 0;                 ///< Newton's.
-  std::int64_t evaluations = 0;  ///< Of the forces of all phyxels.
+  double residual = 0;           ///< Relative residual at the end.
+  int steps = 0;                 ///< Newton steps taken.
+  std::int64_t evaluations = 0;  ///< Evaluations of the forces of all phyxels.
 };
 
 /// A state in which forces cancel on every phyxel that is not held: under gravity, loads at their

@@ -22,9 +22,9 @@ enum class ExitCode : int {
 /// Base of every error phyxel throws on purpose. `what()` is the whole message for the user.
 class Error : public std::runtime_error {
  public:
-  /// @param message the whole of it, for the user
+  /// @param message the complete message for the user
   Error(ExitCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
-  /// What a program that this error ends should return.
+  /// Exit code of a program that ends with this error.
   ExitCode code() const { return code_; }
 
  private:
@@ -54,10 +54,11 @@ class DeviceError : public Error {
   explicit DeviceError(const std::string& message) : Error(ExitCode::device_failed, message) {}
 };
 
-/// What every rank of a program throws alike: all have met it, or have agreed on what one has met.
+/// An error that all ranks throw together: every rank has met it, or the ranks have agreed on the
+/// error of one of them.
 class AgreedError : public Error {
  public:
-  /// @param message what happened, on whichever rank
+  /// @param message the error, on whichever rank it occurred
   using Error::Error;
 };
 

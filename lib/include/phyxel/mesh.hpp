@@ -16,7 +16,7 @@ namespace phyxel {
 ///   empty, malformed or non-finite file, or indices out of range.
 Surface read_mesh(const std::filesystem::path& file);
 
-/// What is wrong with a surface, by count and place.
+/// Defects of a surface, by count and place.
 struct SurfaceDefects {
   Index open_edges = 0;            ///< Edges with one triangle: holes.
   Index crowded_edges = 0;         ///< Edges with more than two triangles.
@@ -26,24 +26,25 @@ struct SurfaceDefects {
   Index parts = 0;          ///< Connected parts.
   bool inside_out = false;  ///< The enclosed volume is negative.
   Vec3d example;            ///< Midpoint of one defective edge or triangle [m].
-  /// Whether nothing is wrong, but for vertices that no triangle uses.
+  /// True if the surface has no defect other than unused vertices.
   bool clean() const;
   std::string describe() const;  ///< One line for the user.
 };
 /// Looks for defects; never throws.
 SurfaceDefects inspect_surface(const Surface& surface);
 
-/// How a surface is filled with phyxels.
+/// Parameters for filling a surface with phyxels.
 struct SampleRequest {
   Index phyxels = 0;       ///< Exact number of phyxels.
   std::uint64_t seed = 1;  ///< The same seed gives the same cloud on any number of threads.
   int relaxations = 30;    ///< Sweeps of the relaxation (Lloyd); 0: none.
-  /// Whether phyxels lie on the surface, too, on its corners and along its sharp edges, or all
-  /// inside, each in the middle of its share. Unset: on the surface if it allows that.
+  /// True puts phyxels on the surface, too, on its corners and along its sharp edges; false puts
+  /// all of them inside, each in the middle of its cell. Unset: on the surface wherever it allows
+  /// that.
   std::optional<bool> on_surface;
 };
 
-/// What sampling found out.
+/// Statistics of a sampled surface.
 struct SampleReport {
   SurfaceDefects defects;
   double volume = 0;             ///< Volume inside the surface [m^3].

@@ -1,4 +1,4 @@
-/// Who interacts with whom: compressed rows of neighbours and of inverse neighbours.
+/// Neighbour lists and inverse neighbour lists as compressed rows.
 #pragma once
 
 #include <optional>
@@ -15,11 +15,11 @@ struct Csr {
   std::vector<Offset> offsets{0};  ///< shape [rows + 1]
   std::vector<Index> indices;      ///< shape [entries]
 
-  /// How many.
+  /// Number of rows.
   Index rows() const { return static_cast<Index>(offsets.size() - 1); }
-  /// Of all rows.
+  /// Number of entries of all rows.
   Offset entries() const { return offsets.back(); }
-  /// Entries of one row.
+  /// Number of entries of one row.
   Index length(Index row) const { return static_cast<Index>(offsets[row + 1] - offsets[row]); }
   /// Entries of row i, ascending.
   std::span<const Index> row(Index i) const {
@@ -27,13 +27,14 @@ struct Csr {
   }
 };
 
-/// Rows become columns: j is in row i of the result if i is in row j of `csr`. Linear time.
+/// The transpose of a pattern: row i of the result contains j if row j of `csr` contains i. Takes
+/// linear time.
 Csr transpose(const Csr& csr, Index columns);
 
 /// How the support radius h of each phyxel is chosen. Source: Mueller et al. 2004, section 4.2:
 /// h_i = factor * (mean distance to the `nearest` nearest phyxels).
 struct NeighbourhoodRule {
-  /// Whether bodies or phyxels have a support.
+  /// The scope of a support radius: a body or a phyxel.
   enum class Support {
     uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for
                ///< both passes.
@@ -46,18 +47,19 @@ struct NeighbourhoodRule {
   std::optional<int>
       max_neighbours;  ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
 
-  /// Whether i may be a neighbour of j without j being one of i.
+  /// True if i may be a neighbour of j without j being a neighbour of i.
   bool one_sided() const { return max_neighbours || (!radius && support == Support::adaptive); }
 };
 
-/// Neighbours of every phyxel (itself excluded): j in N(i) if |x_j - x_i| < h_i. The lists may be
-/// left to the device that needs them; `support` is always there.
+/// Neighbour lists of all phyxels (a phyxel is no neighbour of itself): N(i) contains j if
+/// |x_j - x_i| < h_i. The lists are empty if the device that needs them finds them itself;
+/// `support` is always filled.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
   bool symmetric = true;        ///< N is its own inverse; `inverse()` then returns `neighbours`.
   std::vector<double> support;  ///< h_i [m], shape [n_phyxels].
-  /// {j : i in N(j)}.
+  /// The inverse lists, {j : i in N(j)}.
   const Csr& inverse() const { return symmetric ? neighbours : inverse_lists; }
 };
 
@@ -66,12 +68,12 @@ struct Neighbourhood {
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 
 /// Neighbour search through the spatial hash of Teschner et al. 2003, in time linear in the number
-/// of phyxels. `spacing` is what `mean_spacing` returned.
+/// of phyxels. @param spacing result of `mean_spacing`
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule);
 
-/// For each of `point`, the phyxels i with |x_i - point| < support[i]; a point that no phyxel
-/// reaches gets the nearest one. `unreached` counts those.
+/// For each point, the phyxels i with |x_i - point| < support[i]. A point outside every support
+/// gets the nearest phyxel. @param unreached receives the number of such points; may be null
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached = nullptr);
 

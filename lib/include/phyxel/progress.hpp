@@ -1,4 +1,4 @@
-/// How far a set-up has come, for programs that show it.
+/// Progress of a set-up, for programs that display it.
 #pragma once
 
 #include <functional>
@@ -6,17 +6,17 @@
 
 namespace phyxel {
 
-/// Hears how far a stage of a set-up has come: `share` is 0 at the beginning of the stage, grows,
-/// and is 1 at its end. It is called on the thread that sets up. An exception that it throws
+/// Callback for the progress of one stage of a set-up: `share` is 0 at the beginning of the stage,
+/// grows, and is 1 at its end. It is called on the thread that sets up. An exception that it throws
 /// abandons the set-up, and reaches whoever asked for that; ranks that set up a model together must
 /// all throw it, or none.
 using StageObserver = std::function<void(std::string_view stage, double share)>;
 
-/// While it lives, an observer hears of the stages of everything that this thread sets up: meshes
-/// read and filled, neighbours, moments, closed gradients, shares of ranks, the arrays of a solver,
-/// the largest step. Other threads have observers of their own, so that they can set up models at
-/// the same time. The last observer made is the one that hears. Where there is none, a stage costs
-/// a comparison.
+/// Registers an observer for its own lifetime; the observer is called for all stages of set-ups on
+/// this thread: meshes read and filled, neighbours, moments, closed gradients, shares of ranks, the
+/// arrays of a solver, the largest step. Other threads have observers of their own, so that they
+/// can set up models at the same time. The last observer made is the one that hears. Where there is
+/// none, a stage costs a comparison.
 class ObserveStages {
  public:
   /// An empty observer: nobody hears.

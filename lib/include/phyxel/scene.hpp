@@ -18,23 +18,24 @@ namespace phyxel {
 /// Arithmetic of a run. `mixed`: state in double, forces in float.
 enum class Precision { single, double_, mixed };
 
-/// How a scene gets to its end. `verlet`: explicit steps below the largest stable one. `implicit`:
-/// steps of any size, each a balance of forces. `equilibrium`: where it comes to rest, at once.
+/// Time integration of a scene. `verlet`: explicit steps below the stability limit. `implicit`:
+/// steps of any size, each the solution of a balance of forces. `equilibrium`: the state of rest,
+/// found directly.
 enum class Method { verlet, implicit, equilibrium };
 
 /// "float", "double" or "mixed".
 const char* precision_name(Precision precision);
 
-/// The precision of that name; nothing for another word.
+/// The precision with this name; `nullopt` if there is none.
 std::optional<Precision> precision_named(std::string_view name);
 
 /// "verlet", "implicit" or "equilibrium".
 const char* method_name(Method method);
 
-/// The method of that name; nothing for another word.
+/// The method with this name; `nullopt` if there is none.
 std::optional<Method> method_named(std::string_view name);
 
-/// A choice of phyxels, in rest coordinates after placement. Exactly one member is set.
+/// A selection of phyxels, in rest coordinates after placement. Exactly one member is set.
 struct Selection {
   struct Box {
     Vec3d low, high;
@@ -51,12 +52,14 @@ struct Selection {
   std::string where;  ///< "scene.toml:12:3", for errors.
 };
 
-/// Along which axes a phyxel is held or moved; along the others it is free, as on rollers.
+/// The axes along which a phyxel is fixed or prescribed; along the other axes it is free, as on
+/// rollers.
 struct Axes {
   bool x = true, y = true, z = true;
-  /// Whether along every axis.
+  /// True if the phyxel is constrained along every axis.
   bool all() const { return x && y && z; }
-  char bits() const { return static_cast<char>(x | y << 1 | z << 2); }  ///< One for each.
+  /// One bit for each axis, x lowest.
+  char bits() const { return static_cast<char>(x | y << 1 | z << 2); }
   bool operator==(const Axes&) const = default;
 };
 
@@ -66,13 +69,13 @@ struct InclusionRequest {
   Material material;
 };
 
-/// Phyxels held where they are.
+/// Fixed phyxels.
 struct FixRequest {
   Selection select;
   Axes axes{};
 };
 
-/// Phyxels moved along a given path:
+/// Phyxels with a prescribed displacement:
 /// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency
 /// t), turned about a point by rotation * smoothstep(t / duration).
 struct MotionRequest {
@@ -80,7 +83,7 @@ struct MotionRequest {
   Vec3d displacement;    ///< [m]
   Vec3d rotation;        ///< Axis times angle [degrees]; any number of turns.
   Vec3d about;           ///< A point of that axis [m].
-  double duration = 0;   ///< [s]; of displacement and rotation
+  double duration = 0;   ///< Duration of displacement and rotation [s].
   Vec3d velocity;        ///< [m/s]
   Vec3d amplitude;       ///< [m]
   double frequency = 0;  ///< [Hz]
@@ -96,17 +99,18 @@ struct LoadRequest {
   double ramp = 0;      ///< [s]
 };
 
-/// Where a body's rest shape comes from. Exactly one of `shape.name`, `mesh`, `file`, `cloud` is
+/// The source of a body's rest shape. Exactly one of `shape.name`, `mesh`, `file` and `cloud` is
 /// set.
 struct BodySource {
   ShapeRequest shape;
   std::filesystem::path mesh;  ///< Surface to fill with `phyxels` phyxels.
   std::filesystem::path file;  ///< body.h5 written by `phyxel sample`.
-  std::string cloud;           ///< A name: the program that uses the scene has the cloud.
+  std::string cloud;           ///< Name of a cloud that the calling program supplies.
   Index phyxels = 0;           ///< Mesh: exact count. Lattice shapes: about this many.
   std::uint64_t seed = 1;
   int relaxations = 30;
-  std::optional<bool> on_surface;  ///< Mesh: whether phyxels lie on it, too; unset: if it can be.
+  /// Mesh: true puts phyxels on the surface, too; unset: wherever the surface allows it.
+  std::optional<bool> on_surface;
   bool operator==(const BodySource&) const = default;
 };
 
@@ -122,11 +126,12 @@ struct BodyRequest {
   Material material;
   NeighbourhoodRule neighbourhood;
   VolumeRule volume_rule = VolumeRule::automatic;
-  /// How far gradients are closed (phyxel/physics/closing.hpp): what sums over neighbourhoods may
-  /// miss, as a share of the surface's areas; 0: as they come. Needs a closed surface and one
-  /// support for the body.
+  /// Tolerance of the integration constraint of closed gradients (phyxel/physics/closing.hpp), as a
+  /// share of the surface's areas; 0: gradients are not closed. Closed gradients need a closed
+  /// surface and one support for the body.
   double closure = 0;
-  /// Of those that hold a phyxel, the last counts. Strength of hourglass control is the body's.
+  /// Inclusions; where several contain a phyxel, the last one counts. The strength of hourglass
+  /// control is the body's.
   std::vector<InclusionRequest> inclusions;
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
@@ -134,14 +139,15 @@ struct BodyRequest {
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
-/// How long, and by which steps.
+/// Simulated time and step size.
 struct TimeRequest {
-  double end = 0;              ///< Simulated time [s].
-  std::optional<double> step;  ///< [s]; unset: from the spectral radius of the stiffness.
-  double safety = 0.8;         ///< Fraction of the largest stable step, 0 to 1.
+  double end = 0;  ///< Simulated time [s].
+  std::optional<double>
+      step;             ///< Step size [s]; unset: found from the spectral radius of the stiffness.
+  double safety = 0.8;  ///< Fraction of the largest stable step, 0 to 1.
 };
 
-/// What computes, and how precisely.
+/// Method, device and precision of the solver.
 struct SolverRequest {
   Method method = Method::verlet;
   std::string device = "auto";  ///< "auto", "cpu" or "cuda".
@@ -149,7 +155,7 @@ struct SolverRequest {
   int threads = 0;  ///< 0: OpenMP's choice.
 };
 
-/// What is written, where and how often.
+/// Output of a run: families of files, fields, folder and intervals.
 struct OutputRequest {
   std::filesystem::path directory;  ///< Default: out/<scene file's name>.
   double frames_per_second = 25;    ///< Frames per simulated second; 0: last frame only.
@@ -159,20 +165,20 @@ struct OutputRequest {
   /// "volume_ratio", "mass", "volume", "body".
   std::vector<std::string> fields = {"displacement", "velocity"};
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
-  /// Whether `fields` has it.
+  /// True if `fields` contains the field.
   bool wants(std::string_view field) const;
 };
 
 /// Pictures at the end of a run.
 struct RenderRequest {
   bool pictures = false;  ///< Write PNG pictures at the end of a run.
-  int count = 6;          ///< How many frames, evenly spread, first and last included.
+  int count = 6;          ///< Number of frames drawn, evenly spread, first and last included.
   int width = 960, height = 720;
   Vec3d view{-1, 2, -0.6};  ///< Direction the camera looks along; a scene's turns with `up`.
-  Vec3d up{0, 0, 1};        ///< In a scene that names none: against its gravity, if there is any.
+  Vec3d up{0, 0, 1};  ///< Upward direction; by default against the scene's gravity, if it has any.
 };
 
-/// A whole request: `build_model` takes it.
+/// A complete simulation request, the input of `build_model`.
 struct Scene {
   std::string title;
   std::filesystem::path file;  ///< Where it was read from; may be empty.
@@ -185,14 +191,15 @@ struct Scene {
   std::vector<BodyRequest> bodies;
 };
 
-/// Strength of hourglass control of a body that says nothing of it: 0.1, which is most accurate
-/// (docs/accuracy.md); 0 for the bodies of Farias et al. 2008, which are as in the paper, and where
-/// supports vary, where there is no such control.
+/// Default strength of hourglass control: 0.1, the most accurate value (docs/accuracy.md); 0 for
+/// the bodies of Farias et al. 2008, which follow the paper, and for bodies whose supports vary,
+/// which cannot have hourglass control.
 double default_hourglass(const BodyRequest& body);
 
-/// Checks every value of a scene against the table of scene keys (docs/scenes.md): ranges, which
-/// are what double precision survives, finiteness, and one choice in each selection. `build_model`
-/// asks this of every scene, read from a file or made in code.
+/// Checks every value of a scene against the table of scene keys (docs/scenes.md): its range,
+/// chosen so that double precision suffices, its finiteness, the laws of materials and their
+/// parameters, and that each selection has exactly one member. `build_model` checks every scene,
+/// read from a file or made in code.
 /// @throws InputError naming the body, the key, its value and what is allowed
 void validate(const Scene& scene);
 
@@ -209,8 +216,8 @@ struct Parameter {
 /// hash.
 std::vector<Parameter> scene_parameters(const Scene& scene);
 
-/// What differs between the parameters of two scenes, in words: "gravity: [0, 0, -9.81] then,
-/// [0, 0, 9.81] now", a line each, the first few; empty if nothing does.
+/// The differences between the parameters of two scenes in words: "gravity: [0, 0, -9.81] then,
+/// [0, 0, 9.81] now", one line each, at most eight; empty if there are none.
 std::string parameter_differences(const std::vector<Parameter>& then,
                                   const std::vector<Parameter>& now);
 

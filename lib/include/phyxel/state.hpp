@@ -1,4 +1,4 @@
-/// Everything about a simulation that changes: what a checkpoint holds.
+/// The variables of a simulation that change from step to step, which checkpoints hold.
 #pragma once
 
 #include <vector>
@@ -11,15 +11,15 @@ namespace phyxel {
 /// record, so that a resumed run looks at the same steps as the unbroken one, and finds the same.
 struct Looks {
   std::int64_t next = 0;       ///< Step of the next look.
-  std::int64_t last = -1;      ///< Step of the last one; -1: there has been none.
-  double ratio = 1;            ///< Stiffening that it found.
+  std::int64_t last = -1;      ///< Step of the last look; -1: none was taken.
+  double ratio = 1;            ///< Stiffening found by the last look.
   double change = 0;           ///< Recent peak of the stiffening's rate of change [1/step].
-  std::int64_t measured = -1;  ///< Step at which the limit of the step was found; -1: never.
-  double measured_ratio = 1;   ///< Stiffening then.
-  double measured_share = 0;   ///< (dt / limit)² then.
-  std::int64_t apart = 0;      ///< Steps after which it is found again.
+  std::int64_t measured = -1;  ///< Step at which the stability limit was last found; -1: never.
+  double measured_ratio = 1;   ///< Stiffening at that step.
+  double measured_share = 0;   ///< (dt / limit)² at that step.
+  std::int64_t apart = 0;      ///< Number of steps after which the limit is found again.
 
-  /// As many seconds are twice as many steps of half the size.
+  /// Rewrites all step counts for a step of half the size: the same times have twice the numbers.
   void halve_step();
   bool operator==(const Looks&) const = default;
 };
@@ -35,7 +35,7 @@ struct Watched {
   bool operator==(const Watched&) const = default;
 };
 
-/// State of all phyxels. A `float` run's values are exactly representable as float.
+/// The state of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.
   /// v(t - dt/2) [m/s], shape [n, 3]: (u(t) - u(t - dt)) / dt; of implicit steps v(t).
@@ -46,11 +46,12 @@ struct State {
   Looks looks;
 };
 
-/// When a backend's present state is.
+/// Time level of a backend's state. Velocities are stored at `time - lag` (lag is dt/2 for
+/// leapfrog).
 struct Instant {
   std::int64_t step = 0;
   double time = 0;  ///< [s]
-  double lag = 0;   ///< Its velocities are those of so much earlier [s].
+  double lag = 0;   ///< [s]
 };
 
 /// Deformed surfels.
@@ -65,7 +66,7 @@ struct Stiffening {
   /// infinite if a displacement is not finite.
   double ratio = 1;
   double stretch = 1;  ///< Its largest principal stretch.
-  Index phyxel = -1;   ///< Its global id.
+  Index phyxel = -1;   ///< Its global id; -1: there is no phyxel.
 };
 
 /// Energies and conserved quantities at one instant, all bodies together.
@@ -78,11 +79,12 @@ struct Diagnostics {
   double hourglass_energy = 0;  ///< [J], of hourglass control.
   double gravity_energy = 0;    ///< [J], zero at rest.
   double load_energy = 0;       ///< [J], potential of the point and body loads.
-  /// [J], of the deformation.
+  /// Energy of the deformation [J].
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
-  /// [J], without the potentials of gravity and loads.
+  /// Kinetic and elastic energy [J], without the potentials of gravity and loads.
   double kinetic_and_elastic_energy() const { return kinetic_energy + elastic_energy(); }
-  /// [J], constant where nothing damps, moves or grows (see `is_conservative`).
+  /// Total energy [J], constant in a scene without damping, motions and growing loads
+  /// (`is_conservative`).
   double total_energy() const {
     return kinetic_and_elastic_energy() + gravity_energy + load_energy;
   }

@@ -127,8 +127,8 @@ TEST(ExternalForces, MayChangeAmidARunBesideALoad) {
   Vec3d momentum;
   const State end = solver.state();
   for (Index i = 0; i < model.size(); ++i) momentum += model.mass[i] * end.velocity[i];
-  // Sixty sums in double of internal forces that cancel. Velocities are half a step behind, and those
-  // of the start know of the load, but not of the caller's forces.
+  // Sixty sums in double of internal forces that cancel. Velocities are half a step behind, and
+  // those of the start know of the load, but not of the caller's forces.
   EXPECT_NEAR(momentum.x, expected, 1e-12 * expected);
   EXPECT_NEAR(momentum.z, 59.5 * 2 * dt, 1e-12);
 }

@@ -1,7 +1,8 @@
-/// Closed gradients. A moving-least-squares gradient is exact for affine motions, yet what it takes
-/// from a phyxel over all those around it does not cancel inside a body: a uniform stress leaves
+/// Closed gradients, which satisfy the integration constraint (variational consistency). A
+/// moving-least-squares gradient is exact for affine motions, yet the weights of one phyxel in the
+/// gradients of its neighbours do not cancel inside a body: a uniform stress leaves
 /// forces Σ_i v_i P ∂∇u_i/∂u_j that grow with the irregularity of the cloud. Each gradient gets a
-/// share of what it does not follow (see hourglass.hpp),
+/// share of the residual of its fit (see hourglass.hpp),
 ///   ∇u_i = ∇⁰u_i + r_i ĉ_iᵀ,   r_i = Σ_j w_ij (u_j - u_i - ∇⁰u_i x_ij),
 /// with a closing vector ĉ_i [1/m] for each phyxel, found once for the cloud so that
 ///   Σ_i v_i ∂∇u_i/∂u_j = S_j,
@@ -39,7 +40,7 @@ PHYXEL_HD Mat3<Real> closed_pair_stress(const Mat3<Real>& pair_stress, Vec3<Real
   return fused_outer(-t, inverse_moment * moment_offset, pair_stress);
 }
 
-/// Adds to the force on phyxel i what closing stresses do between it and neighbour j [N].
+/// Adds to the force on phyxel i the force of closing stresses between it and its neighbour j [N].
 template <class Real>
 PHYXEL_HD void add_closing_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t_j, Real w_ij) {
   force = fused(w_ij, t_i - t_j, force);

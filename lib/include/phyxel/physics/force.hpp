@@ -1,6 +1,6 @@
-/// From stress to forces. Everything a phyxel does to its neighbours is in one matrix, its pair
-/// stress Q_i = v_i P_i A_i⁻¹ [N/m per m]; it follows from differentiating the energy
-/// Σ_i v_i ψ(F_i), so momentum is conserved exactly:
+/// Forces from stresses. The forces of a phyxel on all its neighbours follow from one matrix, its
+/// pair stress Q_i = v_i P_i A_i⁻¹ [N/m per m]; it follows from differentiating the energy Σ_i v_i
+/// ψ(F_i), so momentum is conserved exactly:
 ///   f_i = Q_i Σ_{j in N(i)} w_ij x_ij  +  Σ_{j : i in N(j)} w_ji Q_j x_ij.
 /// The first sum is a constant of the cloud (`Model::moment_offset`), the second runs over the
 /// inverse neighbourhood and replaces the n×n force matrix of Farias et al. 2008, section 5.2.
@@ -23,8 +23,9 @@ PHYXEL_HD Vec3<Real> own_force(const Mat3<Real>& q_i, Vec3<Real> moment_offset) 
   return q_i * moment_offset;
 }
 
-/// Adds to `force` that on phyxel i from the stress of phyxel j, which has i as a neighbour [N].
-/// Products go one by one into the sum, so that each can be fused with it. `wx` is w_ji x_ij.
+/// Adds to `force` the force on phyxel i from the stress of phyxel j, which has i as a neighbour
+/// [N]. Products enter the sum one by one, so that each can be fused with it. @param wx w_ji x_ij
+/// [m]
 template <class Real>
 PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> wx) {
   force.x = fused(q_j(0, 0), wx.x, force.x);
@@ -38,14 +39,14 @@ PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec
   force.z = fused(q_j(2, 2), wx.z, force.z);
 }
 
-/// The same from x_ij [m] and w_ji apart.
+/// Adds the same force, with x_ij [m] and w_ji given separately.
 template <class Real>
 PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> x_ij,
                                    Real w_ji) {
   add_neighbour_force(force, q_j, w_ji * x_ij);
 }
 
-/// That force alone.
+/// The force on phyxel i from the stress of its neighbour j [N].
 template <class Real>
 PHYXEL_HD Vec3<Real> neighbour_force(const Mat3<Real>& q_j, Vec3<Real> x_ij, Real w_ji) {
   Vec3<Real> force{};

@@ -1,9 +1,9 @@
-/// Hourglass control: what a phyxel's linear fit does not follow, costs energy,
+/// Hourglass control: an energy of the displacements that a phyxel's linear fit does not follow,
 ///   Σ_i ½ κ Σ_j w_ij |r_ij|²,   r_ij = u_j - u_i - ∇u_i x_ij,
-/// so that motions which no ∇u sees (hourglass modes) are held. Affine motions cost nothing, and
-/// rotations turn r without stretching it: both momenta are conserved. Sources: the energy is that
-/// of Ganzenmüller 2015 (An hourglass control algorithm for Lagrangian smooth particle
-/// hydrodynamics) with the weights of the moment matrix in place of w / r². With these,
+/// which resists motions that ∇u does not see (hourglass modes). Affine motions have no such
+/// energy, and rotations turn r without stretching it: both momenta are conserved. Sources: the
+/// energy is that of Ganzenmüller 2015 (An hourglass control algorithm for Lagrangian smooth
+/// particle hydrodynamics) with the weights of the moment matrix in place of w / r². With these,
 /// Σ_j w_ij r_ij x_ijᵀ = 0, since ∇u_i is the fit that makes phyxel i's share smallest; its
 /// derivative by ∇u_i vanishes, and with symmetric lists and weights
 ///   f_i = 2 κ Σ_j w_ij (u_j - u_i)  -  κ Σ_j w_ij (∇u_i + ∇u_j) x_ij.
@@ -40,7 +40,7 @@ PHYXEL_HD Vec3<Real> pull_force(Real kappa, Vec3<Real> pull) {
   return (Real(2) * kappa) * pull;
 }
 
-/// Q - κ ∇u.
+/// The pair stress with the share of hourglass control, Q - κ ∇u.
 template <class Real>
 PHYXEL_HD Mat3<Real> with_hourglass(const Mat3<Real>& pair_stress, Real kappa,
                                     const Mat3<Real>& grad_u) {
@@ -55,7 +55,7 @@ PHYXEL_HD void add_residual(Real& sum, Vec3<Real> u_ij, const Mat3<Real>& grad_u
   sum = fused(w, dot(r, r), sum);
 }
 
-/// ½ κ Σ_j w_ij |r_ij|² [J].
+/// The hourglass energy of a phyxel, ½ κ Σ_j w_ij |r_ij|² [J]. @param residual the sum [m²]
 PHYXEL_HD double hourglass_energy(double kappa, double residual) { return 0.5 * kappa * residual; }
 
 }  // namespace phyxel

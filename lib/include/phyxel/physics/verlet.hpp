@@ -1,4 +1,4 @@
-/// Time integration.
+/// Explicit time integration.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,8 @@ inline Vec3<double> velocity_before(Vec3<double> velocity, Vec3<double> accelera
   return std::exp(std::fmin(damping * time, 40.0)) * rest;
 }
 
-/// The same step with mass-proportional damping c [1/s] by the exact flow of damping over Δt
+/// The velocity after a step with mass-proportional damping c [1/s] by the exact flow of damping
+/// over Δt
 /// (`damped_flow`): a free body's velocity decays as e^{-ct} for any c Δt, and forces balance
 /// damping at v = a/c. Stable below ω²Δt² = 2 x coth(x/2) with x = cΔt, which is 4 or more: never
 /// below the limit without damping. Distances are off by a share of x²/24.

@@ -15,7 +15,7 @@ PHYXEL_HD Real weight_shape(Real r_squared, Real inverse_h_squared) {
   return t * t * t;
 }
 
-/// The same at any distance: zero from r = h on.
+/// The shape of the weight at any distance: zero for r >= h.
 template <class Real>
 PHYXEL_HD Real weight_shape_anywhere(Real r_squared, Real inverse_h_squared) {
   const Real t = fused(-r_squared, inverse_h_squared, Real(1));
