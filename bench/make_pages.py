@@ -1,20 +1,24 @@
 #!/usr/bin/env python3
-"""Writes the pages that are made of the tables in docs/results, and draws their charts beside the tables. No number there is
+"""Generates pages from the tables in docs/results and draws their charts beside the tables. No number on these pages is
 typed by hand.
 
     bench/make_pages.py                         all pages
     bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, cpu, readme
-    bench/make_pages.py --check                 writes nothing; fails if a page is not what the tables say
+    bench/make_pages.py --check                 writes nothing; fails if a page is not up to date
 
 performance, scaling and accuracy are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
-README.md. Nothing is written unless all pages could be made. Drawing takes matplotlib 3.6 or later; --check takes Python
-alone and looks at the text, since charts differ from one matplotlib to the next.
+README.md. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python alone: it
+compares the text, since charts differ from one version of matplotlib to the next.
 
 The tables come from scripts/measure_gpu.sh, measure_accuracy.py and profile_gpu.sh, bench/compare/*.py, and
 
     build/cpu/bin/phyxel bench step --csv docs/results/cpu_step.csv --force
     build/cpu/bin/phyxel bench step --terms green --threads 1,4,16 --phyxels 100000,1000000 \\
       --csv docs/results/cpu_step_16.csv --force
+    for study in neighbours precision steps; do
+      build/cpu/bin/phyxel_studies $study --csv docs/results/accuracy_$study.csv --force
+    done
+    build/cpu/bin/phyxel_studies pictures
     build/cpu/bin/phyxel_studies neighbour-search --csv docs/results/cpu_neighbours.csv --force
     build/cpu/bin/phyxel accuracy hard --long --csv docs/results/hard_cases_cpu.csv --force
 """
@@ -35,7 +39,7 @@ WRONG_INPUT = 2
 
 
 def write_whole(file, content):
-    """The file with all of its content, or as it was."""
+    """Writes a file by way of a temporary one: a reader sees the old content or the new one, never a part."""
     handle, name = tempfile.mkstemp(dir=file.parent, prefix=f".{file.name}.")
     try:
         with os.fdopen(handle, "wb") as out:
@@ -48,7 +52,7 @@ def write_whole(file, content):
 
 
 def made(names, results, out, readme):
-    """The texts by their files, and the charts by theirs."""
+    """Generates pages: their texts and their charts, each by its file."""
     texts, drawings = {}, {}
     for name in names:
         if name == "readme":
@@ -67,7 +71,7 @@ def made(names, results, out, readme):
 
 
 def differences(texts, drawings, others):
-    """What is not as the tables say, in words. @param others charts that are there"""
+    """Describes pages and charts that are not up to date. `others` are the charts in the folder."""
     found = []
     for file, text in texts.items():
         old = file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""

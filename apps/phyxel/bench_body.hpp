@@ -1,4 +1,4 @@
-/// The body that speed is measured on.
+/// Bodies and scenes of the speed measurements.
 #pragma once
 
 #include <string>
@@ -10,10 +10,9 @@ namespace phyxel::app {
 /// A jittered cube of about `n` phyxels, 0.1 m apart.
 Cloud bench_cube(Index n, bool surfels = false);
 
-/// Bodies of a soft material under gravity.
-/// @param terms what the material or the body has beside Green's strain: a name of `bench step
-///   --terms`
-/// @param factor of the support
+/// A scene of equal bodies of a soft material under gravity.
+/// @param terms a name of `bench step --terms`: the term beside Green's strain, or instead of it
+/// @param factor support factor
 Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
                   int bodies = 1);
 

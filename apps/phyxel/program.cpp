@@ -15,7 +15,7 @@
 namespace phyxel::app {
 namespace {
 
-/// A full disk or a closed pipe behind the standard output: what was asked for has not been said.
+/// Refuses a standard output that lost data: a full disk or a closed pipe.
 [[noreturn]] void refuse_standard_output(int error) {
   throw OutputError(fmt::format("standard output: cannot be written: {}",
                                 std::generic_category().message(error)));

@@ -1,5 +1,4 @@
-/// What the program and the developers' studies (bench/studies) share: from arguments to an exit
-/// code.
+/// The common part of main() in phyxel and in phyxel_studies (bench/studies).
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,11 +6,11 @@
 
 namespace phyxel::app {
 
-/// Parses the arguments and runs the subcommand that they choose, on all ranks. Errors become a
-/// message on stderr.
+/// Parses the arguments and runs the chosen subcommand on all ranks. Errors become a message on
+/// stderr.
 ///
-/// @param check_ranks called after parsing and before the subcommand; throws what several ranks
-///   cannot do
+/// @param check_ranks called between parsing and the subcommand; throws if several ranks cannot run
+///   the subcommand
 /// @returns the exit code
 int run_program(CLI::App& program, int argc, char** argv, const std::function<void()>& check_ranks);
 

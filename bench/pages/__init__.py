@@ -1,1 +1,1 @@
-"""The pages that are made of tables of measurements: one module a page. `bench/make_pages.py` writes them."""
+"""Pages generated from tables of measurements, one module per page. `bench/make_pages.py` writes them."""

@@ -4,7 +4,7 @@ import math
 import re
 
 from pages.charts import Curve, LineChart
-from pages.page import Page
+from pages.page import Page, measured_by
 from pages.problems import problems
 from pages.tables import markdown_table, plain, read_if_there, read_table
 
@@ -19,13 +19,13 @@ with neither. *Order*: by which power of the spacing the error fell since the ro
 forces, in Newton's method and what it needs. *Set-up*: from the scene to the first of them; bold rows and charts count \
 both times. Errors are relative to the reference, or to what the quantity says."""
 
-#: The ways whose finest resolutions stand side by side.
+#: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
            "nodes, jitter 0.2, α = 0.1, closed", "mesh, plain", "mesh, α = 0.1", "mesh, α = 0.1, closed"]
 
 
 def cloud_of(row):
-    """How phyxels lie, but for their resolution."""
+    """The kind of point cloud: lattice, jitter and support factor."""
     cloud = row["lattice"]
     if row.number("jitter") > 0:
         cloud += f", jitter {row['jitter']}"
@@ -35,6 +35,7 @@ def cloud_of(row):
 
 
 def terms_of(row):
+    """The terms beside the plain discretisation: hourglass control and closed gradients."""
     held, closure = row.number("hourglass") > 0, row.number("closure")
     terms = [f"α = {row['hourglass']}"] if held else []
     if closure > 0:
@@ -43,12 +44,12 @@ def terms_of(row):
 
 
 def way_of(row):
-    """How a row was discretised, but for its resolution."""
+    """The discretisation without its resolution: point cloud and terms."""
     return f"{cloud_of(row)}, {terms_of(row)}"
 
 
 def time_of(row):
-    """From the scene to the answer [s]."""
+    """The time of set-up and solution [s]."""
     return row.number("seconds") + row.number("setup_seconds")
 
 
@@ -57,7 +58,7 @@ def error_of(row):
 
 
 def front_of(rows):
-    """The rows that no other one of them is both faster and more accurate than, from the fastest on."""
+    """The Pareto front of time and error: rows that no other row beats in both, the fastest first."""
     front, best = [], math.inf
     for row in sorted(rows, key=time_of):
         if error_of(row) < best:
@@ -67,12 +68,12 @@ def front_of(rows):
 
 
 def file_name_of(quantity):
-    """Its letters and digits, words apart."""
+    """The name of a quantity in a file name: its letters and digits, with hyphens for all other characters."""
     return re.sub("[^a-zA-Z0-9]", "-", plain(quantity).replace("ν", "nu"))
 
 
 def short_error(error):
-    """As a reader takes it in: percents where they say something."""
+    """An error as a percentage, or below 0.01% as a power of ten."""
     error = abs(error)
     if not math.isfinite(error):
         return "flew apart"
@@ -81,12 +82,8 @@ def short_error(error):
     return f"{100 * error:.2g}%" if error < 0.095 else f"{100 * error:.0f}%"
 
 
-def measured_on(table):
-    return f"{table.fact('program')} on {table.fact('hardware')}; {table.fact('compiler')}; {table.fact('date')}"
-
-
 def summary(page, table):
-    """The finest of each way, side by side."""
+    """Adds the errors of each discretisation at its finest resolution, side by side."""
     there = {way_of(row) for row in table.rows}
     ways = [way for way in SUMMARY if way in there]
     if len(ways) < 2:
@@ -110,7 +107,7 @@ def summary(page, table):
 
 
 def beside_lammps(page, results):
-    """LAMMPS on the same beam and the same cores."""
+    """Adds the comparison with LAMMPS on the same beam and the same cores."""
     table = read_if_there(results / "accuracy_lammps.csv")
     if not table:
         return
@@ -133,7 +130,7 @@ def beside_lammps(page, results):
 
 
 def hourglass(page, results):
-    """What hourglass control holds, and what it takes."""
+    """Adds pictures of a bar with and without hourglass control, and the costs of the terms."""
     shown = [p for p in problems()["pictures"] if (results / p["file"]).exists()]
     costs = []
     for device, file in (("CPU", "cpu_terms.csv"), ("GPU", "gpu_terms.csv")):
@@ -161,8 +158,8 @@ def hourglass(page, results):
 
 
 def chart(page, case, quantity, rows, irregular, styles):
-    """Error against time, a curve for each way on regular lattices or on irregular ones, and the front. A lattice has one
-    colour, and what is added to it one marker, on all charts."""
+    """Adds a chart of error over time with a curve for each discretisation and the Pareto front, for regular lattices or
+    irregular ones. On all charts a lattice has the same colour, and a set of terms the same marker."""
     drawn = LineChart(f"{case['name']}: {quantity}, {'irregular' if irregular else 'regular'} lattices",
                       "time from the scene to the answer [s]", "error")
     shown = [row for row in rows if (row.number("jitter") > 0 or row["lattice"] == "mesh") == irregular
@@ -199,7 +196,7 @@ def study_section(page, results, study):
     if not table:
         return
     page.paragraph(f"## {study['name']}")
-    page.paragraph(f"{study['what']} By `phyxel_studies {study['name']}`: {measured_on(table)}.")
+    page.paragraph(f"{study['what']} By `phyxel_studies {study['name']}`: {measured_by(table)}.")
     drawn = LineChart(study["name"], study["x_label"], "error")
     x = study["x"]
     for row in table.rows:
@@ -221,7 +218,7 @@ def hard_section(page, results):
         return
 
     def found_in(table, name):
-        """What a table says of a case, precision by precision."""
+        """The results of a case in one table, precision by precision."""
         found = [f"{row['precision']} {'refused' if row['found'] == 'refusal' else row['error']}"
                  f"{'' if row['good'] == 'yes' else ' **(wrong)**'}" for row in table.where(case=name)]
         return "; ".join(found) or "not run"
@@ -233,7 +230,7 @@ def hard_section(page, results):
         messages = [row["message"] for row in next(iter(tables.values())).where(case=hard["name"]) if row["message"]]
         if messages:
             refusals += f"- {hard['name']}: {messages[0]}\n"
-    measured = " ".join(f"{device}: {measured_on(table)}." for device, table in tables.items())
+    measured = " ".join(f"{device}: {measured_by(table)}." for device, table in tables.items())
     page.paragraph("## Hard cases")
     page.paragraph("From `phyxel accuracy hard`: each is answered within what is allowed, or refused with its cause. "
                    f"{measured}")
@@ -244,14 +241,14 @@ def hard_section(page, results):
 
 
 def make(results, link):
-    """The page. @throws PageError without accuracy.csv"""
+    """The page. Raises PageError if accuracy.csv is missing."""
     table = read_table(results / "accuracy.csv")
     page = Page(link)
     cases = problems()["cases"]
     page.paragraph(HEAD)
     # Cases that another program has measured since.
     apart = "".join(f"; {c['name']} by {table.fact(c['name'])}" for c in cases if table.fact(c["name"]))
-    page.paragraph(f"Measured by {measured_on(table)}{apart}.")
+    page.paragraph(f"Measured by {measured_by(table)}{apart}.")
     summary(page, table)
     beside_lammps(page, results)
     hourglass(page, results)

@@ -1,4 +1,4 @@
-"""What the page about speed says of `phyxel bench cantilever`."""
+"""The section of docs/performance.md about `phyxel bench cantilever`."""
 import math
 
 from pages.charts import LineChart
@@ -7,7 +7,7 @@ from pages.tables import PageError, markdown_table
 
 
 def refinement(table, factor, precision):
-    """Rows of one support and precision, from the coarsest cloud to the finest; at least one."""
+    """The rows of one support factor and precision, from the coarsest cloud to the finest. Raises PageError if there is none."""
     rows = sorted(table.where(factor=factor, precision=precision), key=lambda row: row.positive("across"))
     if not rows:
         raise PageError(f"{table.file}: factor {factor}, {precision}: no row; allowed: a table of a measurement that ended")
@@ -15,18 +15,18 @@ def refinement(table, factor, precision):
 
 
 def usual_factor(table):
-    """The support of scenes that say nothing, if it was measured."""
+    """The default support factor of scenes; the first one of the table if the default was not measured."""
     usual = f"{problems()['default_factor']:g}"
     return usual if table.find(factor=usual) else table.rows[0]["factor"]
 
 
 def rounded_precisions(table):
-    """The precisions that are compared with double."""
+    """All precisions but double, the reference for rounding errors."""
     return [precision for precision in table.values("precision") if precision != "double"]
 
 
 def words(table):
-    """What was measured, and what it shows. Of the supports, the usual one stands for all where there is room for one."""
+    """The paragraphs that describe the problem and its results. Most of them are about the default support factor."""
     beam = problems()["cantilever"]
     text = (
         f"A square beam on a regular lattice, {beam['heights_long']:g} heights long, Poisson's ratio {beam['poisson']:g}, "
@@ -69,7 +69,7 @@ def words(table):
 
 
 def chart(table):
-    """Error against time: discretisation in each precision and with each support, and rounding."""
+    """A chart of errors over time: discretisation for each precision and support factor, and rounding."""
     drawn = LineChart("A cantilever: error against time to solution", "time to solution [s]", "error")
 
     def add(column, factor, precision, colour):
@@ -93,7 +93,7 @@ def chart(table):
 
 
 def side_by_side(table):
-    """A row for each cloud and support, the precisions side by side."""
+    """A Markdown table with a row for each cloud and support factor and with the precisions side by side."""
     precisions, rounded = table.values("precision"), rounded_precisions(table)
     head = ["across", "phyxels", "neighbours", "steps", "of Timoshenko's", "discretisation"]
     head += [f"rounding, {p}" for p in rounded] + [f"s, {p}" for p in precisions]

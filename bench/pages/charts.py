@@ -1,6 +1,6 @@
-"""Line charts as SVG, drawn by matplotlib: the same file for the same chart.
+"""Line charts, drawn by matplotlib. The SVG is deterministic: equal charts give equal files.
 
-Labels are text: matplotlib finds no formula in them, and powers of ten on the axes are written with raised digits.
+Labels are plain text: matplotlib's formulas are off, and powers of ten on the axes are written with raised digits.
 """
 import dataclasses
 import io
@@ -9,7 +9,7 @@ import textwrap
 
 from pages.tables import on_one_line, plain
 
-#: Okabe and Ito 2008, which readers with any colour vision tell apart; without its yellow, too pale for lines.
+#: The colour-blind-safe palette of Okabe and Ito 2008, without its yellow, which is too pale for lines.
 COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X"]
 DASHES = ["solid", (0, (5, 2)), (0, (1, 1.5)), (0, (7, 2, 1.5, 2)), (0, (3, 1.5)), (0, (1, 3))]
@@ -25,13 +25,14 @@ _STYLE = {
 
 @dataclasses.dataclass
 class Curve:
-    """Points in the order in which a line joins them. Numbers choose from the lists above; None: the curve's place."""
+    """A curve through points, in this order. `colour` and `style` are indices into the lists above; None stands for the
+    curve's place in the chart."""
     label: str
     x: list = dataclasses.field(default_factory=list)
     y: list = dataclasses.field(default_factory=list)
     colour: int = None
-    style: int = None       #: marker and dashes
-    is_front: bool = False  #: a broad grey line behind the others, without points
+    style: int = None       #: of marker and dashes
+    is_front: bool = False  #: True for a broad grey line behind the other curves, without markers
 
 
 @dataclasses.dataclass
@@ -44,7 +45,7 @@ class LineChart:
     curves: list = dataclasses.field(default_factory=list)
 
     def curve(self, label, **style):
-        """The curve of that label, a new one if there is none."""
+        """The curve with this label; a new one if there is none."""
         for curve in self.curves:
             if curve.label == label:
                 return curve
@@ -58,14 +59,14 @@ def raised(exponent):
 
 
 def _shown(text):
-    """A label on the way into matplotlib, whose legend leaves out what begins with an underscore. Characters that XML
-    has no place for are replaced."""
+    """Makes a label safe for matplotlib. Characters that XML or fonts lack are replaced. A legend omits labels that begin
+    with an underscore: a word joiner (U+2060), which is invisible, precedes it."""
     text = "".join(c if c.isprintable() else "\ufffd" for c in on_one_line(plain(text)))
     return "\u2060" + text if text.startswith("_") else text
 
 
 def _logarithmic(axis, values):
-    """Ticks at powers of ten; where there are fewer than two of them, numbers in between, too."""
+    """Sets ticks at powers of ten; for less than two decades, ticks with numbers in between, too."""
     from matplotlib import ticker
     span = math.log10(max(values) / min(values))
 
@@ -121,7 +122,7 @@ def _figure(chart):
 
 
 def draw(chart, format="svg"):
-    """The bytes of the drawn chart. @throws ImportError without matplotlib"""
+    """Draws a chart and returns the bytes of the file. Raises ImportError if matplotlib is missing."""
     import matplotlib
     with matplotlib.rc_context({**matplotlib.rcParamsDefault, **_STYLE}):
         out = io.BytesIO()

@@ -1,4 +1,4 @@
-"""docs/results/README.md, speeds on CPUs, and the table of speeds in README.md."""
+"""docs/results/README.md, the speed on CPUs, and the table of speeds in README.md."""
 from pages.page import Page
 from pages.tables import PageError, markdown_table, read_if_there
 
@@ -63,7 +63,7 @@ def neighbours_section(page, table):
 
 
 def peer_rows(peer, own):
-    """Each measured run of LAMMPS beside ours in double and float, of the nearest size."""
+    """Yields rows of LAMMPS and the speeds of phyxel in double and float, of a similar size on as many cores."""
     for row in peer.rows:
         speeds = {}
         for precision in ("double", "float"):
@@ -88,7 +88,7 @@ def peer_table(rows):
 
 
 def peers(results):
-    """LAMMPS' table and ours, and what `peer_rows` finds in them; None without one of them."""
+    """The tables of LAMMPS and of phyxel and the rows of `peer_rows`; None if a table is missing."""
     peer, own = read_if_there(results / "lammps_tlsph.csv"), read_if_there(results / "cpu_step.csv")
     if not peer or not own:
         return None
@@ -96,7 +96,7 @@ def peers(results):
 
 
 def make(results, link):
-    """The page: a section for each table that is there."""
+    """The page, with a section for each table that exists."""
     page = Page(link)
     page.paragraph(HEAD)
     for name, title in (("cpu_step", "One time step on the CPU"), ("cpu_step_16", "Sixteen cores with AVX-512")):
@@ -121,7 +121,7 @@ def make(results, link):
 
 
 def with_speeds(readme, text, results):
-    """The README's text with its table of speeds made anew. @param readme named in errors"""
+    """The text of the README with a new table of speeds. `readme` is its name, for errors."""
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

@@ -1,8 +1,9 @@
-"""A page while it is made: its text and its charts."""
+"""A page under construction."""
 
 
 class Page:
-    """@param link from the page to the folder of tables, where its charts lie, too; ends with "/" unless empty"""
+    """The text and the charts of a page. `link` leads from the page to the folder of tables and charts; it is empty or
+    ends with "/"."""
 
     def __init__(self, link):
         self.link = link
@@ -16,7 +17,7 @@ class Page:
         self._text += text + "\n\n"
 
     def show(self, chart, name):
-        """Draws a chart into `<name>.svg` and shows it here. @param chart its title is text from outside"""
+        """Adds a chart, to be drawn into `<name>.svg`, and the image that shows it. Its title is escaped text."""
         self.charts[name] = chart
         self.paragraph(f"![{chart.title}]({self.link}{name}.svg)")
 
@@ -25,6 +26,6 @@ class Page:
 
 
 def measured_by(table, device="hardware"):
-    """By what, on what and when a table was measured."""
+    """The program, device, compiler and date of a measurement. `device` is the fact that names the device."""
     compiler = "compiler" if device == "hardware" else "cuda"
     return f"{table.fact('program')} on {table.fact(device)}; {table.fact(compiler)}; {table.fact('date')}"

@@ -1,5 +1,5 @@
 """docs/performance.md: the speed of the GPU solver, from the tables of scripts/measure_gpu.sh and scripts/profile_gpu.sh.
-Every number on the page is read from a table; what was asked for stands here."""
+All measured numbers come from these tables; the targets are constants here."""
 import math
 
 from pages import cantilever
@@ -7,7 +7,7 @@ from pages.charts import LineChart
 from pages.page import Page, measured_by
 from pages.tables import markdown_table, read_if_there
 
-# What the solver is to reach on one H200, in float.
+# Targets for one H200, in float unless the name says otherwise.
 ASKED_LARGE, ASKED_DOUBLE = 8e9, 3e9  # phyxel-steps/s, 2 to 17 million phyxels
 ASKED_SETUP = 1                       # s for 16 million
 ASKED_WITH_SURFELS = 1e5              # steps/s of the dino
@@ -47,7 +47,7 @@ one launch a step lost a third to sixteen steps together, and blocks that walk t
 up to a half to a block a step. In clusters: fetching the next neighbours' stresses while the present ones are summed \
 (the longer loop waits for its own instructions)."""
 
-#: Nsight Compute's name, the page's and the factor between them.
+#: Nsight Compute's name of a metric, the page's title and the factor between their units.
 METRICS = [
     ("gpu__time_duration.sum", "time [µs]", 1e-3),
     ("smsp__cycles_elapsed.avg.per_second", "clock [GHz]", 1e-9),
@@ -65,19 +65,20 @@ METRICS = [
 
 
 def against(reached, asked):
+    """The deviation of a speed or a time from its target, in words."""
     share = reached / asked - 1
     return "as asked" if abs(share) < 0.005 else f"{100 * share:+.0f}% of what was asked"
 
 
 def rate(row):
-    """Billions of phyxel-steps a second, as text."""
+    """The speed in billions of phyxel-steps per second, as text."""
     return f"{row.number('phyxel_steps_per_s') * 1e-9:.3g}"
 
 
-def speeds(table, title, x, x_label, logarithmic):
-    """The speed over x, a curve for each precision. @param table of one file or of several: its rows"""
+def speeds(rows, title, x, x_label, logarithmic):
+    """A chart of the speed over column `x`, with a curve for each precision."""
     chart = LineChart(title, x_label, "10⁹ phyxel-steps/s", logarithmic, logarithmic)
-    for row in table:
+    for row in rows:
         curve = chart.curve(row["precision"])
         curve.x.append(row.number(x))
         curve.y.append(row.number("phyxel_steps_per_s") * 1e-9)
@@ -95,7 +96,7 @@ def sizes(page, table, results):
         phyxels = row.number("phyxels")
         if 2e6 < phyxels < 2e7 and row["precision"] in speed:
             speed[row["precision"]].append(row.number("phyxel_steps_per_s"))
-        moves = "resident" not in row["path"]  # what is resident moves none of its bytes
+        moves = "resident" not in row["path"]  # a resident body moves none of its bytes
         copied = f"{100 * row.number('bytes_per_s') / row.positive('copy_bytes_per_s'):.0f}%" if moves else "–"
         cells.append([row["phyxels"], row["precision"], row["path"], f"{1e6 / row.positive('steps_per_s'):.4g}", rate(row),
                       f"{100 * row.number('spread'):.0f}%", row["memory_bytes_per_phyxel"],
@@ -223,7 +224,7 @@ SECTIONS = {"gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu
 
 
 def make(results, link):
-    """The page: a section for each table that is there."""
+    """The page, with a section for each table that exists."""
     page = Page(link)
     page.paragraph(HEAD)
     for name, section in SECTIONS.items():

@@ -1,5 +1,5 @@
-"""The problems that the measurements solve, in the program's own words: problems.json, which `phyxel_studies problems`
-writes. A test compares the two."""
+"""Descriptions of the measured problems. They come from the program: `phyxel_studies problems` writes problems.json, and a
+test compares the two."""
 import functools
 import json
 import pathlib
@@ -7,4 +7,5 @@ import pathlib
 
 @functools.lru_cache
 def problems():
+    """The content of problems.json."""
     return json.loads((pathlib.Path(__file__).parent / "problems.json").read_text(encoding="utf-8"))

@@ -1,9 +1,9 @@
-"""docs/scaling.md: more ranks, from the tables of `phyxel bench scaling`, <cpu|gpu>_ranks_<n>*.csv."""
+"""docs/scaling.md: speed-up on many ranks, from the tables of `phyxel bench scaling`, <cpu|gpu>_ranks_<n>*.csv."""
 from pages.page import Page
 from pages.scaling_model import model
 from pages.tables import PageError, Table, markdown_table, read_if_there, read_table
 
-ASKED_OF_TWO = 1.8  # what two ranks on two cores are to reach from 200,000 phyxels on
+ASKED_OF_TWO = 1.8  # target speed-up of two ranks on two cores, from 200,000 phyxels on
 
 HEAD = """# Scaling
 
@@ -25,8 +25,8 @@ WITHOUT_ONE = ["phyxels", "precision", "cut by", "transport", "10⁶ phyxel-step
 
 
 def joined(first, second):
-    """The rows of two tables as those of one, which tells both programs, compilers and days. An older table has fewer
-    columns: new ones come last."""
+    """Concatenates two tables; the facts name both programs, compilers and dates. An older table may lack the last
+    columns."""
     columns = max(first.columns, second.columns, key=len)
     facts = dict(first.facts)
     for name in ("program", "compiler", "date"):
@@ -40,7 +40,7 @@ def joined(first, second):
 
 
 def tables_in(results, kind):
-    """The tables `<kind>_ranks_<n>*.csv`, those of as many ranks joined, by their number of ranks."""
+    """Reads the tables `<kind>_ranks_<n>*.csv` and joins tables of equal numbers of ranks. Returns them by that number."""
     tables = {}
     for file in sorted(results.glob(f"{kind}_ranks_*.csv")):
         table = read_table(file)
@@ -53,7 +53,7 @@ def tables_in(results, kind):
 
 
 def exchanging(row):
-    """NCCL does not tell how long it waits."""
+    """The share of time spent on exchanges; a dash for NCCL, which does not report its waiting time."""
     return "–" if row["transport"].startswith("NCCL") else f"{100 * row.number('exchanging'):.1f}%"
 
 
@@ -100,7 +100,7 @@ def section(page, table, ranks, gpus):
 
 
 def make(results, link):
-    """The page; None without a table."""
+    """The page; None if there is no table of two ranks or more."""
     gpus, cpus = tables_in(results, "gpu"), tables_in(results, "cpu")
     shown = {kind: {n: t for n, t in tables.items() if n > 1} for kind, tables in (("gpu", gpus), ("cpu", cpus))}
     if not any(shown.values()):

@@ -1,23 +1,23 @@
-"""What steps would take on more GPUs than were measured: a model of a step's time fitted to the tables."""
+"""A model of the time of a step on more GPUs than were measured, fitted to the tables."""
 import bisect
 import dataclasses
 import math
 
 from pages.tables import markdown_table
 
-# Of links between nodes, which were not measured: one of 400 Gbit/s for each GPU.
+# Assumed links between nodes, which were not measured: 400 Gbit/s for each GPU.
 NETWORK_BYTES_PER_S, NETWORK_LATENCY = 50e9, 5e-6
 
 
 class OneGpu:
-    """Seconds of a step of one GPU, by its phyxels. @param sizes table of `bench step` over bodies of many sizes"""
+    """The time of a step on one GPU over the number of phyxels, from the table gpu_sizes.csv."""
 
     def __init__(self, sizes):
         self.points = sorted((row.positive("phyxels"), 1 / row.positive("steps_per_s"))
                              for row in sizes.where(bodies="1", terms="green", precision="float"))
 
     def seconds(self, phyxels):
-        """Between sizes measured by a power law; beyond them in proportion."""
+        """The time of a step [s]: a power law between measured sizes, proportional to the size above them."""
         above = bisect.bisect_left([n for n, _ in self.points], phyxels)
         if above == 0:
             return self.points[0][1]
@@ -30,7 +30,7 @@ class OneGpu:
 
 @dataclasses.dataclass
 class Fit:
-    """A line through what exchanges have added to steps."""
+    """A linear fit of the time that exchanges add to a step over the bytes sent."""
     latency: float          #: [s]
     bytes_per_s: float
     slowdown: float         #: of one GPU on that day, against the table of sizes
@@ -40,7 +40,7 @@ class Fit:
 
 
 def fitted(tables, one):
-    """The fit; None with fewer than three rows or no cut along the curve between two GPUs."""
+    """The fit; None for fewer than three rows, or if no row has two GPUs and a cut along the curve."""
     rows = [row for table in tables for row in table.rows
             if row["phyxels_alone"] and row.number("ranks") >= 2 and row["precision"] == "float"
             and "IPC" in row["transport"]]
@@ -65,8 +65,8 @@ def fitted(tables, one):
 
 
 def model(tables, sizes):
-    """A section of the page about scaling: the model, and what it says of up to 1,024 GPUs. Empty if there is too little to
-    fit. @param tables of `bench scaling` on GPUs"""
+    """The section about the model and its forecast for up to 1,024 GPUs. Empty if there is too little to fit. `tables` come
+    from `bench scaling` on GPUs."""
     one = OneGpu(sizes)
     fit = fitted(tables, one) if len(one.points) > 1 else None
     if not fit:

@@ -1,8 +1,8 @@
-"""Tables of measurements as the program writes them, and tables of Markdown.
+"""Reads the CSV tables that the programs write, and writes Markdown tables.
 
-A file has facts ("# name: value"), then a line of column names, then rows; cells are separated by commas and hold none.
-Cells and facts are text from outside: they are escaped for Markdown when they are read, so that a page can use them as
-they are. `plain` takes the escapes back where text goes into a chart.
+A CSV file has facts ("# name: value"), a line of column names, then rows. Commas separate cells; no cell contains one.
+Cells and facts are untrusted text: the reader escapes them for Markdown, so a page can insert them as they are. `plain`
+removes the escapes from text that goes into a chart.
 """
 import math
 import pathlib
@@ -15,38 +15,38 @@ _NUMBER = re.compile(r"-?(?:\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?|in
 
 
 class PageError(Exception):
-    """A table that no page can be made of. The message names the file, what is wrong and what is allowed."""
+    """A table is missing or damaged. The message names the file, the fault and what is allowed."""
 
 
 def on_one_line(text):
-    """The text with a space for each control character and each separator of lines."""
+    """Replaces control characters and line separators by spaces."""
     return re.sub(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]", " ", text)
 
 
 def markdown_text(text):
-    """The text on one line in which Markdown finds no markup, HTML no element and no reader a formula."""
+    """Escapes the text: one line without Markdown markup, HTML elements or formulas."""
     return _MARKUP.sub(lambda found: f"&#{ord(found.group())};", on_one_line(text))
 
 
 def plain(text):
-    """The text that `markdown_text` was given, on one line."""
+    """Reverses the escapes of `markdown_text`; the result stays on one line."""
     return _ESCAPE.sub(lambda found: chr(int(found.group(1))), text)
 
 
 def markdown_link(path):
-    """A relative address in a Markdown link: everything but letters, digits and "-._~/" is encoded."""
+    """A relative path as the address of a Markdown link: all characters but letters, digits and "-._~/" are encoded."""
     return urllib.parse.quote(pathlib.PurePath(path).as_posix().encode(errors="surrogateescape"), safe="-._~/")
 
 
 def markdown_table(head, rows):
-    """A table and the empty line after it."""
+    """A Markdown table, followed by an empty line."""
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
     return "\n".join(lines) + "\n\n"
 
 
 class Row:
-    """A row of a table: `row["phyxels"]` is text, `row.number("phyxels")` a number. @param place file and line"""
+    """A table row: `row["phyxels"]` is text, `row.number("phyxels")` a number. `place` is its file and line, for errors."""
 
     def __init__(self, table, place, cells):
         self.table, self.place, self._cells = table, place, cells
@@ -55,14 +55,14 @@ class Row:
         return self._cells[self.table.index(column)]
 
     def number(self, column):
-        """The cell as a number, which may be infinite or no number (nan)."""
+        """The cell as a float, which may be inf or nan."""
         text = self[column]
         if not _NUMBER.fullmatch(text):
             raise PageError(f"{self.place}: column \"{column}\": \"{plain(text)}\" is no number")
         return float(text)
 
     def positive(self, column):
-        """The cell as a finite number above zero."""
+        """The cell as a finite float above zero."""
         value = self.number(column)
         if not (value > 0 and math.isfinite(value)):
             raise PageError(f"{self.place}: column \"{column}\": {self[column]}: allowed > 0")
@@ -72,12 +72,12 @@ class Row:
         return all(self[column] == value for column, value in match.items())
 
     def get(self, column):
-        """The cell; "" where the table is older than the column."""
+        """The cell; "" if the table lacks the column, as old tables do."""
         return self[column] if column in self.table.columns else ""
 
 
 class Table:
-    """@param rows pairs of a place, file and line, and cells"""
+    """A table in memory. `rows` are pairs of a place (file and line) and a list of cells."""
 
     def __init__(self, file, facts, columns, rows):
         self.file, self.facts, self.columns = file, facts, columns
@@ -90,27 +90,27 @@ class Table:
             raise PageError(f"{self.file}: no column \"{column}\"; there are: {', '.join(self.columns)}") from None
 
     def fact(self, name):
-        """The fact's value; "" if there is none of this name."""
+        """The value of a fact; "" if the table lacks it."""
         return self.facts.get(name, "")
 
     def where(self, **match):
-        """The rows whose cells are as asked for."""
+        """All rows whose cells equal the given values, by column."""
         for column in match:
             self.index(column)
         return [row for row in self.rows if row.matches(match)]
 
     def find(self, **match):
-        """The first such row; None without one."""
+        """The first row whose cells equal the given values; None if there is none."""
         return next(iter(self.where(**match)), None)
 
     def values(self, column, **match):
-        """The column's distinct cells among such rows, in order of appearance."""
+        """The distinct cells of a column among matching rows, in order of appearance."""
         self.index(column)
         return list(dict.fromkeys(row[column] for row in self.where(**match)))
 
 
 def read_table(file):
-    """The table of a CSV file. @throws PageError"""
+    """Reads a CSV file. Raises PageError if it is missing, damaged or without rows."""
     file = pathlib.Path(file)
     try:
         text = file.read_bytes().decode(errors="replace")
@@ -141,5 +141,5 @@ def read_table(file):
 
 
 def read_if_there(file):
-    """The table, or None where there is no such file."""
+    """Reads a CSV file; None if it does not exist."""
     return read_table(file) if pathlib.Path(file).exists() else None

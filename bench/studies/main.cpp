@@ -1,4 +1,4 @@
-/// phyxel_studies: measurements for those who develop phyxel. It is not installed.
+/// phyxel_studies: measurements for developers. The program is not installed.
 #include "phyxel/error.hpp"
 #include "program.hpp"
 #include "program_ranks.hpp"

@@ -1,4 +1,4 @@
-/// phyxel_studies neighbour-search: spacings, neighbours and their transpose, on the CPU.
+/// phyxel_studies neighbour-search: the time of spacings, lists and their transpose on the CPU.
 #include <fmt/format.h>
 #include <omp.h>
 

@@ -1,5 +1,4 @@
-/// phyxel_studies problems: what the pages in docs/ say about the problems that are measured, in
-/// the program's own words.
+/// phyxel_studies problems: descriptions of the measured problems, for the pages in docs/.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -17,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Six digits, so that the last bits of a compiler's arithmetic make no difference.
+/// Six digits: the result does not depend on the last bits of a compiler's arithmetic.
 double rounded(double value) { return std::stod(fmt::format("{:.6g}", value)); }
 
 Json problems() {
@@ -57,7 +56,7 @@ Json problems() {
 
 void add_problems(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "problems", "The problems of phyxel accuracy and of the studies, as bench/pages tells them");
+      "problems", "Print descriptions of the measured problems as JSON, for bench/pages");
   command->footer(
       "Example:\n"
       "  phyxel_studies problems > bench/pages/problems.json");

@@ -1,4 +1,4 @@
-/// phyxel_studies setup: how long each part of a body's set-up takes.
+/// phyxel_studies setup: the time of each part of a body's set-up.
 #include <fmt/format.h>
 #include <omp.h>
 
@@ -22,8 +22,8 @@ struct SetupOptions {
   app::TableOptions table;
 };
 
-/// From a cloud to the first step: what the survey takes, the rest of the model, the backend with
-/// its lists, the step limit. Without a survey, on the CPU, the model has the lists.
+/// Measures the neighbour search on the GPU (survey), the rest of the model, the backend with its
+/// neighbour lists, and the step limit. On the CPU, the model's time includes the lists.
 void measure_setup(const SetupOptions& options) {
   const ChosenDevice device = app::choose_device(options.device);
   app::PrintedTable table(options.table,

@@ -1,4 +1,4 @@
-/// The subcommands of phyxel_studies: measurements behind docs/ that nobody needs who simulates.
+/// Subcommands of phyxel_studies: measurements for developers, behind the pages in docs/.
 #pragma once
 
 #include <CLI/CLI.hpp>

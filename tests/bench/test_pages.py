@@ -103,7 +103,7 @@ def test_the_problems_are_those_of_the_program(tmp_path):
 @pytest.mark.parametrize("name", MAKERS)
 @pytest.mark.parametrize("words", HOSTILE)
 def test_cells_and_facts_of_every_table_are_text(tmp_path, name, words):
-    """Each cell that is no number and each fact ends in the words. Pages keep their lines, and tables their columns."""
+    """All facts and all cells of text end in hostile words. Pages keep their lines, and tables their columns."""
     folder, bare = copied(tmp_path, name, rows=40), page_of(name, copied(tmp_path, name, rows=40), "")
     for file in folder.iterdir():
         table = read_table(file)
@@ -148,7 +148,7 @@ def test_names_of_folders_are_text(tmp_path, words):
 
 @pytest.mark.parametrize("name", MAKERS)
 def test_a_damaged_column_is_named_or_is_not_needed(tmp_path, name):
-    """Whatever a column lacks, the page is made or the error names file and column."""
+    """Damage to any column yields a page, or an error that names the file and the column."""
     folder = copied(tmp_path, name, rows=4)
     alike = [f"gpu_ranks_{n}.csv" for n in ("2b", "2c", "2d_host", "2d_mpi", "4a", "4b", "4c", "4d_host", "4d_nccl")]
     for file in made_of(name):
@@ -230,6 +230,57 @@ def test_all_pages_are_written_and_checked(tmp_path):
     table = folder / "cpu_step.csv"
     table.write_text(table.read_text().replace("# date: ", "# date: later than "))
     assert "later than" in make_pages("--check", "readme", *arguments).stdout
+
+
+# --- charts --------------------------------------------------------------------------------------
+
+def test_charts_show_the_rows_of_their_tables():
+    charts = performance.make(RESULTS, "").charts
+    sizes, rows = charts["gpu_sizes"], read_table(RESULTS / "gpu_sizes.csv").where(precision="double")
+    assert [curve.label for curve in sizes.curves] == ["float", "double", "mixed"] and sizes.log_x and sizes.log_y
+    assert sizes.curves[1].x == [row.number("phyxels") for row in rows]
+    assert sizes.curves[1].y == [row.number("phyxel_steps_per_s") * 1e-9 for row in rows]
+    assert sizes.curves[0].x[-1] == read_table(RESULTS / "gpu_capacity.csv").rows[0].number("phyxels")
+    neighbours = charts["gpu_neighbours"]
+    assert not neighbours.log_x and neighbours.curves[0].x == [
+        row.number("neighbours") for row in read_table(RESULTS / "gpu_neighbours.csv").where(precision="float")]
+    beam, table = charts["gpu_cantilever"], read_table(RESULTS / "gpu_cantilever.csv")
+    labels = [curve.label for curve in beam.curves]
+    assert labels[:5] == ["double, 30 neighbours", "float, 30 neighbours", "rounding, float, 30 neighbours",
+                          "mixed, 30 neighbours", "rounding, mixed, 30 neighbours"]
+    assert len(labels) == 5 + len(table.values("factor")) - 1  # and float with each other support
+    finest = table.where(factor="1.8", precision="float")[-1]
+    assert (beam.curves[2].x[-1], beam.curves[2].y[-1]) == (finest.number("seconds"), finest.number("rounding_error"))
+
+
+def test_charts_of_accuracy_show_all_of_the_time_and_the_front():
+    charts = accuracy.make(RESULTS, "").charts
+    front, *curves = charts["accuracy_gravity_deflection_regular"].curves
+    assert front.is_front and [curve.label for curve in curves] == [
+        f"{lattice}, {terms}" for lattice in ("nodes", "cells") for terms in ("plain", "closed", "α = 0.1", "α = 0.1, closed")]
+    rows = read_table(RESULTS / "accuracy.csv").where(case="gravity", lattice="cells", jitter="0", hourglass="0.1", closure="0")
+    assert curves[6].x == [row.number("seconds") + row.number("setup_seconds") for row in rows]
+    assert curves[6].y == [abs(row.number("error")) for row in rows]
+    points = [point for curve in curves for point in zip(curve.x, curve.y)]
+    best = [(x, y) for x, y in points if not any((u <= x and v < y) or (u < x and v <= y) for u, v in points)]
+    assert list(zip(front.x, front.y)) == sorted(best)
+    steps = charts["accuracy_steps"].curves
+    assert [curve.label for curve in steps] == ["verlet", "implicit"]
+    assert steps[1].x == [row.number("seconds") for row in read_table(RESULTS / "accuracy_steps.csv").where(way="implicit")]
+
+
+def test_a_lattice_has_one_colour_and_terms_have_one_marker_on_all_charts():
+    colours, markers = {}, {}
+    for name, chart in accuracy.make(RESULTS, "").charts.items():
+        for curve in chart.curves:
+            if curve.colour is None:
+                continue
+            colours.setdefault(curve.label.split(", ")[0], set()).add(curve.colour)
+            terms = curve.label.split("0.2, ")[-1] if "jitter" in curve.label else curve.label.split(", ", 1)[1]
+            markers.setdefault(terms, set()).add(curve.style)
+    assert colours == {"nodes": {0}, "cells": {1}, "mesh": {2}}
+    assert all(len(of_terms) == 1 for of_terms in markers.values())
+    assert len(set().union(*markers.values())) == len(markers) == 6
 
 
 # --- what pages say ------------------------------------------------------------------------------

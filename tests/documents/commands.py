@@ -15,7 +15,7 @@ import sys
 import time
 
 PROGRAM, SOURCE, WORK = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
-STUDIES = PROGRAM.with_name("phyxel_studies")  # what only developers run
+STUDIES = PROGRAM.with_name("phyxel_studies")  # the developers' program, beside the users'
 MPIRUN = len(sys.argv) > 4
 failures = []
 
@@ -108,6 +108,9 @@ def options_are_known(command):
     if helps.returncode != 0:
         return f"{program.name} {words[0]}: no such command"
     text = helps.stdout
+    if re.search(rf"^Usage: .* {words[0]} \[OPTIONS\] SUBCOMMAND", text, re.MULTILINE) and len(names) > 1 and \
+            not re.search(rf"^  {names[1]} ", text, re.MULTILINE):
+        return f"{program.name} {words[0]} {names[1]}: no such command"
     if len(names) > 1:  # bench step
         text += subprocess.run([program, *names[:2], "--help"], capture_output=True, text=True).stdout
     unknown = [w.split("=")[0] for w in words if w.startswith("--") and w != "--help" and w.split("=")[0] not in text]
