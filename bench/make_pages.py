@@ -109,14 +109,14 @@ def run(options):
     return 0
 
 
-def main():
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pages", nargs="*", metavar="page", help="all, if none is named")
     parser.add_argument("--results", type=pathlib.Path, default=ROOT / "docs/results", help="folder of the tables and charts")
     parser.add_argument("--out", type=pathlib.Path, help="folder of the pages; the one above the tables, if none is named")
     parser.add_argument("--readme", type=pathlib.Path, help="README.md, with the project's own tables; else none")
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a page is not up to date")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     unknown = [name for name in options.pages if name not in (*PAGES, "readme")]
     if unknown:
         parser.error(f"page {unknown[0]}: unknown; allowed: {', '.join(PAGES)}, readme")

@@ -1,6 +1,5 @@
 """What the tests of the pages share: bench/pages on the path, small tables of each kind, and the command."""
 import pathlib
-import subprocess
 import sys
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
@@ -31,9 +30,14 @@ def write_table(file, facts, columns, rows):
     pathlib.Path(file).write_bytes(b"\n".join(lines) + b"\n")
 
 
-def make_pages(*arguments, **options):
-    return subprocess.run([sys.executable, "-B", SOURCE / "bench/make_pages.py", *map(str, arguments)], capture_output=True,
-                          text=True, **options)
+def made_pages(capsys, *arguments):
+    """Runs make_pages.py in this process, which spares the start of another. Returns exit code, output and errors."""
+    import make_pages
+    try:
+        code = make_pages.main([str(argument) for argument in arguments])
+    except SystemExit as end:  # argparse
+        code = end.code
+    return code, *capsys.readouterr()
 
 
 def made_of(name):
