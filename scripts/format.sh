@@ -7,5 +7,5 @@ mode=(-i)
 if [[ ${1-} == --check ]]; then
   mode=(--dry-run --Werror)
 fi
-find lib cuda partition mpi apps tests fuzz examples -name '*.[ch]pp' -o -name '*.cu' -o -name '*.cuh' | sort |
+find lib cuda partition mpi apps bench tests fuzz examples -name '*.[ch]pp' -o -name '*.cu' -o -name '*.cuh' | sort |
   xargs clang-format "${mode[@]}"

@@ -5,7 +5,7 @@ case, lattice, jitter and way, each on cores of its own, several at a time, put 
     scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4] [--case CASE]
 
 Times in the table are those of so many cores, with the rest of the machine at work. With --case the table is
-there already: rows of that case are replaced, and a fact says by which program.
+there already: rows of that case are replaced, and a fact says by which program. bench/make_pages.py writes the page.
 """
 import argparse
 import concurrent.futures

@@ -5,22 +5,26 @@
 #
 # Parts: sizes, terms, small, setup; all of these, if none is named. And for hosts of several GPUs,
 # behind docs/scaling.md: ranks (2, 4, 8 GPUs), and large (LARGE phyxels on all GPUs; a billion, for 4 or more).
-# PHYXEL names another program than build/cuda/bin/phyxel. The largest body takes some 100 GB of the
+# PHYXEL names another program than build/cuda/bin/phyxel, and PHYXEL_STUDIES another than phyxel_studies beside it.
+# bench/make_pages.py writes the pages. The largest body takes some 100 GB of the
 # GPU's memory while it is set up, and nearly as much of the host's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results}
 program=${PHYXEL:-build/cuda/bin/phyxel}
+studies=${PHYXEL_STUDIES:-$(dirname "$program")/phyxel_studies}
 mkdir -p "$out"
 shift || true
 parts=" ${*:-sizes terms small setup} "
 has() { [[ $parts == *" $1 "* ]]; }
-step() {
+# measured <table> <program> <arguments>...
+measured() {
   local name=$1
   shift
   echo "== $name"
-  "$program" bench "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
+  "$@" --device cuda --force --csv "$out/$name.csv" | grep -v '^#'
 }
+step() { measured "$1" "$program" bench "${@:2}"; }
 if has sizes; then
   small=125,343,1000,2197,4096,8000,15625,27000
   medium=50653,103823,250047,512000,1000000
@@ -59,7 +63,7 @@ if has small; then
   one gpu_surfels "${surfels[@]}" gpu_surfels_cube
 fi
 if has setup; then
-  step gpu_setup setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
+  measured gpu_setup "$studies" setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
   step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3
 fi
 

@@ -1,24 +1,22 @@
 /// phyxel bench: speeds beside the error they are reached at and the machine's own limits.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <omp.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <random>
 #include <thread>
 
-#include "bench_page.hpp"
+#include "bench_body.hpp"
 #include "bench_scaling.hpp"
 #include "cantilever.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
 #include "phyxel/phyxel.hpp"
 #include "printed_table.hpp"
-#include "scaling_page.hpp"
 #include "setup.hpp"
-#include "setup/survey.hpp"
 #include "stopwatch.hpp"
 #include "version.hpp"
 
@@ -76,64 +74,12 @@ double core_round_trip() {
   return best;
 }
 
-/// A cube of `n` phyxels, 0.1 m apart, jittered.
-Cloud cube(Index n, bool surfels = false) {
-  const double side = std::round(std::cbrt(static_cast<double>(n))) * 0.1;
-  return make_shape({.name = "block",
-                     .size = {side, side, side},
-                     .spacing = 0.1,
-                     .jitter = 0.1,
-                     .surface = surfels});
-}
-
 /// A cube, or one of the bodies of the 2008 paper.
 Cloud bench_cloud(const std::string& shape, Index n, bool surfels) {
-  return shape == "cube" ? cube(n, surfels) : make_shape({.name = shape, .surface = surfels});
+  return shape == "cube" ? bench_cube(n, surfels) : make_shape({.name = shape, .surface = surfels});
 }
 
-/// A law's name in tables of `bench step`. The two laws of Hooke go by their strain, as in tables
-/// of earlier versions.
-std::string term_of(const LawEntry& law) {
-  const std::string name = law.name;
-  if (name == StVenantKirchhoff<double>::name) return "green";
-  return name == SmallStrain<double>::name ? "cauchy" : name;
-}
-
-Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
-                  int bodies = 1) {
-  Scene scene;
-  scene.gravity = {0, 0, -9.81};
-  BodyRequest body;
-  body.name = "cube";
-  body.material = {.young = 1e6, .poisson = 0.3, .density = 1000, .hourglass = 0};
-  for (const LawEntry& law : law_table()) {
-    if (term_of(law) != terms) continue;
-    body.material.law = law.name;
-    for (const LawParameter& p : law.parameters) {
-      if (p.required() && is_own_parameter(p)) body.material.parameters[p.name] = p.typical;
-    }
-  }
-  if (terms == "volume") body.material.volume_stiffness = 1e6;
-  if (terms == "hourglass") body.material.hourglass = 0.1;
-  if (terms == "closure") body.closure = 0.01;
-  if (terms == "damping") body.material.damping = 0.1;
-  if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
-  if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
-  body.neighbourhood.factor = factor;
-  scene.bodies.assign(static_cast<std::size_t>(bodies), body);
-  return scene;
-}
-/// The laws, then terms beside Hooke's law in Green's strain. "surfels": moved after every step.
-std::vector<std::string> term_names() {
-  std::vector<std::string> terms;
-  for (const LawEntry& law : law_table()) terms.push_back(term_of(law));
-  for (const char* term :
-       {"volume", "hourglass", "closure", "damping", "load", "adaptive", "surfels"}) {
-    terms.emplace_back(term);
-  }
-  return terms;
-}
-const std::vector<std::string> all_terms = term_names();
+const std::vector<std::string> all_terms = bench_terms();
 
 /// A deformation of 10%.
 State deformed(const Model& model) {
@@ -286,89 +232,6 @@ void bench_step(const BenchOptions& options) {
   }
 }
 
-void bench_neighbours(const BenchOptions& options) {
-  PrintedTable table(options.table, {"threads", "phyxels", "neighbours", "spacing_us_per_phyxel",
-                                     "search_us_per_phyxel", "transpose_us_per_phyxel"});
-  for (const int threads : options.threads) {
-    omp_set_num_threads(threads);
-    for (const Index size : options.sizes) {
-      const Cloud cloud = cube(size);
-      const double n = static_cast<double>(cloud.position.size());
-      std::vector<double> spacing_time, search_time, transpose_time;
-      double pairs = 0;
-      for (int repeat = 0; repeat < std::max(1, size > 3'000'000 ? 1 : options.repeats / 2);
-           ++repeat) {
-        auto start = Clock::now();
-        const std::vector<double> spacing = mean_spacing(cloud.position, 10);
-        spacing_time.push_back(seconds_since(start));
-        start = Clock::now();
-        const Neighbourhood hood = find_neighbours(cloud.position, spacing, {});
-        search_time.push_back(seconds_since(start));
-        start = Clock::now();
-        const Csr inverse = transpose(hood.neighbours, hood.neighbours.rows());
-        transpose_time.push_back(seconds_since(start));
-        pairs = static_cast<double>(inverse.entries());
-      }
-      const auto microseconds = [&](const std::vector<double>& times) {
-        return fmt::format("{:.3f}", median_of(times).value / n * 1e6);
-      };
-      table.row({std::to_string(threads), std::to_string(cloud.position.size()),
-                 fmt::format("{:.1f}", pairs / n), microseconds(spacing_time),
-                 microseconds(search_time), microseconds(transpose_time)});
-    }
-  }
-}
-
-/// From a cloud to the first step: what the survey takes, the rest of the model, the backend with
-/// its lists, the step limit. Without a survey, on the CPU, the model has the lists.
-void bench_setup(const BenchOptions& options) {
-  const ChosenDevice device = choose_device(options.device);
-  PrintedTable table(options.table,
-                     {"precision", "threads", "phyxels", "neighbours", "survey_s", "model_s",
-                      "backend_s", "limit_s", "omega_max", "iterations"},
-                     device_facts(device));
-  for (const Index size : options.sizes) {
-    const Scene scene = bench_scene("green");
-    const Cloud cloud = cube(size);
-    for (const std::string& precision : options.precisions) {
-      std::vector<double> survey_time, model_time, backend_time, limit_time;
-      StepLimit limit;
-      double neighbours = 0;
-      int threads = 0;
-      for (int repeat = 0; repeat < options.repeats; ++repeat) {
-        const Surveyor surveyor = [&](auto&&... cloud_and_rule) {
-          const auto start = Clock::now();
-          Survey survey = cuda_surveyor(device.gpu->index)(cloud_and_rule...);
-          survey_time.push_back(seconds_since(start));
-          return survey;
-        };
-        auto start = Clock::now();
-        const Model model = device.gpu ? build_model(scene, std::span(&cloud, 1), surveyor)
-                                       : build_model(scene, std::span(&cloud, 1));
-        if (!device.gpu) survey_time.push_back(0);
-        model_time.push_back(seconds_since(start) - survey_time.back());
-        start = Clock::now();
-        const auto backend =
-            make_backend(model, precision_option(precision), device, omp_get_max_threads());
-        backend->wait();
-        backend_time.push_back(seconds_since(start));
-        start = Clock::now();
-        limit = step_limit(model, *backend);
-        limit_time.push_back(seconds_since(start));
-        neighbours = static_cast<double>(model.pairs()) / model.size();
-        threads = backend->threads();
-      }
-      const auto seconds = [](const std::vector<double>& times) {
-        return fmt::format("{:.4g}", median_of(times).value);
-      };
-      table.row({precision, std::to_string(threads), std::to_string(cloud.position.size()),
-                 fmt::format("{:.1f}", neighbours), seconds(survey_time), seconds(model_time),
-                 seconds(backend_time), seconds(limit_time), fmt::format("{:.8g}", limit.omega_max),
-                 std::to_string(limit.iterations)});
-    }
-  }
-}
-
 /// A cantilever of known deflection, settled in every precision on every cloud. Double comes first,
 /// asked for or not: it tells when the beam has settled, and how much of the others is rounding.
 void bench_cantilever(const BenchOptions& options) {
@@ -421,12 +284,11 @@ void add_device_options(CLI::App& command, BenchOptions& options) {
   command.add_option("--precision", options.precisions, "float, double, mixed")->delimiter(',');
 }
 
-CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
-                       std::vector<Index> sizes, void (*body)(const BenchOptions&),
-                       const char* examples) {
-  CLI::App* command = bench.add_subcommand(name, what);
+void add_bench_step(CLI::App& bench) {
+  CLI::App* command = bench.add_subcommand(
+      "step", "Time steps per second of a jittered cube, per term and precision");
   auto options = std::make_shared<BenchOptions>();
-  options->sizes = std::move(sizes);
+  options->sizes = {1000, 10648, 103823, 1000000};
   for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
   options->terms = all_terms;
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
@@ -438,25 +300,24 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   add_table_options(*command, options->table);
   command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
-  if (std::string(name) != "neighbours") add_device_options(*command, *options);
-  if (std::string(name) == "step") {
-    command
-        ->add_option("--terms", options->terms,
-                     "Term sets: green, cauchy, neo-hookean, corotated, volume, hourglass, "
-                     "closure, damping, load, "
-                     "adaptive, surfels")
-        ->delimiter(',');
-    command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
-        ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
-    add_factors(*command, *options);
-    command->add_option("--bodies", options->bodies, "How many of them, side by side")
-        ->check(CLI::Range(1, 100'000));
-    command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
-        ->check(CLI::Range(0.01, 60.0));
-  }
-  command->footer(examples);
-  command->callback([options, body] { body(*options); });
-  return command;
+  add_device_options(*command, *options);
+  command
+      ->add_option("--terms", options->terms,
+                   fmt::format("Term sets: {}", fmt::join(all_terms, ", ")))
+      ->delimiter(',');
+  command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
+      ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
+  add_factors(*command, *options);
+  command->add_option("--bodies", options->bodies, "How many of them, side by side")
+      ->check(CLI::Range(1, 100'000));
+  command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
+      ->check(CLI::Range(0.01, 60.0));
+  command->footer(
+      "Examples:\n"
+      "  phyxel bench step\n"
+      "  phyxel bench step --terms green,hourglass --phyxels 1000000 --csv step.csv\n"
+      "  phyxel bench step --shape dino --bodies 100 --device cuda");
+  command->callback([options] { bench_step(*options); });
 }
 
 void add_bench_cantilever(CLI::App& bench) {
@@ -486,47 +347,15 @@ void add_bench_cantilever(CLI::App& bench) {
 void add_bench(CLI::App& program) {
   CLI::App* bench = program.add_subcommand("bench", "Measure speed beside error and bandwidth");
   bench->require_subcommand(1);
-  add_bench_of(*bench, "step", "Time steps per second of a jittered cube, per term and precision",
-               {1000, 10648, 103823, 1000000}, bench_step,
-               "Examples:\n"
-               "  phyxel bench step\n"
-               "  phyxel bench step --terms green,hourglass --phyxels 1000000 --csv step.csv\n"
-               "  phyxel bench step --shape dino --bodies 100 --device cuda");
-  add_bench_of(*bench, "setup", "From a cloud to the first step: neighbours, moments, step limit",
-               {10648, 103823, 1000000}, bench_setup,
-               "Examples:\n"
-               "  phyxel bench setup\n"
-               "  phyxel bench setup --device cuda --csv setup.csv");
-  add_bench_of(*bench, "neighbours",
-               "Neighbour search: time per phyxel against the number of phyxels",
-               {10648, 103823, 1000000, 9938375}, bench_neighbours,
-               "Examples:\n"
-               "  phyxel bench neighbours\n"
-               "  phyxel bench neighbours --threads 1,2 --csv neighbours.csv");
+  add_bench_step(*bench);
   add_bench_cantilever(*bench);
   add_bench_scaling(*bench);
-
-  CLI::App* page = bench->add_subcommand(
-      "page", "Write the pages about the GPU and about ranks from their tables");
-  auto results = std::make_shared<std::string>("docs/results");
-  auto out = std::make_shared<std::string>("docs/performance.md");
-  page->add_option("--results", *results, "Folder of the tables")->capture_default_str();
-  auto scaling = std::make_shared<std::string>("docs/scaling.md");
-  page->add_option("--out", *out, "The page about the GPU")->capture_default_str();
-  page->add_option("--scaling", *scaling, "The page about ranks")->capture_default_str();
-  page->footer(
-      "Example:\n"
-      "  phyxel bench page");
   bench->footer(
       "Examples:\n"
       "  phyxel bench step\n"
       "  phyxel bench cantilever --across 4,8\n"
       "  mpirun -n 2 phyxel bench scaling\n"
       "Each has more: phyxel bench step --help");
-  page->callback([results, out, scaling] {
-    write_bench_page(*results, *out);
-    write_scaling_page(*results, *scaling);
-  });
 }
 
 }  // namespace phyxel::app

@@ -1,17 +1,11 @@
 /// phyxel: the command-line program. Subcommands live in one file each; what they throw becomes a
-/// message and an exit code.
+/// message and an exit code (program.hpp).
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <system_error>
-
 #include "command.hpp"
-#include "complaint.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/ranks.hpp"
+#include "program.hpp"
 #include "program_ranks.hpp"
-#include "terminal.hpp"
 #include "thread_policy.hpp"
 #include "version.hpp"
 
@@ -33,17 +27,10 @@ void check_ranks(const CLI::App& program) {
                   ranks().size()));
 }
 
-/// A full disk or a closed pipe behind the standard output: what was asked for has not been said.
-[[noreturn]] void refuse_standard_output(int error) {
-  throw phyxel::OutputError(fmt::format("standard output: cannot be written: {}",
-                                        std::generic_category().message(error)));
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   phyxel::app::settle_thread_policy(argv);  // first: it starts the program again
-  using phyxel::ExitCode;
   CLI::App program(
       "Deformable bodies made of phyxels (physics points without a mesh) that carry surfels.");
   program.name("phyxel");
@@ -71,24 +58,5 @@ int main(int argc, char** argv) {
   phyxel::app::add_paper(program);
   phyxel::app::add_doctor(program);
   phyxel::app::add_completion(program);
-  return phyxel::on_ranks(argc, argv, [&](const phyxel::Ranks& all) {
-    phyxel::app::set_ranks(all);
-    program.parse_complete_callback([&] { check_ranks(program); });
-    try {
-      program.parse(argc, argv);
-      if (std::fflush(stdout) != 0 || std::ferror(stdout)) refuse_standard_output(errno);
-      return static_cast<int>(ExitCode::success);
-    } catch (const std::system_error& error) {
-      if (!std::ferror(stdout)) throw;
-      refuse_standard_output(error.code().value());
-    } catch (const CLI::Success& help) {  // --help, --version
-      return all.leads() ? program.exit(help) : 0;
-    } catch (const CLI::ParseError& error) {
-      if (all.leads()) {
-        fmt::print(stderr, "phyxel: {}{}\n", phyxel::error_word(),
-                   phyxel::app::complaint(program, error, argc, argv));
-      }
-      return static_cast<int>(ExitCode::bad_input);
-    }
-  });
+  return phyxel::app::run_program(program, argc, argv, [&] { check_ranks(program); });
 }

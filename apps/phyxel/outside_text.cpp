@@ -39,20 +39,6 @@ std::string markdown_text(const std::string& text) {
   return safe;
 }
 
-std::string markdown_link(const std::filesystem::path& path) {
-  std::string link;
-  for (const char c : path.generic_string()) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       std::string_view("-._~/").find(c) != std::string_view::npos;
-    if (plain) {
-      link += c;
-    } else {
-      link += fmt::format("%{:02X}", static_cast<unsigned char>(c));
-    }
-  }
-  return link;
-}
-
 std::string gnuplot_string(const std::string& text) {
   std::string quoted = "'";
   for (const char c : on_one_line(text)) {

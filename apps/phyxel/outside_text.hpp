@@ -2,7 +2,6 @@
 /// its way into JSON, Markdown and gnuplot's scripts.
 #pragma once
 
-#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
@@ -19,9 +18,6 @@ std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
 /// A text on one line in which Markdown finds no markup and HTML no element.
 std::string markdown_text(const std::string& text);
-
-/// A relative address in a Markdown link: everything but letters, digits and "-._~/" is encoded.
-std::string markdown_link(const std::filesystem::path& path);
 
 /// A string of gnuplot, in single quotes: between those it expands no backquotes, macros or
 /// escapes. Line ends and other control characters become spaces.

@@ -73,81 +73,35 @@ TEST_F(Injection, LabelsOfChartsAreText) {
   EXPECT_THAT(text_of(folder_ / "a.svg"), HasSubstr("$(a)"));
 }
 
-/// `bench page`, from a folder and with cells that would make a file.
-TEST_F(Injection, CellsAndFoldersOfBenchPageAreText) {
-  for (std::size_t k = 0; k < hostile_words.size(); k += 2) {
-    const std::string& words = hostile_words[k];
-    SCOPED_TRACE(words);
-    const std::string folder = words.find('/') == words.npos ? words : std::to_string(k);
-    CsvTable table{{{"program", words}, {"gpu", words}, {"cuda", words}, {"date", words}},
-                   {"phyxels", "precision", "path", "steps_per_s", "phyxel_steps_per_s", "spread",
-                    "memory_bytes_per_phyxel", "bytes_per_phyxel_step", "bytes_per_s",
-                    "copy_bytes_per_s", "force_error", "bodies", "terms"},
-                   {}};
-    for (const char* phyxels : {"27", "64"}) {
-      table.rows.push_back(
-          {phyxels, words, words, "10", "1000", "0.1", "1", "1", "1", "1", words, "1", "other"});
-    }
-    fs::create_directory(folder_ / folder);
-    write_csv(folder_ / folder / "gpu_sizes.csv", table);
-    const Outcome made = run({"bench", "page", "--results", folder, "--out", "page.md"});
-    ASSERT_EQ(made.code, 0) << made.err;
-    EXPECT_EQ(fs::exists(folder_ / folder / "gpu_sizes.svg"), can_plot());
-    const std::string page = text_of(folder_ / "page.md");
-    for (const char* markup : {"<script", "<img", "](javascript", "\n!touch", "\xff"}) {
-      EXPECT_THAT(page, Not(HasSubstr(markup)));
-    }
-    // The row has as many cells as the head.
-    const std::size_t row = page.find("| 27 |");
-    ASSERT_NE(row, std::string::npos);
-    const std::string line = page.substr(row, page.find('\n', row) - row);
-    EXPECT_EQ(std::count(line.begin(), line.end(), '|'), 11);
-  }
-  expect_no_canary();
-}
-
-/// `accuracy page` and `paper --redraw`, whose charts name what stands in cells.
-TEST_F(Injection, CellsOfAccuracyAndPaperPagesAreText) {
+/// `paper --redraw`, whose charts name what stands in cells.
+TEST_F(Injection, CellsOfPaperPagesAreText) {
   for (std::size_t k = 1; k < hostile_words.size(); k += 2) {
     const std::string& words = hostile_words[k];
     SCOPED_TRACE(words);
     const std::string folder = words.find('/') == words.npos ? words : std::to_string(k);
     fs::create_directory(folder_ / folder);
-    CsvTable accuracy{{{"program", words}},
-                      {"case", "quantity", "lattice", "jitter", "factor", "hourglass", "closure",
-                       "across", "phyxels", "neighbours", "value", "reference", "error", "order",
-                       "evaluations", "seconds", "setup_seconds"},
-                      {}};
     CsvTable frames{{{"gpu", words}},
                     {"body", "phyxels", "surfels", "program", "cores", "threads", "objects",
                      "with_surfels", "frames", "frames_per_s", "ms_per_frame", "spread"},
                     {}};
     for (const char* count : {"1", "2"}) {
-      accuracy.rows.push_back({"bending", words, words, "0", "1.8", "0.1", "0", count, count, "30",
-                               "1", "1", "0.1", "", "1", count, "0"});
       frames.rows.push_back({"dino", "575", words, "phyxel CPU", words, "1", count, "no", "shown",
                              "100", "10", "0.1"});
     }
-    write_csv(folder_ / folder / "accuracy.csv", accuracy);
     write_csv(folder_ / folder / "frames.csv", frames);
-    const Outcome page =
-        run({"accuracy", "page", "--results", folder, "--out", folder + "/accuracy.md"});
-    ASSERT_EQ(page.code, 0) << page.err;
     const Outcome redrawn = run({"paper", "--redraw", "--out", folder});
     ASSERT_EQ(redrawn.code, 0) << redrawn.err;
-    for (const char* name : {"accuracy.md", "paper.md"}) {
-      const std::string text = text_of(folder_ / folder / name);
-      EXPECT_FALSE(text.empty());
-      for (const char* markup : {"<script", "<img", "](javascript", "\n!touch", "\xff"}) {
-        EXPECT_THAT(text, Not(HasSubstr(markup)));
-      }
+    const std::string text = text_of(folder_ / folder / "paper.md");
+    EXPECT_FALSE(text.empty());
+    for (const char* markup : {"<script", "<img", "](javascript", "\n!touch", "\xff"}) {
+      EXPECT_THAT(text, Not(HasSubstr(markup)));
     }
     if (!can_plot()) continue;
     std::size_t pictures = 0;
     for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
       pictures += entry.path().extension() == ".svg";
     }
-    EXPECT_GE(pictures, 2u);  // of bending, and Figure 4
+    EXPECT_GE(pictures, 1u);  // Figure 4
   }
   expect_no_canary();
 }
@@ -159,7 +113,6 @@ TEST(OutsideText, NumbersAndPlainWordsStayAsTheyAre) {
   }
   EXPECT_EQ(markdown_text("a|<b>`[\n"), "a&#124;&#60;b&#62;&#96;&#91; ");
   EXPECT_EQ(gnuplot_string("it's\n`x`"), "'it\u2019s `x`'");
-  EXPECT_EQ(markdown_link("a b/(c)`.svg"), "a%20b/%28c%29%60.svg");
   EXPECT_EQ(valid_utf8("a\xff"
                        "b"),
             "a\xef\xbf\xbd"

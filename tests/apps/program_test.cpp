@@ -304,7 +304,6 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
        "kept.h5: exists already and is kept; allowed: another file"},
       {{"info", "kept.h5"}, "kept.h5: not a file written by phyxel"},
       {{"render", "nowhere"}, "nowhere: no such file or folder"},
-      {{"bench", "page", "--results", "nowhere"}, "nowhere: no such folder"},
       {{"bench", "step", "--shape", "cow"}, "cow not in"},
       {{"export", "nowhere.hdf.series", "--single", "x.vtkhdf"},
        "nowhere.hdf.series: no such file"},
@@ -319,20 +318,6 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
     EXPECT_FALSE(fs::exists(folder_ / "a.h5")) << line;
   }
   EXPECT_EQ(text_of(folder_ / "kept.h5"), "precious");
-}
-
-TEST_F(Program, BenchPageIsMadeOfTheTables) {
-  fs::create_directory(folder_ / "tables");
-  const Outcome bench = run({"bench", "step", "--phyxels", "27,64", "--precision", "float,double",
-                             "--terms", "green", "--threads", "1", "--seconds", "0.01", "--repeat",
-                             "1", "--csv", "tables/gpu_sizes.csv"});
-  ASSERT_EQ(bench.code, 0) << bench.err;
-  const Outcome page = run({"bench", "page", "--results", "tables", "--out", "page.md"});
-  ASSERT_EQ(page.code, 0) << page.err;
-  const std::string text = text_of(folder_ / "page.md");
-  EXPECT_THAT(text, HasSubstr("| 27 | float | 1 thread:"));
-  EXPECT_THAT(text, HasSubstr("| 64 | double | 1 thread:"));
-  EXPECT_EQ(text.find("What each term costs"), std::string::npos);  // that table is not there
 }
 
 TEST_F(Program, TablesAndWhatWasWrittenAreJsonOnRequest) {

@@ -15,11 +15,12 @@ import sys
 import time
 
 PROGRAM, SOURCE, WORK = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
+STUDIES = PROGRAM.with_name("phyxel_studies")  # the developers' program, beside the users'
 MPIRUN = len(sys.argv) > 4
 failures = []
 
 # What takes minutes, wants a GPU, or needs what only a finished measurement leaves.
-LONG = re.compile(r"\bphyxel (paper|bench|accuracy)\b|cluster|twist|large_body|-n [3-9]|cuda|big|ten_dinos|--until 0\.5|"
+LONG = re.compile(r"\bphyxel (paper|bench|accuracy)\b|phyxel_studies|cluster|twist|large_body|-n [3-9]|cuda|big|ten_dinos|--until 0\.5|"
                   r"--render|horn_bug|alien_head|2000000|scan.ply|gear.stl")
 
 
@@ -91,23 +92,27 @@ def commands_of(text):
     """Lines that begin a command of ours, in code only; without the remark that follows it."""
     code = re.findall(r"^```(?:sh)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     code.append("\n".join(re.findall(r"^    (.*)$", text, re.MULTILINE)))
-    named = re.findall(r"`((?:mpirun|phyxel) [^`]*)`", text)  # in a sentence: not the whole of it
+    named = re.findall(r"`((?:mpirun|phyxel|phyxel_studies) [^`]*)`", text)  # in a sentence: not the whole of it
     for is_whole, lines in ((True, "\n".join(code).splitlines()), (False, named)):
         for line in lines:
             line = re.split(r"\s{2,}|\s#", line.strip())[0]
-            if re.match(r"(mpirun .*)?phyxel [a-z]", line) and "<" not in line and "..." not in line and "|" not in line:
+            if re.match(r"(mpirun .*)?phyxel(_studies)? [a-z]", line) and "<" not in line and "..." not in line and "|" not in line:
                 yield line, is_whole
 
 
 def options_are_known(command):
-    words = command[command.index("phyxel "):].split()[1:]
+    program, words = re.search(r"\b(phyxel(?:_studies)?) (.*)", command).groups()
+    program, words = STUDIES if program == "phyxel_studies" else PROGRAM, words.split()
     names = [w for w in words if not w.startswith("-")]
-    helps = subprocess.run([PROGRAM, words[0], "--help"], capture_output=True, text=True)
+    helps = subprocess.run([program, words[0], "--help"], capture_output=True, text=True)
     if helps.returncode != 0:
-        return f"phyxel {words[0]}: no such command"
+        return f"{program.name} {words[0]}: no such command"
     text = helps.stdout
+    if re.search(rf"^Usage: .* {words[0]} \[OPTIONS\] SUBCOMMAND", text, re.MULTILINE) and len(names) > 1 and \
+            not re.search(rf"^  {names[1]} ", text, re.MULTILINE):
+        return f"{program.name} {words[0]} {names[1]}: no such command"
     if len(names) > 1:  # bench step
-        text += subprocess.run([PROGRAM, *names[:2], "--help"], capture_output=True, text=True).stdout
+        text += subprocess.run([program, *names[:2], "--help"], capture_output=True, text=True).stdout
     unknown = [w.split("=")[0] for w in words if w.startswith("--") and w != "--help" and w.split("=")[0] not in text]
     return f"unknown: {' '.join(unknown)}" if unknown else ""
 
@@ -146,17 +151,18 @@ def run_alone(command, staged):
 def pages():
     readme = (SOURCE / "README.md").read_text()
     documents = {"README.md": readme}
-    for page in sorted((SOURCE / "docs").glob("*.md")):
+    for page in [SOURCE / "CONTRIBUTING.md", *sorted((SOURCE / "docs").glob("*.md")), SOURCE / "docs/results/README.md"]:
         if page.name != "tutorial.md":
-            documents[f"docs/{page.name}"] = page.read_text()
-    overview = subprocess.run([PROGRAM, "--help"], capture_output=True, text=True).stdout
-    subcommands = re.findall(r"^  ([a-z]+) ", overview.split("Subcommands:")[1], re.MULTILINE)
-    for name in subcommands:
-        text = subprocess.run([PROGRAM, name, "--help"], capture_output=True, text=True).stdout
-        examples = re.search(r"^Examples?:\n((?:  .*\n?|\n)*)", text, re.MULTILINE)
-        if not examples:
-            fail(f"phyxel {name} --help", "", "has no example")
-        documents[f"phyxel {name} --help"] = re.sub(r"^  ", "    ", examples.group(1), flags=re.MULTILINE)
+            documents[str(page.relative_to(SOURCE))] = page.read_text()
+    for program in (PROGRAM, STUDIES):
+        overview = subprocess.run([program, "--help"], capture_output=True, text=True).stdout
+        for name in re.findall(r"^  ([a-z][a-z-]+) ", overview.split("Subcommands:")[1].split("\n\n")[0], re.MULTILINE):
+            text = subprocess.run([program, name, "--help"], capture_output=True, text=True).stdout
+            examples = re.search(r"^Examples?:\n((?:  .*\n?|\n)*)", text, re.MULTILINE)
+            if not examples:
+                fail(f"{program.name} {name} --help", "", "has no example")
+                continue
+            documents[f"{program.name} {name} --help"] = re.sub(r"^  ", "    ", examples.group(1), flags=re.MULTILINE)
     seen, ran = set(), 0
     staged = stage(readme)
     for where, text in documents.items():

@@ -9,9 +9,6 @@
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
-#include "accuracy/page.hpp"
-#include "accuracy/pictures.hpp"
-#include "accuracy/studies.hpp"
 #include "device_option.hpp"
 #include "phyxel/error.hpp"
 #include "printed_table.hpp"
@@ -161,14 +158,6 @@ bool measure_hard(const HardOptions& options) {
   return all_good;
 }
 
-void measure_study(const Study& study, const TableOptions& options) {
-  PrintedTable table(options, {"way", study.x, "error", "evaluations", "seconds"});
-  study.measure([&](const StudyRow& row) {
-    table.row({row.way, fmt::format("{:.4g}", row.x), fmt::format("{:.3e}", row.error),
-               std::to_string(row.evaluations), fmt::format("{:.4g}", row.seconds)});
-  });
-}
-
 }  // namespace
 
 void add_accuracy(CLI::App& program) {
@@ -205,14 +194,6 @@ void add_accuracy(CLI::App& program) {
       ->delimiter(',')
       ->check(CLI::Range(0.0, 1.0));
   add_table_options(*command, options->table);
-  auto results = std::make_shared<std::string>("docs/results");
-  auto out = std::make_shared<std::string>("docs/accuracy.md");
-  CLI::App* page = command->add_subcommand("page", "Write the page from the table accuracy.csv");
-  page->add_option("--results", *results, "Folder of the table")->capture_default_str();
-  page->add_option("--out", *out, "The page")->capture_default_str();
-  CLI::App* pictures = command->add_subcommand(
-      "pictures", "Draw what hourglass control holds, into the folder of the tables");
-  pictures->add_option("--results", *results, "Folder of the tables")->capture_default_str();
   auto hard_options = std::make_shared<HardOptions>();
   CLI::App* hard = command->add_subcommand(
       "hard", "Cases that are hard to keep stable: each answered, or refused with its cause");
@@ -227,22 +208,6 @@ void add_accuracy(CLI::App& program) {
       ->capture_default_str();
   hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
   add_table_options(*hard, hard_options->table);
-  for (const Study& study : studies()) {
-    CLI::App* of_study = command->add_subcommand(study.name, study.what);
-    auto study_options = std::make_shared<TableOptions>();
-    add_table_options(*of_study, *study_options);
-    of_study->footer(
-        fmt::format("Example:\n"
-                    "  phyxel accuracy {} --csv {}.csv",
-                    study.name, study.name));
-    of_study->callback([=] { measure_study(study, *study_options); });
-  }
-  page->footer(
-      "Example:\n"
-      "  phyxel accuracy page");
-  pictures->footer(
-      "Example:\n"
-      "  phyxel accuracy pictures");
   hard->footer(
       "Examples:\n"
       "  phyxel accuracy hard\n"
@@ -251,9 +216,7 @@ void add_accuracy(CLI::App& program) {
       "Examples:\n"
       "  phyxel accuracy tension gravity\n"
       "  phyxel accuracy bending --across 4,6,8 --lattice nodes,mesh --closure 0,1e-3\n"
-      "  phyxel accuracy all --csv docs/results/accuracy.csv --force && phyxel accuracy page");
-  page->callback([=] { write_accuracy_page(*results, *out); });
-  pictures->callback([=] { draw_accuracy_pictures(*results); });
+      "  phyxel accuracy all --csv accuracy.csv");
   hard->callback([=] {
     if (!measure_hard(*hard_options)) {
       throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");

@@ -1,4 +1,6 @@
-#include "accuracy/studies.hpp"
+#include "accuracy_studies.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -6,12 +8,18 @@
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/bar.hpp"
-#include "phyxel/diagnostics.hpp"
 #include "phyxel/solver.hpp"
+#include "printed_table.hpp"
 #include "stopwatch.hpp"
+#include "studies.hpp"
 
-namespace phyxel::app {
+namespace phyxel::studies {
 namespace {
+
+using app::AccuracyCase;
+using app::bar;
+using app::Discretisation;
+using app::Filling;
 
 using Add = std::function<void(const StudyRow&)>;
 
@@ -26,10 +34,10 @@ Stepped step_through(const Model& model, Scene scene, Precision precision, Metho
   const auto backend = make_cpu_backend(model, precision);
   const auto steps = static_cast<std::int64_t>(std::ceil(end / step - 1e-9));
   const double dt = end / static_cast<double>(steps);
-  const auto start = Clock::now();
+  const auto start = app::Clock::now();
   Solver solver(model, *backend, initial_state(model, scene, dt), method);
   while (solver.steps() < steps) solver.step();
-  return {solver.state(), solver.work().evaluations, seconds_since(start)};
+  return {solver.state(), solver.work().evaluations, app::seconds_since(start)};
 }
 
 /// A spinning block is thrown and falls for a second.
@@ -58,7 +66,8 @@ void measure_precision(const Add& add) {
 /// A bar sways for a second, about a period of it.
 void measure_steps(const Add& add) {
   constexpr double end = 1;
-  Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 2}, 0.6, 0.1));
+  Scene scene =
+      app::clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 2}, 0.6, 0.1));
   scene.gravity = {0, 0, -1};
   const Model model = build_model(scene);
   const double limit = step_limit(model).largest_step;
@@ -85,23 +94,31 @@ void measure_neighbours(const Add& add) {
       {"nodes, jitter 0.2, closed",
        {.jitter = 0.2, .hourglass = 0.1, .closure = 1e-3, .across = 6}},
       {"mesh, closed", {.filling = Filling::mesh, .hourglass = 0.1, .closure = 1e-3, .across = 6}}};
-  const std::vector<AccuracyCase> cases = accuracy_cases();
+  const std::vector<AccuracyCase> cases = app::accuracy_cases();
   const auto gravity = std::find_if(cases.begin(), cases.end(),
                                     [](const AccuracyCase& c) { return c.name == "gravity"; });
   for (const auto& [way, fixed] : ways) {
     for (const double factor : {1.3, 1.5, 1.65, 1.8, 2.0, 2.2, 2.5}) {
       Discretisation d = fixed;
       d.factor = factor;
-      const Solution s = gravity->solve(d);
+      const app::Solution s = gravity->solve(d);
       add({way, s.neighbours, std::abs(s.found[0].error()), s.evaluations,
            s.seconds + s.setup_seconds});
     }
   }
 }
 
+void measure(const Study& study, const app::TableOptions& options) {
+  app::PrintedTable table(options, {"way", study.x, "error", "evaluations", "seconds"});
+  study.measure([&](const StudyRow& row) {
+    table.row({row.way, fmt::format("{:.4g}", row.x), fmt::format("{:.3e}", row.error),
+               std::to_string(row.evaluations), fmt::format("{:.4g}", row.seconds)});
+  });
+}
+
 }  // namespace
 
-std::vector<Study> studies() {
+std::vector<Study> accuracy_studies() {
   return {
       {"neighbours",
        "The bar of *gravity* at 1,519 phyxels with α = 0.1, over supports of 1.3 to 2.5 times the "
@@ -121,4 +138,17 @@ std::vector<Study> studies() {
   };
 }
 
-}  // namespace phyxel::app
+void add_accuracy_studies(CLI::App& program) {
+  for (const Study& study : accuracy_studies()) {
+    CLI::App* command = program.add_subcommand(study.name, study.what);
+    auto options = std::make_shared<app::TableOptions>();
+    app::add_table_options(*command, *options);
+    command->footer(
+        fmt::format("Example:\n"
+                    "  phyxel_studies {} --csv {}.csv",
+                    study.name, study.name));
+    command->callback([=] { measure(study, *options); });
+  }
+}
+
+}  // namespace phyxel::studies

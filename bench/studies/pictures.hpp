@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace phyxel::app {
+namespace phyxel::studies {
 
 struct AccuracyPicture {
   std::string file;  ///< In the results' folder.
@@ -14,7 +14,4 @@ struct AccuracyPicture {
 /// In the order in which a page shows them.
 const std::vector<AccuracyPicture>& accuracy_pictures();
 
-/// Lets the bar swing and draws it. @throws OutputError
-void draw_accuracy_pictures(const std::filesystem::path& folder);
-
-}  // namespace phyxel::app
+}  // namespace phyxel::studies

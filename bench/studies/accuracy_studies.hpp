@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace phyxel::app {
+namespace phyxel::studies {
 
 struct StudyRow {
   std::string way;  ///< "float", "verlet", ...
@@ -24,6 +24,6 @@ struct Study {
   /// Calls add(row) for each as it is found.
   void (*measure)(const std::function<void(const StudyRow&)>& add);
 };
-std::vector<Study> studies();
+std::vector<Study> accuracy_studies();
 
-}  // namespace phyxel::app
+}  // namespace phyxel::studies

@@ -1,0 +1,235 @@
+"""docs/performance.md: the speed of the GPU solver, from the tables of scripts/measure_gpu.sh and scripts/profile_gpu.sh.
+All measured numbers come from these tables; the targets are constants here."""
+import math
+
+from pages import cantilever
+from pages.charts import LineChart
+from pages.page import Page, measured_by
+from pages.tables import markdown_table, read_if_there
+
+# Targets for one H200, in float unless the name says otherwise.
+ASKED_LARGE, ASKED_DOUBLE = 8e9, 3e9  # phyxel-steps/s, 2 to 17 million phyxels
+ASKED_SETUP = 1                       # s for 16 million
+ASKED_WITH_SURFELS = 1e5              # steps/s of the dino
+ASKED_STEPS = {"dino": 2, "alien_head": 1.5}  # µs
+
+HEAD = """# Performance of the GPU solver
+
+Written by `bench/make_pages.py` from the CSV files in `docs/results/`, which `scripts/measure_gpu.sh` and \
+`scripts/profile_gpu.sh` make. A step is both passes and Verlet's, of a jittered cube under gravity with Green's strain \
+unless said otherwise; *error* is the largest difference of a force from that in double on the same GPU (which the tests \
+hold against the CPU), over the largest force, at strains of some 10%; *spread* is (fastest − slowest)/median of the \
+repeats: under load the GPU lowers its clock, so that the first repeat is the fastest."""
+
+PATH = """*Path*: `tiles` are two launches a step, which a graph repeats where launches would count; what is resident \
+stays in shared memory for many steps a launch, in a cluster of blocks a body or in blocks that send each other mail. \
+*Bytes moved* are the least that a step must move; their share of a plain copy's bandwidth says that memory is not the \
+limit."""
+
+ALONE = """Alone, a body takes as long as its slowest block needs for the chain of its longest list, twice, and for two \
+exchanges. Many side by side are limited by the loads from shared memory of all."""
+
+SURFELS = """A resident body leaves what its surfels need after each of up to sixteen steps of a launch; then all surfels \
+move after all of those steps at once. Whoever wants to see them after a step ends the launch there."""
+
+TRIED = """## What was tried
+
+In the order of what it gained, from a thread a phyxel over compressed rows: tiles in shared memory with 16-bit slots; \
+lists ordered so that eight lanes never wait for a column of shared memory, with broadcasts counted as free; the own \
+stress through a constant of the cloud; a tile's own phyxels in its first slots, lists 16 bytes at a time, constants \
+fetched into the second-level cache ahead of their use. What lost: two phyxels a lane (half the loads, too few warps), \
+tiles of 512 and 1024 (too few blocks in residence), filling lists up with the lane's own phyxel instead of far points \
+(it meets others in a column), records half as precise. Launches that begin while the last one ends gained 2 to 5% at \
+half a million phyxels, nothing above, and lost a third at 27 thousand: graphs gain 4 to 17% below a million and lose \
+nowhere. For surfels, gradients found by each block of surfels itself lost a half to the tiles' own pass, and lists of \
+carriers common to a warp won 4% where surfels are dense and lost 20% where they are not; of a resident body's surfels, \
+one launch a step lost a third to sixteen steps together, and blocks that walk the sixteen steps one after another lost \
+up to a half to a block a step. In clusters: fetching the next neighbours' stresses while the present ones are summed \
+(the longer loop waits for its own instructions)."""
+
+#: Nsight Compute's name of a metric, the page's title and the factor between their units.
+METRICS = [
+    ("gpu__time_duration.sum", "time [µs]", 1e-3),
+    ("smsp__cycles_elapsed.avg.per_second", "clock [GHz]", 1e-9),
+    ("smsp__inst_executed.sum", "10⁶ instructions of a warp", 1e-6),
+    ("smsp__issue_active.avg.pct_of_peak_sustained_active", "issue slots used [%]", 1),
+    ("l1tex__data_pipe_lsu_wavefronts.avg.pct_of_peak_sustained_elapsed", "loads and stores of shared memory and cache [%]", 1),
+    ("sm__pipe_fma_cycles_active.avg.pct_of_peak_sustained_active", "float arithmetic [%]", 1),
+    ("sm__pipe_fp64_cycles_active.avg.pct_of_peak_sustained_active", "double arithmetic [%]", 1),
+    ("lts__t_bytes.sum", "second-level cache [MB]", 1e-6),
+    ("lts__t_sectors.avg.pct_of_peak_sustained_elapsed", "second-level cache [%]", 1),
+    ("dram__bytes.sum", "memory [MB]", 1e-6),
+    ("dram__throughput.avg.pct_of_peak_sustained_elapsed", "memory [%]", 1),
+    ("sm__warps_active.avg.pct_of_peak_sustained_active", "warps in residence [%]", 1),
+]
+
+
+def against(reached, asked):
+    """The deviation of a speed or a time from its target, in words."""
+    share = reached / asked - 1
+    return "as asked" if abs(share) < 0.005 else f"{100 * share:+.0f}% of what was asked"
+
+
+def rate(row):
+    """The speed in billions of phyxel-steps per second, as text."""
+    return f"{row.number('phyxel_steps_per_s') * 1e-9:.3g}"
+
+
+def speeds(rows, title, x, x_label, logarithmic):
+    """A chart of the speed over column `x`, with a curve for each precision."""
+    chart = LineChart(title, x_label, "10⁹ phyxel-steps/s", logarithmic, logarithmic)
+    for row in rows:
+        curve = chart.curve(row["precision"])
+        curve.x.append(row.number(x))
+        curve.y.append(row.number("phyxel_steps_per_s") * 1e-9)
+    return chart
+
+
+def sizes(page, table, results):
+    page.paragraph("## Against size")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    more = read_if_there(results / "gpu_capacity.csv")
+    rows = table.rows + (more.rows if more else [])
+    speed = {"float": [], "double": []}
+    cells = []
+    for row in rows:
+        phyxels = row.number("phyxels")
+        if 2e6 < phyxels < 2e7 and row["precision"] in speed:
+            speed[row["precision"]].append(row.number("phyxel_steps_per_s"))
+        moves = "resident" not in row["path"]  # a resident body moves none of its bytes
+        copied = f"{100 * row.number('bytes_per_s') / row.positive('copy_bytes_per_s'):.0f}%" if moves else "–"
+        cells.append([row["phyxels"], row["precision"], row["path"], f"{1e6 / row.positive('steps_per_s'):.4g}", rate(row),
+                      f"{100 * row.number('spread'):.0f}%", row["memory_bytes_per_phyxel"],
+                      row["bytes_per_phyxel_step"] if moves else "–", copied, row["force_error"] or "–"])
+    if speed["float"]:
+        slowest, fastest = min(speed["float"]), max(speed["float"])
+        in_double = min(speed["double"], default=math.inf)
+        page.paragraph(
+            f"From 2 to 17 million phyxels, float: {slowest * 1e-9:.3g} to {fastest * 1e-9:.3g} billion phyxel-steps/s "
+            f"({against(slowest, ASKED_LARGE)}; {against(fastest, ASKED_LARGE)}); double: at least {in_double * 1e-9:.3g} "
+            f"({against(in_double, ASKED_DOUBLE)}). The largest body measured has "
+            f"{max(row.number('phyxels') for row in rows) * 1e-6:.0f} million phyxels.")
+    page.show(speeds(rows, "Steps of a cube on one GPU", "phyxels", "phyxels", True), "gpu_sizes")
+    page.paragraph(PATH)
+    page.add(markdown_table(["phyxels", "precision", "path", "µs a step", "10⁹ phyxel-steps/s", "spread",
+                             "bytes held a phyxel", "bytes moved a phyxel-step", "of copy bandwidth", "error"], cells))
+
+
+def small(page, table, _):
+    page.paragraph("## The paper's bodies, alone and side by side")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    for body, asked in ASKED_STEPS.items():
+        row = table.find(shape=body, bodies="1")
+        if row:
+            page.paragraph(f"{body}, {row['phyxels']} phyxels: {1e6 / row.positive('steps_per_s'):.3g} µs a step, "
+                           f"{asked:.3g} µs asked.")
+    cells = []
+    for row in table.rows:
+        alone = 1 / table.find(shape=row["shape"]).positive("steps_per_s")
+        step = 1 / row.positive("steps_per_s")
+        cells.append([row["shape"], row["bodies"], row["phyxels"], row["path"], f"{1e6 * step:.3g}", f"{step / alone:.3g}",
+                      rate(row), row["force_error"]])
+    page.add(markdown_table(["body", "bodies", "phyxels", "path", "µs a step of all", "× one alone", "10⁹ phyxel-steps/s",
+                             "error"], cells))
+    page.paragraph(ALONE)
+
+
+def surfels(page, table, _):
+    page.paragraph("## Surfels moved after every step")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    cells = []
+    for row in table.where(terms="surfels"):
+        steps = row.positive("steps_per_s")
+        without = table.find(shape=row["shape"], phyxels=row["phyxels"], terms="green")
+        cells.append([row["shape"], row["phyxels"], row["surfels"], f"{steps:.4g}", f"{1e6 / steps:.3g}",
+                      f"{1e6 / without.positive('steps_per_s'):.3g}" if without else "–"])
+        if row["shape"] == "dino":
+            page.paragraph(f"Dino, {row['surfels']} surfels: {steps:.3g} steps/s ({against(steps, ASKED_WITH_SURFELS)}).")
+    page.add(markdown_table(["body", "phyxels", "surfels", "steps/s", "µs a step", "µs a step without"], cells))
+    page.paragraph(SURFELS)
+
+
+def neighbours(page, table, _):
+    page.paragraph("## Against neighbours")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    page.show(speeds(table.rows, "Two million phyxels", "neighbours", "neighbours a phyxel", False), "gpu_neighbours")
+    page.add(markdown_table(
+        ["neighbours", "precision", "10⁹ phyxel-steps/s", "10⁹ pairs/s, both passes", "bytes held a phyxel", "error"],
+        [[row["neighbours"], row["precision"], rate(row), f"{row.number('pairs_per_s') * 1e-9:.3g}",
+          row["memory_bytes_per_phyxel"], row["force_error"]] for row in table.rows]))
+
+
+def bending(page, table, _):
+    page.paragraph("## Speed against error: a cantilever")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    page.add(cantilever.words(table))
+    page.show(cantilever.chart(table), "gpu_cantilever")
+    page.add(cantilever.side_by_side(table))
+
+
+def terms(page, table, _):
+    page.paragraph("## What each term costs")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    page.paragraph("Two million phyxels. *Added* is the difference from Green's strain alone in the same precision; "
+                   "differences of time within the spread are noise. A term that is off has no array and is in no kernel.")
+    cells = []
+    for row in table.rows:
+        base = table.find(terms="green", precision=row["precision"])
+
+        def numbers(of):
+            return 1e12 / of.positive("phyxel_steps_per_s"), of.number("memory_bytes_per_phyxel")
+
+        picoseconds, held = numbers(row)
+        added = ("–", "–")
+        if base:
+            base_picoseconds, base_held = numbers(base)
+            added = (f"{picoseconds - base_picoseconds:+.0f}", f"{held - base_held:+.0f}")
+        cells.append([row["terms"], row["precision"], f"{picoseconds:.0f}", added[0], f"{100 * row.number('spread'):.0f}%",
+                      f"{held:.0f}", added[1], row["force_error"]])
+    page.add(markdown_table(["term", "precision", "ps a phyxel-step", "added [ps]", "spread", "bytes held a phyxel", "added",
+                             "error"], cells))
+
+
+def setup(page, table, _):
+    page.paragraph("## Set-up")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    last = table.rows[-1]
+    on_device = last.number("survey_s") + last.number("backend_s")
+    page.paragraph(
+        "*Survey*: spacings, supports, list lengths, ranks of moments. *Model*: the host's copies. *Backend*: order along "
+        "the curve, tiles, lists, moments, all arrays. *Step limit*: Lanczos' iteration. Survey and backend together for "
+        f"{last['phyxels']} phyxels: {on_device:.3g} s ({against(on_device, ASKED_SETUP)}).")
+    columns = ["phyxels", "survey_s", "model_s", "backend_s", "limit_s", "iterations"]
+    page.add(markdown_table(["phyxels", "survey [s]", "model [s]", "backend [s]", "step limit [s]", "iterations"],
+                            [[row[column] for column in columns] for row in table.rows]))
+
+
+def profile(page, table, _):
+    page.paragraph("## What limits the two passes")
+    page.paragraph(f"Nsight Compute on {table.fact('gpu')} with {table.fact('program')}, {table.fact('date')}, two million "
+                   "phyxels; it holds the clock at its base. Shares are of what the hardware can do at most.")
+    columns = [(kernel, precision) for precision in table.values("precision") for kernel in ("pass 1", "pass 2")]
+    cells = []
+    for name, title, scale in METRICS:
+        line = [title]
+        for kernel, precision in columns:
+            row = table.find(precision=precision, kernel=kernel, metric=name)
+            line.append(f"{row.number('value') * scale:.3g}" if row else "–")
+        cells.append(line)
+    page.add(markdown_table(["metric", *(f"{kernel}, {precision}" for kernel, precision in columns)], cells))
+
+
+SECTIONS = {"gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu_neighbours": neighbours,
+            "gpu_cantilever": bending, "gpu_terms": terms, "gpu_setup": setup, "gpu_profile": profile}
+
+
+def make(results, link):
+    """The page, with a section for each table that exists."""
+    page = Page(link)
+    page.paragraph(HEAD)
+    for name, section in SECTIONS.items():
+        table = read_if_there(results / f"{name}.csv")
+        if table:
+            section(page, table, results)
+    page.add(TRIED)
+    return page
