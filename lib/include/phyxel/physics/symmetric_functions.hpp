@@ -6,9 +6,9 @@
 /// eigenvalues, evaluated at the tensor. A double eigenvalue is known only to the square root of
 /// the rounding error, but the error of interpolation is the product of the errors of all three:
 /// the polynomial keeps the digits that eigenvectors would lose. Against cyclic Jacobi rotations
-/// (four sweeps), the eigenvalues and the polynomial take a quarter of the instructions and are as
-/// accurate; against square roots of the tensor by iteration and a Padé approximant, they take no
-/// inverses.
+/// (four sweeps) eigenvalues and polynomial take half the instructions and a quarter of the
+/// divisions and roots, with the same errors; against square roots of the tensor by iteration and a
+/// Padé approximant of the logarithm they take no inverses, and know the sign of each eigenvalue.
 #pragma once
 
 #include <cmath>
