@@ -1,6 +1,6 @@
 /// Functions of symmetric 3x3 tensors without eigenvectors, in arithmetic and square roots only:
 /// the same code runs on scalars and on SIMD packs, and a lane of a pack has the bits of the
-/// scalar.
+/// scalar wherever the compiler contracts products and sums in both alike, or in neither.
 ///
 /// An isotropic function f of a tensor is Newton's interpolation polynomial of f through the three
 /// eigenvalues, evaluated at the tensor. A double eigenvalue is known only to the square root of
