@@ -192,8 +192,11 @@ __device__ inline uint4 first_entries(const DeviceLists& lists, TileLists::Row r
   return row.length > 0 ? __ldcs(list_of(lists, row)) : uint4{0, 0, 0, 0};
 }
 
-template <class Real>
-constexpr int pass_1_blocks = sizeof(Real) == 4 ? 6 : 3;
+/// Blocks of a multiprocessor that share its registers: more of them hide more latency, but leave a
+/// thread 40 registers in float, which some laws would spill.
+template <class Real, class Law>
+constexpr int pass_1_blocks = needs_many_registers<Law> ? (sizeof(Real) == 4 ? 4 : 2)
+                                                        : (sizeof(Real) == 4 ? 6 : 3);
 template <class Real>
 constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
 template <class Real>
@@ -218,7 +221,7 @@ enum class Beyond { nothing, hourglass, closing };
 /// @tparam Law one of `Laws`, or its sum with `VolumeConservation`
 template <class Real, class StateReal, class Law, Beyond beyond, bool only_gradient,
           class Others = Alone>
-__global__ void __launch_bounds__(tile_size, pass_1_blocks<Real>)
+__global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
            const __grid_constant__ Others others) {

@@ -146,6 +146,43 @@ struct Corotated {
   }
 };
 
+/// Hencky 1928 in principal stretches s, by singular values with the sign of det F on the smallest:
+/// ψ = μ Σ L(s)² + λ/2 (Σ L(s))², L = ln s, continued as its tangent below s = 0.1.
+struct Hencky {
+  double mu, lambda;
+  explicit Hencky(const Material& b)
+      : mu(b.young / (2 * (1 + b.poisson))),
+        lambda(b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson))) {}
+  struct Principal {
+    M3 left, right;
+    V3 log, slope;
+  };
+  static Principal principal(const M3& j) {
+    const Eigen::JacobiSVD<M3> svd(j, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    V3 s = svd.singularValues();
+    M3 left = svd.matrixU();
+    if ((left * svd.matrixV().transpose()).determinant() < 0) {
+      s[2] = -s[2];
+      left.col(2) = -left.col(2);
+    }
+    Principal p{left, svd.matrixV(), {}, {}};
+    for (int k = 0; k < 3; ++k) {
+      p.log[k] = s[k] > 0.1 ? std::log(s[k]) : std::log(0.1) + (s[k] - 0.1) / 0.1;
+      p.slope[k] = s[k] > 0.1 ? 1 / s[k] : 10;
+    }
+    return p;
+  }
+  double energy(const M3& j) const {
+    const Principal p = principal(j);
+    return mu * p.log.squaredNorm() + lambda / 2 * p.log.sum() * p.log.sum();
+  }
+  M3 stress(const M3& j) const {
+    const Principal p = principal(j);
+    const V3 t = (2 * mu * p.log + lambda * p.log.sum() * V3::Ones()).cwiseProduct(p.slope);
+    return p.left * t.asDiagonal() * p.right.transpose();
+  }
+};
+
 /// What the linear fit at i leaves of the motion of j.
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
@@ -192,6 +229,7 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
     const M3 g = closed_grad_u(b, u, i), e = strain(m, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
     const double elastic = m.law == "corotated"     ? Corotated(m).energy(M3::Identity() + g)
+                           : m.law == "hencky"      ? Hencky(m).energy(M3::Identity() + g)
                            : m.law == "neo-hookean" ? NeoHooke(m).energy(M3::Identity() + g)
                                                     : 0.5 * e.cwiseProduct(stress(m, e)).sum();
     total += b.v[i] * (elastic + 0.5 * m.volume_stiffness * dj * dj);
@@ -209,6 +247,7 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     M3 p = stress(m, strain(m, g));
     if (m.green()) p = j * p;
     if (m.law == "neo-hookean") p = NeoHooke(m).stress(j, cofactor(j));
+    if (m.law == "hencky") p = Hencky(m).stress(j);
     if (m.law == "corotated") p = Corotated(m).stress(j);
     if (m.volume_stiffness > 0) p += m.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {

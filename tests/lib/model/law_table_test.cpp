@@ -44,7 +44,8 @@ TEST(LawTable, EveryLawHasANameOfItsOwnAndParametersThatAreToldApart) {
 TEST(LawTable, ConstantsAreLamesParametersAndTheStiffnessOfVolumeConservation) {
   Material material = rubber();
   material.volume_stiffness = 4e4;
-  for (const char* name : {"st-venant-kirchhoff", "small-strain", "neo-hookean", "corotated"}) {
+  for (const char* name :
+       {"st-venant-kirchhoff", "small-strain", "neo-hookean", "corotated", "hencky"}) {
     material.law = name;
     const ChosenLaw law = chosen_law(material);
     EXPECT_EQ(std::string(law_table()[law.index].name), name);

@@ -37,7 +37,8 @@ void PrintTo(const Terms& terms, std::ostream* out) { *out << terms.name; }
 
 constexpr const char *st_venant_kirchhoff = StVenantKirchhoff<double>::name,
                      *small_strain = SmallStrain<double>::name,
-                     *neo_hookean = NeoHookean<double>::name, *corotated = Corotated<double>::name;
+                     *neo_hookean = NeoHookean<double>::name, *corotated = Corotated<double>::name,
+                     *hencky = Hencky<double>::name;
 constexpr auto uniform_support = NeighbourhoodRule::Support::uniform,
                adaptive_support = NeighbourhoodRule::Support::adaptive;
 
@@ -54,6 +55,8 @@ const Terms all_terms[] = {
     {"NeoHookeVolumeHourglass", neo_hookean, 2e5, uniform_support, {}, 0.1, false, false},
     {"Corotated", corotated, 0, adaptive_support, {}, 0, false, false},
     {"CorotatedVolumeHourglass", corotated, 2e5, uniform_support, {}, 0.1, false, false},
+    {"Hencky", hencky, 0, adaptive_support, {}, 0, false, false},
+    {"HenckyVolumeHourglass", hencky, 2e5, uniform_support, {}, 0.1, false, false},
     {"Closed", st_venant_kirchhoff, 0, uniform_support, {}, 0, true, false},
     {"ClosedCauchyVolume", small_strain, 2e5, uniform_support, {}, 0, true, false},
     {"ClosedNeoHookeHourglass", neo_hookean, 0, uniform_support, {}, 0.1, true, false},

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <type_traits>
 
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/laws/hencky.hpp"
 #include "phyxel/physics/laws/j2.hpp"
-#include "phyxel/physics/stress.hpp"
 #include "solver/pack.hpp"
 #include "support/deformations.hpp"
 
@@ -18,7 +18,7 @@ namespace {
 
 using namespace phyxel::testing;
 
-using Green = GreenHooke<double>;
+using Green = StVenantKirchhoff<double>;
 using Damped = WithViscosity<Green, double>;
 using DampedMetal = WithViscosity<J2<double>, double>;
 static_assert(sizeof(Damped::State) == 7 * sizeof(double));

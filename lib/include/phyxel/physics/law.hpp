@@ -73,9 +73,19 @@ PHYXEL_HD Law make_law(const Constant* constants) {
   return law;
 }
 
+/// True for a law whose stress takes so many registers of a GPU's thread that fewer blocks share a
+/// multiprocessor: it then says `static constexpr bool many_registers = true`.
+template <class Law>
+inline constexpr bool needs_many_registers = [] {
+  if constexpr (requires { Law::many_registers; }) return Law::many_registers;
+  return false;
+}();
+
 /// Two laws that act side by side: energies, stresses and stiffnesses add.
 template <class First, class Second>
 struct SumOf {
+  static constexpr bool many_registers = needs_many_registers<First>;
+
   First first;
   Second second;
 

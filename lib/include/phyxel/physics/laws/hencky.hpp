@@ -15,8 +15,9 @@
 
 #include <cmath>
 
+#include "phyxel/physics/laws/small_strain.hpp"
 #include "phyxel/physics/rotation.hpp"
-#include "phyxel/physics/stiffening.hpp"
+#include "phyxel/physics/stretches.hpp"
 #include "phyxel/physics/symmetric_functions.hpp"
 #include "phyxel/types.hpp"
 
@@ -171,13 +172,21 @@ struct WaveBound {
 /// falls beyond a stretch of e.
 template <class Real>
 struct Hencky {
+  static constexpr const char* name = "hencky";
+  static constexpr const char* meaning =
+      "Hooke's law in logarithmic strain, the one that metals have; resists compression to "
+      "nothing, and "
+      "inversion";
+  static constexpr LawParameter parameters[] = {young_modulus, poisson_ratio};
+  static constexpr auto constants = lame_constants;
+  static constexpr bool many_registers = true;
+
   Real lambda, mu;  ///< Lamé's parameters [Pa].
 
   /// @param young E [Pa]
   /// @param poisson ν
   static Hencky of(double young, double poisson) {
-    return {Real(young * poisson / ((1 + poisson) * (1 - 2 * poisson))),
-            Real(young / (2 * (1 + poisson)))};
+    return {Real(lame_lambda(young, poisson)), Real(lame_mu(young, poisson))};
   }
 
   /// ψ [J/m³].
@@ -194,7 +203,11 @@ struct Hencky {
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return HenckyStrain<Real>::of(grad_u).first_piola_stress(lambda, mu);
   }
-  /// An upper bound of the stiffness of plane waves [Pa] (stiffening.hpp).
+  /// Hooke's law in Cauchy's strain.
+  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+    return SmallStrain<Real>{{lambda, mu}}.at_rest(volume_stiffness);
+  }
+  /// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp).
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const LogarithmicStrain<Real> strains[3] = {LogarithmicStrain<Real>(s.largest - Real(1)),
                                                 LogarithmicStrain<Real>(s.middle - Real(1)),

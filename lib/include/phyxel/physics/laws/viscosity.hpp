@@ -12,8 +12,8 @@
 #include <sstream>
 #include <string>
 
-#include "phyxel/physics/stiffening.hpp"
 #include "phyxel/physics/strain.hpp"
+#include "phyxel/physics/stretches.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
