@@ -15,6 +15,7 @@
 
 #include "bulk.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/ranks.hpp"
 
 namespace phyxel {
 
@@ -34,17 +35,32 @@ struct ByRank {
   }
 };
 
-/// One for the whole program: MPI starts with it and ends with it. Every function but `rank`,
-/// `size` and `abort` is collective: all ranks call it, in the same order.
+/// Tags of messages between two ranks. Messages of a caller never meet them: they travel in a
+/// duplicate of its communicator.
+enum class Tag : int { alltoallv = 1, halo = 2 };
+
+/// The ranks of a run, in a duplicate of an MPI communicator: messages, tags and errors of the
+/// caller's own are not touched. Every function but `rank`, `size`, `host_of` and `abort` is
+/// collective: all ranks call it, in the same order. The thread that constructs it calls it.
 class Communicator {
  public:
   /// One rank, without MPI.
   Communicator() = default;
-  /// @throws Error if MPI does not start, or there are several ranks in a build without it
+  /// All ranks of the program, MPI_COMM_WORLD. Starts MPI unless it runs.
+  /// @throws Error if MPI does not start or supports fewer threads than are needed, or if there are
+  ///   several ranks in a build without it
   Communicator(int& argc, char**& argv);
+  /// The ranks of a caller's communicator. Collective over it; MPI must run.
+  /// @throws Error naming both levels if MPI was started for fewer threads than are needed
+  explicit Communicator(CommunicatorHandle callers);
+  /// Local. MPI keeps the duplicate until it ends, unless `close` has released it.
   ~Communicator();
   Communicator(const Communicator&) = delete;
   Communicator& operator=(const Communicator&) = delete;
+
+  /// Releases the duplicate, and ends MPI if the constructor has started it. Waits for messages
+  /// whose `Transfers` are gone. No other function may be called after it.
+  void close();
 
   int rank() const { return rank_; }
   int size() const { return size_; }
@@ -141,7 +157,12 @@ class Communicator {
   /// Ends all ranks at once, for errors that no rank but this knows of.
   [[noreturn]] void abort(ExitCode code) const;
 
+  /// The duplicate, for those who include mpi/native.hpp; null without MPI.
+  struct Native;
+  const std::shared_ptr<Native>& native() const { return native_; }
+
  private:
+  void describe_hosts();
   template <class T>
   static std::vector<T> from_bytes(const std::vector<std::byte>& bytes) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -159,7 +180,7 @@ class Communicator {
 
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
   std::vector<int> hosts_{0};  // of each rank
-  bool started_here_ = false;
+  std::shared_ptr<Native> native_;
 };
 
 /// Whether mpirun, srun or another launcher has started this program as one of several.
@@ -174,18 +195,28 @@ std::string mpi_description();
 /// Messages under way between this rank and others, whose lengths both sides know. Not collective.
 class Transfers {
  public:
-  Transfers();
+  Transfers(const Communicator& ranks, Tag tag);
+  /// Local. Messages that are still under way are left to the communicator, and with them the
+  /// memory that `keep` has named: no active request is freed.
   ~Transfers();
   Transfers(const Transfers&) = delete;
   Transfers& operator=(const Transfers&) = delete;
 
-  /// Both return at once. The bytes stay where they are until `wait` has returned.
+  /// Starts to receive a message. The bytes must not be touched until `wait` has returned.
   void receive(int from, std::span<std::byte> bytes);
+  /// Starts to send a message; likewise.
   void send(int to, std::span<const std::byte> bytes);
+  /// The owner of the memory that messages are received into and sent from.
+  void keep(std::shared_ptr<void> memory);
+  /// Lets MPI work on the messages. Many an MPI moves large ones in its calls alone.
+  void progress();
+  /// Waits until all messages have arrived, here and there.
   void wait();
 
  private:
   struct Requests;
+  std::shared_ptr<Communicator::Native> native_;
+  Tag tag_;
   std::unique_ptr<Requests> requests_;
 };
 

@@ -10,7 +10,8 @@
 
 namespace phyxel {
 
-Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
+Halo::Halo(const Communicator& ranks, const ModelShare& share)
+    : ranks_(ranks), transfers_(ranks, Tag::halo) {
   const std::vector<Index>& number = share.share.number;
   const auto each = static_cast<std::size_t>(ranks.size());
   std::vector<std::vector<Index>> ghosts(each), wanted(each);  // here; their numbers
@@ -38,8 +39,9 @@ Halo::Halo(const Communicator& ranks, const ModelShare& share) : ranks_(ranks) {
                             [&](Index i, Index wanted_one) { return number[i] < wanted_one; }));
     }
   }
-  outgoing_.resize(peers_.size());
-  incoming_.resize(peers_.size());
+  packed_->outgoing.resize(peers_.size());
+  packed_->incoming.resize(peers_.size());
+  transfers_.keep(packed_);
 }
 
 std::vector<std::vector<std::byte>> Halo::told(
@@ -85,16 +87,17 @@ void Halo::begin(const Records& records) const {
     const Timed timed(traffic_.seconds);
     under_way_ = records;
     for (std::size_t p = 0; p < peers_.size(); ++p) {
-      incoming_[p].resize(peers_[p].receive.size() * records.bytes);
-      outgoing_[p].resize(peers_[p].send.size() * records.bytes);
-      std::byte* to = outgoing_[p].data();
+      packed_->incoming[p].resize(peers_[p].receive.size() * records.bytes);
+      packed_->outgoing[p].resize(peers_[p].send.size() * records.bytes);
+      std::byte* to = packed_->outgoing[p].data();
       for (const Index i : peers_[p].send) {
         std::memcpy(to, records.of(i), records.bytes);
         to += records.bytes;
       }
     }
   }
-  begin(Bytes(outgoing_.begin(), outgoing_.end()), Bytes(incoming_.begin(), incoming_.end()));
+  begin(Bytes(packed_->outgoing.begin(), packed_->outgoing.end()),
+        Bytes(packed_->incoming.begin(), packed_->incoming.end()));
 }
 
 void Halo::finish() const {
@@ -105,7 +108,7 @@ void Halo::finish() const {
   }
   if (!under_way_.base) return;
   for (std::size_t p = 0; p < peers_.size(); ++p) {
-    const std::byte* from = incoming_[p].data();
+    const std::byte* from = packed_->incoming[p].data();
     for (const Index i : peers_[p].receive) {
       std::memcpy(under_way_.of(i), from, under_way_.bytes);
       from += under_way_.bytes;

@@ -31,8 +31,11 @@ class Halo final : public Others {
  private:
   const Communicator& ranks_;
   std::vector<Peer> peers_;
-  mutable std::vector<std::vector<std::byte>> outgoing_, incoming_;  // of each peer, packed
-  mutable Records under_way_;                                        // to be unpacked
+  struct Packed {
+    std::vector<std::vector<std::byte>> outgoing, incoming;  // of each peer
+  };
+  std::shared_ptr<Packed> packed_ = std::make_shared<Packed>();
+  mutable Records under_way_;  // to be unpacked
   mutable Traffic traffic_;
   mutable Transfers transfers_;
 };

@@ -7,7 +7,8 @@
 
 #include <algorithm>
 
-#include "mpi/pulse.hpp"
+#include "mpi/heartbeat.hpp"
+#include "mpi/native.hpp"
 
 namespace phyxel {
 namespace {
@@ -19,7 +20,7 @@ class SharedFile {
       : ranks_(ranks), name_(file), path_(path) {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_fapl_mpio(access, MPI_COMM_WORLD, MPI_INFO_NULL);
+    H5Pset_fapl_mpio(access, ranks.native()->all, MPI_INFO_NULL);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
     H5Pset_all_coll_metadata_ops(access, true);
     H5Pset_coll_metadata_write(access, true);

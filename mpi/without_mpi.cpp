@@ -19,7 +19,12 @@ Communicator::Communicator(int&, char**&) {
     throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
   }
 }
+Communicator::Communicator(CommunicatorHandle) {
+  throw Error(ExitCode::bad_input,
+              "a communicator was given, but this program was built without MPI");
+}
 Communicator::~Communicator() = default;
+void Communicator::close() {}
 
 void Communicator::barrier() const {}
 double Communicator::sum(double value) const { return value; }
@@ -44,18 +49,21 @@ void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
 }
 
 struct Transfers::Requests {};
-Transfers::Transfers() = default;
+Transfers::Transfers(const Communicator&, Tag tag) : tag_(tag) {}  // there is nobody
 Transfers::~Transfers() = default;
-void Transfers::receive(int, std::span<std::byte>) {}  // there is nobody
+void Transfers::receive(int, std::span<std::byte>) {}
 void Transfers::send(int, std::span<const std::byte>) {}
+void Transfers::keep(std::shared_ptr<void>) {}
+void Transfers::progress() {}
 void Transfers::wait() {}
 
 bool mpi_takes_device_memory() { return false; }
 std::string mpi_description() { return "none: this program was built without it"; }
 
-struct Watchdog::Kennel {};
+struct Watchdog::SharedHeartbeats {};
 Watchdog::Watchdog(const Communicator&, double) {}  // there is nobody
 Watchdog::~Watchdog() = default;
+void Watchdog::close() {}
 void Watchdog::beat(std::int64_t) const {}
 
 void Communicator::abort(ExitCode code) const { std::_Exit(static_cast<int>(code)); }

@@ -115,7 +115,7 @@ void Run::step_to_end() {
     // However early a run ends, it can go on.
     if (scene_.solver.method != Method::equilibrium) write_state();
   }
-  const Watchdog watchdog(ranks(), watchdog_seconds());
+  Watchdog watchdog(ranks(), watchdog_seconds());
   Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
                     {.phyxels = model().whole_size()});
   watch_newton(progress);
@@ -134,6 +134,7 @@ void Run::step_to_end() {
     throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
   }
   writer_.finish();
+  watchdog.close();
   progress.finish();
   loop_seconds_ = seconds_since(loop_start_);
 }
