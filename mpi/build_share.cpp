@@ -20,7 +20,7 @@
 #include "model/share_surveyor.hpp"
 #include "model/space_filling_curve.hpp"
 #include "model/spatial_hash.hpp"
-#include "mpi/halo.hpp"
+#include "mpi/halo_transport.hpp"
 #include "mpi/spread.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
@@ -62,7 +62,7 @@ struct Local {
 
 class Builder {
  public:
-  Builder(const Communicator& ranks, const Scene& scene, const ShareOptions& options)
+  Builder(const MpiCommunicator& ranks, const Scene& scene, const ShareOptions& options)
       : ranks_(ranks), scene_(scene), options_(options), bodies_(scene.bodies.size()) {}
 
   BuiltShare build(const Pieces& piece) {
@@ -550,8 +550,8 @@ class Builder {
       }
       records[0].push_back(record);
     }
-    records = ranks_.exchanged(records);
-    edges = ranks_.exchanged(edges);
+    records = ranks_.alltoallv(records);
+    edges = ranks_.alltoallv(edges);
     if (ranks_.rank() > 0) return {};
     // Ranks have stretches of the curve, so that their groups follow each other.
     Graph graph;
@@ -916,7 +916,7 @@ class Builder {
   }
 
   /// What the ring needs, and what needs the ring, that is not there yet.
-  static std::vector<Index> around_ring(const Local& local, const HaloPlan& plan) {
+  static std::vector<Index> around_ring(const Local& local, const PartHalo& plan) {
     std::vector<char> seen(local.phyxels.size(), 0);
     for (const Index i : plan.owned) seen[i] = 1;
     for (const Index i : plan.rings[0]) seen[i] = 1;
@@ -931,7 +931,7 @@ class Builder {
   }
 
   BuiltShare share_out_of(Local& local) {
-    HaloPlan plan;
+    PartHalo plan;
     plan.part = ranks_.rank();
     const auto n = static_cast<Index>(local.phyxels.size());
     const auto own = [&](Index i) { return owns(local, static_cast<std::size_t>(i)); };
@@ -952,11 +952,11 @@ class Builder {
     share.number = tabulated(share.number.size(),
                              [&](std::size_t k) { return number_of(local, share.number[k]); });
     for (Index& surfel : share.surfel_number) surfel = surfel_number_[surfel];
-    const auto halo = std::make_shared<Halo>(ranks_, made);
+    connect(ranks_, made);
     const auto from_owners = [&](auto& values) {
       constexpr std::size_t bytes = sizeof(values[0]);
-      halo->begin(Records{reinterpret_cast<std::byte*>(values.data()), bytes, bytes});
-      halo->finish();
+      share.transport->start(Records{reinterpret_cast<std::byte*>(values.data()), bytes, bytes});
+      share.transport->finish();
     };
     if (options_.tile > 0) {
       from_owners(place);
@@ -964,9 +964,7 @@ class Builder {
     }
     from_owners(made.model.mass);
     from_owners(made.model.volume);
-    share.others = halo;
-    made.model.share = std::make_shared<Share>(std::move(share));
-    return {std::move(made.model), partitioner_, quality_, std::move(surfaces_)};
+    return {model_of(std::move(made)), partitioner_, quality_, std::move(surfaces_)};
   }
 
   /// Where own phyxels of a share are in the whole model's tiles.
@@ -1010,7 +1008,7 @@ class Builder {
     return place;
   }
 
-  const Communicator& ranks_;
+  const MpiCommunicator& ranks_;
   const Scene& scene_;
   const ShareOptions& options_;
   std::vector<Body> bodies_;
@@ -1025,14 +1023,15 @@ class Builder {
 };
 
 /// Bodies begin on one rank after the other, so that small ones are not all the first one's.
-Piece piece_of(const Communicator& ranks, std::size_t body) {
+Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
   const auto size = static_cast<std::size_t>(ranks.size());
   return {static_cast<int>((static_cast<std::size_t>(ranks.rank()) + body) % size), ranks.size()};
 }
 
 }  // namespace
 
-BuiltShare build_share(const Communicator& ranks, const Scene& scene, const ShareOptions& options) {
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
+                       const ShareOptions& options) {
   // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
   Cloud rest;
@@ -1060,7 +1059,7 @@ BuiltShare build_share(const Communicator& ranks, const Scene& scene, const Shar
   });
 }
 
-BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
   return naming(scene, [&] {
     if (clouds.size() != scene.bodies.size()) {

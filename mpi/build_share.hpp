@@ -40,9 +40,10 @@ struct BuiltShare {
 /// Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to their
 /// owners, which ask the others for what is around. Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
-BuiltShare build_share(const Communicator& ranks, const Scene& scene, const ShareOptions& options);
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
+                       const ShareOptions& options);
 /// The same from clouds in place, one for each body, which every rank has whole.
-BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options);
 
 }  // namespace phyxel

@@ -30,7 +30,7 @@ namespace {
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 
 template <class T>
-T reduced(const Communicator& ranks, T value, MPI_Datatype type, MPI_Op operation) {
+T reduced(const MpiCommunicator& ranks, T value, MPI_Datatype type, MPI_Op operation) {
   if (ranks.size() == 1) return value;
   T result{};
   const Waiting waiting;
@@ -91,7 +91,7 @@ MPI_Comm duplicate_of(MPI_Comm callers) {
 
 }  // namespace
 
-Communicator::Communicator(int& argc, char**& argv) : native_(std::make_shared<Native>()) {
+MpiCommunicator::MpiCommunicator(int& argc, char**& argv) : native_(std::make_shared<Native>()) {
   int running = 0, level = 0;
   MPI_Initialized(&running);
   if (!running) {
@@ -103,7 +103,7 @@ Communicator::Communicator(int& argc, char**& argv) : native_(std::make_shared<N
   describe_hosts();
 }
 
-Communicator::Communicator(CommunicatorHandle callers) : native_(std::make_shared<Native>()) {
+MpiCommunicator::MpiCommunicator(CommunicatorHandle callers) : native_(std::make_shared<Native>()) {
   int running = 0;
   MPI_Initialized(&running);
   if (!running) {
@@ -121,7 +121,7 @@ Communicator::Communicator(CommunicatorHandle callers) : native_(std::make_share
   describe_hosts();
 }
 
-void Communicator::describe_hosts() {
+void MpiCommunicator::describe_hosts() {
   MPI_Comm const all = native_->all;
   PHYXEL_MPI_CALL(MPI_Comm_rank(all, &rank_));
   PHYXEL_MPI_CALL(MPI_Comm_size(all, &size_));
@@ -136,9 +136,9 @@ void Communicator::describe_hosts() {
   MPI_Comm_free(&host);
 }
 
-Communicator::~Communicator() = default;
+MpiCommunicator::~MpiCommunicator() = default;
 
-void Communicator::close() {
+void MpiCommunicator::close() {
   if (!native_ || native_->all == MPI_COMM_NULL) return;
   for (Native::Left& left : native_->left) {
     PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(left.requests.size()), left.requests.data(),
@@ -149,43 +149,43 @@ void Communicator::close() {
   if (native_->started_here) MPI_Finalize();
 }
 
-void Communicator::barrier() const {
+void MpiCommunicator::barrier() const {
   const Waiting waiting;
   if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(native_->all));
 }
 
 // MPI may add in any order; a sum of numbers that were gathered has one.
-double Communicator::sum(double value) const {
+double MpiCommunicator::sum(double value) const {
   const std::vector<double> all = gathered(std::span<const double>(&value, 1));
   return std::accumulate(all.begin(), all.end(), 0.0);
 }
-std::int64_t Communicator::sum(std::int64_t value) const {
+std::int64_t MpiCommunicator::sum(std::int64_t value) const {
   return reduced(*this, value, MPI_INT64_T, MPI_SUM);
 }
-double Communicator::largest(double value) const {
+double MpiCommunicator::largest(double value) const {
   return reduced(*this, value, MPI_DOUBLE, MPI_MAX);
 }
-std::int64_t Communicator::largest(std::int64_t value) const {
+std::int64_t MpiCommunicator::largest(std::int64_t value) const {
   return reduced(*this, value, MPI_INT64_T, MPI_MAX);
 }
-double Communicator::smallest(double value) const {
+double MpiCommunicator::smallest(double value) const {
   return reduced(*this, value, MPI_DOUBLE, MPI_MIN);
 }
-std::int64_t Communicator::smallest(std::int64_t value) const {
+std::int64_t MpiCommunicator::smallest(std::int64_t value) const {
   return reduced(*this, value, MPI_INT64_T, MPI_MIN);
 }
 
-void Communicator::add(std::span<std::int64_t> values) const {
+void MpiCommunicator::add(std::span<std::int64_t> values) const {
   if (size_ == 1) return;
   const Waiting waiting;
   PHYXEL_MPI_CALL(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()),
                                 MPI_INT64_T, MPI_SUM, native_->all));
 }
 
-std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
+std::vector<std::byte> MpiCommunicator::gathered_bytes(std::span<const std::byte> bytes) const {
   const auto ranks = static_cast<std::size_t>(size_);
   const auto size = static_cast<std::int64_t>(bytes.size());
-  const std::vector<std::int64_t> sizes = told(std::vector<std::int64_t>(ranks, size));
+  const std::vector<std::int64_t> sizes = alltoall(std::vector<std::int64_t>(ranks, size));
   std::vector<std::byte> all(
       static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0})));
   std::vector<std::span<std::byte>> from_each;
@@ -198,7 +198,7 @@ std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> b
   return all;
 }
 
-void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
+void MpiCommunicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
   if (size_ == 1) return;
   const Waiting waiting;
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
@@ -206,7 +206,8 @@ void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
   });
 }
 
-std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& numbers) const {
+std::vector<std::int64_t> MpiCommunicator::alltoall(
+    const std::vector<std::int64_t>& numbers) const {
   if (size_ == 1) return numbers;
   const Waiting waiting;
   std::vector<std::int64_t> from_each(numbers.size());
@@ -215,8 +216,8 @@ std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& nu
   return from_each;
 }
 
-void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
-                            const std::vector<std::span<std::byte>>& receive) const {
+void MpiCommunicator::exchange(const std::vector<std::span<const std::byte>>& send,
+                               const std::vector<std::span<std::byte>>& receive) const {
   constexpr int alltoallv_tag = static_cast<int>(Tag::alltoallv);
   const Waiting waiting;
   std::vector<MPI_Request> requests;
@@ -244,7 +245,7 @@ struct Transfers::Requests {
   std::vector<MPI_Request> list;
   std::shared_ptr<void> memory;
 };
-Transfers::Transfers(const Communicator& ranks, Tag tag)
+Transfers::Transfers(const MpiCommunicator& ranks, Tag tag)
     : native_(ranks.native()), tag_(tag), requests_(std::make_unique<Requests>()) {}
 Transfers::~Transfers() {
   if (requests_->list.empty()) return;
@@ -300,7 +301,7 @@ std::string mpi_description() {
   return name;
 }
 
-void Communicator::abort(ExitCode code) const {
+void MpiCommunicator::abort(ExitCode code) const {
   if (size_ > 1) MPI_Abort(native_->all, static_cast<int>(code));
   std::_Exit(static_cast<int>(code));
 }

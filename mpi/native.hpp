@@ -1,4 +1,4 @@
-/// The MPI communicator behind a `Communicator`, for the files that call MPI.
+/// The MPI communicator behind a `MpiCommunicator`, for the files that call MPI.
 #pragma once
 
 #include <mpi.h>
@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-struct Communicator::Native {
+struct MpiCommunicator::Native {
   MPI_Comm all = MPI_COMM_NULL;  ///< The duplicate; null once closed.
   bool started_here = false;     ///< True if MPI was started for it.
   /// Messages under way whose `Transfers` are gone, and the memory that they are in.

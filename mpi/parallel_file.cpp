@@ -16,7 +16,7 @@ namespace {
 /// One that all ranks have open. It is not closed by itself: after an error that would hang.
 class SharedFile {
  public:
-  SharedFile(const Communicator& ranks, const std::string& file, const std::string& path)
+  SharedFile(const MpiCommunicator& ranks, const std::string& file, const std::string& path)
       : ranks_(ranks), name_(file), path_(path) {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
@@ -69,7 +69,7 @@ class SharedFile {
     ranks_.barrier();  // until the first rank ends all
   }
 
-  const Communicator& ranks_;
+  const MpiCommunicator& ranks_;
   std::string name_, path_;
   hid_t file_ = -1, array_ = -1, transfer_ = -1;
 };
@@ -78,7 +78,7 @@ class SharedFile {
 
 bool can_write_together() { return H5open() >= 0; }
 
-void write_together(const Communicator& ranks, const std::string& file, const FileArray& array,
+void write_together(const MpiCommunicator& ranks, const std::string& file, const FileArray& array,
                     Index length, const RowsOf& rows) {
   // Or else HDF5 would hang: a rank that cannot open it leaves the others waiting.
   ranks.together([&] {

@@ -24,7 +24,7 @@ using RowsOf =
 /// @throws AgreedError if a rank does not see it; OutputError on the first rank, whereupon it must
 /// end all: a parallel file that could not
 ///   be written cannot be closed
-void write_together(const Communicator& ranks, const std::string& file, const FileArray& array,
+void write_together(const MpiCommunicator& ranks, const std::string& file, const FileArray& array,
                     Index length, const RowsOf& rows);
 
 }  // namespace phyxel

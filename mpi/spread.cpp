@@ -42,7 +42,7 @@ std::ptrdiff_t first_from(const SpreadPhyxels& phyxels, const KeyedPhyxels& sort
 }
 
 /// The start of the stretch of each rank but the first: nothing before it belongs there.
-std::vector<Key> find_splitters(const Communicator& ranks, const SpreadPhyxels& phyxels,
+std::vector<Key> find_splitters(const MpiCommunicator& ranks, const SpreadPhyxels& phyxels,
                                 const KeyedPhyxels& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
   std::vector<Key> splitters;
@@ -123,9 +123,9 @@ struct Occupied {
   friend auto operator<=>(const Occupied&, const Occupied&) = default;
 };
 /// Cells of other ranks, in their order. @param own of this rank
-Bulk<Occupied> of_other_ranks(const Communicator& ranks, const Names& own) {
+Bulk<Occupied> of_other_ranks(const MpiCommunicator& ranks, const Names& own) {
   const std::vector<Names> from_each =
-      ranks.exchanged(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
+      ranks.alltoallv(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
   Bulk<Occupied> all;
   for (int r = 0; r < ranks.size(); ++r) {
     if (r == ranks.rank()) continue;
@@ -143,7 +143,7 @@ std::span<const Occupied> at_cell(const Bulk<Occupied>& all, Cells::Name name) {
 }
 
 /// Own phyxels in blocks of cells next to which another rank has some: few, if the body is large.
-std::vector<Index> near_others(const Communicator& ranks, const SpreadPhyxels& own,
+std::vector<Index> near_others(const MpiCommunicator& ranks, const SpreadPhyxels& own,
                                const Cells& cells) {
   constexpr int log_edge = 3;
   const auto n = static_cast<Index>(own.size());
@@ -175,7 +175,8 @@ std::vector<Index> near_others(const Communicator& ranks, const SpreadPhyxels& o
 
 }  // namespace
 
-std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies) {
+std::vector<Box> boxes_of(const MpiCommunicator& ranks, const SpreadPhyxels& own,
+                          std::size_t bodies) {
   constexpr double far = std::numeric_limits<double>::infinity();
   const std::vector<Box> none(bodies, {{far, far, far}, {-far, -far, -far}});
   std::vector<Box> boxes = none;
@@ -201,7 +202,7 @@ std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, s
   return boxes;
 }
 
-SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
+SpreadPhyxels spread_along_curve(const MpiCommunicator& ranks, SpreadPhyxels own,
                                  const std::vector<Index>& sizes, const std::vector<Box>& boxes,
                                  Index group) {
   const int parts = ranks.size();
@@ -244,7 +245,7 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     send.values = ordered(own, sorted);
   }
   release(own);
-  own = ranks.exchanged(send).values;
+  own = ranks.alltoallv(send).values;
   release(send.values);
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
   own = ordered(own, keyed(own));
@@ -317,17 +318,17 @@ ByRank<SpreadPhyxel> by_owner(const SpreadPhyxels& own, const Bulk<int>& owner, 
 
 }  // namespace
 
-SpreadPhyxels sent_to_owners(const Communicator& ranks, SpreadPhyxels own, Bulk<int> owner) {
+SpreadPhyxels sent_to_owners(const MpiCommunicator& ranks, SpreadPhyxels own, Bulk<int> owner) {
   ByRank<SpreadPhyxel> send = by_owner(own, owner, ranks.size());
   release(own);
   release(owner);
-  const SpreadPhyxels received = ranks.exchanged(send).values;
+  const SpreadPhyxels received = ranks.alltoallv(send).values;
   release(send.values);
   const Bulk<Index> order = order_by_number(received);
   return in_bulk(order.size(), [&](std::size_t k) { return received[order[k]]; });
 }
 
-OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
+OthersPhyxels others_around(const MpiCommunicator& ranks, const SpreadPhyxels& own,
                             const std::vector<double>& reach, const std::vector<Box>& boxes) {
   OthersPhyxels others;
   if (ranks.size() == 1) return others;
@@ -377,7 +378,7 @@ OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
     joined.begin.push_back(joined.values.size());
     release(of_rank);
   }
-  ByRank<SpreadPhyxel> received = ranks.exchanged(joined);
+  ByRank<SpreadPhyxel> received = ranks.alltoallv(joined);
   const Bulk<Index> order = order_by_number(received.values);
   others.phyxels = in_bulk(order.size(), [&](std::size_t k) { return received.values[order[k]]; });
   others.owner = in_bulk(order.size(), [&](std::size_t k) {
@@ -388,7 +389,7 @@ OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
   return others;
 }
 
-Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
+Surrounded surrounded(const MpiCommunicator& ranks, const SpreadPhyxels& own,
                       const OthersPhyxels& others) {
   // Each knows how many of the other kind come before it.
   const auto before = [](const SpreadPhyxels& phyxels, const SpreadPhyxel& p) {
@@ -413,7 +414,7 @@ Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
   return all;
 }
 
-std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<double>> values) {
+std::vector<double> medians_of(const MpiCommunicator& ranks, std::span<const Bulk<double>> values) {
   // Bits of numbers that are not negative are in the order of the numbers: digit by digit, those
   // are counted that begin as the median does.
   constexpr int digit_bits = 8, digits = 1 << digit_bits;
@@ -449,7 +450,7 @@ std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<d
   return result;
 }
 
-std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values) {
+std::vector<double> largest_of(const MpiCommunicator& ranks, const std::vector<double>& values) {
   std::vector<double> largest = values;
   const std::vector<double> all = ranks.gathered(std::span<const double>(values));
   for (std::size_t k = 0; k < all.size(); ++k) {

@@ -29,7 +29,7 @@ StretchExchange::Places::Range StretchExchange::Places::within(Stretch stretch) 
   return {before(stretch.begin), before(stretch.end)};
 }
 
-StretchExchange::StretchExchange(const Communicator& ranks, const Model& share)
+StretchExchange::StretchExchange(const MpiCommunicator& ranks, const Model& share)
     : ranks_(ranks),
       share_(share),
       own_(places_of(share.share->number, [&](Index i) { return share.owns(i); })),
@@ -49,8 +49,8 @@ std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const 
       values[r].insert(values[r].end(), value.begin(), value.end());
     }
   }
-  numbers = ranks_.exchanged(numbers);
-  values = ranks_.exchanged(values);
+  numbers = ranks_.alltoallv(numbers);
+  values = ranks_.alltoallv(values);
   const Stretch own = wanted[static_cast<std::size_t>(ranks_.rank())];
   std::vector<double> all(width * static_cast<std::size_t>(own.end - own.begin));
   for (std::size_t r = 0; r < numbers.size(); ++r) {

@@ -16,7 +16,7 @@ namespace phyxel {
 class StretchExchange {
  public:
   /// @param share must outlive this
-  StretchExchange(const Communicator& ranks, const Model& share);
+  StretchExchange(const MpiCommunicator& ranks, const Model& share);
 
   /// Some of the whole model's phyxels, or surfels.
   struct Stretch {
@@ -49,7 +49,7 @@ class StretchExchange {
   template <class Wanted>
   static Places places_of(const std::vector<Index>& numbers, Wanted&& wanted);
 
-  const Communicator& ranks_;
+  const MpiCommunicator& ranks_;
   const Model& share_;
   Places own_, surfels_;
 };

@@ -19,7 +19,8 @@ namespace phyxel {
 std::atomic<Heartbeat*> own_heartbeat{nullptr};
 
 struct Watchdog::SharedHeartbeats {
-  SharedHeartbeats(const Communicator& ranks, double seconds) : limit(seconds), all(ranks.size()) {
+  SharedHeartbeats(const MpiCommunicator& ranks, double seconds)
+      : limit(seconds), all(ranks.size()) {
     MPI_Comm_split_type(ranks.native()->all, MPI_COMM_TYPE_SHARED, ranks.rank(), MPI_INFO_NULL,
                         &host);
     void* memory = nullptr;
@@ -101,7 +102,7 @@ struct Watchdog::SharedHeartbeats {
   std::thread thread;
 };
 
-Watchdog::Watchdog(const Communicator& ranks, double limit) {
+Watchdog::Watchdog(const MpiCommunicator& ranks, double limit) {
   if (ranks.size() > 1 && limit > 0) heartbeats_ = std::make_unique<SharedHeartbeats>(ranks, limit);
 }
 Watchdog::~Watchdog() = default;

@@ -14,7 +14,7 @@ namespace phyxel {
 class Watchdog {
  public:
   /// Collective. @param limit how long is long [s]; 0: nobody looks
-  Watchdog(const Communicator& ranks, double limit);
+  Watchdog(const MpiCommunicator& ranks, double limit);
   /// Local: this rank is no longer watched. MPI keeps the shared memory until it ends, unless
   /// `close` has released it.
   ~Watchdog();

@@ -5,7 +5,7 @@ namespace phyxel {
 
 bool can_write_together() { return false; }
 
-void write_together(const Communicator&, const std::string& file, const FileArray&, Index,
+void write_together(const MpiCommunicator&, const std::string& file, const FileArray&, Index,
                     const RowsOf&) {
   throw OutputError(file + ": this program was built without parallel HDF5");
 }

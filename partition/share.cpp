@@ -13,7 +13,7 @@ enum Kind : char { absent, owned, near_ghost, far_ghost };
 
 class Maker {
  public:
-  Maker(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of)
+  Maker(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of)
       : whole_(whole),
         part_of_(part_of),
         has_lists_(whole.has_lists()),
@@ -149,7 +149,7 @@ class Maker {
 
 }  // namespace
 
-ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of) {
+ModelShare share_of(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of) {
   if (!whole.closing.empty()) {
     throw InputError(
         "shares of a model with closed gradients are not made: allowed is closure = 0");

@@ -3,15 +3,15 @@
 
 #include <vector>
 
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 #include "phyxel/share.hpp"
 
 namespace phyxel {
 
-/// A share that does not know the others yet.
+/// A share that is not connected with the other ranks yet.
 struct ModelShare {
   Model model;             ///< `share` is null.
-  Share share;             ///< `others` is null.
+  Share share;             ///< Without communicator, plan and transport.
   std::vector<int> owner;  ///< The part that each phyxel belongs to, shape [n].
 };
 
@@ -20,7 +20,7 @@ struct ModelShare {
 /// for own phyxels and for ghosts whose stresses are found here, and empty for others; there are
 /// none if the whole model's are left to a device.
 /// @param plan of one ring or two
-ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of);
+ModelShare share_of(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of);
 
 /// Values of all phyxels of the whole model, for those of a share.
 template <class T>

@@ -34,7 +34,7 @@ std::vector<std::string> of_all_ranks(const std::string& own) {
   std::vector<std::vector<char>> send(static_cast<std::size_t>(ranks().size()),
                                       std::vector<char>(own.begin(), own.end()));
   std::vector<std::string> all;
-  for (const std::vector<char>& text : ranks().exchanged(send)) {
+  for (const std::vector<char>& text : ranks().alltoallv(send)) {
     all.emplace_back(text.begin(), text.end());
   }
   return all;

@@ -6,7 +6,7 @@
 
 #include "kind.hpp"
 #include "partition/exchange_size.hpp"
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/scene.hpp"
@@ -34,9 +34,9 @@ Facts quality_facts(const Graph& phyxels, const char* cut, Partitioner partition
           {"seconds", seconds}};
 }
 
-Facts plan_facts(const HaloPlan& plan) {
+Facts plan_facts(const PartHalo& plan) {
   Facts peers = Facts::array();
-  for (const HaloPlan::Peer& peer : plan.peers) {
+  for (const PartHalo::Peer& peer : plan.peers) {
     peers.push_back({{"part", peer.part},
                      {"send", {peer.send[0].size(), peer.send[1].size()}},
                      {"receive", {peer.receive[0].size(), peer.receive[1].size()}}});
@@ -85,7 +85,7 @@ Facts partition_facts(const std::filesystem::path& file, int parts, const std::s
     }
   }
   Facts plans = Facts::array();
-  for (const HaloPlan& plan : make_halo_plans(phyxels, chosen_parts, parts, 2)) {
+  for (const PartHalo& plan : make_part_halos(phyxels, chosen_parts, parts, 2)) {
     plans.push_back(plan_facts(plan));
   }
   const ExchangeSize sent = exchange_size(model, chosen_parts);

@@ -61,7 +61,7 @@ void write_profile(const std::string& file) {
   const std::string own = events_of_rank();
   std::vector<std::vector<char>> send(static_cast<std::size_t>(ranks().size()));
   send[0].assign(own.begin(), own.end());
-  const std::vector<std::vector<char>> events = ranks().exchanged(send);
+  const std::vector<std::vector<char>> events = ranks().alltoallv(send);
   const std::int64_t left_out = ranks().sum(static_cast<std::int64_t>(Timeline::left_out()));
   ranks().together([&] {
     if (ranks().rank() > 0) return;

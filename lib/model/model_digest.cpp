@@ -53,7 +53,7 @@ std::uint64_t digest_of_phyxels(const Model& model) {
   for (const Load& load : model.loads) add_entry(load.phyxels);
   if (model.share) {
     auto whole = static_cast<std::int64_t>(sum);
-    model.share->others->add({&whole, 1});
+    model.share->communicator->add({&whole, 1});
     sum = static_cast<std::uint64_t>(whole);
   }
   return sum;

@@ -257,7 +257,7 @@ class CpuBackend final : public Backend {
 
   std::optional<Exchanges> exchanges() const override {
     if (!model_.share) return std::nullopt;
-    return Exchanges{"MPI", model_.share->others->traffic()};
+    return Exchanges{"MPI", model_.share->transport->traffic()};
   }
 
   std::vector<ArrayBytes> memory() const override {
@@ -550,8 +550,8 @@ class CpuBackend final : public Backend {
             layout_.slot_of_phyxel()};
   }
   void refresh(const Records& records) const {
-    model_.share->others->begin(records);
-    model_.share->others->finish();
+    model_.share->transport->start(records);
+    model_.share->transport->finish();
   }
   PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
     return {record[first], record[first + 1], record[first + 2]};

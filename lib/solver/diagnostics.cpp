@@ -144,7 +144,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     all.add(own);
   }
   error.rethrow();
-  if (model.share) all.add_others(*model.share->others);
+  if (model.share) all.add_ranks(*model.share->communicator);
   Diagnostics d = all.values();
   d.step = now.step;
   d.time = now.time;
@@ -160,8 +160,8 @@ std::string describe_phyxel(const Model& model, Index global_id) {
     }
   }
   if (model.share) {
-    const Others& others = *model.share->others;
-    at = {others.largest(at.x), others.largest(at.y), others.largest(at.z)};
+    const Communicator& ranks = *model.share->communicator;
+    at = {ranks.largest(at.x), ranks.largest(at.y), ranks.largest(at.z)};
   }
   Index begin = 0;
   for (const Part& part : model.parts) {

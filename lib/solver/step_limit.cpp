@@ -121,7 +121,7 @@ double smallest_sound_step(const Model& model) {
       if (h > 0) smallest = std::min(smallest, h / c);
     }
   }
-  if (model.share) smallest = model.share->others->smallest(smallest);
+  if (model.share) smallest = model.share->communicator->smallest(smallest);
   return smallest;
 }
 

@@ -90,7 +90,7 @@ Stiffening find_stiffening(const Model& model, Backend& backend) {
   } else {
     found = stiffest_here(model, backend);
   }
-  if (model.share) found.look_at_others(*model.share->others);
+  if (model.share) found.look_at_ranks(*model.share->communicator);
   return found.values();
 }
 

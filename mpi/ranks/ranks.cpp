@@ -20,10 +20,10 @@
 namespace phyxel {
 namespace {
 
-std::unique_ptr<Communicator> communicator_of(int& argc, char**& argv) {
+std::unique_ptr<MpiCommunicator> communicator_of(int& argc, char**& argv) {
   // One rank starts no MPI: it may be there without working outside of mpirun.
-  if (!launched_as_rank()) return std::make_unique<Communicator>();
-  return std::make_unique<Communicator>(argc, argv);
+  if (!launched_as_rank()) return std::make_unique<MpiCommunicator>();
+  return std::make_unique<MpiCommunicator>(argc, argv);
 }
 
 void share_cores(int programs) {
@@ -34,9 +34,10 @@ void share_cores(int programs) {
 
 }  // namespace
 
-Ranks::Ranks() : communicator_(std::make_unique<Communicator>()) {}
+Ranks::Ranks() : communicator_(std::make_unique<MpiCommunicator>()) {}
 Ranks::Ranks(int& argc, char**& argv) : communicator_(communicator_of(argc, argv)) { share_host(); }
-Ranks::Ranks(CommunicatorHandle callers) : communicator_(std::make_unique<Communicator>(callers)) {
+Ranks::Ranks(CommunicatorHandle callers)
+    : communicator_(std::make_unique<MpiCommunicator>(callers)) {
   share_host();
 }
 Ranks::~Ranks() = default;

@@ -77,7 +77,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     if (can_survey_on_cuda(scene)) surveyor = cuda_share_surveyor(device_.gpu->index);
     options.surveyor = surveyor.get();
   }
-  const Communicator& all = ranks_.communicator();
+  const MpiCommunicator& all = ranks_.communicator();
   BuiltShare built =
       clouds ? build_share(all, scene, *clouds, options) : build_share(all, scene, options);
   here_ = std::move(built.model);

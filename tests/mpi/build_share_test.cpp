@@ -236,7 +236,7 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
   world().add(owners);
   world().add(part_of);
   ASSERT_THAT(owners, ::testing::Each(1));
-  const HaloPlan plan = make_halo_plans(phyxel_graph(whole_), {part_of.begin(), part_of.end()},
+  const PartHalo plan = make_part_halos(phyxel_graph(whole_), {part_of.begin(), part_of.end()},
                                         world().size(), cut_.options.rings)[world().rank()];
   const ModelShare made = share_of(whole_, plan, {part_of.begin(), part_of.end()});
   const Model& expected = made.model;

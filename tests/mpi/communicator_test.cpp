@@ -54,7 +54,7 @@ TEST(Communicator, ExchangesWithEveryRank) {
   std::vector<std::vector<int>> send(static_cast<std::size_t>(ranks));
   for (int to = 0; to < ranks; ++to)
     send[to].assign(static_cast<std::size_t>(to + rank), 100 * rank + to);
-  const auto received = world().exchanged(send);
+  const auto received = world().alltoallv(send);
   ASSERT_EQ(static_cast<int>(received.size()), ranks);
   for (int from = 0; from < ranks; ++from) {
     EXPECT_EQ(received[from],

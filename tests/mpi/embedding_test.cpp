@@ -38,12 +38,12 @@ class Embedding : public ::testing::Test {
 };
 
 /// Each rank sends each other rank one number per round, by both kinds of messages.
-void expect_right_exchanges(const Communicator& ranks) {
+void expect_right_exchanges(const MpiCommunicator& ranks) {
   for (int round = 0; round < 20; ++round) {
     const auto number = [&](int from, int to) { return 10'000 * round + 100 * from + to; };
     std::vector<std::vector<int>> send;
     for (int to = 0; to < ranks.size(); ++to) send.push_back({number(ranks.rank(), to)});
-    const auto received = ranks.exchanged(send);
+    const auto received = ranks.alltoallv(send);
     auto arrived = std::vector(send.size(), -1);
     Transfers transfers(ranks, Tag::halo);
     for (int r = 0; r < ranks.size(); ++r) {
@@ -150,7 +150,7 @@ TEST_F(Embedding, DestructorsAreLocal) {
 /// taken for them.
 TEST_F(Embedding, MessagesOutliveTheirTransfers) {
   Ranks half(handle());
-  const Communicator& ranks = half.communicator();
+  const MpiCommunicator& ranks = half.communicator();
   const auto start = [&](Transfers& transfers, int value) {
     constexpr std::size_t length = 1 << 18;  // beyond what MPI sends unasked
     struct Memory {

@@ -34,7 +34,7 @@ class EndsAllAtExceptions : public ::testing::EmptyTestEventListener {
 }  // namespace
 
 const Ranks& all_ranks() { return *the_ranks; }
-const Communicator& world() { return all_ranks().communicator(); }
+const MpiCommunicator& world() { return all_ranks().communicator(); }
 
 }  // namespace phyxel::test
 

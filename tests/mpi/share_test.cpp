@@ -6,7 +6,7 @@
 
 #include "../partition/bodies.hpp"
 #include "device.hpp"
-#include "mpi/halo.hpp"
+#include "mpi/halo_transport.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/solver.hpp"
@@ -109,12 +109,11 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
             ? ungrouped(make_partition(grouped_graph(graph, tiles), parts, partitioner), tiles)
             : make_partition(graph, parts, partitioner));
     ModelShare share =
-        share_of(whole_, make_halo_plans(graph, part_of_, parts, rings)[world().rank()], part_of_);
+        share_of(whole_, make_part_halos(graph, part_of_, parts, rings)[world().rank()], part_of_);
     if (way_ == Way::gpu_host) share.model = testing::without_lists(std::move(share.model));
     if (on_gpus()) share.share.place = values_of(share.share, cuda::make_tiling(whole_).place);
-    share.share.others = std::make_shared<Halo>(world(), share);
-    share.model.share = std::make_shared<Share>(std::move(share.share));
-    model_ = std::move(share.model);
+    connect(world(), share);
+    model_ = phyxel::model_of(std::move(share));
   }
   std::unique_ptr<Backend> backend(const Model& model, Precision precision) const {
     if (!on_gpus()) return make_cpu_backend(model, precision, 1);
@@ -249,10 +248,9 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   const std::vector<int> part_of =
       world().broadcast(make_partition(graph, parts, Partitioner::curve));
   ModelShare cut =
-      share_of(whole, make_halo_plans(graph, part_of, parts, rings)[world().rank()], part_of);
-  cut.share.others = std::make_shared<Halo>(world(), cut);
-  cut.model.share = std::make_shared<Share>(std::move(cut.share));
-  const Model& here = cut.model;
+      share_of(whole, make_part_halos(graph, part_of, parts, rings)[world().rank()], part_of);
+  connect(world(), cut);
+  const Model here = phyxel::model_of(std::move(cut));
 
   const double dt = 0.4 * step_limit(whole, 1).largest_step;
   const std::vector<Vec3d> start = testing::random_deformation(whole, 0.005);

@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-class Communicator;
+class MpiCommunicator;
 
 /// An MPI communicator of the caller's, as MPI_Comm_c2f (or mpi4py's `Comm.py2f`) names it.
 struct CommunicatorHandle {
@@ -85,12 +85,12 @@ class Ranks {
   }
 
   /// What the library's own parts talk through.
-  const Communicator& communicator() const { return *communicator_; }
+  const MpiCommunicator& communicator() const { return *communicator_; }
 
  private:
   void share_host() const;
 
-  std::unique_ptr<Communicator> communicator_;
+  std::unique_ptr<MpiCommunicator> communicator_;
 };
 
 /// Runs a program on its ranks, and returns its exit code for main() to return. An exception that

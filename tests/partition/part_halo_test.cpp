@@ -1,5 +1,5 @@
 /// Plans of who sends what to whom, against their definition and in use.
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ TEST_P(Halo, RingsAndBoundaryAreWhatTheyAreDefinedAs) {
   const Graph graph = phyxel_graph(GetParam().make());
   for (const int parts : {1, 3, 8}) {
     const std::vector<int> part_of = make_partition(graph, parts, Partitioner::bisection);
-    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 2)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 2)) {
       std::set<Index> reached;
       for (Index v = 0; v < graph.vertices(); ++v) {
         if (part_of[v] == plan.part) reached.insert(v);
@@ -52,19 +52,19 @@ TEST_P(Halo, WhatOneSendsTheOtherReceives) {
   const Graph graph = phyxel_graph(GetParam().make());
   constexpr int parts = 6;
   const std::vector<int> part_of = make_partition(graph, parts, Partitioner::curve);
-  const std::vector<HaloPlan> plans = make_halo_plans(graph, part_of, parts, 2);
-  const auto peer_of = [](const HaloPlan& plan, int part) -> const HaloPlan::Peer* {
-    for (const HaloPlan::Peer& peer : plan.peers) {
+  const std::vector<PartHalo> plans = make_part_halos(graph, part_of, parts, 2);
+  const auto peer_of = [](const PartHalo& plan, int part) -> const PartHalo::Peer* {
+    for (const PartHalo::Peer& peer : plan.peers) {
       if (peer.part == part) return &peer;
     }
     return nullptr;
   };
-  for (const HaloPlan& plan : plans) {
+  for (const PartHalo& plan : plans) {
     for (int r = 0; r < 2; ++r) {
       std::vector<Index> received;
-      for (const HaloPlan::Peer& peer : plan.peers) {
+      for (const PartHalo::Peer& peer : plan.peers) {
         EXPECT_NE(peer.part, plan.part);
-        const HaloPlan::Peer* other = peer_of(plans[peer.part], plan.part);
+        const PartHalo::Peer* other = peer_of(plans[peer.part], plan.part);
         ASSERT_NE(other, nullptr);
         EXPECT_EQ(peer.receive[r], other->send[r]);
         for (const Index v : peer.receive[r]) EXPECT_EQ(part_of[v], peer.part);
@@ -102,12 +102,12 @@ TEST_P(Halo, EitherDesignGivesEveryPartWhatTheWholeHas) {
 
   constexpr std::int64_t unknown = -1'000'000'000;
   for (const int rings : {1, 2}) {
-    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, rings)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, rings)) {
       // A part knows its own values and those it receives, no others.
       std::vector<std::int64_t> own_u(n, unknown);
       std::vector<Index> first_rows = plan.owned;
       for (const Index v : plan.owned) own_u[v] = u[v];
-      for (const HaloPlan::Peer& peer : plan.peers) {
+      for (const PartHalo::Peer& peer : plan.peers) {
         for (const auto& ring : peer.receive) {
           for (const Index v : ring) own_u[v] = u[v];
         }
@@ -117,7 +117,7 @@ TEST_P(Halo, EitherDesignGivesEveryPartWhatTheWholeHas) {
       }
       std::vector<std::int64_t> own_q = gathered(graph, own_u, first_rows);
       if (rings == 1) {  // the first ring's, received
-        for (const HaloPlan::Peer& peer : plan.peers) {
+        for (const PartHalo::Peer& peer : plan.peers) {
           for (const Index v : peer.receive[0]) own_q[v] = q[v];
         }
       }

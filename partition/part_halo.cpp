@@ -1,4 +1,4 @@
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 
 #include <algorithm>
 #include <map>
@@ -22,11 +22,11 @@ std::vector<Index> next_ring(const Graph& graph, const std::vector<Index>& from,
   return ring;
 }
 
-HaloPlan::Peer& peer_of(HaloPlan& plan, int part, std::size_t rings) {
-  for (HaloPlan::Peer& peer : plan.peers) {
+PartHalo::Peer& peer_of(PartHalo& plan, int part, std::size_t rings) {
+  for (PartHalo::Peer& peer : plan.peers) {
     if (peer.part == part) return peer;
   }
-  HaloPlan::Peer& peer = plan.peers.emplace_back();
+  PartHalo::Peer& peer = plan.peers.emplace_back();
   peer.part = part;
   peer.send.resize(rings);
   peer.receive.resize(rings);
@@ -35,18 +35,18 @@ HaloPlan::Peer& peer_of(HaloPlan& plan, int part, std::size_t rings) {
 
 }  // namespace
 
-std::size_t HaloPlan::ghosts() const {
+std::size_t PartHalo::ghosts() const {
   return std::accumulate(
       rings.begin(), rings.end(), std::size_t{0},
       [](std::size_t sum, const std::vector<Index>& ring) { return sum + ring.size(); });
 }
 
-std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>& part_of,
+std::vector<PartHalo> make_part_halos(const Graph& graph, const std::vector<int>& part_of,
                                       int parts, int rings) {
-  std::vector<HaloPlan> plans(static_cast<std::size_t>(parts));
+  std::vector<PartHalo> plans(static_cast<std::size_t>(parts));
   for (int p = 0; p < parts; ++p) plans[p].part = p;
   for (Index v = 0; v < graph.vertices(); ++v) {
-    HaloPlan& plan = plans[part_of[v]];
+    PartHalo& plan = plans[part_of[v]];
     plan.owned.push_back(v);
     const auto row = graph.row(v);
     const bool at_boundary =
@@ -55,7 +55,7 @@ std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>
   }
   std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()),
                            -1);  // the part that last did
-  for (HaloPlan& plan : plans) {
+  for (PartHalo& plan : plans) {
     for (const Index v : plan.owned) seen_by[v] = plan.part;
     for (int r = 0; r < rings; ++r) {
       // Only the boundary has neighbours outside.
@@ -68,7 +68,7 @@ std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>
       }
     }
   }
-  for (HaloPlan& plan : plans) {
+  for (PartHalo& plan : plans) {
     std::sort(plan.peers.begin(), plan.peers.end(),
               [](const auto& a, const auto& b) { return a.part < b.part; });
   }

@@ -8,7 +8,7 @@
 namespace phyxel {
 
 /// One part's view. All lists name vertices of the whole graph, ascending.
-struct HaloPlan {
+struct PartHalo {
   int part = 0;
   std::vector<Index> owned;
   std::vector<Index> boundary;  ///< Owned ones with a neighbour that is not.
@@ -27,7 +27,7 @@ struct HaloPlan {
 /// The plans of all parts.
 /// @param rings how far a part sees: 1 where each pass has its own exchange, 2 where the second
 ///   ring's stresses are computed twice instead
-std::vector<HaloPlan> make_halo_plans(const Graph& graph, const std::vector<int>& part_of,
+std::vector<PartHalo> make_part_halos(const Graph& graph, const std::vector<int>& part_of,
                                       int parts, int rings);
 
 }  // namespace phyxel
