@@ -14,11 +14,10 @@ class ShareSurveyor;
 struct ShareOptions {
   std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
                                       Partitioner::metis};
-  int rings = 1;  ///< See `Share`.
   /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
   /// tile. 0: none need to.
   int tile = 0;
-  /// Who searches, if no lists shall be made on the host; one ring of ghosts only. Null: the host.
+  /// Who searches, if no lists shall be made on the host; null: the host.
   const ShareSurveyor* surveyor = nullptr;
   /// What is partitioned are single phyxels, if there are no more than these, or else groups along
   /// the curve.

@@ -149,13 +149,13 @@ class MpiCommunicator final : public Communicator {
   /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of
   /// the
   ///   first rank that failed; what it threw, if there is one rank
-  void together(const std::function<void()>& work) const;
+  void collectively(const std::function<void()>& work) const;
 
-  /// `make()`, which must not communicate, on every rank. @throws AgreedError as `together`
+  /// `make()`, which must not communicate, on every rank. @throws AgreedError as `collectively`
   template <class Make>
   auto agreed(Make&& make) const {
     std::optional<decltype(make())> made;
-    together([&] { made.emplace(make()); });
+    collectively([&] { made.emplace(make()); });
     return std::move(*made);
   }
 

@@ -122,7 +122,7 @@ void MpiHaloTransport::finish() {
 void connect(const MpiCommunicator& ranks, ModelShare& made) {
   Share& share = made.share;
   share.communicator = &ranks;
-  share.halo = std::make_shared<HaloPlan>(make_halo_plan(ranks, made.owner, share.number));
+  share.halo = std::make_shared<HaloPlan>(make_halo_plan(ranks, made.owner, share.global_id));
   share.transport = std::make_shared<MpiHaloTransport>(ranks, share.halo);
 }
 

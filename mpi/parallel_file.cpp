@@ -34,8 +34,7 @@ class SharedFile {
   }
 
   template <class T>
-  void write(hid_t type, std::size_t width, StretchExchange::Stretch rows,
-             const std::vector<double>& values) {
+  void write(hid_t type, std::size_t width, RowRange rows, const std::vector<double>& values) {
     const std::vector<T> stored(values.begin(), values.end());
     const int dimensions = width > 1 ? 2 : 1;
     const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
@@ -76,12 +75,12 @@ class SharedFile {
 
 }  // namespace
 
-bool can_write_together() { return H5open() >= 0; }
+bool can_write_collectively() { return H5open() >= 0; }
 
-void write_together(const MpiCommunicator& ranks, const std::string& file, const FileArray& array,
-                    Index length, const RowsOf& rows) {
+void write_collectively(const MpiCommunicator& ranks, const std::string& file,
+                        const FileArray& array, Index length, const RowsOf& rows) {
   // Or else HDF5 would hang: a rank that cannot open it leaves the others waiting.
-  ranks.together([&] {
+  ranks.collectively([&] {
     if (::access(file.c_str(), R_OK | W_OK) == 0) return;
     throw OutputError(fmt::format(
         "{}: cannot be opened by all ranks: allowed are folders on a file system that all see",
@@ -89,14 +88,14 @@ void write_together(const MpiCommunicator& ranks, const std::string& file, const
   });
   SharedFile out(ranks, file, array.path);
   const std::size_t width = width_of(array.terms[0]);
-  std::vector<StretchExchange::Stretch> of_ranks(static_cast<std::size_t>(ranks.size()));
+  std::vector<RowRange> of_ranks(static_cast<std::size_t>(ranks.size()));
   for (std::int64_t at = 0; at < array.count;) {
-    for (StretchExchange::Stretch& stretch : of_ranks) {
-      stretch.begin = static_cast<Index>(at);
-      stretch.end = static_cast<Index>(at = std::min<std::int64_t>(array.count, at + length));
+    for (RowRange& rows_of : of_ranks) {
+      rows_of.begin = static_cast<Index>(at);
+      rows_of.end = static_cast<Index>(at = std::min<std::int64_t>(array.count, at + length));
     }
     const std::vector<double> values = rows(of_ranks);
-    const StretchExchange::Stretch own = of_ranks[static_cast<std::size_t>(ranks.rank())];
+    const RowRange own = of_ranks[static_cast<std::size_t>(ranks.rank())];
     const Waiting waiting;
     if (array.as_float) {
       out.write<float>(H5T_NATIVE_FLOAT, width, own, values);

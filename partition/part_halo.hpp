@@ -1,4 +1,5 @@
-/// Who sends what to whom: a plain value, made and checked without ranks.
+/// The halo of each part of a graph: its ghosts, and which part sends what to which; plain values,
+/// made and checked without ranks.
 #pragma once
 
 #include <vector>
@@ -12,22 +13,17 @@ struct PartHalo {
   int part = 0;
   std::vector<Index> owned;
   std::vector<Index> boundary;  ///< Owned ones with a neighbour that is not.
-  /// Ghosts: rings[0] are neighbours of owned vertices, rings[1] further neighbours of those.
-  std::vector<std::vector<Index>> rings;
-  /// What one other part and this one exchange, by ring of the one that receives.
+  std::vector<Index> ghosts;    ///< Neighbours of owned vertices that other parts own.
+  /// What one other part and this one exchange.
   struct Peer {
     int part = 0;
-    std::vector<std::vector<Index>> send, receive;
+    std::vector<Index> send, receive;
   };
   std::vector<Peer> peers;  ///< Ascending; those with anything to send or to receive.
-
-  std::size_t ghosts() const;  ///< Of all rings.
 };
 
-/// The plans of all parts.
-/// @param rings how far a part sees: 1 where each pass has its own exchange, 2 where the second
-///   ring's stresses are computed twice instead
+/// The halos of all parts.
 std::vector<PartHalo> make_part_halos(const Graph& graph, const std::vector<int>& part_of,
-                                      int parts, int rings);
+                                      int parts);
 
 }  // namespace phyxel

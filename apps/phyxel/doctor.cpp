@@ -112,8 +112,8 @@ Findings facts() {
           {"nccl", cuda::nccl_version()},
           {"mpi", mpi_description()},
           {"ranks", places},
-          {"hdf5", hdf5_version() + (can_write_together() ? ", parallel: all ranks write"
-                                                          : ", serial: the first rank writes")},
+          {"hdf5", hdf5_version() + (can_write_collectively() ? ", parallel: all ranks write"
+                                                              : ", serial: the first rank writes")},
           {"device", chosen},
           {"transport", transport}};
 }

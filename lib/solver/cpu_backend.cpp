@@ -80,7 +80,6 @@ class CpuBackend final : public Backend {
         layout_(model, boundary_, W),
         boundary_runs_(find_runs(&Layout::boundary)),
         interior_runs_(find_runs(&Layout::interior)),
-        ghost_runs_(find_runs(&Layout::near_ghosts)),
         lists_(model.neighbourhood.neighbours, layout_) {
     if (!model.neighbourhood.symmetric)
       inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
@@ -157,15 +156,13 @@ class CpuBackend final : public Backend {
 
   void stress() override {
     const Phase phase("stresses");
-    pass(model_.share && model_.share->rings == 1, stress_records(),
-         [&](const std::vector<Run>& runs) { find_stresses(runs); });
-    find_stresses(ghost_runs_);
+    pass(stress_records(), [&](const std::vector<Run>& runs) { find_stresses(runs); });
   }
 
   void advance(double time, double dt) override {
     const Phase phase("forces, motion");
     if (!load_.empty()) model_loads(time);
-    pass(model_.share != nullptr, displacement_records(), [&](const std::vector<Run>& runs) {
+    pass(displacement_records(), [&](const std::vector<Run>& runs) {
       for (const Run& run : runs) advance_run(run, dt);
       if (&runs == &boundary_runs_) follow_motions(time, dt, true);  // before they are sent
     });
@@ -397,14 +394,10 @@ class CpuBackend final : public Backend {
 
   /// Does the work of a pass: first on the boundary, whose values other ranks wait for, then on the
   /// interior, while they travel. Ghosts have their owners' values when it returns.
-  /// @param exchanged whether other ranks need the values
-  /// @param work(runs) finds them
+  /// @param work(runs) finds the values
   template <class Work>
-  void pass(bool exchanged, const Records& values, Work&& work) {
-    if (!exchanged) {
-      if (!boundary_runs_.empty()) work(boundary_runs_);
-      return work(interior_runs_);
-    }
+  void pass(const Records& values, Work&& work) {
+    if (!model_.share) return work(interior_runs_);
     HaloTransport& halo = *model_.share->transport;
     work(boundary_runs_);
     halo.start(values);
@@ -702,7 +695,6 @@ class CpuBackend final : public Backend {
   std::vector<char> boundary_;  // of a share: whether each phyxel is exchanged
   Layout layout_;
   std::vector<Run> boundary_runs_, interior_runs_;
-  std::vector<Run> ghost_runs_;  // ghosts whose stresses are found here
   std::vector<std::vector<Run>> interior_pieces_;
   PackedLists lists_, inverse_;            // inverse_ is empty when lists_ is its own inverse
   AlignedVector<Real> points_, stresses_;  // records, by slot

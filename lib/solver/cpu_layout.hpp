@@ -68,9 +68,8 @@ inline std::vector<char> boundary_phyxels(const Model& model) {
 }
 
 /// Slots: phyxels renumbered so that what is alike fills whole packs: first the boundary of all
-/// bodies, then their interior, then the ghosts whose stresses are found here, then the other
-/// ghosts. Slots past an end are padding: they have no neighbours but themselves, no volume and no
-/// mass.
+/// bodies, then their interior, then their ghosts. Slots past an end are padding: they have no
+/// neighbours but themselves, no volume and no mass.
 class Layout {
  public:
   /// @param boundary of `boundary_phyxels`; empty: all is interior
@@ -84,11 +83,9 @@ class Layout {
       interior_.push_back(
           add(part.begin, part.owned_end(), [&](Index i) { return !is_boundary(i); }));
     }
-    const auto all = [](Index) { return true; };
     for (const Part& part : model.parts) {
-      near_.push_back(add(part.owned_end(), part.end - part.far_ghosts, all));
+      add(part.owned_end(), part.end, [](Index) { return true; });
     }
-    for (const Part& part : model.parts) add(part.end - part.far_ghosts, part.end, all);
   }
 
   int width() const { return width_; }
@@ -100,8 +97,6 @@ class Layout {
   const PackRange& boundary(std::size_t part) const { return boundary_[part]; }
   /// Packs of a part's other own phyxels.
   const PackRange& interior(std::size_t part) const { return interior_[part]; }
-  /// Packs of a part's ghosts whose stresses are found here.
-  const PackRange& near_ghosts(std::size_t part) const { return near_[part]; }
 
  private:
   template <class Wanted>
@@ -117,7 +112,7 @@ class Layout {
 
   int width_;
   Index packs_ = 0;
-  std::vector<PackRange> boundary_, interior_, near_;
+  std::vector<PackRange> boundary_, interior_;
   std::vector<Index> slot_;
 };
 

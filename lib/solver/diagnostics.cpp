@@ -111,7 +111,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         const Vec3d u = state.displacement[i], x = model.position[i] + u;
         if (!(is_finite(u) && is_finite(state.velocity[i]) && is_finite(force[i]) &&
               all_finite(gradient[i]))) {
-          own.first_bad = std::min(own.first_bad, model.number(i));
+          own.first_bad = std::min(own.first_bad, model.global_id(i));
         }
         Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
         if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
@@ -137,7 +137,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         own.force_scale.add(norm(force[i]));
         own.torque_scale.add(norm(x) * norm(force[i]));
         own.largest_displacement = std::max(own.largest_displacement, norm(u));
-        own.look_at_speed(norm(v), model.number(i));
+        own.look_at_speed(norm(v), model.global_id(i));
       }
     }
 #pragma omp critical
@@ -156,7 +156,7 @@ std::string describe_phyxel(const Model& model, Index global_id) {
   Vec3d at{nowhere, nowhere, nowhere};
   for (const Part& part : model.parts) {
     for (Index i = part.begin; i < part.owned_end(); ++i) {
-      if (model.number(i) == global_id) at = model.position[i];
+      if (model.global_id(i) == global_id) at = model.position[i];
     }
   }
   if (model.share) {

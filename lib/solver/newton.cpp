@@ -215,7 +215,7 @@ void Newton::find_stiffness(const Balance& balance) {
 }
 
 int Newton::most_inner_here() const {
-  const auto unknowns = 3 * static_cast<std::int64_t>(model_.whole_size());
+  const auto unknowns = 3 * static_cast<std::int64_t>(model_.global_count());
   return static_cast<int>(std::min<std::int64_t>(most_inner, most_inner_share * unknowns + 100));
 }
 

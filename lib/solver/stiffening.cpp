@@ -67,7 +67,7 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const PrincipalStretches<double> s = principal_stretches(gradient[i]);
-        own.look_at(stiffening_of(part.material, gradient[i], s), s.largest, model.number(i));
+        own.look_at(stiffening_of(part.material, gradient[i], s), s.largest, model.global_id(i));
       }
     }
 #pragma omp critical

@@ -66,7 +66,9 @@ double Ranks::exact_sum(std::span<const double> terms) const {
   return sum.value();
 }
 
-void Ranks::together(const std::function<void()>& work) const { communicator_->together(work); }
+void Ranks::collectively(const std::function<void()>& work) const {
+  communicator_->collectively(work);
+}
 
 int on_ranks(int& argc, char**& argv, const std::function<int(const Ranks&)>& program) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "phyxel";

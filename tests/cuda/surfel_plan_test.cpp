@@ -96,11 +96,11 @@ std::map<Index, Described> described(const Model& model, const Tiling& tiling) {
     Described d{block.centre, {}, {}};
     for (int s = 0; s < block.surfels; ++s) {
       const Index surfel = plan.order[block.first_surfel + s];
-      d.surfels.push_back(model.share ? model.share->surfel_number[surfel] : surfel);
+      d.surfels.push_back(model.share ? model.share->global_surfel_id[surfel] : surfel);
       for (int k = 0; k < block.carriers; ++k) {
         const Carrier& c = plan.carriers[block.first_carrier + k * surfel_block + s];
         const Index place = plan.place[block.first_slot + c.slot];
-        d.carriers.emplace_back(model.number(tiling.phyxel[place]), c.weight);
+        d.carriers.emplace_back(model.global_id(tiling.phyxel[place]), c.weight);
       }
     }
     EXPECT_TRUE(blocks.emplace(d.surfels.front(), d).second);

@@ -153,7 +153,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
       const cuda::Tiling tiling = make_tiling(model);
       own += tiling.own_tiles;
       const auto number = [&](Index place) {
-        return tiling.phyxel[place] < 0 ? -1 : model.number(tiling.phyxel[place]);
+        return tiling.phyxel[place] < 0 ? -1 : model.global_id(tiling.phyxel[place]);
       };
       for (Index i = 0; i < model.size(); ++i) ASSERT_EQ(tiling.phyxel[tiling.place[i]], i);
       for (Index tile = 0; tile < tiling.own_tiles; ++tile) {
@@ -161,7 +161,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
         const auto somebody =
             *std::find_if(tiling.phyxel.begin() + first, tiling.phyxel.begin() + first + tile_size,
                           [](Index i) { return i >= 0; });
-        const Index other = places[model.number(somebody)] / tile_size;
+        const Index other = places[model.global_id(somebody)] / tile_size;
         EXPECT_EQ(tiling.part[tile], expected.part[other]);
         for (Index lane = 0; lane < tile_size; ++lane) {
           ASSERT_EQ(number(first + lane), expected.phyxel[other * tile_size + lane]);

@@ -16,26 +16,23 @@ using namespace phyxel::testing;
 
 class Halo : public ::testing::TestWithParam<CutCase> {};
 
-TEST_P(Halo, RingsAndBoundaryAreWhatTheyAreDefinedAs) {
+TEST_P(Halo, GhostsAndBoundaryAreWhatTheyAreDefinedAs) {
   const Graph graph = phyxel_graph(GetParam().make());
   for (const int parts : {1, 3, 8}) {
     const std::vector<int> part_of = make_partition(graph, parts, Partitioner::bisection);
-    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 2)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts)) {
       std::set<Index> reached;
       for (Index v = 0; v < graph.vertices(); ++v) {
         if (part_of[v] == plan.part) reached.insert(v);
       }
       EXPECT_EQ(plan.owned, std::vector<Index>(reached.begin(), reached.end()));
-      for (const std::vector<Index>& ring : plan.rings) {
-        std::set<Index> expected;
-        for (const Index v : reached) {
-          for (const Index w : graph.row(v)) {
-            if (!reached.count(w)) expected.insert(w);
-          }
+      std::set<Index> expected;
+      for (const Index v : reached) {
+        for (const Index w : graph.row(v)) {
+          if (!reached.count(w)) expected.insert(w);
         }
-        EXPECT_EQ(ring, std::vector<Index>(expected.begin(), expected.end()));
-        reached.insert(expected.begin(), expected.end());
       }
+      EXPECT_EQ(plan.ghosts, std::vector<Index>(expected.begin(), expected.end()));
       std::vector<Index> boundary;
       for (const Index v : plan.owned) {
         const auto row = graph.row(v);
@@ -52,7 +49,7 @@ TEST_P(Halo, WhatOneSendsTheOtherReceives) {
   const Graph graph = phyxel_graph(GetParam().make());
   constexpr int parts = 6;
   const std::vector<int> part_of = make_partition(graph, parts, Partitioner::curve);
-  const std::vector<PartHalo> plans = make_part_halos(graph, part_of, parts, 2);
+  const std::vector<PartHalo> plans = make_part_halos(graph, part_of, parts);
   const auto peer_of = [](const PartHalo& plan, int part) -> const PartHalo::Peer* {
     for (const PartHalo::Peer& peer : plan.peers) {
       if (peer.part == part) return &peer;
@@ -60,19 +57,17 @@ TEST_P(Halo, WhatOneSendsTheOtherReceives) {
     return nullptr;
   };
   for (const PartHalo& plan : plans) {
-    for (int r = 0; r < 2; ++r) {
-      std::vector<Index> received;
-      for (const PartHalo::Peer& peer : plan.peers) {
-        EXPECT_NE(peer.part, plan.part);
-        const PartHalo::Peer* other = peer_of(plans[peer.part], plan.part);
-        ASSERT_NE(other, nullptr);
-        EXPECT_EQ(peer.receive[r], other->send[r]);
-        for (const Index v : peer.receive[r]) EXPECT_EQ(part_of[v], peer.part);
-        received.insert(received.end(), peer.receive[r].begin(), peer.receive[r].end());
-      }
-      std::sort(received.begin(), received.end());
-      EXPECT_EQ(received, plan.rings[r]);  // every ghost once
+    std::vector<Index> received;
+    for (const PartHalo::Peer& peer : plan.peers) {
+      EXPECT_NE(peer.part, plan.part);
+      const PartHalo::Peer* other = peer_of(plans[peer.part], plan.part);
+      ASSERT_NE(other, nullptr);
+      EXPECT_EQ(peer.receive, other->send);
+      for (const Index v : peer.receive) EXPECT_EQ(part_of[v], peer.part);
+      received.insert(received.end(), peer.receive.begin(), peer.receive.end());
     }
+    std::sort(received.begin(), received.end());
+    EXPECT_EQ(received, plan.ghosts);  // every ghost once
   }
 }
 
@@ -87,7 +82,7 @@ std::vector<std::int64_t> gathered(const Graph& graph, const std::vector<std::in
   return sums;
 }
 
-TEST_P(Halo, EitherDesignGivesEveryPartWhatTheWholeHas) {
+TEST_P(Halo, EveryPartGetsWhatTheWholeHas) {
   const Graph graph = phyxel_graph(GetParam().make());
   constexpr int parts = 5;
   const std::vector<int> part_of = make_partition(graph, parts, Partitioner::metis);
@@ -101,29 +96,19 @@ TEST_P(Halo, EitherDesignGivesEveryPartWhatTheWholeHas) {
   const std::vector<std::int64_t> q = gathered(graph, u, all), f = gathered(graph, q, all);
 
   constexpr std::int64_t unknown = -1'000'000'000;
-  for (const int rings : {1, 2}) {
-    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, rings)) {
-      // A part knows its own values and those it receives, no others.
-      std::vector<std::int64_t> own_u(n, unknown);
-      std::vector<Index> first_rows = plan.owned;
-      for (const Index v : plan.owned) own_u[v] = u[v];
-      for (const PartHalo::Peer& peer : plan.peers) {
-        for (const auto& ring : peer.receive) {
-          for (const Index v : ring) own_u[v] = u[v];
-        }
-      }
-      if (rings == 2) {  // the first ring's, computed again
-        first_rows.insert(first_rows.end(), plan.rings[0].begin(), plan.rings[0].end());
-      }
-      std::vector<std::int64_t> own_q = gathered(graph, own_u, first_rows);
-      if (rings == 1) {  // the first ring's, received
-        for (const PartHalo::Peer& peer : plan.peers) {
-          for (const Index v : peer.receive[0]) own_q[v] = q[v];
-        }
-      }
-      const std::vector<std::int64_t> own_f = gathered(graph, own_q, plan.owned);
-      for (const Index v : plan.owned) EXPECT_EQ(own_f[v], f[v]);
+  for (const PartHalo& plan : make_part_halos(graph, part_of, parts)) {
+    // A part knows its own values and those it receives, no others.
+    std::vector<std::int64_t> own_u(n, unknown);
+    for (const Index v : plan.owned) own_u[v] = u[v];
+    for (const PartHalo::Peer& peer : plan.peers) {
+      for (const Index v : peer.receive) own_u[v] = u[v];
     }
+    std::vector<std::int64_t> own_q = gathered(graph, own_u, plan.owned);
+    for (const PartHalo::Peer& peer : plan.peers) {
+      for (const Index v : peer.receive) own_q[v] = q[v];
+    }
+    const std::vector<std::int64_t> own_f = gathered(graph, own_q, plan.owned);
+    for (const Index v : plan.owned) EXPECT_EQ(own_f[v], f[v]);
   }
 }
 

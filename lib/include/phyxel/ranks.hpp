@@ -75,12 +75,12 @@ class Ranks {
   /// Does the work of this rank, which must not communicate; then all agree how it went.
   /// @throws Error on every rank if it threw on any, with the message and the exit code of the
   ///   first rank that failed; what it threw, if there is one rank
-  void together(const std::function<void()>& work) const;
-  /// `make()`, which must not communicate, on every rank. @throws Error as `together`
+  void collectively(const std::function<void()>& work) const;
+  /// `make()`, which must not communicate, on every rank. @throws Error as `collectively`
   template <class Make>
   auto agreed(Make&& make) const {
     std::optional<decltype(make())> made;
-    together([&] { made.emplace(make()); });
+    collectively([&] { made.emplace(make()); });
     return std::move(*made);
   }
 

@@ -10,19 +10,16 @@
 
 namespace phyxel {
 
-/// What a share knows of the whole. Of each body it has the phyxels that it owns, then ghosts whose
-/// stresses are found here, too, then ghosts whose stresses are not (see `Part`).
+/// What a rank's share knows of the whole model. Of each body it has the phyxels that it owns, then
+/// its ghosts (see `Part`), whose displacements and stresses come from their owners.
 struct Share {
-  Index whole = 0;            ///< Phyxels of the whole model.
-  std::vector<Index> number;  ///< Which of them each phyxel is, shape [n].
-  std::vector<char> owned;    ///< Whether each is no ghost, shape [n].
+  Index global_count = 0;        ///< Phyxels of the whole model.
+  std::vector<Index> global_id;  ///< Index of each phyxel in the whole model, shape [n].
+  std::vector<char> owned;       ///< False for ghosts, shape [n].
   /// Where each is in the whole model's tiles (`Tiling::place`), shape [n]; empty: no GPU steps
   /// this.
   std::vector<Index> place;
-  std::vector<Index> surfel_number;  ///< Which of the whole model's surfels each surfel is.
-  /// 1: ghosts' stresses come from their owners. 2: displacements of two rings of ghosts do, and
-  /// the inner ring's stresses are found twice.
-  int rings = 1;
+  std::vector<Index> global_surfel_id;  ///< Index of each surfel in the whole model.
   const Communicator* communicator =
       nullptr;  ///< Of all ranks that share the model; outlives this.
   std::shared_ptr<const HaloPlan> halo;

@@ -200,7 +200,7 @@ TEST(Stiffening, BoundsTheFastestModeOfAStretchedBlock) {
       if (is > 1) {
         EXPECT_GE(is, found.ratio / 2) << stretch.x << " " << stretch.y;
       }
-      // Stretches come from an arc cosine, good to 1e-8 where two of them are the same.
+      // ChunkedSource come from an arc cosine, good to 1e-8 where two of them are the same.
       EXPECT_NEAR(found.stretch, std::max(stretch.x, stretch.z), 1e-8);
     }
   }

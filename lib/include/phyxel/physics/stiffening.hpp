@@ -21,7 +21,8 @@ struct PrincipalStretches {
   Real largest, middle, smallest;
 };
 
-/// @param grad_u ∇u = F - I. Stretches are found from Green's strain, so that small strains keep
+/// @param grad_u ∇u = F - I. ChunkedSource are found from Green's strain, so that small strains
+/// keep
 ///   their digits.
 template <class Real>
 PHYXEL_HD PrincipalStretches<Real> principal_stretches(const Mat3<Real>& grad_u) {
