@@ -14,7 +14,7 @@ bool launched_as_rank() {
   return false;
 }
 
-void Communicator::together(const std::function<void()>& work) const {
+void MpiCommunicator::collectively(const std::function<void()>& work) const {
   if (size_ == 1) {
     work();
     return;

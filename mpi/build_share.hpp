@@ -14,11 +14,10 @@ class ShareSurveyor;
 struct ShareOptions {
   std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
                                       Partitioner::metis};
-  int rings = 1;  ///< See `Share`.
   /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
   /// tile. 0: none need to.
   int tile = 0;
-  /// Who searches, if no lists shall be made on the host; one ring of ghosts only. Null: the host.
+  /// Who searches, if no lists shall be made on the host; null: the host.
   const ShareSurveyor* surveyor = nullptr;
   /// What is partitioned are single phyxels, if there are no more than these, or else groups along
   /// the curve.
@@ -40,9 +39,10 @@ struct BuiltShare {
 /// Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to their
 /// owners, which ask the others for what is around. Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
-BuiltShare build_share(const Communicator& ranks, const Scene& scene, const ShareOptions& options);
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
+                       const ShareOptions& options);
 /// The same from clouds in place, one for each body, which every rank has whole.
-BuiltShare build_share(const Communicator& ranks, const Scene& scene,
+BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options);
 
 }  // namespace phyxel

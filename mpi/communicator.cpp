@@ -11,12 +11,11 @@
 #include <numeric>
 
 #include "mpi/copy_bytes.hpp"
-#include "mpi/pulse.hpp"
+#include "mpi/heartbeat.hpp"
+#include "mpi/native.hpp"
 
 namespace phyxel {
-namespace {
 
-/// @throws Error naming the call
 void check_mpi(int code, const char* call) {
   if (code == MPI_SUCCESS) return;
   char text[MPI_MAX_ERROR_STRING] = "";
@@ -24,17 +23,18 @@ void check_mpi(int code, const char* call) {
   MPI_Error_string(code, text, &length);
   throw Error(ExitCode::bad_input, fmt::format("MPI: {} failed: {}", call, text));
 }
-#define PHYXEL_MPI_CALL(call) check_mpi(call, #call)
+
+namespace {
 
 /// Counts of MPI are ints, and some networks fail above: larger messages go in pieces.
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 
 template <class T>
-T reduced(int ranks, T value, MPI_Datatype type, MPI_Op operation) {
-  if (ranks == 1) return value;
+T reduced(const MpiCommunicator& ranks, T value, MPI_Datatype type, MPI_Op operation) {
+  if (ranks.size() == 1) return value;
   T result{};
   const Waiting waiting;
-  PHYXEL_MPI_CALL(MPI_Allreduce(&value, &result, 1, type, operation, MPI_COMM_WORLD));
+  PHYXEL_MPI_CALL(MPI_Allreduce(&value, &result, 1, type, operation, ranks.native()->all));
   return result;
 }
 
@@ -45,72 +45,147 @@ void in_pieces(std::size_t bytes, Call&& call) {
   }
 }
 
+/// MPI is called by one thread, beside which others run: OpenMP's, and the writer's.
+constexpr int needed_level = MPI_THREAD_FUNNELED;
+
+const char* name_of_level(int level) {
+  switch (level) {
+    case MPI_THREAD_SINGLE:
+      return "MPI_THREAD_SINGLE";
+    case MPI_THREAD_FUNNELED:
+      return "MPI_THREAD_FUNNELED";
+    case MPI_THREAD_SERIALIZED:
+      return "MPI_THREAD_SERIALIZED";
+    default:
+      return "MPI_THREAD_MULTIPLE";
+  }
+}
+
+/// @throws Error naming the level that MPI runs with and the one that is needed
+void check_threads() {
+  int level = 0, is_main = 0;
+  PHYXEL_MPI_CALL(MPI_Query_thread(&level));
+  if (level < needed_level) {
+    throw Error(ExitCode::bad_input,
+                fmt::format("MPI runs with the thread level {}: needed is {} or a higher one, by "
+                            "MPI_Init_thread",
+                            name_of_level(level), name_of_level(needed_level)));
+  }
+  PHYXEL_MPI_CALL(MPI_Is_thread_main(&is_main));
+  if (level < MPI_THREAD_SERIALIZED && !is_main) {
+    throw Error(ExitCode::bad_input,
+                fmt::format("MPI runs with the thread level {}: allowed is the thread that has "
+                            "started MPI, and no other",
+                            name_of_level(level)));
+  }
+}
+
+/// The caller's communicator, duplicated. Errors of the duplicate, and of no other communicator,
+/// come back as return values.
+MPI_Comm duplicate_of(MPI_Comm callers) {
+  MPI_Comm own = MPI_COMM_NULL;
+  PHYXEL_MPI_CALL(MPI_Comm_dup(callers, &own));
+  PHYXEL_MPI_CALL(MPI_Comm_set_errhandler(own, MPI_ERRORS_RETURN));
+  return own;
+}
+
 }  // namespace
 
-Communicator::Communicator(int& argc, char**& argv) {
+MpiCommunicator::MpiCommunicator(int& argc, char**& argv) : native_(std::make_shared<Native>()) {
   int running = 0, level = 0;
   MPI_Initialized(&running);
   if (!running) {
-    // The writer's thread uses no MPI.
-    PHYXEL_MPI_CALL(MPI_Init_thread(&argc, &argv, MPI_THREAD_FUNNELED, &level));
-    started_here_ = true;
+    PHYXEL_MPI_CALL(MPI_Init_thread(&argc, &argv, needed_level, &level));
+    native_->started_here = true;
   }
-  MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN);
-  PHYXEL_MPI_CALL(MPI_Comm_rank(MPI_COMM_WORLD, &rank_));
-  PHYXEL_MPI_CALL(MPI_Comm_size(MPI_COMM_WORLD, &size_));
+  check_threads();
+  native_->all = duplicate_of(MPI_COMM_WORLD);
+  describe_hosts();
+}
+
+MpiCommunicator::MpiCommunicator(CommunicatorHandle callers) : native_(std::make_shared<Native>()) {
+  int running = 0;
+  MPI_Initialized(&running);
+  if (!running) {
+    throw Error(ExitCode::bad_input,
+                "a communicator was given, but MPI does not run: allowed is one of a program that "
+                "has called MPI_Init_thread");
+  }
+  check_threads();
+  const MPI_Comm all = MPI_Comm_f2c(callers.fortran);
+  if (all == MPI_COMM_NULL) {
+    throw Error(ExitCode::bad_input,
+                "MPI_COMM_NULL was given: allowed are communicators that this rank belongs to");
+  }
+  native_->all = duplicate_of(all);
+  describe_hosts();
+}
+
+void MpiCommunicator::describe_hosts() {
+  MPI_Comm const all = native_->all;
+  PHYXEL_MPI_CALL(MPI_Comm_rank(all, &rank_));
+  PHYXEL_MPI_CALL(MPI_Comm_size(all, &size_));
   MPI_Comm host = MPI_COMM_NULL;
-  PHYXEL_MPI_CALL(
-      MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host));
+  PHYXEL_MPI_CALL(MPI_Comm_split_type(all, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host));
   PHYXEL_MPI_CALL(MPI_Comm_rank(host, &host_rank_));
   PHYXEL_MPI_CALL(MPI_Comm_size(host, &host_size_));
   int first = rank_;  // of this host
   PHYXEL_MPI_CALL(MPI_Bcast(&first, 1, MPI_INT, 0, host));
   hosts_.resize(static_cast<std::size_t>(size_));
-  PHYXEL_MPI_CALL(MPI_Allgather(&first, 1, MPI_INT, hosts_.data(), 1, MPI_INT, MPI_COMM_WORLD));
+  PHYXEL_MPI_CALL(MPI_Allgather(&first, 1, MPI_INT, hosts_.data(), 1, MPI_INT, all));
   MPI_Comm_free(&host);
 }
 
-Communicator::~Communicator() {
-  if (started_here_) MPI_Finalize();
+MpiCommunicator::~MpiCommunicator() = default;
+
+void MpiCommunicator::close() {
+  if (!native_ || native_->all == MPI_COMM_NULL) return;
+  for (Native::Left& left : native_->left) {
+    PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(left.requests.size()), left.requests.data(),
+                                MPI_STATUSES_IGNORE));
+  }
+  native_->left.clear();
+  PHYXEL_MPI_CALL(MPI_Comm_free(&native_->all));
+  if (native_->started_here) MPI_Finalize();
 }
 
-void Communicator::barrier() const {
+void MpiCommunicator::barrier() const {
   const Waiting waiting;
-  if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(MPI_COMM_WORLD));
+  if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(native_->all));
 }
 
 // MPI may add in any order; a sum of numbers that were gathered has one.
-double Communicator::sum(double value) const {
+double MpiCommunicator::sum(double value) const {
   const std::vector<double> all = gathered(std::span<const double>(&value, 1));
   return std::accumulate(all.begin(), all.end(), 0.0);
 }
-std::int64_t Communicator::sum(std::int64_t value) const {
-  return reduced(size_, value, MPI_INT64_T, MPI_SUM);
+std::int64_t MpiCommunicator::sum(std::int64_t value) const {
+  return reduced(*this, value, MPI_INT64_T, MPI_SUM);
 }
-double Communicator::largest(double value) const {
-  return reduced(size_, value, MPI_DOUBLE, MPI_MAX);
+double MpiCommunicator::largest(double value) const {
+  return reduced(*this, value, MPI_DOUBLE, MPI_MAX);
 }
-std::int64_t Communicator::largest(std::int64_t value) const {
-  return reduced(size_, value, MPI_INT64_T, MPI_MAX);
+std::int64_t MpiCommunicator::largest(std::int64_t value) const {
+  return reduced(*this, value, MPI_INT64_T, MPI_MAX);
 }
-double Communicator::smallest(double value) const {
-  return reduced(size_, value, MPI_DOUBLE, MPI_MIN);
+double MpiCommunicator::smallest(double value) const {
+  return reduced(*this, value, MPI_DOUBLE, MPI_MIN);
 }
-std::int64_t Communicator::smallest(std::int64_t value) const {
-  return reduced(size_, value, MPI_INT64_T, MPI_MIN);
+std::int64_t MpiCommunicator::smallest(std::int64_t value) const {
+  return reduced(*this, value, MPI_INT64_T, MPI_MIN);
 }
 
-void Communicator::add(std::span<std::int64_t> values) const {
+void MpiCommunicator::add(std::span<std::int64_t> values) const {
   if (size_ == 1) return;
   const Waiting waiting;
   PHYXEL_MPI_CALL(MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()),
-                                MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD));
+                                MPI_INT64_T, MPI_SUM, native_->all));
 }
 
-std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
+std::vector<std::byte> MpiCommunicator::gathered_bytes(std::span<const std::byte> bytes) const {
   const auto ranks = static_cast<std::size_t>(size_);
   const auto size = static_cast<std::int64_t>(bytes.size());
-  const std::vector<std::int64_t> sizes = told(std::vector<std::int64_t>(ranks, size));
+  const std::vector<std::int64_t> sizes = alltoall(std::vector<std::int64_t>(ranks, size));
   std::vector<std::byte> all(
       static_cast<std::size_t>(std::accumulate(sizes.begin(), sizes.end(), std::int64_t{0})));
   std::vector<std::span<std::byte>> from_each;
@@ -123,39 +198,41 @@ std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> b
   return all;
 }
 
-void Communicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
+void MpiCommunicator::broadcast_bytes(std::span<std::byte> bytes, int from) const {
   if (size_ == 1) return;
   const Waiting waiting;
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
-    PHYXEL_MPI_CALL(MPI_Bcast(bytes.data() + at, count, MPI_BYTE, from, MPI_COMM_WORLD));
+    PHYXEL_MPI_CALL(MPI_Bcast(bytes.data() + at, count, MPI_BYTE, from, native_->all));
   });
 }
 
-std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& numbers) const {
+std::vector<std::int64_t> MpiCommunicator::alltoall(
+    const std::vector<std::int64_t>& numbers) const {
   if (size_ == 1) return numbers;
   const Waiting waiting;
   std::vector<std::int64_t> from_each(numbers.size());
-  PHYXEL_MPI_CALL(MPI_Alltoall(numbers.data(), 1, MPI_INT64_T, from_each.data(), 1, MPI_INT64_T,
-                               MPI_COMM_WORLD));
+  PHYXEL_MPI_CALL(
+      MPI_Alltoall(numbers.data(), 1, MPI_INT64_T, from_each.data(), 1, MPI_INT64_T, native_->all));
   return from_each;
 }
 
-void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
-                            const std::vector<std::span<std::byte>>& receive) const {
+void MpiCommunicator::exchange(const std::vector<std::span<const std::byte>>& send,
+                               const std::vector<std::span<std::byte>>& receive) const {
+  constexpr int alltoallv_tag = static_cast<int>(Tag::alltoallv);
   const Waiting waiting;
   std::vector<MPI_Request> requests;
   for (int r = 0; r < size_; ++r) {
     if (r == rank_) continue;
     in_pieces(receive.at(r).size(), [&](std::size_t at, int count) {
-      PHYXEL_MPI_CALL(MPI_Irecv(receive[r].data() + at, count, MPI_BYTE, r, 0, MPI_COMM_WORLD,
-                                &requests.emplace_back()));
+      PHYXEL_MPI_CALL(MPI_Irecv(receive[r].data() + at, count, MPI_BYTE, r, alltoallv_tag,
+                                native_->all, &requests.emplace_back()));
     });
   }
   for (int r = 0; r < size_; ++r) {
     if (r == rank_) continue;
     in_pieces(send.at(r).size(), [&](std::size_t at, int count) {
-      PHYXEL_MPI_CALL(MPI_Isend(send[r].data() + at, count, MPI_BYTE, r, 0, MPI_COMM_WORLD,
-                                &requests.emplace_back()));
+      PHYXEL_MPI_CALL(MPI_Isend(send[r].data() + at, count, MPI_BYTE, r, alltoallv_tag,
+                                native_->all, &requests.emplace_back()));
     });
   }
   copy_bytes(send.at(rank_), receive.at(rank_));
@@ -166,29 +243,40 @@ void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
 
 struct Transfers::Requests {
   std::vector<MPI_Request> list;
+  std::shared_ptr<void> memory;
 };
-Transfers::Transfers() : requests_(std::make_unique<Requests>()) {}
-Transfers::~Transfers() = default;
-
-namespace {
-constexpr int transfer_tag = 1;  // `exchanged` has 0
+Transfers::Transfers(const MpiCommunicator& ranks, Tag tag)
+    : native_(ranks.native()), tag_(tag), requests_(std::make_unique<Requests>()) {}
+Transfers::~Transfers() {
+  if (requests_->list.empty()) return;
+  native_->left.push_back({std::move(requests_->list), std::move(requests_->memory)});
 }
 
 void Transfers::receive(int from, std::span<std::byte> bytes) {
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
-    PHYXEL_MPI_CALL(MPI_Irecv(bytes.data() + at, count, MPI_BYTE, from, transfer_tag,
-                              MPI_COMM_WORLD, &requests_->list.emplace_back()));
+    PHYXEL_MPI_CALL(MPI_Irecv(bytes.data() + at, count, MPI_BYTE, from, static_cast<int>(tag_),
+                              native_->all, &requests_->list.emplace_back()));
   });
 }
 void Transfers::send(int to, std::span<const std::byte> bytes) {
   in_pieces(bytes.size(), [&](std::size_t at, int count) {
-    PHYXEL_MPI_CALL(MPI_Isend(bytes.data() + at, count, MPI_BYTE, to, transfer_tag, MPI_COMM_WORLD,
-                              &requests_->list.emplace_back()));
+    PHYXEL_MPI_CALL(MPI_Isend(bytes.data() + at, count, MPI_BYTE, to, static_cast<int>(tag_),
+                              native_->all, &requests_->list.emplace_back()));
   });
 }
-void Transfers::wait() {
-  const Waiting waiting;
+void Transfers::keep(std::shared_ptr<void> memory) { requests_->memory = std::move(memory); }
+void Transfers::progress() {
   std::vector<MPI_Request>& list = requests_->list;
+  int done = 0;
+  if (list.empty()) return;
+  PHYXEL_MPI_CALL(
+      MPI_Testall(static_cast<int>(list.size()), list.data(), &done, MPI_STATUSES_IGNORE));
+  if (done) list.clear();
+}
+void Transfers::wait() {
+  std::vector<MPI_Request>& list = requests_->list;
+  if (list.empty()) return;
+  const Waiting waiting;
   PHYXEL_MPI_CALL(MPI_Waitall(static_cast<int>(list.size()), list.data(), MPI_STATUSES_IGNORE));
   list.clear();
 }
@@ -213,8 +301,8 @@ std::string mpi_description() {
   return name;
 }
 
-void Communicator::abort(ExitCode code) const {
-  if (size_ > 1) MPI_Abort(MPI_COMM_WORLD, static_cast<int>(code));
+void MpiCommunicator::abort(ExitCode code) const {
+  if (size_ > 1) MPI_Abort(native_->all, static_cast<int>(code));
   std::_Exit(static_cast<int>(code));
 }
 

@@ -7,7 +7,8 @@
 
 #include <algorithm>
 
-#include "mpi/pulse.hpp"
+#include "mpi/heartbeat.hpp"
+#include "mpi/native.hpp"
 
 namespace phyxel {
 namespace {
@@ -15,11 +16,11 @@ namespace {
 /// One that all ranks have open. It is not closed by itself: after an error that would hang.
 class SharedFile {
  public:
-  SharedFile(const Communicator& ranks, const std::string& file, const std::string& path)
+  SharedFile(const MpiCommunicator& ranks, const std::string& file, const std::string& path)
       : ranks_(ranks), name_(file), path_(path) {
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    H5Pset_fapl_mpio(access, MPI_COMM_WORLD, MPI_INFO_NULL);
+    H5Pset_fapl_mpio(access, ranks.native()->all, MPI_INFO_NULL);
     H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
     H5Pset_all_coll_metadata_ops(access, true);
     H5Pset_coll_metadata_write(access, true);
@@ -33,8 +34,7 @@ class SharedFile {
   }
 
   template <class T>
-  void write(hid_t type, std::size_t width, StretchExchange::Stretch rows,
-             const std::vector<double>& values) {
+  void write(hid_t type, std::size_t width, RowRange rows, const std::vector<double>& values) {
     const std::vector<T> stored(values.begin(), values.end());
     const int dimensions = width > 1 ? 2 : 1;
     const hsize_t start[2] = {static_cast<hsize_t>(rows.begin), 0};
@@ -68,19 +68,19 @@ class SharedFile {
     ranks_.barrier();  // until the first rank ends all
   }
 
-  const Communicator& ranks_;
+  const MpiCommunicator& ranks_;
   std::string name_, path_;
   hid_t file_ = -1, array_ = -1, transfer_ = -1;
 };
 
 }  // namespace
 
-bool can_write_together() { return H5open() >= 0; }
+bool can_write_collectively() { return H5open() >= 0; }
 
-void write_together(const Communicator& ranks, const std::string& file, const FileArray& array,
-                    Index length, const RowsOf& rows) {
+void write_collectively(const MpiCommunicator& ranks, const std::string& file,
+                        const FileArray& array, Index length, const RowsOf& rows) {
   // Or else HDF5 would hang: a rank that cannot open it leaves the others waiting.
-  ranks.together([&] {
+  ranks.collectively([&] {
     if (::access(file.c_str(), R_OK | W_OK) == 0) return;
     throw OutputError(fmt::format(
         "{}: cannot be opened by all ranks: allowed are folders on a file system that all see",
@@ -88,14 +88,14 @@ void write_together(const Communicator& ranks, const std::string& file, const Fi
   });
   SharedFile out(ranks, file, array.path);
   const std::size_t width = width_of(array.terms[0]);
-  std::vector<StretchExchange::Stretch> of_ranks(static_cast<std::size_t>(ranks.size()));
+  std::vector<RowRange> of_ranks(static_cast<std::size_t>(ranks.size()));
   for (std::int64_t at = 0; at < array.count;) {
-    for (StretchExchange::Stretch& stretch : of_ranks) {
-      stretch.begin = static_cast<Index>(at);
-      stretch.end = static_cast<Index>(at = std::min<std::int64_t>(array.count, at + length));
+    for (RowRange& rows_of : of_ranks) {
+      rows_of.begin = static_cast<Index>(at);
+      rows_of.end = static_cast<Index>(at = std::min<std::int64_t>(array.count, at + length));
     }
     const std::vector<double> values = rows(of_ranks);
-    const StretchExchange::Stretch own = of_ranks[static_cast<std::size_t>(ranks.rank())];
+    const RowRange own = of_ranks[static_cast<std::size_t>(ranks.rank())];
     const Waiting waiting;
     if (array.as_float) {
       out.write<float>(H5T_NATIVE_FLOAT, width, own, values);

@@ -14,17 +14,22 @@ namespace phyxel {
 class Watchdog {
  public:
   /// Collective. @param limit how long is long [s]; 0: nobody looks
-  Watchdog(const Communicator& ranks, double limit);
+  Watchdog(const MpiCommunicator& ranks, double limit);
+  /// Local: this rank is no longer watched. MPI keeps the shared memory until it ends, unless
+  /// `close` has released it.
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
+
+  /// Ends the watch and releases the memory that ranks share. Collective.
+  void close();
 
   /// This rank is alive, and has come to this step.
   void beat(std::int64_t step) const;
 
  private:
-  struct Kennel;
-  std::unique_ptr<Kennel> kennel_;
+  struct SharedHeartbeats;
+  std::unique_ptr<SharedHeartbeats> heartbeats_;
 };
 
 }  // namespace phyxel

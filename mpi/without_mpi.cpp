@@ -7,7 +7,7 @@
 
 namespace phyxel {
 
-Communicator::Communicator(int&, char**&) {
+MpiCommunicator::MpiCommunicator(int&, char**&) {
   const auto above = [](const char* variable, int limit) {
     const char* number = std::getenv(variable);
     return number && std::atoi(number) > limit;
@@ -19,45 +19,54 @@ Communicator::Communicator(int&, char**&) {
     throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
   }
 }
-Communicator::~Communicator() = default;
+MpiCommunicator::MpiCommunicator(CommunicatorHandle) {
+  throw Error(ExitCode::bad_input,
+              "a communicator was given, but this program was built without MPI");
+}
+MpiCommunicator::~MpiCommunicator() = default;
+void MpiCommunicator::close() {}
 
-void Communicator::barrier() const {}
-double Communicator::sum(double value) const { return value; }
-std::int64_t Communicator::sum(std::int64_t value) const { return value; }
-double Communicator::largest(double value) const { return value; }
-std::int64_t Communicator::largest(std::int64_t value) const { return value; }
-double Communicator::smallest(double value) const { return value; }
-std::int64_t Communicator::smallest(std::int64_t value) const { return value; }
+void MpiCommunicator::barrier() const {}
+double MpiCommunicator::sum(double value) const { return value; }
+std::int64_t MpiCommunicator::sum(std::int64_t value) const { return value; }
+double MpiCommunicator::largest(double value) const { return value; }
+std::int64_t MpiCommunicator::largest(std::int64_t value) const { return value; }
+double MpiCommunicator::smallest(double value) const { return value; }
+std::int64_t MpiCommunicator::smallest(std::int64_t value) const { return value; }
 
-void Communicator::add(std::span<std::int64_t>) const {}
+void MpiCommunicator::add(std::span<std::int64_t>) const {}
 
-std::vector<std::byte> Communicator::gathered_bytes(std::span<const std::byte> bytes) const {
+std::vector<std::byte> MpiCommunicator::gathered_bytes(std::span<const std::byte> bytes) const {
   return {bytes.begin(), bytes.end()};
 }
-void Communicator::broadcast_bytes(std::span<std::byte>, int) const {}
-std::vector<std::int64_t> Communicator::told(const std::vector<std::int64_t>& numbers) const {
+void MpiCommunicator::broadcast_bytes(std::span<std::byte>, int) const {}
+std::vector<std::int64_t> MpiCommunicator::alltoall(
+    const std::vector<std::int64_t>& numbers) const {
   return numbers;
 }
-void Communicator::exchange(const std::vector<std::span<const std::byte>>& send,
-                            const std::vector<std::span<std::byte>>& receive) const {
+void MpiCommunicator::exchange(const std::vector<std::span<const std::byte>>& send,
+                               const std::vector<std::span<std::byte>>& receive) const {
   copy_bytes(send.at(0), receive.at(0));
 }
 
 struct Transfers::Requests {};
-Transfers::Transfers() = default;
+Transfers::Transfers(const MpiCommunicator&, Tag tag) : tag_(tag) {}  // there is nobody
 Transfers::~Transfers() = default;
-void Transfers::receive(int, std::span<std::byte>) {}  // there is nobody
+void Transfers::receive(int, std::span<std::byte>) {}
 void Transfers::send(int, std::span<const std::byte>) {}
+void Transfers::keep(std::shared_ptr<void>) {}
+void Transfers::progress() {}
 void Transfers::wait() {}
 
 bool mpi_takes_device_memory() { return false; }
 std::string mpi_description() { return "none: this program was built without it"; }
 
-struct Watchdog::Kennel {};
-Watchdog::Watchdog(const Communicator&, double) {}  // there is nobody
+struct Watchdog::SharedHeartbeats {};
+Watchdog::Watchdog(const MpiCommunicator&, double) {}  // there is nobody
 Watchdog::~Watchdog() = default;
+void Watchdog::close() {}
 void Watchdog::beat(std::int64_t) const {}
 
-void Communicator::abort(ExitCode code) const { std::_Exit(static_cast<int>(code)); }
+void MpiCommunicator::abort(ExitCode code) const { std::_Exit(static_cast<int>(code)); }
 
 }  // namespace phyxel

@@ -3,10 +3,10 @@
 
 namespace phyxel {
 
-bool can_write_together() { return false; }
+bool can_write_collectively() { return false; }
 
-void write_together(const Communicator&, const std::string& file, const FileArray&, Index,
-                    const RowsOf&) {
+void write_collectively(const MpiCommunicator&, const std::string& file, const FileArray&, Index,
+                        const RowsOf&) {
   throw OutputError(file + ": this program was built without parallel HDF5");
 }
 

@@ -9,27 +9,24 @@ namespace phyxel {
 namespace {
 
 /// What kind a phyxel is for a part, in the order in which each body has them.
-enum Kind : char { absent, owned, near_ghost, far_ghost };
+enum Kind : char { absent, owned, ghost };
 
 class Maker {
  public:
-  Maker(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of)
+  Maker(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of)
       : whole_(whole),
         part_of_(part_of),
         has_lists_(whole.has_lists()),
         kind_(static_cast<std::size_t>(whole.size()), absent),
         here_(kind_.size(), -1) {
-    out_.share.whole = whole.size();
-    out_.share.rings = static_cast<int>(plan.rings.size());
+    out_.share.global_count = whole.size();
     mark(plan.owned, owned);
-    for (std::size_t r = 0; r < plan.rings.size(); ++r) {
-      mark(plan.rings[r], r + 1 == plan.rings.size() ? far_ghost : near_ghost);
-    }
+    mark(plan.ghosts, ghost);
     for (Index s = 0; s < static_cast<Index>(whole.surfels.position.size()); ++s) {
       if (!has_surfel(s)) continue;
-      out_.share.surfel_number.push_back(s);
+      out_.share.global_surfel_id.push_back(s);
       for (const Index i : whole.surfels.carriers.row(s)) {
-        if (kind_[i] == absent) kind_[i] = far_ghost;
+        if (kind_[i] == absent) kind_[i] = ghost;
       }
     }
   }
@@ -69,26 +66,25 @@ class Maker {
     for (std::size_t k = 0; k < phyxels.size(); ++k) kind_[phyxels[k]] = kind;
   }
   bool has_surfel(Index s) const { return kind_[whole_.surfels.carriers.row(s).front()] == owned; }
-  Index present() const { return static_cast<Index>(out_.share.number.size()); }
+  Index present() const { return static_cast<Index>(out_.share.global_id.size()); }
 
   void add_part(const Part& part) {
     Part own = part;
     own.begin = present();
-    Index count[far_ghost + 1] = {};
-    for (const Kind kind : {owned, near_ghost, far_ghost}) {
+    Index count[ghost + 1] = {};
+    for (const Kind kind : {owned, ghost}) {
       const Index first = present();
       const std::vector<Index> found =
           chosen(part.begin, part.end, [&](Index i) { return kind_[i] == kind; });
       count[kind] = static_cast<Index>(found.size());
 #pragma omp parallel for schedule(static)
       for (Index k = 0; k < count[kind]; ++k) here_[found[k]] = first + k;
-      out_.share.number.insert(out_.share.number.end(), found.begin(), found.end());
+      out_.share.global_id.insert(out_.share.global_id.end(), found.begin(), found.end());
       out_.share.owned.insert(out_.share.owned.end(), found.size(), kind == owned);
     }
     own.end = present();
-    own.far_ghosts = count[far_ghost];
-    own.ghosts = count[near_ghost] + count[far_ghost];
-    const std::vector<Index>& surfels = out_.share.surfel_number;
+    own.ghosts = count[ghost];
+    const std::vector<Index>& surfels = out_.share.global_surfel_id;
     const auto before = [&](Index end) {
       return static_cast<Index>(std::lower_bound(surfels.begin(), surfels.end(), end) -
                                 surfels.begin());
@@ -101,7 +97,7 @@ class Maker {
   /// Of each phyxel that is here, what the whole has of it.
   template <class T>
   std::vector<T> own_of(const std::vector<T>& whole) const {
-    const std::vector<Index>& number = out_.share.number;
+    const std::vector<Index>& number = out_.share.global_id;
     return tabulated(number.size(), [&](std::size_t k) { return whole[number[k]]; });
   }
   void add_phyxels() {
@@ -115,8 +111,8 @@ class Maker {
     if (!has_lists_) return;
     m.inverse_moment = own_of(whole_.inverse_moment);
     m.moment_offset = own_of(whole_.moment_offset);
-    for (const Index i : out_.share.number) {
-      add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, kind_[i] != far_ghost);
+    for (const Index i : out_.share.global_id) {
+      add_row(hood.neighbours, whole_.neighbourhood.neighbours, i, kind_[i] == owned);
       if (!hood.symmetric) {
         add_row(hood.inverse_lists, whole_.neighbourhood.inverse_lists, i, kind_[i] == owned);
       }
@@ -132,7 +128,7 @@ class Maker {
   void add_surfels() {
     Surfels& surfels = out_.model.surfels;
     surfels.unreached = whole_.surfels.unreached;
-    for (const Index s : out_.share.surfel_number) {
+    for (const Index s : out_.share.global_surfel_id) {
       surfels.position.push_back(whole_.surfels.position[s]);
       surfels.normal.push_back(whole_.surfels.normal[s]);
       add_row(surfels.carriers, whole_.surfels.carriers, s, true);
@@ -149,7 +145,7 @@ class Maker {
 
 }  // namespace
 
-ModelShare share_of(const Model& whole, const HaloPlan& plan, const std::vector<int>& part_of) {
+ModelShare share_of(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of) {
   if (!whole.closing.empty()) {
     throw InputError(
         "shares of a model with closed gradients are not made: allowed is closure = 0");

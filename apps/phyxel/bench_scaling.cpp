@@ -28,7 +28,6 @@ struct Options {
   std::vector<Index> sizes{8000, 50653, 195112};
   std::vector<std::string> partitioners = partitioner_names();
   std::vector<std::string> precisions{"float"};
-  std::vector<int> rings{1, 2};
   double seconds = 1;
   int repeats = 5;
   TableOptions table;
@@ -136,7 +135,7 @@ Measured measure(const SharedModel& ensemble, const Scene& scene, const Model* o
   Stepped shared(ensemble.here(), scene, precision, device, options);
   const double upload = ranks().largest(seconds_since(start));
   std::optional<Stepped> alone;
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (one) alone.emplace(*one, scene_of_one, precision, device, options);
   });
   Repeats together(
@@ -189,19 +188,19 @@ const std::vector<std::string> columns{"ranks",
                                        "host_gb"};
 
 std::vector<std::string> row_of(const SharedModel& ensemble, const std::string& partitioner,
-                                int rings, const std::string& precision, double set_up,
-                                Index phyxels_alone, double host_gb, const Measured& m) {
+                                const std::string& precision, double set_up, Index phyxels_alone,
+                                double host_gb, const Measured& m) {
   const bool alone = ranks().size() == 1;
   const Model& model = ensemble.here();
-  const double n = model.whole_size();
+  const double n = model.global_count();
   const SharedModel::Shares& shares = ensemble.shares();
   std::vector<std::string> row{std::to_string(ranks().size()),
                                "1",
                                alone ? "none" : partitioner,
                                alone ? "none" : ensemble.partitioner(),
-                               alone ? "0" : std::to_string(rings),
+                               alone ? "0" : "1",
                                precision,
-                               std::to_string(model.whole_size()),
+                               std::to_string(model.global_count()),
                                fmt::format("{:.1f}", static_cast<double>(model.pairs()) / n),
                                std::to_string(shares.fewest),
                                std::to_string(shares.most),
@@ -232,40 +231,36 @@ void bench_scaling(const Options& options) {
   Facts facts = device_facts(device);
   if (device.gpu) facts.emplace_back("gpus", std::to_string(gpus_of_ranks(device)));
   std::optional<PrintedTable> table;  // of the first rank
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (leads) table.emplace(options.table, columns, facts, cores);
   });
   for (const Index size : options.sizes) {
     const std::int64_t all = options.weak ? std::int64_t{size} * ranks().size() : size;
-    ranks().together([&] {
+    ranks().collectively([&] {
       if (all <= std::numeric_limits<Index>::max()) return;
       throw InputError(fmt::format("--phyxels {} on {} ranks are {}: allowed are {}", size,
                                    ranks().size(), all, std::numeric_limits<Index>::max()));
     });
     const Scene scene = cube_scene(static_cast<Index>(all)), scene_of_one = cube_scene(size);
     std::optional<Model> one;
-    ranks().together([&] {
+    ranks().collectively([&] {
       if (leads && !alone && !options.without_one) one = build_model(scene_of_one, device);
     });
     for (const std::string& partitioner : options.partitioners) {
-      for (const int rings : options.rings) {
-        if (device.gpu && rings != 1) continue;
-        ranks().barrier();
-        const auto start = Clock::now();
-        const SharedModel ensemble(all_ranks(), scene, device, {partitioner, rings});
-        const double set_up = ranks().largest(seconds_since(start));
-        for (const std::string& precision : options.precisions) {
-          const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,
-                                     precision_option(precision), device, options);
-          // Of the host, so far: if larger bodies come last, of this one.
-          const double host_gb = 1e-9 * ranks().size() * ranks().largest(peak_memory());
-          ranks().together([&] {
-            if (!table) return;
-            table->row(row_of(ensemble, partitioner, rings, precision, set_up,
-                              one ? one->size() : 0, host_gb, m));
-          });
-        }
-        if (alone) break;
+      ranks().barrier();
+      const auto start = Clock::now();
+      const SharedModel ensemble(all_ranks(), scene, device, {partitioner});
+      const double set_up = ranks().largest(seconds_since(start));
+      for (const std::string& precision : options.precisions) {
+        const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,
+                                   precision_option(precision), device, options);
+        // Of the host, so far: if larger bodies come last, of this one.
+        const double host_gb = 1e-9 * ranks().size() * ranks().largest(peak_memory());
+        ranks().collectively([&] {
+          if (!table) return;
+          table->row(
+              row_of(ensemble, partitioner, precision, set_up, one ? one->size() : 0, host_gb, m));
+        });
       }
       if (alone) break;
     }
@@ -291,9 +286,6 @@ void add_bench_scaling(CLI::App& bench) {
   command
       ->add_option("--transport", options->transport, "auto, direct, nccl, mpi, host: between GPUs")
       ->check(CLI::IsMember(transport_names()));
-  command->add_option("--ghost-rings", options->rings, "1, 2; GPUs: 1")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 2));
   command->add_option("--precision", options->precisions, "float, double, mixed")
       ->delimiter(',')
       ->check(CLI::IsMember({"float", "double", "mixed"}));

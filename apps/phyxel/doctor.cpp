@@ -34,7 +34,7 @@ std::vector<std::string> of_all_ranks(const std::string& own) {
   std::vector<std::vector<char>> send(static_cast<std::size_t>(ranks().size()),
                                       std::vector<char>(own.begin(), own.end()));
   std::vector<std::string> all;
-  for (const std::vector<char>& text : ranks().exchanged(send)) {
+  for (const std::vector<char>& text : ranks().alltoallv(send)) {
     all.emplace_back(text.begin(), text.end());
   }
   return all;
@@ -112,8 +112,8 @@ Findings facts() {
           {"nccl", cuda::nccl_version()},
           {"mpi", mpi_description()},
           {"ranks", places},
-          {"hdf5", hdf5_version() + (can_write_together() ? ", parallel: all ranks write"
-                                                          : ", serial: the first rank writes")},
+          {"hdf5", hdf5_version() + (can_write_collectively() ? ", parallel: all ranks write"
+                                                              : ", serial: the first rank writes")},
           {"device", chosen},
           {"transport", transport}};
 }

@@ -11,10 +11,10 @@
 namespace phyxel::app {
 
 /// The values of all ranks, as the writer's thread sees them.
-class FileWriter::Asking : public Stretches {
+class FileWriter::Asking : public ChunkedSource {
  public:
   Asking(FileWriter& writer, const Moment& moment)
-      : Stretches(writer.length_), writer_(writer), moment_(moment) {}
+      : ChunkedSource(writer.length_), writer_(writer), moment_(moment) {}
 
   bool has(Quantity quantity) const override {
     const auto& optional = moment_.optional;
@@ -25,10 +25,10 @@ class FileWriter::Asking : public Stretches {
   }
   std::span<const Triangle> triangles() const override { return writer_.shared_.triangles(); }
   /// Where they are more than the first rank can be brought at once.
-  bool writes_together(Index count) const override {
-    return can_write_together() && count > length();
+  bool writes_collectively(Index count) const override {
+    return can_write_collectively() && count > length();
   }
-  void write_together(const std::filesystem::path& file, const FileArray& array) override {
+  void write_collectively(const std::filesystem::path& file, const FileArray& array) override {
     writer_.have_written({std::filesystem::absolute(file).string(), array});
   }
 
@@ -39,7 +39,7 @@ class FileWriter::Asking : public Stretches {
 };
 
 FileWriter::FileWriter(const SharedModel& shared, Index length) : shared_(shared), length_(length) {
-  can_write_together();  // HDF5 starts on this thread, as MPI wants it
+  can_write_collectively();  // HDF5 starts on this thread, as MPI wants it
 }
 
 FileWriter::~FileWriter() {
@@ -53,13 +53,13 @@ FileWriter::~FileWriter() {
 void FileWriter::submit(std::shared_ptr<const Moment> moment, Job job) {
   if (alone()) {
     writer_.submit([this, moment = std::move(moment), job = std::move(job)] {
-      FrameStretches values(shared_.here(), moment->frame, length_);
+      FrameSource values(shared_.here(), moment->frame, length_);
       job(values);
     });
     return;
   }
   wait_for_room();
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (!leads()) return;
     writer_.submit([this, moment, job = std::move(job)] {
       try {
@@ -94,7 +94,7 @@ void FileWriter::serve(bool wait) {
   const Call call = ranks().broadcast(std::vector{next_call(wait)}).front();
   for (; done_ < call.done; ++done_) open_.pop_front();
   if (call.failed) {
-    ranks().together([&] {
+    ranks().collectively([&] {
       if (leads()) writer_.finish();
     });
   }
@@ -137,12 +137,12 @@ void FileWriter::write_array() const {
   const Numbers numbers =
       ranks().broadcast(std::vector{Numbers{asked.as_float, asked.count}}).front();
   const FileArray array{text(told(asked.path)), numbers.as_float, numbers.count, told(asked.terms)};
-  phyxel::write_together(ranks(), file, array, length_,
-                         [&](std::span<const StretchExchange::Stretch> of_ranks) {
-                           return sum_of_terms(array, [&](Quantity term) {
-                             return shared_.exchange().brought(term, own_values(term), of_ranks);
-                           });
-                         });
+  phyxel::write_collectively(
+      ranks(), file, array, length_, [&](std::span<const RowRange> of_ranks) {
+        return sum_of_terms(array, [&](Quantity term) {
+          return shared_.exchange().redistributed(term, own_values(term), of_ranks);
+        });
+      });
 }
 
 FileWriter::Call FileWriter::next_call(bool wait) {
@@ -156,7 +156,7 @@ FileWriter::Call FileWriter::next_call(bool wait) {
   return call_;
 }
 
-std::vector<double> FileWriter::asked(Quantity quantity, StretchExchange::Stretch stretch) {
+std::vector<double> FileWriter::asked(Quantity quantity, RowRange stretch) {
   std::unique_lock lock(mutex_);
   call_ = {call_.done, false, Call::Ask::stretch, quantity, stretch};
   return answered(lock);

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "background_writer.hpp"
-#include "mpi/stretch_exchange.hpp"
+#include "mpi/row_redistribution.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/shared_model.hpp"
 #include "program_ranks.hpp"
@@ -37,7 +37,7 @@ struct Moment {
 class FileWriter {
  public:
   /// Called on the first rank's thread, with values that its thread alone may ask for.
-  using Job = std::function<void(Stretches&)>;
+  using Job = std::function<void(ChunkedSource&)>;
 
   /// @param shared whose values are written; must outlive this
   /// @param length of a stretch
@@ -63,7 +63,7 @@ class FileWriter {
     bool failed = false;
     enum class Ask { nothing, stretch, array } ask = Ask::nothing;  // of the file that is open
     Quantity quantity{};
-    StretchExchange::Stretch stretch;
+    RowRange stretch;
   };
   /// What is to be written together.
   struct Array {
@@ -75,7 +75,7 @@ class FileWriter {
   static bool leads() { return ranks().rank() == 0; }
   void serve(bool wait);
   Call next_call(bool wait);
-  std::vector<double> asked(Quantity quantity, StretchExchange::Stretch stretch);
+  std::vector<double> asked(Quantity quantity, RowRange stretch);
   void have_written(Array array);
   std::vector<double> answered(std::unique_lock<std::mutex>& lock);
   std::span<const double> own_values(Quantity quantity) const;

@@ -6,7 +6,7 @@
 
 #include "kind.hpp"
 #include "partition/exchange_size.hpp"
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/scene.hpp"
@@ -34,17 +34,16 @@ Facts quality_facts(const Graph& phyxels, const char* cut, Partitioner partition
           {"seconds", seconds}};
 }
 
-Facts plan_facts(const HaloPlan& plan) {
+Facts plan_facts(const PartHalo& plan) {
   Facts peers = Facts::array();
-  for (const HaloPlan::Peer& peer : plan.peers) {
-    peers.push_back({{"part", peer.part},
-                     {"send", {peer.send[0].size(), peer.send[1].size()}},
-                     {"receive", {peer.receive[0].size(), peer.receive[1].size()}}});
+  for (const PartHalo::Peer& peer : plan.peers) {
+    peers.push_back(
+        {{"part", peer.part}, {"send", peer.send.size()}, {"receive", peer.receive.size()}});
   }
   return {{"part", plan.part},
           {"phyxels", plan.owned.size()},
           {"boundary", plan.boundary.size()},
-          {"ghosts", {plan.rings[0].size(), plan.rings[1].size()}},
+          {"ghosts", plan.ghosts.size()},
           {"peers", peers}};
 }
 
@@ -85,7 +84,7 @@ Facts partition_facts(const std::filesystem::path& file, int parts, const std::s
     }
   }
   Facts plans = Facts::array();
-  for (const HaloPlan& plan : make_halo_plans(phyxels, chosen_parts, parts, 2)) {
+  for (const PartHalo& plan : make_part_halos(phyxels, chosen_parts, parts)) {
     plans.push_back(plan_facts(plan));
   }
   const ExchangeSize sent = exchange_size(model, chosen_parts);
@@ -126,18 +125,17 @@ std::string partition_tables(const Facts& facts) {
   text += fmt::format(
       "\n  slowest: what the part with most to do has to do, ghosts counted, over the mean\n"
       "\n  Tiles by {}:\n"
-      "  part      phyxels     boundary       ring 1       ring 2  peers (ghosts of ring 1)\n",
+      "  part      phyxels     boundary       ghosts  peers (ghosts of each)\n",
       facts["partitioner"].get<std::string>());
   for (const Facts& plan : facts["plans"]) {
     std::string peers;
     for (const Facts& peer : plan["peers"]) {
       peers += fmt::format("{}{} ({})", peers.empty() ? "" : ", ", peer["part"].get<int>(),
-                           peer["receive"][0].get<std::size_t>());
+                           peer["receive"].get<std::size_t>());
     }
-    text += fmt::format("  {:>4} {:>12} {:>12} {:>12} {:>12}  {}\n", plan["part"].get<int>(),
+    text += fmt::format("  {:>4} {:>12} {:>12} {:>12}  {}\n", plan["part"].get<int>(),
                         plan["phyxels"].get<std::size_t>(), plan["boundary"].get<std::size_t>(),
-                        plan["ghosts"][0].get<std::size_t>(), plan["ghosts"][1].get<std::size_t>(),
-                        peers);
+                        plan["ghosts"].get<std::size_t>(), peers);
   }
   const auto kilobytes = [&](const char* way) {
     return 1e-3 * sizeof(float) * facts["numbers sent a step"][way].get<double>();

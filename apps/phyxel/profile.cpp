@@ -50,7 +50,7 @@ std::string events_of_rank() {
 }  // namespace
 
 void start_profile(const std::string& file, bool force) {
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (ranks().rank() == 0) check_output_file(file, force, Output::file_or_stream);
   });
   ranks().barrier();
@@ -61,9 +61,9 @@ void write_profile(const std::string& file) {
   const std::string own = events_of_rank();
   std::vector<std::vector<char>> send(static_cast<std::size_t>(ranks().size()));
   send[0].assign(own.begin(), own.end());
-  const std::vector<std::vector<char>> events = ranks().exchanged(send);
+  const std::vector<std::vector<char>> events = ranks().alltoallv(send);
   const std::int64_t left_out = ranks().sum(static_cast<std::int64_t>(Timeline::left_out()));
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (ranks().rank() > 0) return;
     std::string text = "{\"traceEvents\":[\n";
     for (const std::vector<char>& of_rank : events) text.append(of_rank.begin(), of_rank.end());

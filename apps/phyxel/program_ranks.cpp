@@ -14,7 +14,7 @@ const Ranks& all_ranks() {
   static const Ranks alone;
   return the_ranks ? *the_ranks : alone;
 }
-const Communicator& ranks() { return all_ranks().communicator(); }
+const MpiCommunicator& ranks() { return all_ranks().communicator(); }
 
 void require_alike(std::uint64_t value, const char* what) {
   const auto signed_value = static_cast<std::int64_t>(value);

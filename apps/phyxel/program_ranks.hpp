@@ -13,7 +13,7 @@ namespace phyxel::app {
 void set_ranks(const Ranks& ranks);
 const Ranks& all_ranks();
 /// What they talk through.
-const Communicator& ranks();
+const MpiCommunicator& ranks();
 
 /// @throws AgreedError if it is not the same number on all ranks. Collective.
 void require_alike(std::uint64_t value, const char* what);

@@ -200,7 +200,7 @@ class Finder {
     out_.boundary_tiles = tiling.boundary_tiles;
     out_.phyxel_at = sent(out_.phyxel, "places");
     place_of_ = sent(share.place, "places");
-    number_ = sent(share.number, "places");
+    number_ = sent(share.global_id, "places");
     std::vector<Index> first_place;
     for (Index tile = 0; tile < out_.own_tiles; ++tile) {
       Index any = -1;

@@ -121,7 +121,7 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
 
 std::vector<Index> numbers_at(const Model& model, const std::vector<Index>& phyxel) {
   return tabulated(phyxel.size(), [&](std::size_t place) {
-    return phyxel[place] < 0 ? -1 : model.number(phyxel[place]);
+    return phyxel[place] < 0 ? -1 : model.global_id(phyxel[place]);
   });
 }
 

@@ -19,9 +19,8 @@ std::unique_ptr<Backend> make_double_backend(const Model& model, int device, Cud
 
 std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
                                            CudaPath path, Transport transport) {
-  if (model.share && (model.share->place.size() != static_cast<std::size_t>(model.size()) ||
-                      model.share->rings != 1)) {
-    throw InputError("a GPU steps shares that are cut between tiles and have one ring of ghosts");
+  if (model.share && model.share->place.size() != static_cast<std::size_t>(model.size())) {
+    throw InputError("a GPU steps shares that are cut between tiles");
   }
   for (const Part& part : model.parts) {
     if (!part.material.custom_law) continue;

@@ -33,11 +33,11 @@ class CudaBackend final : public Backend {
     // Ranks launch alike, or one would wait for what another has not launched yet.
     if (m_.share()) {
       recordable = recordable && halo_->is_direct();
-      recordable = m_.share()->others->smallest(recordable) > 0;
+      recordable = m_.share()->communicator->smallest(recordable) > 0;
     }
     recorded_ = recordable;
     has_surfels_ = !model.surfels.position.empty();
-    if (m_.share()) has_surfels_ = m_.share()->others->largest(has_surfels_) > 0;
+    if (m_.share()) has_surfels_ = m_.share()->communicator->largest(has_surfels_) > 0;
   }
 
   std::string name() const override {
@@ -57,7 +57,7 @@ class CudaBackend final : public Backend {
     settle();
     passes_->receive_displacements();
     m_.wait();
-    if (m_.share()) m_.share()->others->largest(0);  // the others have come as far
+    if (m_.share()) m_.share()->communicator->largest(0);  // the others have come as far
     fresh_ = true;
     m_.put(state);
   }
@@ -153,7 +153,7 @@ class CudaBackend final : public Backend {
     }
     m_.wait();
     Totals totals = totals_of(fetched(all)[0]);
-    if (m_.share()) totals.add_others(*m_.share()->others);
+    if (m_.share()) totals.add_ranks(*m_.share()->communicator);
     return totals.values();
   }
 

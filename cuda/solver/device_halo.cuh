@@ -71,9 +71,9 @@ class PinnedBytes {
 /// Where each peer's records are, one peer after the other.
 class PeerLists {
  public:
-  PeerLists(const std::vector<Peer>& peers, std::vector<Index> Peer::*list,
+  PeerLists(const std::vector<HaloPlan::Peer>& peers, std::vector<Index> HaloPlan::Peer::*list,
             const std::vector<Index>& place_of) {
-    for (const Peer& peer : peers) {
+    for (const HaloPlan::Peer& peer : peers) {
       for (const Index i : peer.*list) places.push_back(place_of[i]);
       counts.push_back((peer.*list).size());
     }
@@ -81,8 +81,8 @@ class PeerLists {
   }
   int count() const { return static_cast<int>(places.size()); }
   /// The bytes of each peer in `memory`.
-  Others::Bytes in(std::byte* memory, std::size_t bytes_each) const {
-    Others::Bytes bytes;
+  HaloTransport::PeerBytes in(std::byte* memory, std::size_t bytes_each) const {
+    HaloTransport::PeerBytes bytes;
     for (const std::size_t count : counts) {
       bytes.emplace_back(memory, count * bytes_each);
       memory += count * bytes_each;
@@ -96,9 +96,9 @@ class PeerLists {
 };
 
 /// Brings packed records to other ranks and theirs here, in a queue of its own.
-class Courier {
+class PackedTransport {
  public:
-  virtual ~Courier() = default;
+  virtual ~PackedTransport() = default;
   virtual void reserve(std::size_t outgoing, std::size_t incoming) = 0;
   /// @param bytes_each of a record
   virtual void begin(std::byte* packed, std::byte* arrived, std::size_t bytes_each) = 0;
@@ -112,10 +112,10 @@ class Courier {
 };
 
 /// Through host memory, by MPI.
-class HostCourier final : public Courier {
+class HostTransport final : public PackedTransport {
  public:
-  HostCourier(const Others& others, const PeerLists& send, const PeerLists& receive)
-      : others_(others), send_(send), receive_(receive) {}
+  HostTransport(HaloTransport& halo, const PeerLists& send, const PeerLists& receive)
+      : halo_(halo), send_(send), receive_(receive) {}
 
   void reserve(std::size_t outgoing, std::size_t incoming) override {
     outgoing_.reserve(outgoing);
@@ -126,9 +126,8 @@ class HostCourier final : public Courier {
   }
   void finish(std::byte* arrived, std::size_t bytes_each) override {
     PHYXEL_CUDA(cudaStreamSynchronize(queue()));
-    others_.begin(send_.in(outgoing_.data(), bytes_each),
-                  receive_.in(incoming_.data(), bytes_each));
-    others_.finish();
+    halo_.start(send_.in(outgoing_.data(), bytes_each), receive_.in(incoming_.data(), bytes_each));
+    halo_.finish();
     copy(arrived, incoming_.data(), receive_.places.size() * bytes_each, cudaMemcpyHostToDevice);
   }
   std::string describe() const override { return "host memory and MPI"; }
@@ -138,40 +137,40 @@ class HostCourier final : public Courier {
     if (bytes > 0) PHYXEL_CUDA(cudaMemcpyAsync(to, from, bytes, kind, queue()));
   }
 
-  const Others& others_;
+  HaloTransport& halo_;
   const PeerLists &send_, &receive_;
   PinnedBytes outgoing_, incoming_;
 };
 
 /// By MPI, which gets the device's memory itself.
-class MpiCourier final : public Courier {
+class MpiTransport final : public PackedTransport {
  public:
-  MpiCourier(const Others& others, const PeerLists& send, const PeerLists& receive)
-      : others_(others), send_(send), receive_(receive) {}
+  MpiTransport(HaloTransport& halo, const PeerLists& send, const PeerLists& receive)
+      : halo_(halo), send_(send), receive_(receive) {}
 
   void reserve(std::size_t, std::size_t) override {}
   void begin(std::byte* packed, std::byte*, std::size_t) override { packed_ = packed; }
   void finish(std::byte* arrived, std::size_t bytes_each) override {
     PHYXEL_CUDA(cudaStreamSynchronize(queue()));
-    others_.begin(send_.in(packed_, bytes_each), receive_.in(arrived, bytes_each));
-    others_.finish();
+    halo_.start(send_.in(packed_, bytes_each), receive_.in(arrived, bytes_each));
+    halo_.finish();
   }
   std::string describe() const override { return "CUDA-aware MPI"; }
 
  private:
-  const Others& others_;
+  HaloTransport& halo_;
   const PeerLists &send_, &receive_;
   std::byte* packed_ = nullptr;
 };
 
 /// By NCCL; the host only queues.
-class NcclCourier final : public Courier {
+class NcclTransport final : public PackedTransport {
  public:
   /// Collective. @throws DeviceError
-  NcclCourier(const Others& others, const NcclRanks::Name& name, const PeerLists& send,
-              const PeerLists& receive)
-      : others_(others),
-        ranks_(name, others.rank(), others.count()),
+  NcclTransport(const Share& share, const NcclRanks::Name& name, const PeerLists& send,
+                const PeerLists& receive)
+      : plan_(*share.halo),
+        ranks_(name, share.communicator->rank(), share.communicator->size()),
         send_(send),
         receive_(receive) {}
 
@@ -184,15 +183,15 @@ class NcclCourier final : public Courier {
   std::string describe() const override { return "NCCL " + nccl_version(); }
 
  private:
-  std::vector<NcclRanks::Message> messages(const Others::Bytes& of_peers) const {
+  std::vector<NcclRanks::Message> messages(const HaloTransport::PeerBytes& of_peers) const {
     std::vector<NcclRanks::Message> messages;
     for (std::size_t p = 0; p < of_peers.size(); ++p) {
-      messages.push_back({others_.peers()[p].rank, of_peers[p]});
+      messages.push_back({plan_.peers[p].rank, of_peers[p]});
     }
     return messages;
   }
 
-  const Others& others_;
+  const HaloPlan& plan_;
   NcclRanks ranks_;
   const PeerLists &send_, &receive_;
 };
@@ -205,11 +204,11 @@ class PackedExchange {
       : m_(model),
         send_(send),
         receive_(receive),
-        courier_(std::make_unique<HostCourier>(*model.share()->others, send, receive)) {}
+        transport_(std::make_unique<HostTransport>(*model.share()->transport, send, receive)) {}
 
   /// From now on, between exchanges.
-  void send_by(std::unique_ptr<Courier> courier) {
-    courier_ = std::move(courier);
+  void send_by(std::unique_ptr<PackedTransport> transport) {
+    transport_ = std::move(transport);
     bytes_each_ = 0;
   }
   template <class Records>
@@ -220,19 +219,19 @@ class PackedExchange {
                    send_.count(), reinterpret_cast<Value*>(packed_.data()));
     // What carries has a queue of its own; it begins when all before has been packed.
     PHYXEL_CUDA(cudaEventRecord(packed_now_.get(), m_.stream()));
-    PHYXEL_CUDA(cudaStreamWaitEvent(courier_->queue(), packed_now_.get()));
-    courier_->begin(packed_.data(), arrived_.data(), sizeof(Value));
+    PHYXEL_CUDA(cudaStreamWaitEvent(transport_->queue(), packed_now_.get()));
+    transport_->begin(packed_.data(), arrived_.data(), sizeof(Value));
   }
   template <class Records>
   void finish(const Records& records) {
     using Value = typename Records::Value;
-    courier_->finish(arrived_.data(), sizeof(Value));
-    PHYXEL_CUDA(cudaEventRecord(arrived_now_.get(), courier_->queue()));
+    transport_->finish(arrived_.data(), sizeof(Value));
+    PHYXEL_CUDA(cudaEventRecord(arrived_now_.get(), transport_->queue()));
     PHYXEL_CUDA(cudaStreamWaitEvent(m_.stream(), arrived_now_.get()));
     m_.launch_each("unpack", unpack<Records>, receive_.count(), records, receive_.on_device.data(),
                    receive_.count(), reinterpret_cast<const Value*>(arrived_.data()));
   }
-  std::string describe() const { return courier_->describe(); }
+  std::string describe() const { return transport_->describe(); }
   std::size_t bytes() const { return packed_.bytes() + arrived_.bytes(); }
 
  private:
@@ -243,12 +242,12 @@ class PackedExchange {
     bytes_each_ = bytes_each;
     packed_ = {send_.places.size() * bytes_each, "what other ranks get"};
     arrived_ = {receive_.places.size() * bytes_each, "what other ranks send"};
-    courier_->reserve(packed_.size(), arrived_.size());
+    transport_->reserve(packed_.size(), arrived_.size());
   }
 
   const Model& m_;
   const PeerLists &send_, &receive_;
-  std::unique_ptr<Courier> courier_;
+  std::unique_ptr<PackedTransport> transport_;
   std::size_t bytes_each_ = 0;
   DeviceArray<std::byte> packed_, arrived_;
   Event packed_now_, arrived_now_;
@@ -280,7 +279,7 @@ class DirectExchange {
   /// Collective. @throws DeviceError if memory cannot be shared or opened; on this rank alone, and
   ///   after all that is collective
   DirectExchange(const Model& model, const PeerLists& receive) : m_(model) {
-    const std::size_t count = m_.share()->others->peers().size();
+    const std::size_t count = m_.share()->halo->peers.size();
     std::vector<std::vector<std::byte>> words(count);
     std::string trouble;
     try {
@@ -289,9 +288,9 @@ class DirectExchange {
     } catch (const DeviceError& error) {
       trouble = error.what();
     }
-    const std::vector<std::vector<std::byte>> heard = m_.share()->others->told(words);
+    const std::vector<std::vector<std::byte>> received = exchanged_with_peers(std::move(words));
     if (!trouble.empty()) throw DeviceError(trouble);
-    open(heard);
+    open(received);
   }
 
   void begin(Sent what) const {
@@ -383,21 +382,32 @@ class DirectExchange {
     }
     return words;
   }
-  void open(const std::vector<std::vector<std::byte>>& heard) {
-    const std::vector<Peer>& peers = m_.share()->others->peers();
+  /// Sends words[p] to peer p. @returns the bytes received from each peer
+  std::vector<std::vector<std::byte>> exchanged_with_peers(
+      std::vector<std::vector<std::byte>> words) const {
+    const std::vector<HaloPlan::Peer>& peers = m_.share()->halo->peers;
+    const Communicator& ranks = *m_.share()->communicator;
+    std::vector<std::vector<std::byte>> of_ranks(static_cast<std::size_t>(ranks.size()));
+    for (std::size_t p = 0; p < peers.size(); ++p) of_ranks[peers[p].rank] = std::move(words[p]);
+    of_ranks = ranks.alltoallv(of_ranks);
+    for (std::size_t p = 0; p < peers.size(); ++p) words[p] = std::move(of_ranks[peers[p].rank]);
+    return words;
+  }
+  void open(const std::vector<std::vector<std::byte>>& received) {
+    const std::vector<HaloPlan::Peer>& peers = m_.share()->halo->peers;
     std::vector<Points<Real>> points;
     std::vector<Stresses<Real>> stresses;
     std::vector<unsigned*> their_flags[kinds_sent];
     std::vector<Crossing> crossings;
     for (std::size_t p = 0; p < peers.size(); ++p) {
-      if (heard[p].size() < sizeof(Invitation)) {
+      if (received[p].size() < sizeof(Invitation)) {
         throw DeviceError("rank " + std::to_string(peers[p].rank) + " cannot share its memory");
       }
       Invitation invitation;
-      std::memcpy(&invitation, heard[p].data(), sizeof(Invitation));
+      std::memcpy(&invitation, received[p].data(), sizeof(Invitation));
       std::vector<Index> there(peers[p].send.size());
       if (!there.empty()) {
-        std::memcpy(there.data(), heard[p].data() + sizeof(Invitation),
+        std::memcpy(there.data(), received[p].data() + sizeof(Invitation),
                     there.size() * sizeof(Index));
       }
       for (std::size_t k = 0; k < there.size(); ++k) {
@@ -474,8 +484,8 @@ class DeviceHalo {
   /// Collective. @throws DeviceError on all ranks if `wanted` cannot be had on one
   DeviceHalo(const Model& model, Transport wanted)
       : m_(model),
-        send_(others().peers(), &Peer::send, model.tiling().place),
-        receive_(others().peers(), &Peer::receive, model.tiling().place),
+        send_(m_.share()->halo->peers, &HaloPlan::Peer::send, model.tiling().place),
+        receive_(m_.share()->halo->peers, &HaloPlan::Peer::receive, model.tiling().place),
         packed_(model, send_, receive_) {
     if (wanted == Transport::automatic || wanted == Transport::direct) {
       open_direct(wanted == Transport::direct);
@@ -541,7 +551,7 @@ class DeviceHalo {
     return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : packed_.describe();
   }
   Traffic traffic() const {
-    return {bytes_sent_, direct_ ? direct_->waited_seconds() : others().traffic().seconds};
+    return {bytes_sent_, direct_ ? direct_->waited_seconds() : halo().traffic().seconds};
   }
   std::size_t bytes() const {
     return send_.on_device.bytes() + receive_.on_device.bytes() + packed_.bytes() +
@@ -549,19 +559,20 @@ class DeviceHalo {
   }
 
  private:
-  const Others& others() const { return *m_.share()->others; }
+  const Communicator& ranks() const { return *m_.share()->communicator; }
+  HaloTransport& halo() const { return *m_.share()->transport; }
   /// Memory is freed when nobody has it open.
   void close() {
     if (direct_) direct_->close();
-    others().largest(0);
+    ranks().largest(0);
   }
   void open_direct(bool insist) {
     std::string trouble;
-    const std::vector<Peer>& peers = others().peers();
+    const std::vector<HaloPlan::Peer>& peers = m_.share()->halo->peers;
     bool one_host = true;
-    for (const Peer& peer : peers) one_host = one_host && peer.same_host;
+    for (const HaloPlan::Peer& peer : peers) one_host = one_host && peer.same_host;
     // All ranks take the same way.
-    if (others().smallest(one_host) > 0) {
+    if (ranks().smallest(one_host) > 0) {
       try {
         direct_ = std::make_unique<DirectExchange<Real, StateReal>>(m_, receive_);
       } catch (const DeviceError& error) {
@@ -571,7 +582,7 @@ class DeviceHalo {
     } else {
       trouble = "ranks of several hosts";
     }
-    if (others().smallest(direct_ != nullptr) > 0) return;
+    if (ranks().smallest(direct_ != nullptr) > 0) return;
     close();
     direct_.reset();
     if (!insist) return;
@@ -591,17 +602,17 @@ class DeviceHalo {
     std::array<std::int64_t, 2> own;
     static_assert(sizeof own == sizeof properties.uuid);
     std::memcpy(own.data(), &properties.uuid, sizeof own);
-    std::vector<std::int64_t> words(2 * static_cast<std::size_t>(others().count()), 0);
-    const auto at = 2 * static_cast<std::size_t>(others().rank());
+    std::vector<std::int64_t> words(2 * static_cast<std::size_t>(ranks().size()), 0);
+    const auto at = 2 * static_cast<std::size_t>(ranks().rank());
     std::copy(own.begin(), own.end(), words.begin() + static_cast<std::ptrdiff_t>(at));
-    others().add(words);
+    ranks().add(words);
     std::set<std::pair<std::int64_t, std::int64_t>> gpus;
     for (std::size_t k = 0; k < words.size(); k += 2) gpus.emplace(words[k], words[k + 1]);
-    return static_cast<int>(gpus.size()) == others().count();
+    return static_cast<int>(gpus.size()) == ranks().size();
   }
   void open_mpi(bool insist) {
-    if (others().smallest(others().takes_device_memory()) > 0) {
-      packed_.send_by(std::make_unique<MpiCourier>(others(), send_, receive_));
+    if (ranks().smallest(halo().takes_device_memory()) > 0) {
+      packed_.send_by(std::make_unique<MpiTransport>(halo(), send_, receive_));
     } else if (insist) {
       refuse("mpi", "this MPI is not CUDA-aware", "direct, nccl, host, auto");
     }
@@ -610,7 +621,7 @@ class DeviceHalo {
   bool open_nccl(bool insist) {
     std::string trouble;
     NcclRanks::Name name{};
-    const auto agree = [&](bool fine) { return others().smallest(fine) > 0; };
+    const auto agree = [&](bool fine) { return ranks().smallest(fine) > 0; };
     const auto attempt = [&](auto&& work) {
       try {
         work();
@@ -624,17 +635,18 @@ class DeviceHalo {
     const bool named = attempt([&] {
       if (!has_nccl()) throw DeviceError(nccl_version());
       if (!apart) throw DeviceError("ranks share a GPU");
-      if (others().rank() == 0) name = NcclRanks::make_name();
+      if (ranks().rank() == 0) name = NcclRanks::make_name();
     });
     if (named) {
-      others().add(name);
-      std::unique_ptr<Courier> courier;
-      if (attempt(
-              [&] { courier = std::make_unique<NcclCourier>(others(), name, send_, receive_); })) {
-        packed_.send_by(std::move(courier));
+      ranks().add(name);
+      std::unique_ptr<PackedTransport> transport;
+      if (attempt([&] {
+            transport = std::make_unique<NcclTransport>(*m_.share(), name, send_, receive_);
+          })) {
+        packed_.send_by(std::move(transport));
         return true;
       }
-      courier.release();  // to end it would be collective, and not all ranks have it
+      transport.release();  // to end it would be collective, and not all ranks have it
     }
     if (!insist) return false;
     if (trouble.empty()) trouble = "another rank cannot use NCCL";

@@ -71,7 +71,7 @@ class DeviceModel {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
-    if (share()) own_supports_ = share()->others->largest(own_supports_) > 0;
+    if (share()) own_supports_ = share()->communicator->largest(own_supports_) > 0;
     last_launch_.subject = subject_ = std::to_string(model.size()) + " phyxels";
     lists_ = view_of(tiling_.neighbours);
     second_lists_ = view_of(tiling_.second());

@@ -171,7 +171,7 @@ class CudaLanczosVectors : public Vibration {
     m_.wait();
     ExactSum sum;
     std::ranges::copy(fetched(product_), sum.ready().begin());
-    if (m_.share()) m_.share()->others->add(sum.ready());
+    if (m_.share()) m_.share()->communicator->add(sum.ready());
     return sum.value();
   }
   void scale(DeviceArray<Real>& a, double factor) {
@@ -219,7 +219,7 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
       // Of all ranks; a rank may have nobody.
       const auto smallest = [&](double value) {
         const double nobody = std::numeric_limits<double>::infinity();
-        const double all = model.share->others->smallest(value > 0 ? value : nobody);
+        const double all = model.share->communicator->smallest(value > 0 ? value : nobody);
         return all < nobody ? all : 0;
       };
       support = smallest(support);
@@ -287,7 +287,7 @@ class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
                    this->current().data(), farthest_.data());
     m.wait();
     const auto largest = static_cast<double>(std::bit_cast<float>(fetched(farthest_)[0]));
-    return m.share() ? m.share()->others->largest(largest) : largest;
+    return m.share() ? m.share()->communicator->largest(largest) : largest;
   }
 
   double distance_;

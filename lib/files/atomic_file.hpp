@@ -52,13 +52,13 @@ struct Content {
   using Sink = std::function<void(std::span<const std::byte>)>;
   struct Piece {
     std::uint64_t bytes = 0;
-    std::function<void(const Sink&)> produce;  ///< Null: comes by `write_together`.
+    std::function<void(const Sink&)> produce;  ///< Null: comes by `write_collectively`.
     bool is_layout = false;                    ///< What tells where all else is.
   };
   std::uint64_t size = 0;
   std::vector<Piece> pieces;
   /// Puts pieces into a file whose layout is there, which it may change; null: there are none.
-  std::function<void(const std::filesystem::path& file)> write_together;
+  std::function<void(const std::filesystem::path& file)> write_collectively;
 };
 
 /// What a program can write to: regular files only, or streams (FIFOs, character devices) as well.

@@ -89,13 +89,13 @@ fs::path write_checkpoint(const fs::path& directory, const State& state,
   const Model none;
   Frame frame;
   frame.state = &state;
-  FrameStretches values(none, frame);
+  FrameSource values(none, frame);
   return write_checkpoint(directory, state, info, static_cast<Index>(state.displacement.size()),
                           values);
 }
 
 fs::path write_checkpoint(const fs::path& directory, const State& state, const CheckpointInfo& info,
-                          Index phyxels, Stretches& values) {
+                          Index phyxels, ChunkedSource& values) {
   Hdf5Writer out;
   out.group("/phyxel");
   out.attribute("/phyxel", "version", version);

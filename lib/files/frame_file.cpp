@@ -67,7 +67,7 @@ void write_counts(Hdf5Writer& out, std::int64_t points, std::int64_t cells,
 
 /// Rows of an array, in the type they are stored as.
 template <class T>
-Hdf5Writer::Fill<T> rows_of(const FileArray& array, Stretches& values) {
+Hdf5Writer::Fill<T> rows_of(const FileArray& array, ChunkedSource& values) {
   return [array, &values](std::size_t first, std::span<T> rows) {
     const auto begin = static_cast<Index>(first);
     const Index end = begin + static_cast<Index>(rows.size() / width_of(array.terms[0]));
@@ -79,13 +79,14 @@ Hdf5Writer::Fill<T> rows_of(const FileArray& array, Stretches& values) {
 }
 
 template <class T>
-void write_rows(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+void write_rows(Hdf5Writer& out, const FileArray& array, ChunkedSource& values) {
   const std::size_t width = width_of(array.terms[0]), columns = width > 1 ? width : 0;
   const auto rows = static_cast<std::size_t>(array.count);
-  if (values.writes_together(array.count)) {
-    out.together<T>(array.path, rows, columns, [array, &values](const std::filesystem::path& file) {
-      values.write_together(file, array);
-    });
+  if (values.writes_collectively(array.count)) {
+    out.collectively<T>(array.path, rows, columns,
+                        [array, &values](const std::filesystem::path& file) {
+                          values.write_collectively(file, array);
+                        });
   } else {
     out.later<T>(array.path, rows, columns, static_cast<std::size_t>(values.length()),
                  rows_of<T>(array, values));
@@ -130,7 +131,7 @@ bool floats_hold_positions(const Model& model, double displacement, Points point
   });
 }
 
-void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values) {
+void write_later(Hdf5Writer& out, const FileArray& array, ChunkedSource& values) {
   if (array.as_float) return write_rows<float>(out, array, values);
   write_rows<double>(out, array, values);
 }
@@ -162,11 +163,11 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
 }
 
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                        const Diagnostics& diagnostics, Stretches& values) {
+                        const Diagnostics& diagnostics, ChunkedSource& values) {
   const bool as_float = scene.solver.precision == Precision::single;
   const bool floats_do =
       floats_hold_positions(model, diagnostics.largest_displacement, Points::phyxels);
-  const Index n = model.whole_size();
+  const Index n = model.global_count();
   const auto rows = static_cast<std::size_t>(n),
              stretch = static_cast<std::size_t>(values.length());
   const Ends ends = ends_of(model);
@@ -201,7 +202,7 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
 }
 
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                         const Diagnostics& diagnostics, Stretches& values) {
+                         const Diagnostics& diagnostics, ChunkedSource& values) {
   const bool floats_do =
       floats_hold_positions(model, diagnostics.largest_displacement, Points::surfels);
   const Ends ends = ends_of(model);

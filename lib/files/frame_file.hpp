@@ -38,11 +38,11 @@ std::span<const DiagnosticColumn> diagnostic_columns();
 /// Positions in the precision of the run's state, and in double where floats do not hold them.
 /// `model` may be a rank's share.
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                        const Diagnostics& diagnostics, Stretches& values);
+                        const Diagnostics& diagnostics, ChunkedSource& values);
 
 /// The same for the deformed surface: triangles, with normals.
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
-                         const Diagnostics& diagnostics, Stretches& values);
+                         const Diagnostics& diagnostics, ChunkedSource& values);
 
 /// Values of an array's rows. @param values_of those of one of its terms
 template <class ValuesOf>
@@ -59,6 +59,6 @@ std::vector<double> sum_of_terms(const FileArray& array, ValuesOf&& values_of) {
 
 class Hdf5Writer;
 /// An array that comes when the file is written.
-void write_later(Hdf5Writer& out, const FileArray& array, Stretches& values);
+void write_later(Hdf5Writer& out, const FileArray& array, ChunkedSource& values);
 
 }  // namespace phyxel

@@ -176,8 +176,8 @@ void Hdf5Writer::later(const std::string& path, std::size_t rows, std::size_t co
 }
 
 template <class T>
-void Hdf5Writer::together(const std::string& path, std::size_t rows, std::size_t columns,
-                          std::function<void(const std::filesystem::path& file)> write) {
+void Hdf5Writer::collectively(const std::string& path, std::size_t rows, std::size_t columns,
+                              std::function<void(const std::filesystem::path& file)> write) {
   const std::size_t bytes = rows * std::max<std::size_t>(columns, 1) * sizeof(T);
   later_.push_back({place<T>(path, rows, columns), {bytes, nullptr}});
   together_.push_back(std::move(write));
@@ -266,7 +266,7 @@ Content Hdf5Writer::content() {
   }
   add_layout(content.size);
   if (!together_.empty()) {
-    content.write_together = [all = std::move(together_)](const std::filesystem::path& file) {
+    content.write_collectively = [all = std::move(together_)](const std::filesystem::path& file) {
       for (const auto& write : all) write(file);
     };
   }
@@ -281,8 +281,8 @@ void Hdf5Writer::close() {
 
 #define PHYXEL_HDF5_TYPE(T)                                                                     \
   template void Hdf5Writer::array<T>(const std::string&, std::span<const T>, std::size_t);      \
-  template void Hdf5Writer::together<T>(const std::string&, std::size_t, std::size_t,           \
-                                        std::function<void(const std::filesystem::path&)>);     \
+  template void Hdf5Writer::collectively<T>(const std::string&, std::size_t, std::size_t,       \
+                                            std::function<void(const std::filesystem::path&)>); \
   template void Hdf5Writer::later<T>(const std::string&, std::size_t, std::size_t, std::size_t, \
                                      Fill<T>);                                                  \
   template void Hdf5Writer::reserve<T>(const std::string&, std::size_t, std::size_t);           \

@@ -46,8 +46,8 @@ class Hdf5Writer {
              Fill<T> fill);
   /// The same, written by `write(file)` when all that is not `later` is in the file.
   template <class T>
-  void together(const std::string& path, std::size_t rows, std::size_t columns,
-                std::function<void(const std::filesystem::path& file)> write);
+  void collectively(const std::string& path, std::size_t rows, std::size_t columns,
+                    std::function<void(const std::filesystem::path& file)> write);
   /// Shape [n, 3], stored as float or double.
   void vectors(const std::string& path, std::span<const Vec3d> values, bool as_float);
   /// A text of any length; nothing is stored for an empty one.

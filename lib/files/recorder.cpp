@@ -69,11 +69,11 @@ std::span<const double> values_of(const Model& model, const Frame& frame, Quanti
   return {};
 }
 
-bool FrameStretches::has(Quantity quantity) const {
+bool FrameSource::has(Quantity quantity) const {
   return !values_of(model_, frame_, quantity).empty();
 }
 
-std::span<const double> FrameStretches::values(Quantity quantity, Index begin, Index end) {
+std::span<const double> FrameSource::values(Quantity quantity, Index begin, Index end) {
   const std::size_t width = width_of(quantity);
   return values_of(model_, frame_, quantity)
       .subspan(width * static_cast<std::size_t>(begin),
@@ -86,7 +86,7 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
       scene_(scene),
       directory_(scene.output.directory),
       writes_phyxels_(scene.output.phyxels),
-      writes_surface_(scene.output.surface && model.whole_surfels() > 0) {
+      writes_surface_(scene.output.surface && model.global_surfel_count() > 0) {
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -112,7 +112,7 @@ void Recorder::check_space(std::int64_t frames_before) const {
   const double scalar = scene_.solver.precision == Precision::single ? 4 : 8;
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
   double frame = 20e3;  // seal, HDF5's own structure, metadata
-  const double phyxels = model_.whole_size();
+  const double phyxels = model_.global_count();
   const auto position = [&](Points points) {  // at rest; a motion may carry bodies farther
     return floats_hold_positions(model_, 0, points) ? scalar : 8;
   };
@@ -122,7 +122,7 @@ void Recorder::check_space(std::int64_t frames_before) const {
   }
   if (writes_surface_) {
     // A closed surface has twice as many triangles as corners.
-    frame += model_.whole_surfels() * (3 * (position(Points::surfels) + 4) + 2 * 33);
+    frame += model_.global_surfel_count() * (3 * (position(Points::surfels) + 4) + 2 * 33);
   }
   const double frames = scene_.output.frames_per_second > 0
                             ? std::floor(scene_.time.end * scene_.output.frames_per_second) + 1
@@ -194,11 +194,11 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
 }
 
 void Recorder::write(const Frame& frame) {
-  FrameStretches values(model_, frame);
+  FrameSource values(model_, frame);
   write(frame.diagnostics, values);
 }
 
-void Recorder::write(const Diagnostics& diagnostics, Stretches& values) {
+void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values) {
   const double time = diagnostics.time;
   if (writes_phyxels_) {
     const fs::path file = frame_file(directory_, "phyxels", frames_);

@@ -76,7 +76,7 @@ std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
 }
 
 /// The layout first, by which those who write the rest find their way.
-void write_together(NewFile& out, const Content& content) {
+void write_collectively(NewFile& out, const Content& content) {
   std::uint64_t at = seal_size;
   for (const Content::Piece& piece : content.pieces) {
     std::uint64_t end = at;
@@ -89,7 +89,7 @@ void write_together(NewFile& out, const Content& content) {
     at += piece.bytes;
   }
   out.sync();  // for those on other hosts
-  content.write_together(out.temporary());
+  content.write_collectively(out.temporary());
 }
 
 /// The seal of a file, whose stream then stands behind it.
@@ -126,7 +126,7 @@ void check_bytes(const fs::path& file, const std::string& seal, std::uint64_t by
 void write_sealed(const fs::path& file, const std::string& kind, const Content& content,
                   Durable durable) {
   NewFile out(file, seal_size + content.size);
-  if (content.write_together) write_together(out, content);
+  if (content.write_collectively) write_collectively(out, content);
   Digest digest;
   std::uint64_t at = seal_size;
   const auto digested = [&](std::span<const std::byte> bytes) {

@@ -361,7 +361,7 @@ std::span<const Part> Model::parts_of_body(const Part& part) const {
   return {first, last};
 }
 
-Index Model::whole_surfels() const {
+Index Model::global_surfel_count() const {
   if (!share) return static_cast<Index>(surfels.position.size());
   Index sum = 0;
   for (const Part& part : parts) sum += part.surfels;

@@ -37,7 +37,7 @@ std::uint64_t digest_of_phyxels(const Model& model) {
     for (Index i = part.begin; i < end; ++i) {
       const Vec3d& x = model.position[i];
       // Kernel volumes are sums, whose last bits depend on who summed.
-      sum += digest_of(std::array{static_cast<double>(model.number(i)), x.x, x.y, x.z,
+      sum += digest_of(std::array{static_cast<double>(model.global_id(i)), x.x, x.y, x.z,
                                   model.neighbourhood.support[i],
                                   part.kernel_volumes ? 0.0 : model.volume[i]});
     }
@@ -46,14 +46,14 @@ std::uint64_t digest_of_phyxels(const Model& model) {
   const auto add_entry = [&](const std::vector<Index>& phyxels) {
     ++entry;
     for (const Index i : phyxels) {
-      if (model.owns(i)) sum += digest_of(std::array{entry, std::int64_t{model.number(i)}});
+      if (model.owns(i)) sum += digest_of(std::array{entry, std::int64_t{model.global_id(i)}});
     }
   };
   for (const Motion& motion : model.motions) add_entry(motion.phyxels);
   for (const Load& load : model.loads) add_entry(load.phyxels);
   if (model.share) {
     auto whole = static_cast<std::int64_t>(sum);
-    model.share->others->add({&whole, 1});
+    model.share->communicator->add({&whole, 1});
     sum = static_cast<std::uint64_t>(whole);
   }
   return sum;

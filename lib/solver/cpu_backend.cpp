@@ -76,9 +76,10 @@ class CpuBackend final : public Backend {
   CpuBackend(const Model& model, int threads)
       : model_(model.with_lists()),
         threads_(threads > 0 ? threads : omp_get_max_threads()),
-        layout_(model, W),
-        runs_(find_runs(&Layout::owned)),
-        ghost_runs_(find_runs(&Layout::near_ghosts)),
+        boundary_(boundary_phyxels(model)),
+        layout_(model, boundary_, W),
+        boundary_runs_(find_runs(&Layout::boundary)),
+        interior_runs_(find_runs(&Layout::interior)),
         lists_(model.neighbourhood.neighbours, layout_) {
     if (!model.neighbourhood.symmetric)
       inverse_ = PackedLists(model.neighbourhood.inverse(), layout_);
@@ -96,6 +97,7 @@ class CpuBackend final : public Backend {
     if (!model.closing.empty()) closing_.assign(slots * 3, Real(0));
     for (std::size_t p = 0; p < model.parts.size(); ++p) pack_part(p);
     model_loads(0);
+    cut_interior();
   }
 
   std::string name() const override {
@@ -107,7 +109,9 @@ class CpuBackend final : public Backend {
   }
   int threads() const override {
     int used = 1;  // small bodies leave threads alone
-    for (const Run& run : runs_) used = std::max(used, threads_for(run.range));
+    for (const auto& runs : {boundary_runs_, interior_runs_}) {
+      for (const Run& run : runs) used = std::max(used, threads_for(run.range));
+    }
     return used;
   }
   Index size() const override { return model_.size(); }
@@ -152,38 +156,17 @@ class CpuBackend final : public Backend {
 
   void stress() override {
     const Phase phase("stresses");
-    find_stresses(runs_);
-    if (!model_.share) return;
-    if (model_.share->rings == 1) {
-      refresh(stress_records());
-    } else {
-      find_stresses(ghost_runs_);
-    }
+    pass(stress_records(), [&](const std::vector<Run>& runs) { find_stresses(runs); });
   }
 
   void advance(double time, double dt) override {
     const Phase phase("forces, motion");
     if (!load_.empty()) model_loads(time);
-    for (const Run& run : runs_) {
-      const bool damped = run.material.damping > 0;
-      if (!closing_.empty()) {
-        damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
-      } else if (load_.empty() && pull_.empty() && external_.empty()) {
-        damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
-      } else {
-        damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
-      }
-    }
-    for (const Motion& motion : model_.motions) {
-      const Path before = motion.path_at(time), after = motion.path_at(time + dt);
-      for (const Index i : motion.phyxels) {
-        const Index slot = layout_.slot(i);
-        const Vec3d x = model_.position[i], u = after.at(x);
-        set_state(i, motion.along_axes(u, get3(displacement_, slot)),
-                  motion.along_axes((u - before.at(x)) / dt, get3(velocity_, slot)));
-      }
-    }
-    if (model_.share) refresh(displacement_records());
+    pass(displacement_records(), [&](const std::vector<Run>& runs) {
+      for (const Run& run : runs) advance_run(run, dt);
+      if (&runs == &boundary_runs_) follow_motions(time, dt, true);  // before they are sent
+    });
+    follow_motions(time, dt, false);
   }
 
   void internal_forces(std::vector<Vec3d>& force) override {
@@ -257,7 +240,7 @@ class CpuBackend final : public Backend {
 
   std::optional<Exchanges> exchanges() const override {
     if (!model_.share) return std::nullopt;
-    return Exchanges{"MPI", model_.share->others->traffic()};
+    return Exchanges{"MPI", model_.share->transport->traffic()};
   }
 
   std::vector<ArrayBytes> memory() const override {
@@ -386,6 +369,71 @@ class CpuBackend final : public Backend {
   /// where other programs want the cores, a barrier waits for a thread that is not running.
   int threads_for(PackRange range) const {
     return std::clamp((range.end - range.begin) * W / 400, 1, threads_);
+  }
+
+  /// Interior packs in pieces, between which messages under way may advance; each is worth waking
+  /// all threads for.
+  void cut_interior() {
+    constexpr Index most_pieces = 8, least_phyxels = 2000;
+    Index packs = 0;
+    for (const Run& run : interior_runs_) packs += run.range.end - run.range.begin;
+    const Index each = std::max(packs / most_pieces + 1, least_phyxels * threads_ / W);
+    Index room = 0;  // of the last piece
+    for (Run run : interior_runs_) {
+      const Index end = run.range.end;
+      while (run.range.begin < end) {
+        if (room == 0) {
+          interior_pieces_.emplace_back();
+          room = each;
+        }
+        run.range.end = std::min(end, run.range.begin + room);
+        room -= run.range.end - run.range.begin;
+        interior_pieces_.back().push_back(run);
+        run.range.begin = run.range.end;
+      }
+    }
+  }
+
+  /// Does the work of a pass: first on the boundary, whose values other ranks wait for, then on the
+  /// interior, while they travel. Ghosts have their owners' values when it returns.
+  /// @param work(runs) finds the values
+  template <class Work>
+  void pass(const Records& values, Work&& work) {
+    if (!model_.share) return work(interior_runs_);
+    HaloTransport& halo = *model_.share->transport;
+    work(boundary_runs_);
+    halo.start(values);
+    for (const std::vector<Run>& piece : interior_pieces_) {
+      work(piece);
+      halo.progress();
+    }
+    halo.finish();
+  }
+
+  /// Sets the phyxels that motions prescribe, those of the boundary or all others.
+  void follow_motions(double time, double dt, bool of_boundary) {
+    for (const Motion& motion : model_.motions) {
+      const Path before = motion.path_at(time), after = motion.path_at(time + dt);
+      for (const Index i : motion.phyxels) {
+        if ((!boundary_.empty() && boundary_[i]) != of_boundary) continue;
+        const Index slot = layout_.slot(i);
+        const Vec3d x = model_.position[i], u = after.at(x);
+        set_state(i, motion.along_axes(u, get3(displacement_, slot)),
+                  motion.along_axes((u - before.at(x)) / dt, get3(velocity_, slot)));
+      }
+    }
+  }
+
+  /// Takes a step of the phyxels of a run, by the code for the terms that the scene has.
+  void advance_run(const Run& run, double dt) {
+    const bool damped = run.material.damping > 0;
+    if (!closing_.empty()) {
+      damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
+    } else if (load_.empty() && pull_.empty() && external_.empty()) {
+      damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
+    } else {
+      damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
+    }
   }
 
   /// Force, gravity and the Verlet step; with `More` what the scene has of loads and pulls.
@@ -551,8 +599,8 @@ class CpuBackend final : public Backend {
             layout_.slot_of_phyxel()};
   }
   void refresh(const Records& records) const {
-    model_.share->others->begin(records);
-    model_.share->others->finish();
+    model_.share->transport->start(records);
+    model_.share->transport->finish();
   }
   PHYXEL_HD static Vec3<P> vec3_at(const P* record, int first) {
     return {record[first], record[first + 1], record[first + 2]};
@@ -645,8 +693,10 @@ class CpuBackend final : public Backend {
 
   const Model& model_;
   int threads_;
+  std::vector<char> boundary_;  // of a share: whether each phyxel is exchanged
   Layout layout_;
-  std::vector<Run> runs_, ghost_runs_;     // own phyxels; ghosts whose stresses are found here
+  std::vector<Run> boundary_runs_, interior_runs_;
+  std::vector<std::vector<Run>> interior_pieces_;
   PackedLists lists_, inverse_;            // inverse_ is empty when lists_ is its own inverse
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;

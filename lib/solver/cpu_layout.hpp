@@ -1,6 +1,6 @@
 /// How the CPU backend numbers phyxels: bodies start at a multiple of the SIMD width, so that a
-/// pack never mixes two bodies, nor a share's own phyxels with ghosts; neighbour lists are stored
-/// pack by pack.
+/// pack never mixes two bodies, nor a share's boundary, interior and ghosts; neighbour lists are
+/// stored pack by pack.
 #pragma once
 
 #include <algorithm>
@@ -46,20 +46,46 @@ struct PackRange {
   Index begin = 0, end = 0;
 };
 
-/// Slots: phyxels renumbered so that what is alike fills whole packs: first all bodies' own
-/// phyxels, then the ghosts whose stresses are found here, then the other ghosts. Slots past an end
-/// are padding: they have no neighbours but themselves, no volume and no mass.
+/// Whether each phyxel of a share is a ghost of another rank or has a ghost in its lists, shape
+/// [n]. Empty if the model is no share.
+inline std::vector<char> boundary_phyxels(const Model& model) {
+  if (!model.share) return {};
+  std::vector<char> boundary(static_cast<std::size_t>(model.size()), 0);
+  for (const HaloPlan::Peer& peer : model.share->halo->peers) {
+    for (const Index i : peer.send) boundary[i] = 1;
+  }
+  const auto reaches_ghosts = [&](const Csr& lists, Index i) {
+    const auto row = lists.row(i);
+    return std::any_of(row.begin(), row.end(), [&](Index j) { return !model.owns(j); });
+  };
+#pragma omp parallel for schedule(static)
+  for (Index i = 0; i < model.size(); ++i) {
+    if (!model.owns(i) || boundary[i]) continue;
+    boundary[i] = reaches_ghosts(model.neighbourhood.neighbours, i) ||
+                  reaches_ghosts(model.neighbourhood.inverse(), i);
+  }
+  return boundary;
+}
+
+/// Slots: phyxels renumbered so that what is alike fills whole packs: first the boundary of all
+/// bodies, then their interior, then their ghosts. Slots past an end are padding: they have no
+/// neighbours but themselves, no volume and no mass.
 class Layout {
  public:
-  Layout(const Model& model, int width)
+  /// @param boundary of `boundary_phyxels`; empty: all is interior
+  Layout(const Model& model, const std::vector<char>& boundary, int width)
       : width_(width), slot_(static_cast<std::size_t>(model.size())) {
+    const auto is_boundary = [&](Index i) { return !boundary.empty() && boundary[i]; };
     for (const Part& part : model.parts) {
-      owned_.push_back(add(part.begin, part.owned_end()));
+      boundary_.push_back(add(part.begin, part.owned_end(), is_boundary));
     }
     for (const Part& part : model.parts) {
-      near_.push_back(add(part.owned_end(), part.end - part.far_ghosts));
+      interior_.push_back(
+          add(part.begin, part.owned_end(), [&](Index i) { return !is_boundary(i); }));
     }
-    for (const Part& part : model.parts) add(part.end - part.far_ghosts, part.end);
+    for (const Part& part : model.parts) {
+      add(part.owned_end(), part.end, [](Index) { return true; });
+    }
   }
 
   int width() const { return width_; }
@@ -67,21 +93,26 @@ class Layout {
   Index slots() const { return packs_ * width_; }
   Index slot(Index phyxel) const { return slot_[phyxel]; }
   const Index* slot_of_phyxel() const { return slot_.data(); }
-  /// What is stepped of a body, and the ghosts whose stresses are found here.
-  const PackRange& owned(std::size_t part) const { return owned_[part]; }
-  const PackRange& near_ghosts(std::size_t part) const { return near_[part]; }
+  /// Packs of a part's own phyxels that exchange values with other ranks.
+  const PackRange& boundary(std::size_t part) const { return boundary_[part]; }
+  /// Packs of a part's other own phyxels.
+  const PackRange& interior(std::size_t part) const { return interior_[part]; }
 
  private:
-  PackRange add(Index begin, Index end) {
+  template <class Wanted>
+  PackRange add(Index begin, Index end, Wanted&& wanted) {
     const Index first = packs_;
-    for (Index i = begin; i < end; ++i) slot_[i] = first * width_ + (i - begin);
-    packs_ += (end - begin + width_ - 1) / width_;
+    Index count = 0;
+    for (Index i = begin; i < end; ++i) {
+      if (wanted(i)) slot_[i] = first * width_ + count++;
+    }
+    packs_ += (count + width_ - 1) / width_;
     return {first, packs_};
   }
 
   int width_;
   Index packs_ = 0;
-  std::vector<PackRange> owned_, near_;
+  std::vector<PackRange> boundary_, interior_;
   std::vector<Index> slot_;
 };
 

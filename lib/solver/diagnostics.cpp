@@ -103,7 +103,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         const Vec3d u = state.displacement[i], x = model.position[i] + u;
         if (!(is_finite(u) && is_finite(state.velocity[i]) && is_finite(force[i]) &&
               all_finite(gradient[i]))) {
-          own.first_bad = std::min(own.first_bad, model.number(i));
+          own.first_bad = std::min(own.first_bad, model.global_id(i));
         }
         Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
         if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
@@ -127,14 +127,14 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         own.force_scale.add(norm(force[i]));
         own.torque_scale.add(norm(x) * norm(force[i]));
         own.largest_displacement = std::max(own.largest_displacement, norm(u));
-        own.look_at_speed(norm(v), model.number(i));
+        own.look_at_speed(norm(v), model.global_id(i));
       }
     }
 #pragma omp critical
     all.add(own);
   }
   error.rethrow();
-  if (model.share) all.add_others(*model.share->others);
+  if (model.share) all.add_ranks(*model.share->communicator);
   Diagnostics d = all.values();
   d.step = now.step;
   d.time = now.time;
@@ -146,12 +146,12 @@ std::string describe_phyxel(const Model& model, Index global_id) {
   Vec3d at{nowhere, nowhere, nowhere};
   for (const Part& part : model.parts) {
     for (Index i = part.begin; i < part.owned_end(); ++i) {
-      if (model.number(i) == global_id) at = model.position[i];
+      if (model.global_id(i) == global_id) at = model.position[i];
     }
   }
   if (model.share) {
-    const Others& others = *model.share->others;
-    at = {others.largest(at.x), others.largest(at.y), others.largest(at.z)};
+    const Communicator& ranks = *model.share->communicator;
+    at = {ranks.largest(at.x), ranks.largest(at.y), ranks.largest(at.z)};
   }
   Index begin = 0;
   for (const Part& part : model.parts) {

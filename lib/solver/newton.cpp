@@ -215,7 +215,7 @@ void Newton::find_stiffness(const Balance& balance) {
 }
 
 int Newton::most_inner_here() const {
-  const auto unknowns = 3 * static_cast<std::int64_t>(model_.whole_size());
+  const auto unknowns = 3 * static_cast<std::int64_t>(model_.global_count());
   return static_cast<int>(std::min<std::int64_t>(most_inner, most_inner_share * unknowns + 100));
 }
 
@@ -224,7 +224,7 @@ bool Newton::asked_to_stop(int iteration, double inner_residual) {
   progress_.iteration = iteration;
   progress_.inner_residual = inner_residual;
   const double stop = observer_(progress_) ? 0 : 1;
-  return (model_.share ? model_.share->others->largest(stop) : stop) > 0;
+  return (model_.share ? model_.share->communicator->largest(stop) : stop) > 0;
 }
 
 /// The step of Newton's method, held phyxels all the way to their targets: conjugate gradients, by

@@ -44,7 +44,7 @@ class OwnedVectors {
 #pragma omp critical
       all.add(own);
     }
-    if (model_.share) model_.share->others->add(all.ready());
+    if (model_.share) model_.share->communicator->add(all.ready());
     return all.value();
   }
   double product(const Vector& a, const Vector& b) const {
@@ -60,16 +60,16 @@ class OwnedVectors {
         largest = std::max(largest, value(i));
       }
     }
-    return model_.share ? model_.share->others->largest(largest) : largest;
+    return model_.share ? model_.share->communicator->largest(largest) : largest;
   }
 
   /// Ghosts take their owners' values. Collective.
   void refresh_ghosts(Vector& values) const {
     if (!model_.share) return;
-    const Others& others = *model_.share->others;
-    others.begin(
+    HaloTransport& halo = *model_.share->transport;
+    halo.start(
         {reinterpret_cast<std::byte*>(values.data()), sizeof(Vec3d), sizeof(Vec3d), nullptr});
-    others.finish();
+    halo.finish();
   }
 
   /// The smallest support of all ranks' phyxels [m]; infinite, if there is none. Collective.
@@ -79,7 +79,7 @@ class OwnedVectors {
       const double h = model_.neighbourhood.support[i];
       if (h > 0) smallest = std::min(smallest, h);
     }
-    return model_.share ? model_.share->others->smallest(smallest) : smallest;
+    return model_.share ? model_.share->communicator->smallest(smallest) : smallest;
   }
 
  private:

@@ -61,7 +61,7 @@ void add_ranks(const Model& model, std::vector<BodySums>& bodies) {
       words.insert(words.end(), ready.begin(), ready.end());
     });
   }
-  model.share->others->add(words);
+  model.share->communicator->add(words);
   auto from = words.begin();
   for (BodySums& body : bodies) {
     body.for_each_sum([&](ExactSum& sum) {

@@ -16,7 +16,7 @@ namespace {
 constexpr double whip = 10;
 
 double largest_over_ranks(const Model& model, double value) {
-  return model.share ? model.share->others->largest(value) : value;
+  return model.share ? model.share->communicator->largest(value) : value;
 }
 
 /// Upper bound of the speeds that a motion prescribes [m/s]. Of a share: collective.

@@ -34,7 +34,7 @@ class HostVibration final : public Vibration {
         distance_(distance) {
     backend_.upload(present_);
     backend_.internal_forces(there_);
-    vectors_.for_each([&](Index i) { current_[i] = start_component(model.number(i)); });
+    vectors_.for_each([&](Index i) { current_[i] = start_component(model.global_id(i)); });
     const double length = std::sqrt(vectors_.product(current_, current_));
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
   }
@@ -121,7 +121,7 @@ double smallest_sound_step(const Model& model) {
       if (h > 0) smallest = std::min(smallest, h / c);
     }
   }
-  if (model.share) smallest = model.share->others->smallest(smallest);
+  if (model.share) smallest = model.share->communicator->smallest(smallest);
   return smallest;
 }
 
@@ -139,7 +139,8 @@ Frequency largest_frequency(const Model& model, Vibration& vibration, double tol
   Frequency found;
   std::vector<double> diagonal, off_diagonal;
   double beta = 0;
-  const auto most = std::min<std::int64_t>(120, 3 * static_cast<std::int64_t>(model.whole_size()));
+  const auto most =
+      std::min<std::int64_t>(120, 3 * static_cast<std::int64_t>(model.global_count()));
   for (std::int64_t k = 0; k < most; ++k) {
     const double alpha = vibration.apply(beta);
     diagonal.push_back(alpha);

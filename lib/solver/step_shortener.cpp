@@ -44,7 +44,7 @@ StepShortener::StepShortener(const Model& model, Backend& backend, const StepPla
   if (!plan.shortens) return;
   for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
   // Ranks look together; one of them may have nothing that stiffens.
-  if (model.share) active_ = model.share->others->largest(active_) > 0;
+  if (model.share) active_ = model.share->communicator->largest(active_) > 0;
   if (!active_) return;
   // A wave travels about one spacing in a step, and so crosses a body in as many steps as the body
   // has phyxels across: a small one deforms fully within a few steps.

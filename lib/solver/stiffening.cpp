@@ -68,7 +68,7 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const PrincipalStretches<double> s = principal_stretches(gradient[i]);
         own.look_at(stiffening_of(law, volume, gradient[i], s, at_rest), s.largest,
-                    model.number(i));
+                    model.global_id(i));
       }
     }
 #pragma omp critical
@@ -91,7 +91,7 @@ Stiffening find_stiffening(const Model& model, Backend& backend) {
   } else {
     found = stiffest_here(model, backend);
   }
-  if (model.share) found.look_at_others(*model.share->others);
+  if (model.share) found.look_at_ranks(*model.share->communicator);
   return found.values();
 }
 

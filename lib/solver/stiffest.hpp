@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "phyxel/share.hpp"
+#include "phyxel/communicator.hpp"
 #include "phyxel/state.hpp"
 
 namespace phyxel {
@@ -32,13 +32,13 @@ class Stiffest {
     if (o.phyxel >= 0) look_at(o.ratio, o.stretch, o.phyxel);
   }
   /// Collective.
-  void look_at_others(const Others& others) {
+  void look_at_ranks(const Communicator& ranks) {
     const bool any = found_.phyxel >= 0;
-    const double ratio = others.largest(any ? found_.ratio : 0);
+    const double ratio = ranks.largest(any ? found_.ratio : 0);
     bool mine = any && found_.ratio == ratio;
-    const double stretch = others.largest(mine ? found_.stretch : 0);
+    const double stretch = ranks.largest(mine ? found_.stretch : 0);
     mine = mine && found_.stretch == stretch;
-    const double who = others.smallest(mine ? static_cast<double>(found_.phyxel) : infinity);
+    const double who = ranks.smallest(mine ? static_cast<double>(found_.phyxel) : infinity);
     found_ = {ratio, stretch, who < infinity ? static_cast<Index>(who) : -1};
   }
   const Stiffening& values() const { return found_; }

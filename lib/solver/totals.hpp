@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "exact_sum.hpp"
+#include "phyxel/communicator.hpp"
 #include "phyxel/diagnostics.hpp"
-#include "phyxel/share.hpp"
 
 namespace phyxel {
 
@@ -47,26 +47,26 @@ struct Totals {
     if (other.fastest >= 0) look_at_speed(other.largest_speed, other.fastest);
     first_bad = std::min(first_bad, other.first_bad);
   }
-  void add_others(const Others& others) {
+  void add_ranks(const Communicator& ranks) {
     std::vector<std::int64_t> words{inverted};
     for_each_sum([&](ExactSum& sum) {
       const auto ready = sum.ready();
       words.insert(words.end(), ready.begin(), ready.end());
     });
-    others.add(words);
+    ranks.add(words);
     auto from = words.begin();
     inverted = *from++;
     for_each_sum([&](ExactSum& sum) {
       for (std::int64_t& word : sum.ready()) word = *from++;
     });
-    largest_displacement = others.largest(largest_displacement);
-    const double fastest_of_all = others.largest(largest_speed);
+    largest_displacement = ranks.largest(largest_displacement);
+    const double fastest_of_all = ranks.largest(largest_speed);
     const double nobody = std::numeric_limits<double>::infinity();
-    const double who = others.smallest(
+    const double who = ranks.smallest(
         largest_speed == fastest_of_all && fastest >= 0 ? static_cast<double>(fastest) : nobody);
     largest_speed = fastest_of_all;
     fastest = who < nobody ? static_cast<Index>(who) : -1;
-    first_bad = static_cast<Index>(others.smallest(static_cast<double>(first_bad)));
+    first_bad = static_cast<Index>(ranks.smallest(static_cast<double>(first_bad)));
   }
   Diagnostics values() const {
     Diagnostics d;

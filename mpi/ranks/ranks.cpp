@@ -20,10 +20,10 @@
 namespace phyxel {
 namespace {
 
-std::unique_ptr<const Communicator> communicator_of(int& argc, char**& argv) {
+std::unique_ptr<MpiCommunicator> communicator_of(int& argc, char**& argv) {
   // One rank starts no MPI: it may be there without working outside of mpirun.
-  if (!launched_as_rank()) return std::make_unique<const Communicator>();
-  return std::make_unique<const Communicator>(argc, argv);
+  if (!launched_as_rank()) return std::make_unique<MpiCommunicator>();
+  return std::make_unique<MpiCommunicator>(argc, argv);
 }
 
 void share_cores(int programs) {
@@ -34,12 +34,18 @@ void share_cores(int programs) {
 
 }  // namespace
 
-Ranks::Ranks() : communicator_(std::make_unique<const Communicator>()) {}
-Ranks::Ranks(int& argc, char**& argv) : communicator_(communicator_of(argc, argv)) {
+Ranks::Ranks() : communicator_(std::make_unique<MpiCommunicator>()) {}
+Ranks::Ranks(int& argc, char**& argv) : communicator_(communicator_of(argc, argv)) { share_host(); }
+Ranks::Ranks(CommunicatorHandle callers)
+    : communicator_(std::make_unique<MpiCommunicator>(callers)) {
+  share_host();
+}
+Ranks::~Ranks() = default;
+void Ranks::close() { communicator_->close(); }
+void Ranks::share_host() const {
   share_host_memory(host_size());
   if (size() > 1) share_cores(host_size());
 }
-Ranks::~Ranks() = default;
 
 int Ranks::rank() const { return communicator_->rank(); }
 int Ranks::size() const { return communicator_->size(); }
@@ -60,7 +66,9 @@ double Ranks::exact_sum(std::span<const double> terms) const {
   return sum.value();
 }
 
-void Ranks::together(const std::function<void()>& work) const { communicator_->together(work); }
+void Ranks::collectively(const std::function<void()>& work) const {
+  communicator_->collectively(work);
+}
 
 int on_ranks(int& argc, char**& argv, const std::function<int(const Ranks&)>& program) {
   const std::string name = argc > 0 ? std::filesystem::path(argv[0]).filename().string() : "phyxel";
@@ -78,9 +86,13 @@ int on_ranks(int& argc, char**& argv, const std::function<int(const Ranks&)>& pr
     return static_cast<int>(code);
   };
   try {
-    return program(ranks.emplace(argc, argv));
+    const int code = program(ranks.emplace(argc, argv));
+    ranks->close();
+    return code;
   } catch (const AgreedError& error) {
-    return fail(error.code(), error.what(), true);
+    const int code = fail(error.code(), error.what(), true);
+    if (ranks) ranks->close();
+    return code;
   } catch (const Error& error) {
     return fail(error.code(), error.what());
   } catch (const std::bad_alloc&) {

@@ -4,7 +4,7 @@
 
 #include "mpi/build_share.hpp"
 #include "mpi/communicator.hpp"
-#include "mpi/stretch_exchange.hpp"
+#include "mpi/row_redistribution.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
@@ -17,11 +17,6 @@ namespace {
 std::vector<Partitioner> candidates_of(const std::string& name) {
   if (name != "auto") return {partitioner_of(name)};
   return {Partitioner::bisection, Partitioner::curve, Partitioner::metis};
-}
-
-void check_rings(int rings, const ChosenDevice& device) {
-  if (rings == 1 || (rings == 2 && !device.gpu)) return;
-  throw InputError(fmt::format("{} rings of ghosts: allowed are 1 or, on CPU ranks, 2", rings));
 }
 
 /// Of all bodies, as the whole model numbers their surfels.
@@ -60,11 +55,7 @@ SharedModel::~SharedModel() = default;
 void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
                         const CutOptions& cut) {
   ShareOptions options;
-  ranks_.together([&] {
-    options.candidates = candidates_of(cut.partitioner);
-    options.rings = cut.rings;
-    if (ranks_.size() > 1) check_rings(cut.rings, device_);
-  });
+  ranks_.collectively([&] { options.candidates = candidates_of(cut.partitioner); });
   if (ranks_.size() == 1) {
     here_ = clouds ? build_model(scene, *clouds, device_) : build_model(scene, device_);
     shares_ = {here_.size(), here_.size(), 0};
@@ -77,11 +68,11 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     if (can_survey_on_cuda(scene)) surveyor = cuda_share_surveyor(device_.gpu->index);
     options.surveyor = surveyor.get();
   }
-  const Communicator& all = ranks_.communicator();
+  const MpiCommunicator& all = ranks_.communicator();
   BuiltShare built =
       clouds ? build_share(all, scene, *clouds, options) : build_share(all, scene, options);
   here_ = std::move(built.model);
-  exchange_ = std::make_unique<const StretchExchange>(all, here_);
+  exchange_ = std::make_unique<const RowRedistribution>(all, here_);
   if (ranks_.leads()) triangles_ = triangles_of(built.surfaces);
   partitioner_ = partitioner_name(built.partitioner);
   digest_ = model_digest(here_);
@@ -96,7 +87,7 @@ std::unique_ptr<Backend> SharedModel::make_backend(Precision precision, int thre
   const auto make = [&] {
     return phyxel::make_backend(here_, precision, device_, threads, transport);
   };
-  ranks_.together([&] { check_transport_name(transport); });
+  ranks_.collectively([&] { check_transport_name(transport); });
   // Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
   return device_.gpu ? make() : ranks_.agreed(make);
 }
@@ -116,11 +107,12 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     Looks looks;
   };
   Header now{};
-  ranks_.together([&] {
+  ranks_.collectively([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));
     if (!ranks_.leads()) return;
-    if (checkpoint->info().model_digest != digest_ || checkpoint->phyxels() != here_.whole_size()) {
+    if (checkpoint->info().model_digest != digest_ ||
+        checkpoint->phyxels() != here_.global_count()) {
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
     }
     const State header = checkpoint->state(0, 0);

@@ -43,7 +43,6 @@ density = 1000
   } cases[] = {
       {{"run", "missing.toml"}, "missing.toml"},
       {{"run", "scene.toml", "--partitioner", "metiss"}, "--partitioner metiss"},
-      {{"run", "scene.toml", "--ghost-rings", "3"}, "ghost-rings"},
       {{"run", "scene.toml", "--step", "1"}, "error: scene.toml: time.step = 1 s is unstable"},
       {{"run", "scene.toml", "--transport", "pigeon"}, "--transport pigeon"},
       {{"run", "huge.toml"}, "error: huge.toml:6:1: body \"huge\": "},

@@ -154,18 +154,18 @@ TEST_F(Mpirun, WritesTheSameBytesOnAnyNumberOfRanks) {
   ASSERT_EQ(alone.code, 0) << alone.err;
   const struct {
     int ranks;
-    const char *partitioner, *rings, *stretch;
-  } cases[] = {{1, "metis", "1", "7"},
-               {2, "metis", "1", "97"},
-               {2, "curve", "2", "1000000"},
-               {3, "bisection", "1", "1000000"},
-               {3, "metis", "2", "97"}};
+    const char *partitioner, *stretch;
+  } cases[] = {{1, "metis", "7"},
+               {2, "metis", "97"},
+               {2, "curve", "1000000"},
+               {3, "bisection", "1000000"},
+               {3, "metis", "97"}};
   for (const auto& c : cases) {
-    const std::string out = std::string(c.partitioner) + std::to_string(c.ranks) + c.rings;
+    const std::string out = std::string(c.partitioner) + std::to_string(c.ranks);
     use_ranks(c.ranks);
     environment_.emplace_back("PHYXEL_STRETCH", c.stretch);
-    const Outcome outcome = run({"run", "scene.toml", "--out", out, "--partitioner", c.partitioner,
-                                 "--ghost-rings", c.rings});
+    const Outcome outcome =
+        run({"run", "scene.toml", "--out", out, "--partitioner", c.partitioner});
     ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
     if (c.ranks > 1) {
       EXPECT_THAT(outcome.out, HasSubstr(std::to_string(c.ranks) + " ranks, cut by"));

@@ -96,11 +96,11 @@ std::map<Index, Described> described(const Model& model, const Tiling& tiling) {
     Described d{block.centre, {}, {}};
     for (int s = 0; s < block.surfels; ++s) {
       const Index surfel = plan.order[block.first_surfel + s];
-      d.surfels.push_back(model.share ? model.share->surfel_number[surfel] : surfel);
+      d.surfels.push_back(model.share ? model.share->global_surfel_id[surfel] : surfel);
       for (int k = 0; k < block.carriers; ++k) {
         const Carrier& c = plan.carriers[block.first_carrier + k * surfel_block + s];
         const Index place = plan.place[block.first_slot + c.slot];
-        d.carriers.emplace_back(model.number(tiling.phyxel[place]), c.weight);
+        d.carriers.emplace_back(model.global_id(tiling.phyxel[place]), c.weight);
       }
     }
     EXPECT_TRUE(blocks.emplace(d.surfels.front(), d).second);
@@ -118,7 +118,7 @@ TEST_P(SurfelPlans, OfSharesHaveTheBlocksOfTheWhole) {
     for (Index t = 0; t < tiles.count; ++t) part_of_tile.push_back((5 * t + 1) % parts);
     const std::vector<int> part_of = ungrouped(part_of_tile, tiles);
     std::map<Index, Described> found;
-    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
       ModelShare made = share_of(whole, plan, part_of);
       made.share.place = values_of(made.share, make_tiling(whole).place);
       made.model.share = std::make_shared<Share>(made.share);

@@ -145,7 +145,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
     for (Index g = 0; g < groups.count; ++g) part_of_tile.push_back((7 * g + 3) % parts);
     const std::vector<int> part_of = ungrouped(part_of_tile, groups);
     Index own = 0;
-    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
       ModelShare made = share_of(whole, plan, part_of);
       made.share.place = values_of(made.share, places);
       Model& model = made.model;
@@ -153,7 +153,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
       const cuda::Tiling tiling = make_tiling(model);
       own += tiling.own_tiles;
       const auto number = [&](Index place) {
-        return tiling.phyxel[place] < 0 ? -1 : model.number(tiling.phyxel[place]);
+        return tiling.phyxel[place] < 0 ? -1 : model.global_id(tiling.phyxel[place]);
       };
       for (Index i = 0; i < model.size(); ++i) ASSERT_EQ(tiling.phyxel[tiling.place[i]], i);
       for (Index tile = 0; tile < tiling.own_tiles; ++tile) {
@@ -161,7 +161,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
         const auto somebody =
             *std::find_if(tiling.phyxel.begin() + first, tiling.phyxel.begin() + first + tile_size,
                           [](Index i) { return i >= 0; });
-        const Index other = places[model.number(somebody)] / tile_size;
+        const Index other = places[model.global_id(somebody)] / tile_size;
         EXPECT_EQ(tiling.part[tile], expected.part[other]);
         for (Index lane = 0; lane < tile_size; ++lane) {
           ASSERT_EQ(number(first + lane), expected.phyxel[other * tile_size + lane]);

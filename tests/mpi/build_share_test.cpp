@@ -230,22 +230,21 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
   std::vector<std::int64_t> owners(static_cast<std::size_t>(whole_.size()), 0), part_of(owners);
   for (Index i = 0; i < here_.size(); ++i) {
     if (!here_.owns(i)) continue;
-    owners.at(here_.number(i)) = 1;
-    part_of.at(here_.number(i)) = world().rank();
+    owners.at(here_.global_id(i)) = 1;
+    part_of.at(here_.global_id(i)) = world().rank();
   }
   world().add(owners);
   world().add(part_of);
   ASSERT_THAT(owners, ::testing::Each(1));
-  const HaloPlan plan = make_halo_plans(phyxel_graph(whole_), {part_of.begin(), part_of.end()},
-                                        world().size(), cut_.options.rings)[world().rank()];
+  const PartHalo plan = make_part_halos(phyxel_graph(whole_), {part_of.begin(), part_of.end()},
+                                        world().size())[world().rank()];
   const ModelShare made = share_of(whole_, plan, {part_of.begin(), part_of.end()});
   const Model& expected = made.model;
   const Share& share = *here_.share;
 
-  EXPECT_EQ(share.whole, made.share.whole);
-  ASSERT_EQ(share.number, made.share.number);
+  EXPECT_EQ(share.global_count, made.share.global_count);
+  ASSERT_EQ(share.global_id, made.share.global_id);
   EXPECT_EQ(share.owned, made.share.owned);
-  EXPECT_EQ(share.rings, made.share.rings);
   EXPECT_TRUE(same_bits(here_.position, expected.position));
   const Neighbourhood &hood = here_.neighbourhood, &lists = expected.neighbourhood;
   EXPECT_EQ(hood.symmetric, lists.symmetric);
@@ -265,11 +264,9 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
     EXPECT_EQ(part.begin, other.begin);
     EXPECT_EQ(part.end, other.end);
     EXPECT_EQ(part.ghosts, other.ghosts);
-    EXPECT_EQ(part.far_ghosts, other.far_ghosts);
     EXPECT_EQ(part.surfel_begin, other.surfel_begin);
     EXPECT_EQ(part.surfel_end, other.surfel_end);
-    // Stresses of the inner ring are found here.
-    const Index end = part.end - part.far_ghosts;
+    const Index end = part.owned_end();
     const auto alike = [&](const auto& values, const auto& others) {
       return same_bits(range(values, part.begin, end), range(others, part.begin, end));
     };
@@ -278,7 +275,7 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
     EXPECT_TRUE(!has_lists || alike(here_.inverse_moment, expected.inverse_moment));
     EXPECT_TRUE(!has_lists || alike(here_.moment_offset, expected.moment_offset));
   }
-  EXPECT_EQ(share.surfel_number, made.share.surfel_number);
+  EXPECT_EQ(share.global_surfel_id, made.share.global_surfel_id);
   EXPECT_EQ(here_.surfels.unreached, expected.surfels.unreached);
   EXPECT_TRUE(same_bits(here_.surfels.position, expected.surfels.position));
   EXPECT_TRUE(same_bits(here_.surfels.normal, expected.surfels.normal));
@@ -305,7 +302,7 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
 TEST_P(BuiltShares, TellTheQualityOfTheirCut) {
   std::vector<std::int64_t> part_of(static_cast<std::size_t>(whole_.size()), 0);
   for (Index i = 0; i < here_.size(); ++i) {
-    if (here_.owns(i)) part_of.at(here_.number(i)) = world().rank();
+    if (here_.owns(i)) part_of.at(here_.global_id(i)) = world().rank();
   }
   world().add(part_of);
   const bool chosen = std::any_of(
@@ -343,12 +340,11 @@ TEST_P(BuiltShares, KnowOfTheWhole) {
     EXPECT_EQ(part.volume, whole.volume);
     EXPECT_TRUE(part.centre == whole.centre && part.origin == whole.origin);
   }
-  EXPECT_EQ(here_.whole_size(), whole_.size());
-  EXPECT_EQ(here_.whole_surfels(), whole_.whole_surfels());
+  EXPECT_EQ(here_.global_count(), whole_.size());
+  EXPECT_EQ(here_.global_surfel_count(), whole_.global_surfel_count());
   EXPECT_EQ(model_digest(here_), model_digest(whole_));
   EXPECT_EQ(here_.degenerate.describe(), whole_.degenerate.describe());
   EXPECT_EQ(here_.warnings, whole_.warnings);
-  EXPECT_EQ(here_.share->rings, cut_.options.rings);
 }
 
 TEST_P(BuiltShares, KeepTilesWhole) {
@@ -371,12 +367,12 @@ INSTANTIATE_TEST_SUITE_P(
     Bodies, BuiltShares,
     ::testing::Combine(
         ::testing::ValuesIn(build_cases()),
-        ::testing::Values(Cut{"Metis", {{Partitioner::metis}, 1, 0}},
-                          Cut{"Coarse", {{Partitioner::metis}, 1, 0, nullptr, 60, 400}},
-                          Cut{"Curve", {{Partitioner::curve}, 2, 0}},
-                          Cut{"Groups", {{Partitioner::bisection}, 1, cuda::tile_size, nullptr, 4}},
-                          Cut{"Tiles", {{Partitioner::bisection}, 1, cuda::tile_size}},
-                          Cut{"Device", {{Partitioner::curve}, 1, cuda::tile_size, &surveyor}})),
+        ::testing::Values(Cut{"Metis", {{Partitioner::metis}, 0}},
+                          Cut{"Coarse", {{Partitioner::metis}, 0, nullptr, 60, 400}},
+                          Cut{"Curve", {{Partitioner::curve}, 0}},
+                          Cut{"Groups", {{Partitioner::bisection}, cuda::tile_size, nullptr, 4}},
+                          Cut{"Tiles", {{Partitioner::bisection}, cuda::tile_size}},
+                          Cut{"Device", {{Partitioner::curve}, cuda::tile_size, &surveyor}})),
     [](const auto& test) {
       return std::string(std::get<0>(test.param).name) + std::get<1>(test.param).name;
     });
@@ -454,11 +450,11 @@ TEST(BuiltShare, AsksForTheMemoryThatItTakes) {
   Scene scene{.bodies = {shape("beam", 0.05)}};  // 24,000 phyxels: tens of MB
   scene.bodies[0].neighbourhood.nearest = 20;
   // Few groups, as bodies have that are large enough to fill a machine.
-  const ShareOptions options{{Partitioner::metis}, 1, 0, nullptr, 60, 400};
+  const ShareOptions options{{Partitioner::metis}, 0, nullptr, 60, 400};
   malloc_trim(0);
   const double before = status_bytes("VmRSS");
   std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
-  const Index phyxels = build_share(world(), scene, options).model.whole_size();
+  const Index phyxels = build_share(world(), scene, options).model.global_count();
   const auto taken = static_cast<double>(
       world().largest(static_cast<std::int64_t>(status_bytes("VmHWM") - before)));
   ASSERT_GT(taken, 100.0 * phyxels / world().size());  // positions, lists and moments alone

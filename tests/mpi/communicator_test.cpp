@@ -54,7 +54,7 @@ TEST(Communicator, ExchangesWithEveryRank) {
   std::vector<std::vector<int>> send(static_cast<std::size_t>(ranks));
   for (int to = 0; to < ranks; ++to)
     send[to].assign(static_cast<std::size_t>(to + rank), 100 * rank + to);
-  const auto received = world().exchanged(send);
+  const auto received = world().alltoallv(send);
   ASSERT_EQ(static_cast<int>(received.size()), ranks);
   for (int from = 0; from < ranks; ++from) {
     EXPECT_EQ(received[from],
@@ -75,7 +75,7 @@ bool is_agreed(const Error& error) { return dynamic_cast<const AgreedError*>(&er
 TEST(Communicator, AFailureOfOneIsThatOfAll) {
   const int last = world().size() - 1;
   try {
-    world().together([&] {
+    world().collectively([&] {
       if (world().rank() == last) throw DeviceError("no GPU is left");
     });
     FAIL() << "nobody was told";
@@ -88,7 +88,7 @@ TEST(Communicator, AFailureOfOneIsThatOfAll) {
   }
   // What all say is said once, of nobody.
   try {
-    world().together([] { throw InputError("scene.toml:3: unknown key"); });
+    world().collectively([] { throw InputError("scene.toml:3: unknown key"); });
     FAIL() << "nobody was told";
   } catch (const Error& error) {
     EXPECT_EQ(is_agreed(error), world().size() > 1);
@@ -96,7 +96,7 @@ TEST(Communicator, AFailureOfOneIsThatOfAll) {
     EXPECT_STREQ(error.what(), "scene.toml:3: unknown key");
   }
   int done = 0;
-  world().together([&] { ++done; });
+  world().collectively([&] { ++done; });
   EXPECT_EQ(done, 1);
 }
 

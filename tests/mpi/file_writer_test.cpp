@@ -8,7 +8,7 @@
 
 #include "../partition/bodies.hpp"
 #include "mpi/parallel_file.hpp"
-#include "mpi/stretch_exchange.hpp"
+#include "mpi/row_redistribution.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "ranks.hpp"
 #include "support/folder.hpp"
@@ -49,7 +49,7 @@ std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
   state->dt = 0.5;
   state->time = 0.5 * k;
   for (Index i = 0; i < model.size(); ++i) {
-    const Index number = model.owns(i) ? model.number(i) : -1;
+    const Index number = model.owns(i) ? model.global_id(i) : -1;
     const auto value = [&](int what) { return value_of(number, what) + k; };
     state->displacement.push_back({value(0), value(1), value(2)});
     state->velocity.push_back({value(3), value(4), value(5)});
@@ -57,7 +57,7 @@ std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
     moment->frame.volume_ratio.push_back(value(7));
   }
   for (Index s = 0; s < static_cast<Index>(model.surfels.position.size()); ++s) {
-    const Index number = model.share ? model.share->surfel_number[s] : s;
+    const Index number = model.share ? model.share->global_surfel_id[s] : s;
     moment->surfels.position.push_back({value_of(number, 8) + k, 0, 1});
     moment->surfels.normal.push_back({0, value_of(number, 9), 1});
   }
@@ -88,7 +88,7 @@ class SharedFiles : public phyxel::test::Folder {
 
 /// Or else the tests of this program would say nothing of mpi/parallel_file.cpp.
 TEST_F(SharedFiles, AreWrittenByAllRanksWithAParallelHdf5) {
-  EXPECT_EQ(can_write_together(), PHYXEL_PARALLEL_HDF5 == 1);
+  EXPECT_EQ(can_write_collectively(), PHYXEL_PARALLEL_HDF5 == 1);
 }
 
 TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
@@ -100,15 +100,15 @@ TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
     FileWriter writer(shared_, length);
     for (int k = 0; k < frames; ++k) {
       const auto moment = moment_at(k, shared_.here());
-      writer.submit(moment, [&, now = moment->frame.diagnostics](Stretches& values) {
+      writer.submit(moment, [&, now = moment->frame.diagnostics](ChunkedSource& values) {
         EXPECT_EQ(values.length(), length);
         recorder->write(now, values);
       });
       writer.serve();  // and the ranks go on
     }
     const auto moment = moment_at(frames, shared_.here());
-    writer.submit(moment, [&](Stretches& values) {
-      write_checkpoint(recorder->directory(), *moment->state, info(), shared_.here().whole_size(),
+    writer.submit(moment, [&](ChunkedSource& values) {
+      write_checkpoint(recorder->directory(), *moment->state, info(), shared_.here().global_count(),
                        values);
     });
     writer.finish();
@@ -131,12 +131,12 @@ TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
 /// No call for more than a stretch: what the first rank holds beside its own.
 TEST_F(SharedFiles, TakeAStretchOfTheFirstRanksMemory) {
   if (world().size() == 1) GTEST_SKIP() << "one rank has all values anyway";
-  const Index all = shared_.here().whole_size();
+  const Index all = shared_.here().global_count();
   const auto moment = moment_at(0, shared_.here());
   FileWriter writer(shared_, 50);
   std::size_t most = 0;
   Index found = 0;
-  writer.submit(moment, [&](Stretches& values) {
+  writer.submit(moment, [&](ChunkedSource& values) {
     for (Index begin = 0; begin < all; begin += values.length()) {
       const Index end = std::min(all, begin + values.length());
       const auto some = values.values(Quantity::velocity, begin, end);
@@ -164,7 +164,7 @@ TEST_F(SharedFiles, AnErrorOfTheWriterIsThatOfAllRanks) {
     return "no error";
   };
   bool later = false;
-  writer.submit(moment, [](Stretches& values) {
+  writer.submit(moment, [](ChunkedSource& values) {
     values.values(Quantity::mass, 0, 10);
     throw OutputError("out/phyxels_000000.hdf: No space left on device");
   });
@@ -175,7 +175,8 @@ TEST_F(SharedFiles, AnErrorOfTheWriterIsThatOfAllRanks) {
     }
   });
   EXPECT_THAT(message, HasSubstr("No space left on device"));
-  EXPECT_EQ(message_of([&] { writer.submit(moment, [&](Stretches&) { later = true; }); }), message);
+  EXPECT_EQ(message_of([&] { writer.submit(moment, [&](ChunkedSource&) { later = true; }); }),
+            message);
   EXPECT_EQ(message_of([&] { writer.finish(); }), message);
   EXPECT_FALSE(later);
 }
@@ -186,7 +187,7 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
   {
     FileWriter writer(shared_, 50);
     const auto moment = moment_at(0, shared_.here());
-    writer.submit(moment, [&](Stretches& values) {
+    writer.submit(moment, [&](ChunkedSource& values) {
       try {
         values.values(Quantity::mass, 0, 10);
       } catch (const OutputError& left) {
@@ -194,7 +195,7 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
         throw;
       }
     });
-    writer.submit(moment, [&](Stretches&) { error = "written"; });
+    writer.submit(moment, [&](ChunkedSource&) { error = "written"; });
   }
   if (leads()) {
     EXPECT_THAT(error, HasSubstr("ended before"));
@@ -205,7 +206,7 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
 TEST_F(SharedFiles, StatesComeBackToAllRanks) {
   if (world().size() == 1) GTEST_SKIP() << "one rank reads all";
   const Model& here = shared_.here();
-  for (const Index length : {1000, here.whole_size(), Stretches::usual_length}) {
+  for (const Index length : {1000, here.global_count(), ChunkedSource::usual_length}) {
     Index most = 0;
     const State state = shared_.exchange().scattered(length, [&](Index begin, Index end) {
       most = std::max(most, end - begin);
@@ -216,11 +217,11 @@ TEST_F(SharedFiles, StatesComeBackToAllRanks) {
       }
       return some;
     });
-    EXPECT_EQ(most, leads() ? std::min(length, here.whole_size()) : 0);
+    EXPECT_EQ(most, leads() ? std::min(length, here.global_count()) : 0);
     ASSERT_EQ(state.displacement.size(), here.position.size());
     for (Index i = 0; i < here.size(); ++i) {
-      EXPECT_EQ(state.displacement[i].x, value_of(here.number(i), 0));
-      EXPECT_EQ(state.velocity[i].y, value_of(here.number(i), 1));
+      EXPECT_EQ(state.displacement[i].x, value_of(here.global_id(i), 0));
+      EXPECT_EQ(state.velocity[i].y, value_of(here.global_id(i), 1));
     }
   }
 }

@@ -34,7 +34,7 @@ class EndsAllAtExceptions : public ::testing::EmptyTestEventListener {
 }  // namespace
 
 const Ranks& all_ranks() { return *the_ranks; }
-const Communicator& world() { return all_ranks().communicator(); }
+const MpiCommunicator& world() { return all_ranks().communicator(); }
 
 }  // namespace phyxel::test
 
@@ -52,6 +52,6 @@ int main(int argc, char** argv) {
   const int own_code = exit_code_of(failed, world().rank() == 0);
   // Skipped as a whole where no rank has run a case.
   const int code = static_cast<int>(world().smallest(static_cast<std::int64_t>(own_code)));
-  the_ranks.reset();
+  the_ranks->close();
   return code;
 }

@@ -8,6 +8,6 @@ namespace phyxel::test {
 
 const Ranks& all_ranks();
 /// What they talk through.
-const Communicator& world();
+const MpiCommunicator& world();
 
 }  // namespace phyxel::test

@@ -6,7 +6,7 @@
 
 #include "../partition/bodies.hpp"
 #include "device.hpp"
-#include "mpi/halo.hpp"
+#include "mpi/halo_transport.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/solver.hpp"
@@ -84,7 +84,7 @@ const Model& whole_of(const ShareCase& c) {
 }
 
 /// What steps a share, and how values travel.
-enum class Way { one_ring, two_rings, gpu_direct, gpu_nccl, gpu_mpi, gpu_host };
+enum class Way { cpu, gpu_direct, gpu_nccl, gpu_mpi, gpu_host };
 
 class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
  protected:
@@ -99,7 +99,7 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
       GTEST_SKIP() << "NCCL needs a GPU for each rank, and itself: " << cuda::nccl_version();
     }
     if (way_ == Way::gpu_mpi && !mpi_takes_device_memory()) GTEST_SKIP() << mpi_description();
-    const int rings = way_ == Way::two_rings ? 2 : 1, parts = world().size();
+    const int parts = world().size();
     const Graph graph = phyxel_graph(whole_);
     const Groups tiles = curve_groups(whole_, cuda::tile_size);
     // METIS asks the C library for random numbers: one rank's answer serves all.
@@ -109,12 +109,11 @@ class Shares : public ::testing::TestWithParam<std::tuple<ShareCase, Way>> {
             ? ungrouped(make_partition(grouped_graph(graph, tiles), parts, partitioner), tiles)
             : make_partition(graph, parts, partitioner));
     ModelShare share =
-        share_of(whole_, make_halo_plans(graph, part_of_, parts, rings)[world().rank()], part_of_);
+        share_of(whole_, make_part_halos(graph, part_of_, parts)[world().rank()], part_of_);
     if (way_ == Way::gpu_host) share.model = testing::without_lists(std::move(share.model));
     if (on_gpus()) share.share.place = values_of(share.share, cuda::make_tiling(whole_).place);
-    share.share.others = std::make_shared<Halo>(world(), share);
-    share.model.share = std::make_shared<Share>(std::move(share.share));
-    model_ = std::move(share.model);
+    connect(world(), share);
+    model_ = phyxel::model_of(std::move(share));
   }
   std::unique_ptr<Backend> backend(const Model& model, Precision precision) const {
     if (!on_gpus()) return make_cpu_backend(model, precision, 1);
@@ -188,7 +187,7 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     Index owned = 0;
     for (Index i = 0; i < model_.size(); ++i) {
       if (!model_.owns(i)) continue;
-      const Index n = model_.number(i);
+      const Index n = model_.global_id(i);
       if (!(a.displacement[n] == b.displacement[i] && a.velocity[n] == b.velocity[i])) {
         different.push_back(n);
       }
@@ -213,7 +212,7 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     here->advect_surfels(q);
     different.clear();
     for (std::size_t s = 0; s < q.position.size(); ++s) {
-      const Index k = model_.share->surfel_number.at(s);
+      const Index k = model_.share->global_surfel_id.at(s);
       if (!(p.position[k] == q.position[s] && p.normal[k] == q.normal[s])) different.push_back(k);
     }
     EXPECT_THAT(different, ::testing::IsEmpty());
@@ -225,9 +224,7 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
 
 /// A body of one of our laws, cut among the ranks, against the oracle, which is written from the
 /// papers and knows of no ranks: forces, and a few of the papers' steps.
-class AgainstTheOracle : public ::testing::TestWithParam<int> {};
-
-TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
+TEST(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   Material material = testing::rubber();
   material.law = NeoHookean<double>::name;
   material.volume_stiffness = 3e4;
@@ -244,15 +241,13 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   }
   oracle::find_neighbours(body);
 
-  const int rings = GetParam(), parts = world().size();
+  const int parts = world().size();
   const Graph graph = phyxel_graph(whole);
   const std::vector<int> part_of =
       world().broadcast(make_partition(graph, parts, Partitioner::curve));
-  ModelShare cut =
-      share_of(whole, make_halo_plans(graph, part_of, parts, rings)[world().rank()], part_of);
-  cut.share.others = std::make_shared<Halo>(world(), cut);
-  cut.model.share = std::make_shared<Share>(std::move(cut.share));
-  const Model& here = cut.model;
+  ModelShare cut = share_of(whole, make_part_halos(graph, part_of, parts)[world().rank()], part_of);
+  connect(world(), cut);
+  const Model here = phyxel::model_of(std::move(cut));
 
   const double dt = 0.4 * step_limit(whole, 1).largest_step;
   const std::vector<Vec3d> start = testing::random_deformation(whole, 0.005);
@@ -269,7 +264,7 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
     backend->internal_forces(force);
     for (Index i = 0; i < here.size(); ++i) {
       if (!here.owns(i)) continue;
-      const oracle::V3& e = expected[here.number(i)];
+      const oracle::V3& e = expected[here.global_id(i)];
       largest_difference = std::max(largest_difference, norm(force[i] - Vec3d{e[0], e[1], e[2]}));
       largest_force = std::max(largest_force, e.norm());
     }
@@ -286,7 +281,7 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   Index owned = 0;
   for (Index i = 0; i < here.size(); ++i) {
     if (!here.owns(i)) continue;
-    const Index n = here.number(i);
+    const Index n = here.global_id(i);
     off = std::max(off, norm(end.displacement[i] - Vec3d{now[n][0], now[n][1], now[n][2]}));
     moved = std::max(moved, norm(end.displacement[i] - start[n]));
     ++owned;
@@ -298,7 +293,6 @@ TEST_P(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   EXPECT_EQ(world().sum(std::int64_t{owned}), whole.size());
   world().barrier();
 }
-INSTANTIATE_TEST_SUITE_P(Rings, AgainstTheOracle, ::testing::Values(1, 2));
 
 /// The stiffest phyxel of all ranks is that of one, a step is halved to the same bits, and the
 /// limit of the deformed body is the same.
@@ -329,7 +323,7 @@ TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
   const State a = whole.state(), b = share.state();
   std::vector<Index> different;
   for (Index i = 0; i < model_.size(); ++i) {
-    const Index n = model_.number(i);
+    const Index n = model_.global_id(i);
     if (model_.owns(i) &&
         !(a.displacement[n] == b.displacement[i] && a.velocity[n] == b.velocity[i])) {
       different.push_back(n);
@@ -381,7 +375,7 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
   State state = start(model_);
   const Index broken = whole_.size() - 1;
   for (Index i = 0; i < model_.size(); ++i) {
-    if (model_.number(i) == broken) state.displacement[i].x = std::nan("");
+    if (model_.global_id(i) == broken) state.displacement[i].x = std::nan("");
   }
   here->upload(state);
   const Diagnostics d = diagnose(model_, *here, 0, state.dt);
@@ -392,15 +386,15 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
 }
 
 std::string name_of(const ::testing::TestParamInfo<std::tuple<ShareCase, Way>>& test) {
-  const char* ways[] = {"OneRing", "TwoRings", "GpuDirect", "GpuNccl", "GpuMpi", "GpuHost"};
+  const char* ways[] = {"Cpu", "GpuDirect", "GpuNccl", "GpuMpi", "GpuHost"};
   const auto& [body, way] = test.param;
   return std::string(body.name) + ways[static_cast<int>(way)];
 }
 INSTANTIATE_TEST_SUITE_P(Bodies, Shares,
                          ::testing::Combine(::testing::ValuesIn(share_cases()),
-                                            ::testing::Values(Way::one_ring, Way::two_rings,
-                                                              Way::gpu_direct, Way::gpu_nccl,
-                                                              Way::gpu_mpi, Way::gpu_host)),
+                                            ::testing::Values(Way::cpu, Way::gpu_direct,
+                                                              Way::gpu_nccl, Way::gpu_mpi,
+                                                              Way::gpu_host)),
                          name_of);
 
 }  // namespace

@@ -52,7 +52,7 @@ TEST_F(ASharedModel, IsTheWholeOneInParts) {
   const Model whole = build_model(scene);
   const SharedModel shared(all_ranks(), scene, cpu);
   EXPECT_EQ(shared.digest(), model_digest(whole));
-  EXPECT_EQ(shared.here().whole_size(), whole.size());
+  EXPECT_EQ(shared.here().global_count(), whole.size());
   const int count = all_ranks().size();
   EXPECT_LE(shared.shares().fewest, whole.size() / count);
   EXPECT_GE(shared.shares().most, whole.size() / count);
@@ -66,7 +66,7 @@ TEST_F(ASharedModel, IsTheWholeOneInParts) {
 TEST_F(ASharedModel, FromCloudsIsTheSame) {
   const Scene scene = spinning_beam();
   const std::vector<Cloud> clouds{make_cloud(scene.bodies[0])};
-  const SharedModel shared(all_ranks(), scene, clouds, cpu, {"curve", 2});
+  const SharedModel shared(all_ranks(), scene, clouds, cpu, {"curve"});
   EXPECT_EQ(shared.digest(), model_digest(build_model(scene)));
   EXPECT_EQ(shared.partitioner(), all_ranks().size() > 1 ? "curve" : "");
 }
@@ -80,7 +80,7 @@ TEST_F(ASharedModel, StepsAsOneRankWould) {
   const State whole = stepped(alone, scene, 20);
   std::vector<double> values;
   for (const Vec3d u : here.displacement) values.insert(values.end(), {u.x, u.y, u.z});
-  const Index begin = 17, end = shared.here().whole_size() - 5;
+  const Index begin = 17, end = shared.here().global_count() - 5;
   const std::vector<double> some = shared.gathered(Quantity::displacement, values, begin, end);
   if (!leads_) {
     EXPECT_THAT(some, IsEmpty());
@@ -140,16 +140,7 @@ TEST_F(ASharedModel, RefusesOnEveryRankWhatItDoesNotKnow) {
     return "nothing";
   };
   const Scene scene = spinning_beam();
-  EXPECT_THAT(said([&] {
-                SharedModel(all_ranks(), scene, cpu, {"knife", 1});
-              }),
-              HasSubstr("knife"));
-  if (all_ranks().size() > 1) {
-    EXPECT_THAT(said([&] {
-                  SharedModel(all_ranks(), scene, cpu, {"auto", 3});
-                }),
-                HasSubstr("3 rings"));
-  }
+  EXPECT_THAT(said([&] { SharedModel(all_ranks(), scene, cpu, {"knife"}); }), HasSubstr("knife"));
   EXPECT_THAT(said([&] { choose_device(all_ranks(), "gpu"); }), HasSubstr("device gpu: unknown"));
   const SharedModel shared(all_ranks(), scene, cpu);
   EXPECT_THAT(said([&] { shared.make_backend(Precision::single, 1, "pigeon"); }),

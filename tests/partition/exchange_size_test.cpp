@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "bodies.hpp"
-#include "partition/halo_plan.hpp"
+#include "partition/part_halo.hpp"
 #include "partition/partition.hpp"
 
 namespace phyxel {
@@ -23,8 +23,8 @@ TEST_P(Exchange, SizesAreThoseOfTheirDefinitions) {
   for (const int parts : {1, 2, 8}) {
     const std::vector<int> part_of = make_partition(graph, parts, Partitioner::bisection);
     std::int64_t sends = 0;
-    for (const HaloPlan& plan : make_halo_plans(graph, part_of, parts, 1)) {
-      for (const HaloPlan::Peer& peer : plan.peers) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
+      for (const PartHalo::Peer& peer : plan.peers) {
         sends += static_cast<std::int64_t>(peer.send[0].size());
       }
     }

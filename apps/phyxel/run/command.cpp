@@ -50,11 +50,6 @@ void add_run(CLI::App& program) {
           "the three")
       ->check(CLI::IsMember(partitioner_choices()));
   command
-      ->add_option("--ghost-rings", options->cut.rings,
-                   "1: ranks exchange displacements and stresses; 2: displacements of two "
-                   "rings of neighbours, and stresses between are found twice")
-      ->check(CLI::Range(1, 2));
-  command
       ->add_option("--transport", options->transport,
                    "How ranks' GPUs exchange: direct (stores into each other's memory), nccl, mpi "
                    "(a CUDA-aware one), host (MPI through the host's memory), or auto")

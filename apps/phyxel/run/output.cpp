@@ -51,7 +51,7 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
   const Phase phase("frame");
   const auto moment = moment_of(good);
   Frame& frame = moment->frame;
-  if (scene_.output.surface && model().whole_surfels() > 0) {
+  if (scene_.output.surface && model().global_surfel_count() > 0) {
     backend_->advect_surfels(moment->surfels);
     frame.surfels = &moment->surfels;
     moment->optional.push_back(Quantity::surfel_position);
@@ -67,14 +67,14 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
     stress_fields(model(), *backend_, von_mises ? &frame.von_mises : nullptr,
                   volume_ratio ? &frame.volume_ratio : nullptr);
   }
-  hand_over(moment, [this, diagnostics = good->diagnostics](Stretches& values) {
+  hand_over(moment, [this, diagnostics = good->diagnostics](ChunkedSource& values) {
     const Phase writing("writing a frame");
     recorder_->write(diagnostics, values);
   });
 }
 
 void Run::write_state() {
-  hand_over(moment_of(good_), [this, good = good_](Stretches& values) {
+  hand_over(moment_of(good_), [this, good = good_](ChunkedSource& values) {
     const Phase writing("writing a checkpoint");
     CheckpointInfo info;
     info.program = program_version();
@@ -88,7 +88,7 @@ void Run::write_state() {
     info.frames_written = recorder_->frames_written();
     recorder_->sync();  // the checkpoint counts the frames
     checkpoint_ =
-        write_checkpoint(recorder_->directory(), good->state, info, model().whole_size(), values);
+        write_checkpoint(recorder_->directory(), good->state, info, model().global_count(), values);
   });
 }
 

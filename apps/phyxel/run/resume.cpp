@@ -70,7 +70,7 @@ std::optional<Checkpoint> Run::checkpoint_for_all() {
                     options_.resume)),
                 "options (--until, --step, --precision, --method, --resume)");
   std::optional<Checkpoint> found;
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (!leads()) return;
     checkpoint_reader_ = find_checkpoint();
     if (checkpoint_reader_) {
@@ -95,7 +95,7 @@ State Run::first_state() {
   if (!begin_) {
     return ranks().agreed([&] { return initial_state(model(), scene_, plan_.dt); });
   }
-  ranks().together([&] { check_resumed(); });
+  ranks().collectively([&] { check_resumed(); });
   plan_.halve(*halvings_between(plan_.dt, begin_->state.dt));
   const CheckpointReader* const reader = checkpoint_reader_ ? &*checkpoint_reader_ : nullptr;
   State state = shared_.state_of(reader, stretch_length());
@@ -105,7 +105,7 @@ State Run::first_state() {
 
 Index Run::stretch_length() {
   const char* said = std::getenv("PHYXEL_STRETCH");
-  const Index length = said ? std::max(1, std::atoi(said)) : Stretches::usual_length;
+  const Index length = said ? std::max(1, std::atoi(said)) : ChunkedSource::usual_length;
   return ranks().broadcast(std::vector{length}).front();
 }
 
@@ -121,7 +121,8 @@ void Run::check_resumed() const {
           options_.resume, differences));
     }
   }
-  const bool as_many = !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().whole_size();
+  const bool as_many =
+      !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().global_count();
   if (begin_->info.model_digest != shared_.digest() || !as_many) {
     throw InputError(
         fmt::format("{}: the checkpoint belongs to another model: bodies (what body.mesh, "

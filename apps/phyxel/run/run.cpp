@@ -40,7 +40,7 @@ Run::Run(const RunOptions& options)
   StopSignal::work_begins();
   // Last, because it replaces what an earlier run has left: all that could be refused, or find no
   // memory, has been tried by now.
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (!leads() || options_.dry_run) return;
     const std::filesystem::path& folder = scene_.output.directory;
     // What is done and summed up stays as it is.
@@ -62,7 +62,7 @@ void Run::rehearse() {
   bytes = ranks().sum(bytes);
   const std::optional<double> seconds = forecast();
   if (!leads()) return;
-  const double phyxels = std::max(1, model().whole_size());
+  const double phyxels = std::max(1, model().global_count());
   if (options_.json) {
     nlohmann::ordered_json j = identity();
     j["time_step_s"] = plan_.dt;
@@ -115,9 +115,9 @@ void Run::step_to_end() {
     // However early a run ends, it can go on.
     if (scene_.solver.method != Method::equilibrium) write_state();
   }
-  const Watchdog watchdog(ranks(), watchdog_seconds());
+  Watchdog watchdog(ranks(), watchdog_seconds());
   Progress progress(end_time(), options_.quiet || options_.json || !leads() ? nullptr : stderr,
-                    {.phyxels = model().whole_size()});
+                    {.phyxels = model().global_count()});
   watch_newton(progress);
   loop_start_ = Clock::now();
   try {
@@ -134,6 +134,7 @@ void Run::step_to_end() {
     throw Error(ExitCode::bad_input, with_last_good_state("out of memory", progress));
   }
   writer_.finish();
+  watchdog.close();
   progress.finish();
   loop_seconds_ = seconds_since(loop_start_);
 }
@@ -197,7 +198,7 @@ bool Run::summary_is_missing() const {
 }
 
 void Run::draw_and_sum_up() {
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (leads() && scene_.render.pictures && !options_.no_pictures) {
       pictures_ = spent_.timed("pictures", [&] {
         return render_directory(recorder_->directory(), scene_.render, true);
@@ -209,7 +210,7 @@ void Run::draw_and_sum_up() {
     bytes += static_cast<std::int64_t>(array.bytes);
   bytes = ranks().sum(bytes);
   const Traffic traffic = most_traffic(*backend_);
-  ranks().together([&] {
+  ranks().collectively([&] {
     if (!leads()) return;
     const nlohmann::ordered_json summary = summary_of(now_, bytes, traffic);
     const std::string text = json_text(summary) + "\n";

@@ -29,14 +29,14 @@ double rounding_energy(const Model& model) {
 }  // namespace
 
 nlohmann::ordered_json Run::identity() const {
-  const Index phyxels = model().whole_size();
+  const Index phyxels = model().global_count();
   return {{"program", program_version()},
           {"scene", scene_.file.string()},
           {"title", scene_.title},
           {"device", backend_->name()},
           {"ranks", ranks().size()},
           {"phyxels", phyxels},
-          {"surfels", model().whole_surfels()},
+          {"surfels", model().global_surfel_count()},
           {"neighbours_per_phyxel", static_cast<double>(model().pairs()) / std::max(1, phyxels)},
           {"method", method_name(scene_.solver.method)}};
 }
@@ -50,10 +50,9 @@ void Run::say_plan() const {
   if (ranks().size() > 1) {
     const SharedModel::Shares& shares = shared_.shares();
     fmt::print(
-        "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; {} "
-        "exchanged through {}\n",
+        "  ranks       {} ranks, cut by {}: {} to {} phyxels each, at most {} ghosts; "
+        "displacements and stresses exchanged through {}\n",
         ranks().size(), shared_.partitioner(), shares.fewest, shares.most, shares.most_ghosts,
-        options_.cut.rings == 1 ? "displacements and stresses" : "displacements of two rings",
         transport_);
     if (!gpus_.empty()) fmt::print("  gpus        {}, by rank\n", fmt::join(gpus_, ", "));
   }
@@ -127,7 +126,7 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
 nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t bytes,
                                        const Traffic& traffic) const {
   const double steps = steps_taken();
-  const Index phyxels = model().whole_size();
+  const Index phyxels = model().global_count();
   std::vector<std::string> warnings = model().warnings;
   for (const std::string& warning : warnings_of(now)) warnings.push_back(warning);
   nlohmann::ordered_json j = identity();
@@ -166,7 +165,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
 
 void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
   const double steps = steps_taken();
-  const Index phyxels = model().whole_size();
+  const Index phyxels = model().global_count();
   fmt::print(
       "  speed       {:.4g} steps/s, {:.4g} phyxel-steps/s; {:.2f} s for the steps, {:.2f} s "
       "with "

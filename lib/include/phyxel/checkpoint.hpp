@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "phyxel/chunked_source.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
-#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
@@ -38,7 +38,7 @@ std::filesystem::path write_checkpoint(const std::filesystem::path& directory, c
 /// @param state its arrays are not looked at
 std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
                                        const CheckpointInfo& info, Index phyxels,
-                                       Stretches& values);
+                                       ChunkedSource& values);
 
 /// A whole checkpoint.
 struct Checkpoint {

@@ -23,13 +23,12 @@ struct ListLengths {
 
 /// What is of one material in one body: phyxels [begin, end), surfels [surfel_begin, surfel_end).
 /// Most bodies are one part; those with inclusions are several, side by side, of which the first
-/// has the surfels. In a rank's share, the last `ghosts` phyxels are stepped elsewhere, and
-/// stresses of the last `far_ghosts` are not found here.
+/// has the surfels. In a rank's share, the last `ghosts` phyxels are stepped by other ranks.
 struct Part {
   std::string name;
   Index body = 0;  ///< Which body of the scene it belongs to.
   Index begin = 0, end = 0;
-  Index ghosts = 0, far_ghosts = 0;
+  Index ghosts = 0;
   Index surfel_begin = 0, surfel_end = 0;
   Material material;
   std::string neighbourhood;    ///< The rule in words, for summaries.
@@ -139,11 +138,11 @@ struct Model {
   /// All parts of the body of a part of this model.
   std::span<const Part> parts_of_body(const Part& part) const;
   /// Phyxels of the whole model.
-  Index whole_size() const { return share ? share->whole : size(); }
+  Index global_count() const { return share ? share->global_count : size(); }
   /// Surfels of the whole model.
-  Index whole_surfels() const;
-  /// Which phyxel of the whole model phyxel i is.
-  Index number(Index i) const { return share ? share->number[i] : i; }
+  Index global_surfel_count() const;
+  /// Index of phyxel i in the whole model.
+  Index global_id(Index i) const { return share ? share->global_id[i] : i; }
   /// Whether phyxel i is no ghost.
   bool owns(Index i) const { return !share || share->owned[i]; }
   /// Whether neighbour lists are here.

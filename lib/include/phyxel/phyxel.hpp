@@ -5,6 +5,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
+#include "phyxel/chunked_source.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/device.hpp"
@@ -23,5 +24,4 @@
 #include "phyxel/shared_model.hpp"
 #include "phyxel/solver.hpp"
 #include "phyxel/state.hpp"
-#include "phyxel/stretches.hpp"
 #include "phyxel/types.hpp"

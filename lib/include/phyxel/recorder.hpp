@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/chunked_source.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
-#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
@@ -30,11 +30,11 @@ struct Frame {
 std::span<const double> values_of(const Model& model, const Frame& frame, Quantity quantity);
 
 /// A frame of a model that is whole here.
-class FrameStretches : public Stretches {
+class FrameSource : public ChunkedSource {
  public:
   /// Both must outlive this.
-  FrameStretches(const Model& model, const Frame& frame, Index length = usual_length)
-      : Stretches(length), model_(model), frame_(frame) {}
+  FrameSource(const Model& model, const Frame& frame, Index length = usual_length)
+      : ChunkedSource(length), model_(model), frame_(frame) {}
   bool has(Quantity quantity) const override;
   std::span<const double> values(Quantity quantity, Index begin, Index end) override;
   std::span<const Triangle> triangles() const override { return model_.surfels.triangle; }
@@ -112,7 +112,7 @@ class Recorder {
   /// @throws OutputError; frames already written stay intact.
   void write(const Frame& frame);
   /// A frame whose values are not all here, or not at once. @throws likewise
-  void write(const Diagnostics& diagnostics, Stretches& values);
+  void write(const Diagnostics& diagnostics, ChunkedSource& values);
 
   /// Brings all frames written so far to the disk, as a checkpoint that counts them must find them
   /// after a power cut. @throws OutputError

@@ -8,21 +8,20 @@
 #include <vector>
 
 #include "phyxel/checkpoint.hpp"
+#include "phyxel/chunked_source.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
-#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
 class Ranks;
-class StretchExchange;
+class RowRedistribution;
 
 /// How a model is cut, and what its parts exchange.
 struct CutOptions {
   /// "metis", "curve", "bisection", or "auto": the one whose slowest part has least to do.
   std::string partitioner = "auto";
-  int rings = 1;  ///< See `Share`; GPUs: 1.
 };
 /// Names of partitioners, and "auto".
 std::vector<std::string> partitioner_choices();
@@ -70,12 +69,13 @@ class SharedModel {
   /// This rank's share of the state of a checkpoint, read so many phyxels at a time. Collective.
   /// @param checkpoint on the first rank; the others give null
   /// @throws Error on every rank if it is of another model, or damaged
-  State state_of(const CheckpointReader* checkpoint, Index length = Stretches::usual_length) const;
+  State state_of(const CheckpointReader* checkpoint,
+                 Index length = ChunkedSource::usual_length) const;
   /// Of the surfels of the whole, on the first rank; nothing on the others.
   std::span<const Triangle> triangles() const;
 
   /// Between the ranks, for the library's own writers; there must be several.
-  const StretchExchange& exchange() const { return *exchange_; }
+  const RowRedistribution& exchange() const { return *exchange_; }
 
  private:
   void build(const Scene& scene, const std::vector<Cloud>* clouds, const CutOptions& cut);
@@ -83,7 +83,7 @@ class SharedModel {
   const Ranks& ranks_;
   ChosenDevice device_;
   Model here_;
-  std::unique_ptr<const StretchExchange> exchange_;
+  std::unique_ptr<const RowRedistribution> exchange_;
   std::vector<Triangle> triangles_;  // of a share's whole
   std::uint64_t digest_ = 0;
   Shares shares_;

@@ -65,13 +65,13 @@ TEST_F(Recording, FramesComeBack) {
 }
 
 /// Counts what is asked for.
-class Counted : public FrameStretches {
+class Counted : public FrameSource {
  public:
-  using FrameStretches::FrameStretches;
+  using FrameSource::FrameSource;
   std::span<const double> values(Quantity quantity, Index begin, Index end) override {
     ++asked;
     longest = std::max(longest, end - begin);
-    return FrameStretches::values(quantity, begin, end);
+    return FrameSource::values(quantity, begin, end);
   }
   int asked = 0;
   Index longest = 0;
@@ -96,14 +96,14 @@ TEST_F(Recording, FramesAreTheSameBytesWhateverTheLengthOfStretches) {
 }
 
 /// Stands for ranks that write all arrays by themselves: through HDF5, which changes the layout.
-class WrittenBeside : public FrameStretches {
+class WrittenBeside : public FrameSource {
  public:
-  using FrameStretches::FrameStretches;
-  bool writes_together(Index) const override { return true; }
-  void write_together(const fs::path& file, const FileArray& array) override {
+  using FrameSource::FrameSource;
+  bool writes_collectively(Index) const override { return true; }
+  void write_collectively(const fs::path& file, const FileArray& array) override {
     std::vector<double> sum;
     for (const Quantity term : array.terms) {
-      const auto more = FrameStretches::values(term, 0, array.count);
+      const auto more = FrameSource::values(term, 0, array.count);
       sum.resize(more.size());
       for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += more[k];
     }

@@ -1,4 +1,4 @@
-#include "mpi/spread.hpp"
+#include "mpi/migrate.hpp"
 
 #include <omp.h>
 
@@ -33,7 +33,7 @@ struct Keyed {
 using KeyedPhyxels = Bulk<Keyed>;
 
 /// Which is the first that is not before a key.
-std::ptrdiff_t first_from(const SpreadPhyxels& phyxels, const KeyedPhyxels& sorted,
+std::ptrdiff_t first_from(const MigratingPhyxels& phyxels, const KeyedPhyxels& sorted,
                           const Key& key) {
   const auto before = [&](const Keyed& a, const Key& b) {
     return std::tuple(a.body, a.key, phyxels[a.here].number) < std::tuple(b.body, b.key, b.number);
@@ -42,7 +42,7 @@ std::ptrdiff_t first_from(const SpreadPhyxels& phyxels, const KeyedPhyxels& sort
 }
 
 /// The start of the stretch of each rank but the first: nothing before it belongs there.
-std::vector<Key> find_splitters(const Communicator& ranks, const SpreadPhyxels& phyxels,
+std::vector<Key> find_splitters(const MpiCommunicator& ranks, const MigratingPhyxels& phyxels,
                                 const KeyedPhyxels& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
   std::vector<Key> splitters;
@@ -86,7 +86,7 @@ class Cells {
     }
   }
   /// @param log_edge of blocks of so many cells a side, instead of a cell
-  Name name_of(const SpreadPhyxel& p, int log_edge = 0) const {
+  Name name_of(const MigratingPhyxel& p, int log_edge = 0) const {
     const auto b = static_cast<std::size_t>(p.body);
     const Vec3d at = inverse_edge_[b] * (p.position - boxes_[b].low);
     const auto along = [&](double x) { return (static_cast<Name>(x) >> log_edge) + 1; };
@@ -123,9 +123,9 @@ struct Occupied {
   friend auto operator<=>(const Occupied&, const Occupied&) = default;
 };
 /// Cells of other ranks, in their order. @param own of this rank
-Bulk<Occupied> of_other_ranks(const Communicator& ranks, const Names& own) {
+Bulk<Occupied> of_other_ranks(const MpiCommunicator& ranks, const Names& own) {
   const std::vector<Names> from_each =
-      ranks.exchanged(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
+      ranks.alltoallv(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
   Bulk<Occupied> all;
   for (int r = 0; r < ranks.size(); ++r) {
     if (r == ranks.rank()) continue;
@@ -143,7 +143,7 @@ std::span<const Occupied> at_cell(const Bulk<Occupied>& all, Cells::Name name) {
 }
 
 /// Own phyxels in blocks of cells next to which another rank has some: few, if the body is large.
-std::vector<Index> near_others(const Communicator& ranks, const SpreadPhyxels& own,
+std::vector<Index> near_others(const MpiCommunicator& ranks, const MigratingPhyxels& own,
                                const Cells& cells) {
   constexpr int log_edge = 3;
   const auto n = static_cast<Index>(own.size());
@@ -175,7 +175,8 @@ std::vector<Index> near_others(const Communicator& ranks, const SpreadPhyxels& o
 
 }  // namespace
 
-std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies) {
+std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                          std::size_t bodies) {
   constexpr double far = std::numeric_limits<double>::infinity();
   const std::vector<Box> none(bodies, {{far, far, far}, {-far, -far, -far}});
   std::vector<Box> boxes = none;
@@ -201,15 +202,15 @@ std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, s
   return boxes;
 }
 
-SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
-                                 const std::vector<Index>& sizes, const std::vector<Box>& boxes,
-                                 Index group) {
+MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyxels own,
+                                     const std::vector<Index>& sizes, const std::vector<Box>& boxes,
+                                     Index group) {
   const int parts = ranks.size();
   std::vector<HilbertFrame> frames;
   for (const Box& box : boxes) frames.push_back(HilbertFrame::around(box.low, box.high));
-  const auto keyed = [&](const SpreadPhyxels& phyxels) {
+  const auto keyed = [&](const MigratingPhyxels& phyxels) {
     KeyedPhyxels keys = in_bulk(phyxels.size(), [&](std::size_t i) {
-      const SpreadPhyxel& p = phyxels[i];
+      const MigratingPhyxel& p = phyxels[i];
       return Keyed{frames[p.body].key_of(p.position), p.body, static_cast<Index>(i)};
     });
     parallel_sort(keys, [&](const Keyed& a, const Keyed& b) {
@@ -230,10 +231,10 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     while (body + 1 < sizes.size() && at >= groups_of(sizes[body])) at -= groups_of(sizes[body++]);
     starts.emplace_back(static_cast<Index>(body), static_cast<Index>(at * group));
   }
-  const auto ordered = [](const SpreadPhyxels& phyxels, const KeyedPhyxels& sorted) {
+  const auto ordered = [](const MigratingPhyxels& phyxels, const KeyedPhyxels& sorted) {
     return in_bulk(sorted.size(), [&](std::size_t k) { return phyxels[sorted[k].here]; });
   };
-  ByRank<SpreadPhyxel> send;
+  ByRank<MigratingPhyxel> send;
   {
     const KeyedPhyxels sorted = keyed(own);
     for (const Key& splitter :
@@ -244,11 +245,11 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
     send.values = ordered(own, sorted);
   }
   release(own);
-  own = ranks.exchanged(send).values;
+  own = ranks.alltoallv(send).values;
   release(send.values);
   const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
   own = ordered(own, keyed(own));
-  for (const auto& [first, last] : stretches_of_bodies(own)) {
+  for (const auto& [first, last] : ranges_of_bodies(own)) {
     // A rank's first body may have begun on another one.
     const Index begun = first == 0 && own[0].body == first_body ? first_along : 0;
     const std::size_t begin = first, end = last;  // for clang, whose OpenMP takes no bindings
@@ -260,11 +261,11 @@ SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
   return own;
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const SpreadPhyxels& phyxels) {
+std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(const MigratingPhyxels& phyxels) {
   std::vector<std::pair<std::size_t, std::size_t>> stretches;
   for (auto first = phyxels.begin(), last = first; first != phyxels.end(); first = last) {
     last = std::partition_point(first, phyxels.end(),
-                                [&](const SpreadPhyxel& p) { return p.body == first->body; });
+                                [&](const MigratingPhyxel& p) { return p.body == first->body; });
     stretches.emplace_back(first - phyxels.begin(), last - phyxels.begin());
   }
   return stretches;
@@ -273,12 +274,12 @@ std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const Sprea
 namespace {
 
 /// The order of all phyxels: by body, then by number.
-std::uint64_t numbered(const SpreadPhyxel& p) {
+std::uint64_t numbered(const MigratingPhyxel& p) {
   return static_cast<std::uint64_t>(p.body) << 32 | static_cast<std::uint64_t>(p.number);
 }
 
 /// Which one is first, second, ... in that order.
-Bulk<Index> order_by_number(const SpreadPhyxels& phyxels) {
+Bulk<Index> order_by_number(const MigratingPhyxels& phyxels) {
   using Numbered = std::pair<std::uint64_t, Index>;
   auto keys = in_bulk(phyxels.size(), [&](std::size_t i) {
     return Numbered{numbered(phyxels[i]), static_cast<Index>(i)};
@@ -288,7 +289,7 @@ Bulk<Index> order_by_number(const SpreadPhyxels& phyxels) {
 }
 
 /// Phyxels go where `owner` says, in the order in which they are.
-ByRank<SpreadPhyxel> by_owner(const SpreadPhyxels& own, const Bulk<int>& owner, int ranks) {
+ByRank<MigratingPhyxel> by_owner(const MigratingPhyxels& own, const Bulk<int>& owner, int ranks) {
   const auto parts = static_cast<std::size_t>(ranks);
   // Threads take stretches; where each begins among what a rank gets.
   const auto threads = static_cast<std::size_t>(omp_get_max_threads());
@@ -300,7 +301,7 @@ ByRank<SpreadPhyxel> by_owner(const SpreadPhyxels& own, const Bulk<int>& owner, 
       ++at[t][static_cast<std::size_t>(owner[k])];
     }
   }
-  ByRank<SpreadPhyxel> send{SpreadPhyxels(own.size())};
+  ByRank<MigratingPhyxel> send{MigratingPhyxels(own.size())};
   for (std::size_t r = 0; r < parts; ++r) {
     std::size_t next = send.begin.back();
     for (std::size_t t = 0; t < threads; ++t) next += std::exchange(at[t][r], next);
@@ -317,19 +318,21 @@ ByRank<SpreadPhyxel> by_owner(const SpreadPhyxels& own, const Bulk<int>& owner, 
 
 }  // namespace
 
-SpreadPhyxels sent_to_owners(const Communicator& ranks, SpreadPhyxels own, Bulk<int> owner) {
-  ByRank<SpreadPhyxel> send = by_owner(own, owner, ranks.size());
+MigratingPhyxels migrate_to_owners(const MpiCommunicator& ranks, MigratingPhyxels own,
+                                   Bulk<int> owner) {
+  ByRank<MigratingPhyxel> send = by_owner(own, owner, ranks.size());
   release(own);
   release(owner);
-  const SpreadPhyxels received = ranks.exchanged(send).values;
+  const MigratingPhyxels received = ranks.alltoallv(send).values;
   release(send.values);
   const Bulk<Index> order = order_by_number(received);
   return in_bulk(order.size(), [&](std::size_t k) { return received[order[k]]; });
 }
 
-OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
-                            const std::vector<double>& reach, const std::vector<Box>& boxes) {
-  OthersPhyxels others;
+RemotePhyxels remote_phyxels_around(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                                    const std::vector<double>& reach,
+                                    const std::vector<Box>& boxes) {
+  RemotePhyxels others;
   if (ranks.size() == 1) return others;
   const Cells cells(reach, boxes);
   const std::vector<Index> near = near_others(ranks, own, cells);
@@ -347,10 +350,10 @@ OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
   }
   begin.push_back(here.size());
   const Bulk<Occupied> elsewhere = of_other_ranks(ranks, occupied);
-  std::vector<SpreadPhyxels> send(static_cast<std::size_t>(ranks.size()));
+  std::vector<MigratingPhyxels> send(static_cast<std::size_t>(ranks.size()));
 #pragma omp parallel
   {
-    std::vector<SpreadPhyxels> mine(send.size());
+    std::vector<MigratingPhyxels> mine(send.size());
     std::vector<int> wanted_by;
 #pragma omp for schedule(dynamic, 256) nowait
     for (std::size_t c = 0; c < occupied.size(); ++c) {
@@ -371,13 +374,13 @@ OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
       send[r].insert(send[r].end(), mine[r].begin(), mine[r].end());
     }
   }
-  ByRank<SpreadPhyxel> joined;
-  for (SpreadPhyxels& of_rank : send) {
+  ByRank<MigratingPhyxel> joined;
+  for (MigratingPhyxels& of_rank : send) {
     joined.values.insert(joined.values.end(), of_rank.begin(), of_rank.end());
     joined.begin.push_back(joined.values.size());
     release(of_rank);
   }
-  ByRank<SpreadPhyxel> received = ranks.exchanged(joined);
+  ByRank<MigratingPhyxel> received = ranks.alltoallv(joined);
   const Bulk<Index> order = order_by_number(received.values);
   others.phyxels = in_bulk(order.size(), [&](std::size_t k) { return received.values[order[k]]; });
   others.owner = in_bulk(order.size(), [&](std::size_t k) {
@@ -388,13 +391,13 @@ OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
   return others;
 }
 
-Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
-                      const OthersPhyxels& others) {
+Surrounded surrounded(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                      const RemotePhyxels& others) {
   // Each knows how many of the other kind come before it.
-  const auto before = [](const SpreadPhyxels& phyxels, const SpreadPhyxel& p) {
+  const auto before = [](const MigratingPhyxels& phyxels, const MigratingPhyxel& p) {
     const std::uint64_t at = numbered(p);
     const auto first = std::partition_point(
-        phyxels.begin(), phyxels.end(), [&](const SpreadPhyxel& q) { return numbered(q) < at; });
+        phyxels.begin(), phyxels.end(), [&](const MigratingPhyxel& q) { return numbered(q) < at; });
     return static_cast<std::size_t>(first - phyxels.begin());
   };
   Surrounded all;
@@ -413,7 +416,7 @@ Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
   return all;
 }
 
-std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<double>> values) {
+std::vector<double> medians_of(const MpiCommunicator& ranks, std::span<const Bulk<double>> values) {
   // Bits of numbers that are not negative are in the order of the numbers: digit by digit, those
   // are counted that begin as the median does.
   constexpr int digit_bits = 8, digits = 1 << digit_bits;
@@ -449,7 +452,7 @@ std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<d
   return result;
 }
 
-std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values) {
+std::vector<double> largest_of(const MpiCommunicator& ranks, const std::vector<double>& values) {
   std::vector<double> largest = values;
   const std::vector<double> all = ranks.gathered(std::span<const double>(values));
   for (std::size_t k = 0; k < all.size(); ++k) {

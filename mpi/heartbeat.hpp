@@ -1,4 +1,4 @@
-/// What a rank tells the others of its host, in memory that they share.
+/// The heartbeat of a rank: how far it has come, in memory that the ranks of its host share.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,7 @@
 
 namespace phyxel {
 
-struct Pulse {
+struct Heartbeat {
   std::atomic<std::int64_t> step{0};
   std::atomic<std::int64_t> since{0};     ///< [ns], by the host's steady clock: of the last change.
   std::atomic<std::int64_t> watching{0};  ///< The same: when its watchdog last looked.
@@ -21,10 +21,10 @@ struct Pulse {
 };
 static_assert(std::atomic<std::int64_t>::is_always_lock_free);  // or processes could not share it
 
-/// This rank's, while somebody watches.
-extern std::atomic<Pulse*> own_pulse;
+/// The heartbeat of this rank; null while nobody watches.
+extern std::atomic<Heartbeat*> own_heartbeat;
 
-/// While it lives, this rank waits for others.
+/// Marks this rank as waiting for others, as long as the object lives.
 class Waiting {
  public:
   Waiting() { mark(1); }
@@ -34,10 +34,10 @@ class Waiting {
 
  private:
   static void mark(int waiting) {
-    Pulse* const pulse = own_pulse;
-    if (!pulse) return;
-    pulse->since = Pulse::now();
-    pulse->waiting = waiting;
+    Heartbeat* const beat = own_heartbeat;
+    if (!beat) return;
+    beat->since = Heartbeat::now();
+    beat->waiting = waiting;
   }
 };
 

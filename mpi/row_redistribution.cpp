@@ -1,4 +1,4 @@
-#include "mpi/stretch_exchange.hpp"
+#include "mpi/row_redistribution.hpp"
 
 #include <algorithm>
 
@@ -8,8 +8,8 @@
 namespace phyxel {
 
 template <class Wanted>
-StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& numbers,
-                                                   Wanted&& wanted) {
+RowRedistribution::Places RowRedistribution::places_of(const std::vector<Index>& numbers,
+                                                       Wanted&& wanted) {
   Places places;
   places.here = chosen(0, static_cast<Index>(numbers.size()), wanted);
   const auto by_number = [&](Index a, Index b) { return numbers[a] < numbers[b]; };
@@ -21,22 +21,23 @@ StretchExchange::Places StretchExchange::places_of(const std::vector<Index>& num
   return places;
 }
 
-StretchExchange::Places::Range StretchExchange::Places::within(Stretch stretch) const {
+RowRedistribution::Places::Range RowRedistribution::Places::within(RowRange range) const {
   const auto before = [&](Index limit) {
     return static_cast<std::size_t>(std::lower_bound(number.begin(), number.end(), limit) -
                                     number.begin());
   };
-  return {before(stretch.begin), before(stretch.end)};
+  return {before(range.begin), before(range.end)};
 }
 
-StretchExchange::StretchExchange(const Communicator& ranks, const Model& share)
+RowRedistribution::RowRedistribution(const MpiCommunicator& ranks, const Model& share)
     : ranks_(ranks),
       share_(share),
-      own_(places_of(share.share->number, [&](Index i) { return share.owns(i); })),
-      surfels_(places_of(share.share->surfel_number, [](Index) { return true; })) {}
+      own_(places_of(share.share->global_id, [&](Index i) { return share.owns(i); })),
+      surfels_(places_of(share.share->global_surfel_id, [](Index) { return true; })) {}
 
-std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const double> here,
-                                             std::span<const Stretch> wanted) const {
+std::vector<double> RowRedistribution::redistributed(Quantity quantity,
+                                                     std::span<const double> here,
+                                                     std::span<const RowRange> wanted) const {
   const Places& places = is_of_surfels(quantity) ? surfels_ : own_;
   const std::size_t width = width_of(quantity);
   std::vector<std::vector<Index>> numbers(wanted.size());
@@ -49,9 +50,9 @@ std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const 
       values[r].insert(values[r].end(), value.begin(), value.end());
     }
   }
-  numbers = ranks_.exchanged(numbers);
-  values = ranks_.exchanged(values);
-  const Stretch own = wanted[static_cast<std::size_t>(ranks_.rank())];
+  numbers = ranks_.alltoallv(numbers);
+  values = ranks_.alltoallv(values);
+  const RowRange own = wanted[static_cast<std::size_t>(ranks_.rank())];
   std::vector<double> all(width * static_cast<std::size_t>(own.end - own.begin));
   for (std::size_t r = 0; r < numbers.size(); ++r) {
     for (std::size_t k = 0; k < numbers[r].size(); ++k) {
@@ -62,24 +63,24 @@ std::vector<double> StretchExchange::brought(Quantity quantity, std::span<const 
   return all;
 }
 
-std::vector<double> StretchExchange::gathered(Quantity quantity, std::span<const double> here,
-                                              Stretch wanted) const {
-  std::vector<Stretch> of_ranks(static_cast<std::size_t>(ranks_.size()));
+std::vector<double> RowRedistribution::gathered(Quantity quantity, std::span<const double> here,
+                                                RowRange wanted) const {
+  std::vector<RowRange> of_ranks(static_cast<std::size_t>(ranks_.size()));
   of_ranks[0] = wanted;
-  return brought(quantity, here, of_ranks);
+  return redistributed(quantity, here, of_ranks);
 }
 
-State StretchExchange::scattered(Index length,
-                                 const std::function<State(Index begin, Index end)>& read) const {
-  const Places places = places_of(share_.share->number, [](Index) { return true; });
-  const Index all = share_.whole_size();
+State RowRedistribution::scattered(Index length,
+                                   const std::function<State(Index begin, Index end)>& read) const {
+  const Places places = places_of(share_.share->global_id, [](Index) { return true; });
+  const Index all = share_.global_count();
   State state;
   state.displacement.resize(places.here.size());
   state.velocity.resize(places.here.size());
   for (Index begin = 0; begin < all;) {
     const Index end = all - begin > length ? begin + length : all;
     State some;
-    ranks_.together([&] {
+    ranks_.collectively([&] {
       if (ranks_.rank() == 0) some = read(begin, end);
     });
     some.displacement = ranks_.broadcast(std::move(some.displacement));

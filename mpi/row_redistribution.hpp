@@ -1,5 +1,5 @@
-/// Values of the whole model, a stretch at a time: from all ranks to the first one, which writes
-/// them, and back.
+/// Redistribution of rows: the values of a share's phyxels, which each rank has in its own order,
+/// to ranks that want ranges of the whole model's, and back.
 #pragma once
 
 #include <functional>
@@ -7,29 +7,30 @@
 #include <vector>
 
 #include "mpi/communicator.hpp"
+#include "phyxel/chunked_source.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
-#include "phyxel/stretches.hpp"
 
 namespace phyxel {
 
-class StretchExchange {
+/// Phyxels, or surfels, [begin, end) of the whole model.
+struct RowRange {
+  Index begin = 0, end = 0;
+};
+
+class RowRedistribution {
  public:
   /// @param share must outlive this
-  StretchExchange(const Communicator& ranks, const Model& share);
+  RowRedistribution(const MpiCommunicator& ranks, const Model& share);
 
-  /// Some of the whole model's phyxels, or surfels.
-  struct Stretch {
-    Index begin = 0, end = 0;
-  };
-  /// The values of the stretch that this rank is to have. Collective.
-  /// @param here of all phyxels or surfels of this rank
-  /// @param wanted what each rank is to have
-  std::vector<double> brought(Quantity quantity, std::span<const double> here,
-                              std::span<const Stretch> wanted) const;
+  /// The values of the range that this rank wants. Collective.
+  /// @param here values of all phyxels or surfels of this rank
+  /// @param wanted the range that each rank wants
+  std::vector<double> redistributed(Quantity quantity, std::span<const double> here,
+                                    std::span<const RowRange> wanted) const;
   /// The same, on the first rank alone.
   std::vector<double> gathered(Quantity quantity, std::span<const double> here,
-                               Stretch wanted) const;
+                               RowRange wanted) const;
 
   /// This rank's share of a state, at most `length` phyxels of which are in any other memory.
   /// Collective.
@@ -44,12 +45,12 @@ class StretchExchange {
     struct Range {
       std::size_t begin, end;
     };
-    Range within(Stretch stretch) const;
+    Range within(RowRange range) const;
   };
   template <class Wanted>
   static Places places_of(const std::vector<Index>& numbers, Wanted&& wanted);
 
-  const Communicator& ranks_;
+  const MpiCommunicator& ranks_;
   const Model& share_;
   Places own_, surfels_;
 };

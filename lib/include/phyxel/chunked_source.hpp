@@ -1,4 +1,4 @@
-/// Values of a whole model, brought to whoever writes a file, so many at a time.
+/// The values of a whole model, chunk by chunk, for the writers of files.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ enum class Quantity {
   surfel_normal
 };
 
-/// Numbers of one phyxel or surfel.
+/// The components of a quantity.
 constexpr std::size_t width_of(Quantity quantity) {
   switch (quantity) {
     case Quantity::mass:
@@ -36,7 +36,7 @@ constexpr std::size_t width_of(Quantity quantity) {
       return 3;
   }
 }
-/// Whether surfels have it; else phyxels do.
+/// True for a quantity of surfels, false for one of phyxels.
 constexpr bool is_of_surfels(Quantity quantity) {
   return quantity == Quantity::surfel_position || quantity == Quantity::surfel_normal;
 }
@@ -49,33 +49,34 @@ struct FileArray {
   std::vector<Quantity> terms;
 };
 
-/// Where a file's values come from: on one rank the arrays themselves; on several, wherever they
-/// are, so that no rank holds those of the whole model.
-class Stretches {
+/// A source of a whole model's values: on one rank its arrays; on several the ranks, each of which
+/// sends its part of a chunk, so that none holds the values of the whole model.
+class ChunkedSource {
  public:
   /// 24 MB of vectors: long enough for messages and writes to be efficient, short beside what a
   /// rank holds anyway.
   static constexpr Index usual_length = 1 << 20;
 
-  /// @param length of what is asked for at a time, at most
-  explicit Stretches(Index length = usual_length) : length_(length) {}
-  virtual ~Stretches() = default;
-  Stretches(const Stretches&) = default;
-  Stretches& operator=(const Stretches&) = default;
+  /// @param length of a chunk, at most
+  explicit ChunkedSource(Index length = usual_length) : length_(length) {}
+  virtual ~ChunkedSource() = default;
+  ChunkedSource(const ChunkedSource&) = default;
+  ChunkedSource& operator=(const ChunkedSource&) = default;
 
-  /// Phyxels, surfels or triangles asked for at a time, at most.
+  /// The most phyxels, surfels or triangles of a chunk.
   Index length() const { return length_; }
-  /// Whether there are such values.
+  /// True if the source has this quantity.
   virtual bool has(Quantity quantity) const = 0;
-  /// Those of the whole model's phyxels, or surfels, `begin` to `end`. Valid until the next call.
+  /// The values of phyxels, or surfels, [begin, end) of the whole model. Valid until the next call.
   virtual std::span<const double> values(Quantity quantity, Index begin, Index end) = 0;
-  /// All of the whole model.
+  /// All triangles of the whole model.
   virtual std::span<const Triangle> triangles() const = 0;
 
-  /// Whether an array of so many is written by all who have its values, instead of being asked for.
-  virtual bool writes_together(Index) const { return false; }
-  /// Has them write it into a file that is laid out. What else is in the file must be written anew.
-  virtual void write_together(const std::filesystem::path&, const FileArray&) {}
+  /// True if all ranks write an array of `count` rows themselves, each its own values.
+  virtual bool writes_collectively(Index) const { return false; }
+  /// Lets all ranks write an array into a file that is laid out. The rest of the file must be
+  /// written again.
+  virtual void write_collectively(const std::filesystem::path&, const FileArray&) {}
 
  private:
   Index length_;

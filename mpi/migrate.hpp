@@ -14,7 +14,7 @@
 namespace phyxel {
 
 /// What is known of a phyxel so far, as ranks send it to each other.
-struct SpreadPhyxel {
+struct MigratingPhyxel {
   Vec3d position;      ///< [m]
   double volume = 0;   ///< [m³], where the cloud tells.
   double spacing = 0;  ///< r̄ [m], where it is wanted.
@@ -24,50 +24,53 @@ struct SpreadPhyxel {
   Index along = 0;            ///< Where it stands in its body along Hilbert's curve.
   std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
 };
-using SpreadPhyxels = Bulk<SpreadPhyxel>;
+using MigratingPhyxels = Bulk<MigratingPhyxel>;
 
 /// The box of each body.
-std::vector<Box> boxes_of(const Communicator& ranks, const SpreadPhyxels& own, std::size_t bodies);
+std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                          std::size_t bodies);
 
 /// Brings phyxels into the order of their bodies, and within each of Hilbert's curve over its box,
 /// that of `curve_order`; each rank gets a stretch of it, of whole groups and about equally many.
 /// Sets `along`.
 /// @param sizes of the bodies. @param group phyxels that stay together, counted from the start of
 ///   each body
-SpreadPhyxels spread_along_curve(const Communicator& ranks, SpreadPhyxels own,
-                                 const std::vector<Index>& sizes, const std::vector<Box>& boxes,
-                                 Index group);
+MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyxels own,
+                                     const std::vector<Index>& sizes, const std::vector<Box>& boxes,
+                                     Index group);
 
 /// Phyxels go to their owners, and are there in the order of bodies and numbers. @param owner of
 ///   each
-SpreadPhyxels sent_to_owners(const Communicator& ranks, SpreadPhyxels own, Bulk<int> owner);
+MigratingPhyxels migrate_to_owners(const MpiCommunicator& ranks, MigratingPhyxels own,
+                                   Bulk<int> owner);
 
 /// First and last of each body that is there, which follow each other.
-std::vector<std::pair<std::size_t, std::size_t>> stretches_of_bodies(const SpreadPhyxels& phyxels);
+std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(const MigratingPhyxels& phyxels);
 
 /// Other ranks' phyxels, in the order of bodies and numbers, and whose each is.
-struct OthersPhyxels {
-  SpreadPhyxels phyxels;
+struct RemotePhyxels {
+  MigratingPhyxels phyxels;
   Bulk<int> owner;
 };
 /// @param reach of each body [m]: all phyxels nearer than that to an own one are there, and others
-OthersPhyxels others_around(const Communicator& ranks, const SpreadPhyxels& own,
-                            const std::vector<double>& reach, const std::vector<Box>& boxes);
+RemotePhyxels remote_phyxels_around(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                                    const std::vector<double>& reach,
+                                    const std::vector<Box>& boxes);
 
 /// Own phyxels and those of other ranks around them, in the order of bodies and numbers.
 struct Surrounded {
-  SpreadPhyxels phyxels;
+  MigratingPhyxels phyxels;
   std::vector<int> owner;  ///< Rank of each.
 };
 /// @param own in that order, too
-Surrounded surrounded(const Communicator& ranks, const SpreadPhyxels& own,
-                      const OthersPhyxels& others);
+Surrounded surrounded(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                      const RemotePhyxels& others);
 
 /// The value in the middle of each list, as `median_of`; 0 for none. @param values [list], none
 ///   below 0
-std::vector<double> medians_of(const Communicator& ranks, std::span<const Bulk<double>> values);
+std::vector<double> medians_of(const MpiCommunicator& ranks, std::span<const Bulk<double>> values);
 
 /// The largest of each over the ranks.
-std::vector<double> largest_of(const Communicator& ranks, const std::vector<double>& values);
+std::vector<double> largest_of(const MpiCommunicator& ranks, const std::vector<double>& values);
 
 }  // namespace phyxel

@@ -1,0 +1,29 @@
+/// The MPI communicator behind a `MpiCommunicator`, for the files that call MPI.
+#pragma once
+
+#include <mpi.h>
+
+#include <list>
+#include <memory>
+#include <vector>
+
+#include "mpi/communicator.hpp"
+
+namespace phyxel {
+
+struct MpiCommunicator::Native {
+  MPI_Comm all = MPI_COMM_NULL;  ///< The duplicate; null once closed.
+  bool started_here = false;     ///< True if MPI was started for it.
+  /// Messages under way whose `Transfers` are gone, and the memory that they are in.
+  struct Left {
+    std::vector<MPI_Request> requests;
+    std::shared_ptr<void> memory;
+  };
+  std::list<Left> left;
+};
+
+/// @throws Error naming the call
+void check_mpi(int code, const char* call);
+#define PHYXEL_MPI_CALL(call) check_mpi(call, #call)
+
+}  // namespace phyxel

@@ -1,0 +1,97 @@
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+#include "model/space_filling_curve.hpp"
+#include "mpi/halo_transport.hpp"
+#include "mpi/share_pipeline.hpp"
+#include "parallel_sort.hpp"
+#include "partition/share.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Where own phyxels of a share are in the whole model's tiles.
+/// @param share its numbers are those of `local`
+std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
+                              const LocalModel& local, const Share& share) {
+  std::vector<Index> place(share.global_id.size(), -1);
+  if (setup.options.tile == 0) return place;
+  const auto phyxel = [&](Index k) -> const MigratingPhyxel& {
+    return local.phyxels[share.global_id[k]];
+  };
+  // body, along, which of the share
+  const std::vector<Index> owned =
+      chosen(0, static_cast<Index>(place.size()), [&](Index k) { return share.owned[k]; });
+  auto sorted = in_bulk(owned.size(), [&](std::size_t k) {
+    const MigratingPhyxel& p = phyxel(owned[k]);
+    return std::tuple(p.body, p.along, owned[k]);
+  });
+  parallel_sort(sorted);
+  auto own = in_bulk(sorted.size(), [&](std::size_t k) { return std::get<2>(sorted[k]); });
+  const auto tile_of = [&](std::size_t k) {
+    return whole.bodies[std::get<0>(sorted[k])].tile + std::get<1>(sorted[k]) / setup.options.tile;
+  };
+  const auto n = static_cast<Index>(own.size());
+  std::vector<Index> begin = chosen(0, n, [&](Index k) {  // of each tile
+    const auto at = static_cast<std::size_t>(k);
+    return at == 0 || tile_of(at) != tile_of(at - 1);
+  });
+  begin.push_back(n);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t t = 0; t < begin.size() - 1; ++t) {
+    const auto first = static_cast<std::size_t>(begin[t]);
+    const auto last = static_cast<std::size_t>(begin[t + 1]);
+    order_in_tile(std::span(own).subspan(first, last - first), [&](Index k) {
+      const Index i = share.global_id[k], b = phyxel(k).body;
+      return local.around[b].length[i - local.model.parts[b].begin];
+    });
+    for (std::size_t k = first; k < last; ++k) {
+      place[own[k]] = tile_of(first) * setup.options.tile + static_cast<Index>(k - first);
+    }
+  }
+  return place;
+}
+
+}  // namespace
+
+BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& cut,
+                        LocalModel& local) {
+  PartHalo plan;
+  plan.part = setup.ranks.rank();
+  const auto n = static_cast<Index>(local.phyxels.size());
+  const auto own = [&](Index i) { return owns(local, static_cast<std::size_t>(i)); };
+  plan.owned = chosen(0, n, own);
+  std::vector<Index>& ring = plan.ghosts;
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+    const Part& part = local.model.parts[b];
+    const std::vector<Index> needed = chosen(part.begin, part.end, [&](Index i) {
+      return !own(i) && local.around[b].needed[i - part.begin];
+    });
+    ring.insert(ring.end(), needed.begin(), needed.end());
+  }
+  ModelShare made = share_of(local.model, plan, local.owner);
+  Share& share = made.share;
+  std::vector<Index> place = own_places(setup, whole, local, share);
+  share.global_count = whole.size;
+  share.global_id = tabulated(share.global_id.size(), [&](std::size_t k) {
+    return global_id_of(whole, local, share.global_id[k]);
+  });
+  for (Index& surfel : share.global_surfel_id) surfel = local.surfel_id[surfel];
+  connect(setup.ranks, made);
+  const auto from_owners = [&](auto& values) {
+    constexpr std::size_t bytes = sizeof(values[0]);
+    share.transport->start(Records{reinterpret_cast<std::byte*>(values.data()), bytes, bytes});
+    share.transport->finish();
+  };
+  if (setup.options.tile > 0) {
+    from_owners(place);
+    share.place = std::move(place);
+  }
+  from_owners(made.model.mass);
+  from_owners(made.model.volume);
+  return {model_of(std::move(made)), cut.partitioner, cut.quality, std::move(whole.surfaces)};
+}
+
+}  // namespace phyxel

@@ -1,0 +1,123 @@
+#include <algorithm>
+#include <cmath>
+
+#include "model/neighbour_search.hpp"
+#include "model/share_surveyor.hpp"
+#include "model/spatial_hash.hpp"
+#include "mpi/share_pipeline.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+/// A little more than asked for, so that rounding leaves nothing out.
+constexpr double margin = 1 + 1e-9;
+
+}  // namespace
+
+std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::size_t b) {
+  const auto first_from = [&](std::size_t body) {
+    return std::partition_point(phyxels.begin(), phyxels.end(), [&](const MigratingPhyxel& p) {
+      return static_cast<std::size_t>(p.body) < body;
+    });
+  };
+  return {first_from(b), first_from(b + 1)};
+}
+
+/// Asks farther and farther around until the nearest are there for sure.
+void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels& own) {
+  const std::size_t n = whole.bodies.size();
+  const auto wants = [&](std::size_t b) {
+    return !setup.scene.bodies[b].neighbourhood.radius || whole.bodies[b].kernel_volumes;
+  };
+  std::vector<double> reach(n, 0);
+  bool any = false;
+  for (std::size_t b = 0; b < n; ++b) {
+    if (!wants(b) || whole.bodies[b].size < 2) continue;
+    any = true;
+    // Of evenly spread phyxels that would be half as far again as is needed.
+    reach[b] = roomy_cell_size(whole.boxes[b].low, whole.boxes[b].high,
+                               static_cast<std::size_t>(whole.bodies[b].size)) *
+               1.6 * std::cbrt(setup.scene.bodies[b].neighbourhood.nearest / 10.0);
+  }
+  if (!any) return;
+  for (;;) {
+    const RemotePhyxels others = remote_phyxels_around(setup.ranks, own, reach, whole.boxes);
+    std::vector<double> needed(n, 0);
+    for (const auto& [first, last] : ranges_of_bodies(own)) {
+      const auto b = static_cast<std::size_t>(own[first].body);
+      if (!wants(b)) continue;
+      const std::span<MigratingPhyxel> here = std::span(own).subspan(first, last - first);
+      const std::span<const MigratingPhyxel> there = of_body(others.phyxels, b);
+      const std::size_t size = here.size() + there.size();
+      const Bulk<Vec3d> position = in_bulk(size, [&](std::size_t k) {
+        return (k < here.size() ? here[k] : there[k - here.size()]).position;
+      });
+      const int nearest = setup.scene.bodies[b].neighbourhood.nearest;
+      Bulk<double> farthest = in_bulk(size, [](std::size_t) { return 0.0; });
+      const std::vector<double> spacing =
+          setup.options.surveyor
+              ? setup.options.surveyor->mean_spacing(position, nearest, farthest.data())
+              : mean_spacing(position, nearest, farthest.data());
+      const auto enough = std::min<Index>(nearest + 1, whole.bodies[b].size);
+      const bool too_few = static_cast<Index>(size) < enough;
+      double most = 0;
+#pragma omp parallel for schedule(static) reduction(max : most)
+      for (std::size_t k = 0; k < here.size(); ++k) {
+        here[k].spacing = spacing[k];
+        most = std::max(most, too_few ? 2 * reach[b] + 1e-300 : farthest[k] * margin);
+      }
+      needed[b] = most;
+    }
+    needed = largest_of(setup.ranks, needed);
+    bool done = true;
+    for (std::size_t b = 0; b < n; ++b) {
+      if (needed[b] <= reach[b]) continue;
+      reach[b] = needed[b];
+      done = false;
+    }
+    if (done) return;
+  }
+}
+
+void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own) {
+  std::vector<Bulk<double>> spacings(whole.bodies.size());
+  const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
+    return setup.scene.bodies[b].neighbourhood;
+  };
+  const auto spacings_of = [&](std::size_t first, std::size_t last) {
+    return in_bulk(last - first, [&](std::size_t k) { return own[first + k].spacing; });
+  };
+  const auto stretches = ranges_of_bodies(own);
+  for (const auto& [first, last] : stretches) {
+    const auto b = static_cast<std::size_t>(own[first].body);
+    if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
+    spacings[b] = spacings_of(first, last);
+  }
+  const std::vector<double> medians = medians_of(setup.ranks, spacings);
+  std::vector<double> reach(whole.bodies.size(), 0);
+  for (const auto& [first, last] : stretches) {
+    const auto b = static_cast<std::size_t>(own[first].body);
+    const std::vector<double> support =
+        support_radii(spacings_of(first, last), rule(b), medians[b]);
+    const std::size_t begin = first;  // for clang, whose OpenMP takes no bindings
+    double most = 0;
+#pragma omp parallel for schedule(static) reduction(max : most)
+    for (std::size_t k = 0; k < support.size(); ++k) {
+      own[begin + k].support = support[k];
+      most = std::max(most, support[k]);
+    }
+    reach[b] = most;
+  }
+  reach = largest_of(setup.ranks, reach);
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) whole.bodies[b].reach = reach[b];
+}
+
+RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
+                                    const MigratingPhyxels& own, double supports) {
+  std::vector<double> reach;
+  for (const WholeBody& body : whole.bodies) reach.push_back(supports * margin * body.reach);
+  return remote_phyxels_around(setup.ranks, own, reach, whole.boxes);
+}
+
+}  // namespace phyxel
