@@ -156,7 +156,7 @@ double largest_eigenvalue(const Model& model, Backend& backend, const std::vecto
   for (Index i = 0; i < model.size(); ++i) v.push_back(uniform_vector(engine, 1));
   const double step = 1e-7;
   double value = 0;
-  for (int k = 0; k < 150; ++k) {
+  for (int k = 0; k < 600; ++k) {
     double largest = 0;
     for (const Vec3d& x : v) largest = std::max(largest, norm(x));
     std::vector<Vec3d> there(u);
@@ -197,8 +197,9 @@ TEST(Stiffening, BoundsTheFastestModeOfAStretchedBlock) {
       const double is = largest_eigenvalue(model, *backend, u) / rest;
       backend->upload(state_of(u));
       const Stiffening found = find_stiffening(model, *backend);
-      // A tenth more: at its surfaces gradients are not those of plane waves. Seen: 1.095.
-      EXPECT_LE(is, 1.1 * found.ratio) << stretch.x << " " << stretch.y;
+      // More by what `at_surfaces` allows: at its surfaces gradients are not those of plane waves.
+      // Seen: 1.102 (neo-Hooke).
+      EXPECT_LE(is, 1.12 * found.ratio) << law.name << " " << stretch.x << " " << stretch.y;
       if (is > 1) {
         EXPECT_GE(is, found.ratio / 2) << stretch.x << " " << stretch.y;
       }
