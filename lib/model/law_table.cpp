@@ -42,6 +42,21 @@ bool is_allowed(const LawParameter& parameter, double value) {
                         : parameter.low <= value && value <= parameter.high;
 }
 
+/// Refuses parameters that a law allows one by one, but not together (`unmet` in its file).
+template <class Law>
+void check_together(const std::vector<double>& values) {
+  if constexpr (requires { Law::unmet(values); }) {
+    const std::string needed = Law::unmet(values);
+    if (needed.empty()) return;
+    std::vector<std::string> found;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      found.push_back(fmt::format("{} = {:g}", Law::parameters[k].name, values[k]));
+    }
+    throw InputError(fmt::format("{} found, which law \"{}\" does not allow together; allowed: {}",
+                                 fmt::join(found, ", "), Law::name, needed));
+  }
+}
+
 /// The parameters of a law in the order of its table.
 std::vector<double> values_of(const LawEntry& law, const Material& material) {
   std::vector<double> values;
@@ -105,6 +120,7 @@ ChosenLaw chosen_law(const Material& material) {
   chosen.index = index_of(material.law);
   const std::vector<double> values = values_of(law_table()[chosen.index], material);
   Laws::with_type<double>(chosen.index, [&]<class Law>(std::type_identity<Law>) {
+    check_together<Law>(values);
     const auto constants = Law::constants(values);
     static_assert(std::tuple_size_v<decltype(constants)> == constants_of_law<Law, double>);
     std::copy(constants.begin(), constants.end(), chosen.constants.begin());
