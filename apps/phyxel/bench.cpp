@@ -1,5 +1,6 @@
 /// phyxel bench: speeds beside the error they are reached at and the machine's own limits.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <omp.h>
 
 #include <algorithm>
@@ -442,9 +443,7 @@ CLI::App* add_bench_of(CLI::App& bench, const char* name, const char* what,
   if (std::string(name) == "step") {
     command
         ->add_option("--terms", options->terms,
-                     "Term sets: green, cauchy, neo-hookean, corotated, volume, hourglass, "
-                     "closure, damping, load, "
-                     "adaptive, surfels")
+                     fmt::format("Term sets: {}", fmt::join(all_terms, ", ")))
         ->delimiter(',');
     command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
         ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
