@@ -18,6 +18,14 @@ constexpr bool is_linear() {
   return false;
 }
 
+template <class Law>
+constexpr bool has_young() {
+  for (const LawParameter& p : Law::parameters) {
+    if (std::string_view(p.name) == young_modulus.name) return true;
+  }
+  return false;
+}
+
 std::vector<LawEntry> make_table() {
   std::vector<LawEntry> table;
   Laws::for_each<double>([&]<class Law>(std::type_identity<Law>) {
@@ -40,6 +48,21 @@ int index_of(const std::string& name) {
 bool is_allowed(const LawParameter& parameter, double value) {
   return parameter.open ? parameter.low < value && value < parameter.high
                         : parameter.low <= value && value <= parameter.high;
+}
+
+/// Refuses parameters that a law allows one by one, but not together (`unmet` in its file).
+template <class Law>
+void check_together(const std::vector<double>& values) {
+  if constexpr (requires { Law::unmet(values); }) {
+    const std::string needed = Law::unmet(values);
+    if (needed.empty()) return;
+    std::vector<std::string> found;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      found.push_back(fmt::format("{} = {:g}", Law::parameters[k].name, values[k]));
+    }
+    throw InputError(fmt::format("{} found, which law \"{}\" does not allow together; allowed: {}",
+                                 fmt::join(found, ", "), Law::name, needed));
+  }
 }
 
 /// The parameters of a law in the order of its table.
@@ -105,6 +128,7 @@ ChosenLaw chosen_law(const Material& material) {
   chosen.index = index_of(material.law);
   const std::vector<double> values = values_of(law_table()[chosen.index], material);
   Laws::with_type<double>(chosen.index, [&]<class Law>(std::type_identity<Law>) {
+    check_together<Law>(values);
     const auto constants = Law::constants(values);
     static_assert(std::tuple_size_v<decltype(constants)> == constants_of_law<Law, double>);
     std::copy(constants.begin(), constants.end(), chosen.constants.begin());
@@ -120,6 +144,7 @@ double hourglass_modulus(const Material& material) {
     if constexpr (requires(std::vector<double> v) { Law::hourglass_modulus(v); }) {
       return Law::hourglass_modulus(values_of(law_table()[index], material));
     } else {
+      static_assert(has_young<Law>(), "a law without young_modulus needs hourglass_modulus");
       return material.young;
     }
   });

@@ -295,10 +295,11 @@ std::vector<SceneKey> body_keys() {
        .range = between(0, 1e12),
        .meaning = "Slows every velocity v by damping * v each second; 0: none."},
       {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = between(0, 1e6),
-       .meaning = "Strength of hourglass control, as a share of young: energy of what does not "
+       .meaning = "Strength of hourglass control, as a share of E (`young`, or what follows from "
+           "the parameters of a law without it): energy of what does not "
            "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
            "see; 0: none. Needs one support for the body. With inclusions, a share of the smallest "
-           "`young`."},
+           "E."},
 
       {.section = "body.inclusion", .name = "young", .unit = "Pa", .otherwise = "the body's",
        .range = between(1e-12, stiffest), .meaning = "Young's modulus E."},

@@ -13,8 +13,8 @@ namespace phyxel {
 namespace {
 
 /// Phyxels at a surface have neighbours on one side, so that their gradients are not quite those of
-/// plane waves: modes of a stretched block are up to a tenth stiffer than the bound.
-constexpr double at_surfaces = 1.1;
+/// plane waves: modes of a stretched block are up to 11% stiffer than the bound.
+constexpr double at_surfaces = 1.12;
 
 /// Steps after which the limit is found again, as a multiple of the fewest steps between two looks.
 /// It is found even if no phyxel has stiffened, because the stiffest place may have moved.

@@ -17,6 +17,7 @@
 #include "solver/cuda_backend.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -252,7 +253,7 @@ TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
   for (const bool volume : {false, true}) {
     for (const LawEntry& law : law_table()) {
       Bodies b = overlapping();
-      b.scene.bodies[1].material.law = law.name;
+      b.scene.bodies[1].material = rubber_of(law.name);
       if (volume) b.scene.bodies[1].material.volume_stiffness = 3e6;
       if (volume) b.scene.bodies[1].material.hourglass = 5;  // so that it sets the limit
       const Model model = build_model(b.scene, b.clouds);

@@ -1,13 +1,30 @@
-/// A law of a caller's own whose answers are known.
+/// Materials of every law, and a law of a caller's own whose answers are known.
 #pragma once
 
 #include <string>
 
 #include "phyxel/custom_law.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/material.hpp"
-#include "phyxel/physics/laws/neo_hookean.hpp"
+#include "support/clouds.hpp"
 
 namespace phyxel::testing {
+
+/// `rubber` with a law of any parameters: those of its own are about as stiff as E of rubber, which
+/// is a tenth of the E that `typical` goes with.
+inline Material rubber_of(const std::string& law) {
+  Material material = rubber();
+  material.law = law;
+  for (const LawEntry& entry : law_table()) {
+    if (law != entry.name) continue;
+    for (const LawParameter& p : entry.parameters) {
+      if (!p.required() || !is_own_parameter(p)) continue;
+      const bool is_modulus = p.unit == std::string("Pa");
+      material.parameters[p.name] = is_modulus ? 0.1 * p.typical : p.typical;
+    }
+  }
+  return material;
+}
 
 /// The library's neo-Hookean law once more, so many times as stiff.
 class Repeated final : public CustomLaw {

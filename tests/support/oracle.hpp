@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ using M3 = Eigen::Matrix3d;
 struct Material {
   double young = 0, poisson = 0, volume_stiffness = 0;
   std::string law = "st-venant-kirchhoff";
+  std::map<std::string, double> parameters = {};  // of laws that have others than E and ν
   /// True if its strain is Green's.
   bool green() const { return law == "st-venant-kirchhoff"; }
 };
@@ -183,6 +185,27 @@ struct Hencky {
   }
 };
 
+/// Mooney–Rivlin in the invariants of C = FᵀF, with the derivatives of these by F.
+struct MooneyRivlin {
+  double c10, c01, l;
+  explicit MooneyRivlin(const Material& b)
+      : c10(b.parameters.at("c10")), c01(b.parameters.at("c01")) {
+    const double mu = 2 * (c10 + c01), lambda = b.parameters.at("bulk_modulus") - 2 * mu / 3;
+    l = lambda + 2 * c10;
+  }
+  double energy(const M3& j) const {
+    const M3 c = j.transpose() * j;
+    const double i1 = c.trace(), i2 = 0.5 * (i1 * i1 - (c * c).trace());
+    const double dj = j.determinant() - 1;
+    return c10 * (i1 - 3) + c01 * (i2 - 3) - 2 * (c10 + 2 * c01) * dj + l / 2 * dj * dj;
+  }
+  M3 stress(const M3& j, const M3& cof) const {
+    const M3 c = j.transpose() * j;
+    return 2 * c10 * j + 2 * c01 * (c.trace() * j - j * c) +
+           (l * (j.determinant() - 1) - 2 * (c10 + 2 * c01)) * cof;
+  }
+};
+
 /// What the linear fit at i leaves of the motion of j.
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
@@ -228,10 +251,11 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
     const Material& m = material_of(b, i);
     const M3 g = closed_grad_u(b, u, i), e = strain(m, g);
     const double dj = (M3::Identity() + g).determinant() - 1;
-    const double elastic = m.law == "corotated"     ? Corotated(m).energy(M3::Identity() + g)
-                           : m.law == "hencky"      ? Hencky(m).energy(M3::Identity() + g)
-                           : m.law == "neo-hookean" ? NeoHooke(m).energy(M3::Identity() + g)
-                                                    : 0.5 * e.cwiseProduct(stress(m, e)).sum();
+    const double elastic = m.law == "corotated"       ? Corotated(m).energy(M3::Identity() + g)
+                           : m.law == "hencky"        ? Hencky(m).energy(M3::Identity() + g)
+                           : m.law == "neo-hookean"   ? NeoHooke(m).energy(M3::Identity() + g)
+                           : m.law == "mooney-rivlin" ? MooneyRivlin(m).energy(M3::Identity() + g)
+                                                      : 0.5 * e.cwiseProduct(stress(m, e)).sum();
     total += b.v[i] * (elastic + 0.5 * m.volume_stiffness * dj * dj);
   }
   return total;
@@ -249,6 +273,7 @@ inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
     if (m.law == "neo-hookean") p = NeoHooke(m).stress(j, cofactor(j));
     if (m.law == "hencky") p = Hencky(m).stress(j);
     if (m.law == "corotated") p = Corotated(m).stress(j);
+    if (m.law == "mooney-rivlin") p = MooneyRivlin(m).stress(j, cofactor(j));
     if (m.volume_stiffness > 0) p += m.volume_stiffness * (j.determinant() - 1) * cofactor(j);
     for (const int n : b.neighbours[i]) {
       V3 push = -b.v[i] * p * grad_of(b, a, i, n);

@@ -9,6 +9,7 @@
 
 #include "phyxel/error.hpp"
 #include "support/clouds.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -62,11 +63,7 @@ TEST(LawTable, ConstantsAreLamesParametersAndTheStiffnessOfVolumeConservation) {
 /// The linear law at rest has the stress of the law at small strains, volume conservation included.
 TEST(LawTable, TheLawAtRestIsTheTangentAtRest) {
   for (const LawEntry& entry : law_table()) {
-    Material material = rubber();
-    material.law = entry.name;
-    for (const LawParameter& p : entry.parameters) {
-      if (p.required() && is_own_parameter(p)) material.parameters[p.name] = p.typical;
-    }
+    Material material = testing::rubber_of(entry.name);
     material.volume_stiffness = 3e4;
     const ChosenLaw chosen = chosen_law(material);
     Laws::with<double>(chosen.index, chosen.constants.data(), [&](const auto& law) {
@@ -85,6 +82,29 @@ TEST(LawTable, TheLawAtRestIsTheTangentAtRest) {
       }
     });
   }
+}
+
+/// c10, c01 and the bulk modulus say what E, λ and μ are; E and ν of the material do not count.
+TEST(LawTable, ALawWithoutYoungsModulusHasItsOwn) {
+  Material material = testing::rubber_of("mooney-rivlin");
+  material.parameters = {{"c10", 3e4}, {"c01", 1e4}, {"bulk_modulus", 2e5}};
+  const double mu = 8e4, lambda = 2e5 - 2 * mu / 3;
+  EXPECT_NEAR(wave_stiffness_at_rest(material), lambda + 2 * mu, 1e-15 * lambda);
+  EXPECT_NEAR(hourglass_modulus(material), mu * (3 * lambda + 2 * mu) / (lambda + mu), 1e-9);
+  material.young = material.poisson = 0;
+  EXPECT_EQ(refusal_of(material), "accepted");
+}
+
+/// Each within its range, and together not: L = K + 2/3 c10 - 4/3 c01 has to be positive.
+TEST(LawTable, RefusesParametersThatDoNotGoTogether) {
+  Material material = testing::rubber_of("mooney-rivlin");
+  material.parameters = {{"c10", 1e4}, {"c01", 3e4}, {"bulk_modulus", 3.4e4}};
+  EXPECT_EQ(refusal_of(material), "accepted");
+  material.parameters["bulk_modulus"] = 3.3e4;
+  EXPECT_THAT(refusal_of(material),
+              HasSubstr("c10 = 10000, c01 = 30000, bulk_modulus = 33000 found, which law "
+                        "\"mooney-rivlin\" does not allow together; allowed: "
+                        "bulk_modulus > 4/3 c01 - 2/3 c10"));
 }
 
 TEST(LawTable, RefusesWhatALawDoesNotHave) {

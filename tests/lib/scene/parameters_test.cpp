@@ -140,9 +140,16 @@ density = 1000
 name = 'fifth'
 cloud = 'a' # body.cloud => cloud = 'b'
 [body.material]
-young = 1e5
-poisson = 0.3
+law = 'mooney-rivlin'
+c10 = 1e4 # body.material.c10 => c10 = 2e4
+c01 = 1e3 # body.material.c01 => c01 = 2e3
+bulk_modulus = 1e5 # body.material.bulk_modulus => bulk_modulus = 2e5
 density = 1000
+[[body.inclusion]]
+region = 'x-'
+c10 = 2e4 # body.inclusion.c10 => c10 = 3e4
+c01 = 2e3 # body.inclusion.c01 => c01 = 3e3
+bulk_modulus = 3e5 # body.inclusion.bulk_modulus => bulk_modulus = 4e5
 )";
 
 /// The text with the value of one key changed, or of none.

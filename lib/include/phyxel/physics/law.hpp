@@ -11,7 +11,14 @@
 ///   wave_stiffness(stretches)    an upper bound of ρc² over all plane waves [Pa]
 ///   at_rest(volume_stiffness)    the linear law that it is at small displacements
 ///
-/// of which all but `constants` run on GPUs too.
+/// of which all but `constants` and `at_rest` run on GPUs too. It may have
+///
+///   static constexpr bool is_linear = true;         it never stiffens
+///   static double hourglass_modulus(std::span<const double> parameters);
+///   what hourglass control is a share of [Pa], of a law without `young_modulus`
+///   static const char* unmet(std::span<const double> parameters);
+///   what parameters that are each in their range still have to fulfil together, in the words of a
+///   refusal, e.g. "a > 2 b"; "" if they do
 ///
 /// On `wave_stiffness`: a plane wave of direction b (at rest) and polarisation a has the
 /// displacement gradient a bᵀ and sees the stiffness a bᵀ : ∂P/∂F : a bᵀ, the quadratic form of the
@@ -42,7 +49,7 @@ struct LawParameter {
   const char* meaning;  ///< One sentence for the reference of scenes.
   /// The value of a parameter that the user leaves out; NaN: the parameter is required.
   double fallback = std::numeric_limits<double>::quiet_NaN();
-  /// A required parameter's value in measurements of speed, where E = 1e6 Pa.
+  /// A required parameter's value in measurements of speed, where E = 1e6 Pa, and in tests.
   double typical = 0;
 
   /// True if the user has to give it.

@@ -4,6 +4,7 @@
 
 #include "phyxel/physics/laws/corotated.hpp"
 #include "phyxel/physics/laws/hencky.hpp"
+#include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
 #include "phyxel/physics/laws/small_strain.hpp"
 #include "phyxel/physics/laws/st_venant_kirchhoff.hpp"
@@ -12,7 +13,7 @@
 namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
-using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky>;
+using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin>;
 
 /// The factor by which a material is stiffer than at rest, at most: 1 at rest.
 /// @param law its index in `Laws`. @param volume_stiffness of volume conservation [Pa]; 0: none
