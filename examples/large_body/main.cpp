@@ -89,14 +89,14 @@ int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
   const double fallen = -ranks.exact_sum(terms) / share.parts[0].mass;
 
   if (!ranks.leads()) return 0;
-  const double n = share.global_count_size(), t = solver.time();
+  const double n = share.global_count(), t = solver.time();
   const phyxel::SharedModel::Shares& shares = block.shares();
   std::printf("%d ranks, each on %s: %s\n", ranks.size(),
               device.gpu ? device.gpu->describe().c_str() : device.why_no_gpu.c_str(),
               backend->name().c_str());
   std::printf("shares: %lld to %lld of %d phyxels, and at most %lld ghosts\n",
               static_cast<long long>(shares.fewest), static_cast<long long>(shares.most),
-              share.global_count_size(), static_cast<long long>(shares.most_ghosts));
+              share.global_count(), static_cast<long long>(shares.most_ghosts));
   std::printf("speed: %.3g phyxel-steps/s; %.0f bytes of ghosts a step\n",
               n * options.steps / seconds, static_cast<double>(sent) / options.steps);
   std::printf("%d steps to t = %.6g s\n", options.steps, t);

@@ -100,7 +100,7 @@ class Help : public test::Program {
 
 TEST_F(Help, HasExamplesForEveryCommandOfOptionsThatThereAre) {
   const std::vector<std::string> paths = commands();
-  EXPECT_GT(paths.size(), 20u);
+  EXPECT_GE(paths.size(), 16u);  // the program, its commands and their subcommands
   for (const std::string& path : paths) {
     SCOPED_TRACE(path);
     const std::string help = help_of(path);

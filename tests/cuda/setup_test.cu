@@ -158,7 +158,7 @@ ModelShare a_share(const Model& whole) {
   const Groups tiles = curve_groups(whole, cuda::tile_size);
   const std::vector<int> part_of =
       ungrouped(make_partition(grouped_graph(graph, tiles), 3, Partitioner::bisection), tiles);
-  ModelShare made = share_of(whole, make_part_halos(graph, part_of, 3, 1)[1], part_of);
+  ModelShare made = share_of(whole, make_part_halos(graph, part_of, 3)[1], part_of);
   made.share.place = values_of(made.share, cuda::make_tiling(whole).place);
   made.model.share = std::make_shared<Share>(made.share);
   return made;

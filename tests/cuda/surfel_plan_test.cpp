@@ -118,7 +118,7 @@ TEST_P(SurfelPlans, OfSharesHaveTheBlocksOfTheWhole) {
     for (Index t = 0; t < tiles.count; ++t) part_of_tile.push_back((5 * t + 1) % parts);
     const std::vector<int> part_of = ungrouped(part_of_tile, tiles);
     std::map<Index, Described> found;
-    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts)) {
       ModelShare made = share_of(whole, plan, part_of);
       made.share.place = values_of(made.share, make_tiling(whole).place);
       made.model.share = std::make_shared<Share>(made.share);

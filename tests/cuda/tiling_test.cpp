@@ -145,7 +145,7 @@ TEST_P(Tiling, OfAShareIsThatOfTheWholeTileByTile) {
     for (Index g = 0; g < groups.count; ++g) part_of_tile.push_back((7 * g + 3) % parts);
     const std::vector<int> part_of = ungrouped(part_of_tile, groups);
     Index own = 0;
-    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts)) {
       ModelShare made = share_of(whole, plan, part_of);
       made.share.place = values_of(made.share, places);
       Model& model = made.model;

@@ -23,9 +23,9 @@ TEST_P(Exchange, SizesAreThoseOfTheirDefinitions) {
   for (const int parts : {1, 2, 8}) {
     const std::vector<int> part_of = make_partition(graph, parts, Partitioner::bisection);
     std::int64_t sends = 0;
-    for (const PartHalo& plan : make_part_halos(graph, part_of, parts, 1)) {
+    for (const PartHalo& plan : make_part_halos(graph, part_of, parts)) {
       for (const PartHalo::Peer& peer : plan.peers) {
-        sends += static_cast<std::int64_t>(peer.send[0].size());
+        sends += static_cast<std::int64_t>(peer.send.size());
       }
     }
     std::int64_t pairs = 0;
