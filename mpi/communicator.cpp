@@ -112,7 +112,7 @@ MpiCommunicator::MpiCommunicator(CommunicatorHandle callers) : native_(std::make
                 "has called MPI_Init_thread");
   }
   check_threads();
-  const MPI_Comm all = MPI_Comm_f2c(callers.fortran);
+  MPI_Comm all = MPI_Comm_f2c(callers.fortran);
   if (all == MPI_COMM_NULL) {
     throw Error(ExitCode::bad_input,
                 "MPI_COMM_NULL was given: allowed are communicators that this rank belongs to");
@@ -122,7 +122,7 @@ MpiCommunicator::MpiCommunicator(CommunicatorHandle callers) : native_(std::make
 }
 
 void MpiCommunicator::describe_hosts() {
-  MPI_Comm const all = native_->all;
+  MPI_Comm all = native_->all;
   PHYXEL_MPI_CALL(MPI_Comm_rank(all, &rank_));
   PHYXEL_MPI_CALL(MPI_Comm_size(all, &size_));
   MPI_Comm host = MPI_COMM_NULL;
