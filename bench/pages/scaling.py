@@ -8,10 +8,10 @@ ASKED_OF_TWO = 1.8  # target speed-up of two ranks on two cores, from 200,000 ph
 HEAD = """# Scaling
 
 Written by `bench/make_pages.py` from the tables of `phyxel bench scaling` in `docs/results/`: one jittered cube under \
-gravity with Green's strain, stepped by ranks that `mpirun -n N` starts. Every rank count, partitioner and number of ghost \
-rings gives the same positions to the last bit (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), so the error of \
-a scaled run is that of one rank. One ring of ghosts: displacements and stresses are exchanged; two: displacements of \
-both, and the inner ring's stresses are found twice. *One alone*: 10⁶ phyxel-steps/s of the first rank by itself, with \
+gravity with Green's strain, stepped by ranks that `mpirun -n N` starts. Every rank count and partitioner \
+gives the same positions to the last bit (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), so the error of \
+a scaled run is that of one rank. Ranks have one ring of ghosts, whose displacements and stresses are exchanged; \
+rows of two rings, where the inner ring's stresses were found twice, are of versions that had them. *One alone*: 10⁶ phyxel-steps/s of the first rank by itself, with \
 the whole body or with one rank's part of it, measured in turn with all ranks; *speed-up*: over that; *efficiency*: that \
 by rank; *spread*: (largest - smallest) / median of the repeats, of all and of one. *Exchanging* is the largest share of \
 a rank's time for packing, waiting and unpacking, in which uneven work shows, too. *Shares*: until each rank has its part \
