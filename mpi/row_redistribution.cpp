@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "parallel_sort.hpp"
+#include "phyxel/history.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -77,6 +78,7 @@ State RowRedistribution::scattered(Index length,
   State state;
   state.displacement.resize(places.here.size());
   state.velocity.resize(places.here.size());
+  state.history = virgin_history(share_);
   for (Index begin = 0; begin < all;) {
     const Index end = all - begin > length ? begin + length : all;
     State some;
@@ -85,11 +87,25 @@ State RowRedistribution::scattered(Index length,
     });
     some.displacement = ranks_.broadcast(std::move(some.displacement));
     some.velocity = ranks_.broadcast(std::move(some.velocity));
+    // The first rank's columns are those of a model of the same materials (`check_resumed`).
+    auto columns = static_cast<std::size_t>(
+        ranks_.broadcast(std::vector<Index>{static_cast<Index>(some.history.size())}).front());
+    some.history.resize(columns);
+    if (columns == 0) state.history.clear();
+    for (HistoryColumn& column : some.history) {
+      const std::vector<char> name = ranks_.broadcast(
+          std::vector<char>(column.name.begin(), column.name.end()));
+      column.name.assign(name.begin(), name.end());
+      column.values = ranks_.broadcast(std::move(column.values));
+    }
     const Places::Range range = places.within({begin, end});
     for (std::size_t k = range.begin; k < range.end; ++k) {
       const auto row = static_cast<std::size_t>(places.number[k] - begin);
       state.displacement[places.here[k]] = some.displacement[row];
       state.velocity[places.here[k]] = some.velocity[row];
+      for (std::size_t c = 0; c < state.history.size(); ++c) {
+        state.history[c].values[places.here[k]] = some.history[c].values[row];
+      }
     }
     begin = end;
   }

@@ -192,23 +192,18 @@ void bench_step(const BenchOptions& options) {
         const double dt =
             0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
         Solver solver(*backend, initial_state(model, scene, dt));
-        const auto step = [&] {
-          solver.step();
-          if (surfels) backend->update_surfels();
-        };
         const auto warm = Clock::now();
         int steps = 0;
         while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {
-          step();
-          ++steps;
-          if (steps % 16 == 0) backend->wait();
+          solver.step(16, surfels);
+          steps += 16;
+          backend->wait();
         }
-        backend->wait();
         steps = std::max(2, static_cast<int>(steps * options.seconds / seconds_since(warm)));
         std::vector<double> rate;
         for (int repeat = 0; repeat < options.repeats; ++repeat) {
           const auto start = Clock::now();
-          for (int s = 0; s < steps; ++s) step();
+          solver.step(steps, surfels);
           backend->wait();
           rate.push_back(steps / seconds_since(start));
         }

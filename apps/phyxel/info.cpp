@@ -137,7 +137,13 @@ Facts scene_facts(const fs::path& file) {
                 {"law", body.material.law}};
     if (has_parameter(body.material.law, "young")) facts["E [Pa]"] = body.material.young;
     if (has_parameter(body.material.law, "poisson")) facts["nu"] = body.material.poisson;
-    for (const auto& [name, value] : body.material.parameters) facts[name] = value;
+    for (const auto& [name, value] : body.material.parameters) {
+      if (value.is_vector()) {
+        facts[name] = value.text();
+      } else {
+        facts[name] = value.number();
+      }
+    }
     facts["rho [kg/m^3]"] = body.material.density;
     bodies.push_back(facts);
   }

@@ -26,7 +26,7 @@ std::string moduli_of(const Material& m) {
 std::string terms_of(const Part& part) {
   const Material& m = part.material;
   std::string terms = m.custom_law ? m.custom_law->name() : m.law;
-  for (const auto& [name, value] : m.parameters) terms += fmt::format(", {} = {:g}", name, value);
+  for (const auto& [name, value] : m.parameters) terms += fmt::format(", {} = {}", name, value.text());
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.hourglass.value_or(0) > 0) {
@@ -34,6 +34,7 @@ std::string terms_of(const Part& part) {
   }
   if (part.closure > 0) terms += fmt::format(", closed gradients (to {:g})", part.closure);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
+  if (m.viscosity > 0) terms += fmt::format(", viscosity ({:g} s)", m.viscosity);
   return terms;
 }
 

@@ -292,12 +292,15 @@ class Simulation {
 
   /// So many steps of the present size: of twice as many, once they are halved.
   void take(std::int64_t count) {
-    for (std::int64_t k = 0; k < count; ++k) {
+    for (std::int64_t k = 0, taken = 1; k < count; k += taken) {
       const int made = shortener_->look(*solver_, plan_.halvings);
       plan_.halve(made);
       count = k + ((count - k) << made);
       try {
-        naming(scene_, [&] { solver_->step(); });
+        const std::int64_t end = solver_->steps() + (count - k);
+        taken = solver_->steps_to(
+            std::min({end, looked_ + watch_interval, shortener_->next_look(*solver_)}));
+        naming(scene_, [&] { solver_->step(static_cast<int>(taken)); });
       } catch (const InterruptedError&) {
         const py::gil_scoped_acquire here;
         throw py::error_already_set();

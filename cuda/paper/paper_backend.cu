@@ -155,7 +155,7 @@ class GpuBackend final : public PaperBackend {
     launched("updateSurfels", blocks, surfel_block);
   }
 
-  void internal_forces(std::vector<Vec3d>& force) override {
+  void internal_forces(std::vector<Vec3d>& force, HistoryUse) override {
     stress();
     sum_forces();
     wait();

@@ -28,6 +28,18 @@ class PaperBackend : public Backend {
   /// gather, which stores none.
   virtual std::vector<Vec3d> pair_forces() const = 0;
 
+  /// calcStrainStressA: displacements -> gradients -> stresses -> forces on each neighbour.
+  virtual void stress() = 0;
+  /// calcStrainStressB and updatePositions: sums forces, and takes a step of `dt` [s].
+  virtual void advance(double time, double dt) = 0;
+  void step(std::int64_t first, double dt, int count, bool move_surfels) override {
+    for (int s = 0; s < count; ++s) {
+      stress();
+      advance(static_cast<double>(first + s) * dt, dt);
+      if (move_surfels) update_surfels();
+    }
+  }
+
   /// updateSurfels: fills the vertex buffer from the present displacements and the gradients of
   /// the last `stress()`. `advect_surfels` does both and copies the buffer to the host.
   void update_surfels() override = 0;

@@ -104,7 +104,7 @@ class SequentialBackend final : public PaperBackend {
     }
   }
 
-  void internal_forces(std::vector<Vec3d>& force) override {
+  void internal_forces(std::vector<Vec3d>& force, HistoryUse) override {
     stress();
     force.clear();
     for (const V& f : force_) force.push_back(to_double(f));

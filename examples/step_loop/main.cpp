@@ -45,8 +45,7 @@ int main() {
   std::int64_t steps = 0;
   // What `Solver::step` does, and what it leaves to its caller.
   for (; static_cast<double>(steps) * dt < duration; ++steps) {
-    backend->stress();
-    backend->advance(static_cast<double>(steps) * dt, dt);
+    backend->step(steps, dt);
     const double now_pulled = state.displacement(end[0]).x;
     backend->internal_forces(force);
     const double now_pulling = pulling_force(force);

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t version = 3;
+constexpr std::int64_t version = 4;  // with history
 constexpr std::int64_t oldest_version = 2;  // without parameters
 constexpr std::size_t kept = 2;
 // Phyxels whose values are looked at together.
@@ -73,13 +73,36 @@ std::vector<Parameter> parameters_in(const Hdf5Reader& in, const std::string& te
   return parameters;
 }
 
-void check_finite(const Hdf5Reader& in, const char* path, const std::vector<Vec3d>& values,
+template <class T>
+void check_finite(const Hdf5Reader& in, const std::string& path, const std::vector<T>& values,
                   Index first) {
+  using phyxel::is_finite;
+  using std::isfinite;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!is_finite(values[i]))
+    bool finite = false;
+    if constexpr (std::is_same_v<T, double>) {
+      finite = isfinite(values[i]);
+    } else {
+      finite = is_finite(values[i]);
+    }
+    if (!finite) {
       in.refuse(
           fmt::format("{} is not finite in row {}", path, i + static_cast<std::size_t>(first)));
+    }
   }
+}
+
+std::string history_path(const std::string& column) { return "/state/history/" + column; }
+
+/// The lines of a text.
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return lines;
 }
 
 }  // namespace
@@ -119,6 +142,19 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   const bool as_float = info.precision == Precision::single;
   write_later(out, {"/state/displacement", as_float, phyxels, {Quantity::displacement}}, values);
   write_later(out, {"/state/velocity", as_float, phyxels, {Quantity::velocity}}, values);
+  // Laws remember in the precision of the work, which is float in mixed runs.
+  out.attribute("/state", "history_interval", state.history_interval);
+  std::string columns;
+  for (std::size_t k = 0; k < state.history.size(); ++k) {
+    const std::string& name = state.history[k].name;
+    columns += name + '\n';
+    if (k == 0) out.group("/state/history");
+    write_later(out,
+                {history_path(name), info.precision != Precision::double_, phyxels,
+                 {history_quantity(k)}},
+                values);
+  }
+  if (!columns.empty()) out.text("/state/history_columns", columns);
 
   fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);
@@ -184,6 +220,20 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
         fmt::format("dt = {} s at t = {} s; allowed: dt > 0, both finite", state_.dt, state_.time));
   }
   const std::size_t rows = in.shape("/state/displacement").rows;
+  if (info_.version > 3) {
+    state_.history_interval = in.number_attribute("/state", "history_interval");
+    if (!(state_.history_interval >= 0) || !std::isfinite(state_.history_interval)) {
+      in.refuse(fmt::format("history_interval = {} s; allowed: 0 and more, finite",
+                            state_.history_interval));
+    }
+    for (std::string& name : lines_of(in.text("/state/history_columns"))) {
+      const std::string path = history_path(name);
+      if (const std::size_t other = in.shape(path.c_str()).rows; other != rows) {
+        in.refuse(fmt::format("{} has {} rows, /state/displacement {}", path, other, rows));
+      }
+      state_.history.push_back({std::move(name), {}});
+    }
+  }
   if (const std::size_t other = in.shape("/state/velocity").rows; other != rows) {
     in.refuse(fmt::format("/state/velocity has {} rows, /state/displacement {}", other, rows));
   }
@@ -199,7 +249,7 @@ CheckpointReader& CheckpointReader::operator=(CheckpointReader&&) noexcept = def
 
 State CheckpointReader::state(Index begin, Index end) const {
   State state = state_;
-  const auto read = [&](const char* path) {
+  const auto read = [&](const std::string& path) {
     std::vector<Vec3d> values =
         file_->vectors(path, static_cast<std::size_t>(begin), static_cast<std::size_t>(end));
     check_finite(*file_, path, values, begin);
@@ -207,6 +257,12 @@ State CheckpointReader::state(Index begin, Index end) const {
   };
   state.displacement = read("/state/displacement");
   state.velocity = read("/state/velocity");
+  for (HistoryColumn& column : state.history) {
+    const std::string path = history_path(column.name);
+    column.values = file_->numbers(path, static_cast<std::size_t>(begin),
+                                   static_cast<std::size_t>(end));
+    check_finite(*file_, path, column.values, begin);
+  }
   return state;
 }
 

@@ -10,6 +10,7 @@
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/history.hpp"
 #include "version.hpp"
 
 namespace phyxel {
@@ -144,6 +145,8 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
       {"strain_energy", "J", [](D d) { return d.strain_energy; }},
       {"volume_energy", "J", [](D d) { return d.volume_energy; }},
       {"hourglass_energy", "J", [](D d) { return d.hourglass_energy; }},
+      {"plastic_work", "J", [](D d) { return d.plastic_work; }},
+      {"viscous_work", "J", [](D d) { return d.viscous_work; }},
       {"gravity_energy", "J", [](D d) { return d.gravity_energy; }},
       {"load_energy", "J", [](D d) { return d.load_energy; }},
       {"total_energy", "J", [](D d) { return d.total_energy(); }},
@@ -192,6 +195,12 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
   if (scene.output.wants("velocity")) field("velocity", as_float, Quantity::velocity);
   if (values.has(Quantity::von_mises)) field("von_mises", true, Quantity::von_mises);
   if (values.has(Quantity::volume_ratio)) field("volume_ratio", true, Quantity::volume_ratio);
+  if (scene.output.wants("history")) {
+    const std::vector<std::string> columns = history_columns(model);
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      field(columns[k].c_str(), true, history_quantity(k));
+    }
+  }
   if (scene.output.wants("mass")) field("mass", true, Quantity::mass);
   if (scene.output.wants("volume")) field("volume", true, Quantity::volume);
   if (cells > 1 || scene.output.wants("body")) {
@@ -288,6 +297,12 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
     };
     for (const char* name : {"displacement", "velocity"}) field(name, 3);
     for (const char* name : {"von_mises", "volume_ratio", "mass", "volume"}) field(name, 0);
+    for (const std::string& name : in.members("/VTKHDF/PointData")) {  // what laws remember
+      const std::string path = "/VTKHDF/PointData/" + name;
+      if (name != "body" && frame.field.count(name) == 0 && in.shape(path).columns == 0) {
+        field(name.c_str(), 0);
+      }
+    }
   }
   if (kind == surface_frame_kind) {
     const auto corners = in.array<std::int64_t>("/VTKHDF/Connectivity");

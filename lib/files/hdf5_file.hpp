@@ -117,6 +117,10 @@ class Hdf5Reader {
                       std::size_t end) const;
   std::vector<Vec3d> vectors(const std::string& path) const;
   std::vector<Vec3d> vectors(const std::string& path, std::size_t begin, std::size_t end) const;
+  /// The names of what a group holds.
+  std::vector<std::string> members(const std::string& group) const;
+  /// Numbers [begin, end) of an array of one dimension. @throws InputError likewise
+  std::vector<double> numbers(const std::string& path, std::size_t begin, std::size_t end) const;
   std::string text(const std::string& path) const;
 
   bool has_attribute(const std::string& path, const std::string& name) const;

@@ -133,6 +133,23 @@ std::vector<Vec3d> Hdf5Reader::vectors(const std::string& path, std::size_t begi
   return values;
 }
 
+std::vector<std::string> Hdf5Reader::members(const std::string& group) const {
+  std::vector<std::string> names;
+  const std::string prefix = group + "/";
+  for (const auto& [path, object] : objects_) {
+    if (path.size() > prefix.size() && path.compare(0, prefix.size(), prefix) == 0 &&
+        path.find('/', prefix.size()) == std::string::npos) {
+      names.push_back(path.substr(prefix.size()));
+    }
+  }
+  return names;
+}
+
+std::vector<double> Hdf5Reader::numbers(const std::string& path, std::size_t begin,
+                                        std::size_t end) const {
+  return rows<double>(path, 0, begin, end);
+}
+
 std::string Hdf5Reader::text_of(const Hdf5Value& value) const {
   std::string text(value.width, '\0');
   file_.read(value.at, value.width, text.data());

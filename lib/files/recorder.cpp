@@ -65,6 +65,10 @@ std::span<const double> values_of(const Model& model, const Frame& frame, Quanti
     case Quantity::surfel_normal:
       if (frame.surfels) return flat(frame.surfels->normal);
       break;
+    default:
+      if (history_column(quantity) < frame.state->history.size()) {
+        return frame.state->history[history_column(quantity)].values;
+      }
   }
   return {};
 }

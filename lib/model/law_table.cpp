@@ -7,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 
 namespace phyxel {
@@ -26,10 +27,21 @@ constexpr bool has_young() {
   return false;
 }
 
+template <class Law>
+constexpr std::span<const HistoryNumber> history_of_law() {
+  if constexpr (has_history<Law>) {
+    static_assert(std::size(Law::history) == history_numbers<Law, double>);
+    return Law::history;
+  } else {
+    return {};
+  }
+}
+
 std::vector<LawEntry> make_table() {
   std::vector<LawEntry> table;
   Laws::for_each<double>([&]<class Law>(std::type_identity<Law>) {
-    table.push_back({Law::name, Law::meaning, Law::parameters, is_linear<Law>()});
+    table.push_back({Law::name, Law::meaning, Law::parameters, is_linear<Law>(),
+                     history_of_law<Law>()});
   });
   return table;
 }
@@ -57,15 +69,20 @@ void check_together(const std::vector<double>& values) {
     const std::string needed = Law::unmet(values);
     if (needed.empty()) return;
     std::vector<std::string> found;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      found.push_back(fmt::format("{} = {:g}", Law::parameters[k].name, values[k]));
+    for (std::size_t k = 0; const LawParameter& p : Law::parameters) {
+      found.push_back(fmt::format("{} = {}", p.name,
+                                  p.count == 1 ? ParameterValue(values[k]).text()
+                                               : ParameterValue(Vec3d{values[k], values[k + 1],
+                                                                      values[k + 2]})
+                                                     .text()));
+      k += static_cast<std::size_t>(p.count);
     }
     throw InputError(fmt::format("{} found, which law \"{}\" does not allow together; allowed: {}",
                                  fmt::join(found, ", "), Law::name, needed));
   }
 }
 
-/// The parameters of a law in the order of its table.
+/// The parameters of a law in the order of its table, vectors component by component.
 std::vector<double> values_of(const LawEntry& law, const Material& material) {
   std::vector<double> values;
   for (const auto& [name, value] : material.parameters) {
@@ -73,13 +90,17 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
     if (std::none_of(law.parameters.begin(), law.parameters.end(), is_it)) {
       std::vector<std::string> names;
       for (const LawParameter& p : law.parameters) names.emplace_back(p.name);
-      throw InputError(fmt::format("{} = {:g} found, which law \"{}\" does not have; allowed: {}",
-                                   name, value, law.name, fmt::join(names, ", ")));
+      throw InputError(fmt::format("{} = {} found, which law \"{}\" does not have; allowed: {}", name,
+                                   value.text(), law.name, fmt::join(names, ", ")));
     }
   }
   for (const LawParameter& parameter : law.parameters) {
     const std::string name = parameter.name;
-    double value = parameter.fallback;
+    ParameterValue value = parameter.fallback;
+    if (parameter.count == 3) {
+      const double* v = parameter.vector_fallback;
+      value = Vec3d{v[0], v[1], v[2]};
+    }
     if (name == "young") {
       value = material.young;
     } else if (name == "poisson") {
@@ -89,19 +110,29 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
     } else if (parameter.required()) {
       throw InputError(fmt::format("{} is missing, which law \"{}\" needs", name, law.name));
     }
-    if (!is_allowed(parameter, value)) {
+    if (value.is_vector() != (parameter.count == 3)) {
+      throw InputError(fmt::format("{} = {} found; allowed: {}", name, value.text(),
+                                   parameter.count == 3 ? "a vector [x, y, z]" : "a number"));
+    }
+    for (const double number : value.numbers()) {
+      if (is_allowed(parameter, number)) continue;
       const char* const less = parameter.open ? "<" : "<=";
-      throw InputError(fmt::format("{} = {:g} found; allowed: {:g} {} {} {} {:g}{}{}{}", name,
-                                   value, parameter.low, less, name, less, parameter.high,
+      throw InputError(fmt::format("{} = {} found; allowed: {:g} {} {} {} {:g}{}{}{}", name,
+                                   value.text(), parameter.low, less, name, less, parameter.high,
                                    *parameter.unit ? " [" : "", parameter.unit,
                                    *parameter.unit ? "]" : ""));
     }
-    values.push_back(value);
+    values.insert(values.end(), value.numbers().begin(), value.numbers().end());
   }
   return values;
 }
 
 }  // namespace
+
+std::string ParameterValue::text() const {
+  return is_vector() ? fmt::format("[{:g}, {:g}, {:g}]", numbers_[0], numbers_[1], numbers_[2])
+                     : fmt::format("{:g}", numbers_[0]);
+}
 
 std::span<const LawEntry> law_table() {
   static const std::vector<LawEntry> table = make_table();
@@ -133,8 +164,26 @@ ChosenLaw chosen_law(const Material& material) {
     static_assert(std::tuple_size_v<decltype(constants)> == constants_of_law<Law, double>);
     std::copy(constants.begin(), constants.end(), chosen.constants.begin());
     chosen.constants[constants.size()] = material.volume_stiffness;
+    chosen.constants[constants.size() + 1] = material.viscosity;
   });
   return chosen;
+}
+
+std::vector<std::string> history_names(const Material& material) {
+  std::vector<std::string> names;
+  if (material.custom_law) {
+    names = material.custom_law->history();
+  } else {
+    for (const HistoryNumber& n : law_table()[index_of(material.law)].history) {
+      names.emplace_back(n.name);
+    }
+  }
+  if (material.viscosity > 0) {
+    for (const HistoryNumber& n : WithViscosity<SmallStrain<double>, double>::history) {
+      names.emplace_back(n.name);
+    }
+  }
+  return names;
 }
 
 double hourglass_modulus(const Material& material) {

@@ -75,8 +75,9 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<char>(m.law.begin(), m.law.end()));
     for (const auto& [name, value] : m.parameters) {
       add(state.get(), std::vector<char>(name.begin(), name.end()));
-      add(state.get(), std::vector<double>{value});
+      add(state.get(), std::vector<double>(value.numbers().begin(), value.numbers().end()));
     }
+    if (m.viscosity > 0) add(state.get(), std::vector<double>{m.viscosity});
     if (m.custom_law) {
       const std::string name = m.custom_law->name();
       add(state.get(), std::vector<char>(name.begin(), name.end()));

@@ -130,7 +130,7 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
 void read_law(const SceneTable& table, Material& material, bool inherits) {
   const std::string of_body = material.law;
   table.read("law", material.law);
-  std::map<std::string, double> parameters;
+  std::map<std::string, ParameterValue> parameters;
   for (const LawEntry& entry : law_table()) {
     const bool is_it = material.law == entry.name;
     for (const LawParameter& parameter : entry.parameters) {
@@ -150,7 +150,16 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
       } else {
         const auto bodys = material.parameters.find(name);
         if (bodys != material.parameters.end()) parameters.insert(*bodys);
-        if (table.has(parameter.name)) table.read(parameter.name, parameters[name]);
+        if (!table.has(parameter.name)) continue;
+        if (parameter.count == 3) {
+          Vec3d vector;
+          table.read(parameter.name, vector);
+          parameters[name] = vector;
+        } else {
+          double number = 0;
+          table.read(parameter.name, number);
+          parameters[name] = number;
+        }
       }
     }
   }
@@ -163,6 +172,7 @@ Material read_material(const SceneTable& table) {
   table.read("density", material.density);
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
+  table.read("viscosity", material.viscosity);
   table.read("hourglass", material.hourglass);
   return material;
 }
@@ -218,6 +228,7 @@ InclusionRequest read_inclusion(const SceneTable& table, Material material) {
   table.read("density", material.density);
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
+  table.read("viscosity", material.viscosity);
   return {select, material};
 }
 

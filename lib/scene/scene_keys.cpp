@@ -55,10 +55,15 @@ std::vector<SceneKey> law_keys(const std::string& section) {
       std::string otherwise = fmt::format("law \"{}\" needs it", law.name);
       if (section != "body.material") {
         otherwise = "the body's";
+      } else if (p.count == 3) {
+        const double* v = p.vector_fallback;
+        otherwise = ParameterValue(Vec3d{v[0], v[1], v[2]}).text();
       } else if (!p.required()) {
         otherwise = fmt::format("{:g}", p.fallback);
       }
-      keys.push_back({.section = section, .name = p.name, .unit = p.unit, .otherwise = otherwise,
+      keys.push_back({.section = section, .name = p.name,
+                      .type = p.count == 3 ? KeyType::vector : KeyType::number, .unit = p.unit,
+                      .otherwise = otherwise,
                       .range = {p.low, p.high, p.open},
                       .meaning = fmt::format("With law = \"{}\": {}", law.name, p.meaning)});
     }
@@ -178,7 +183,7 @@ std::vector<SceneKey> run_keys() {
        .meaning = "Write the deformed surface, if a body has surfels."},
       {.section = "output", .name = "fields", .type = KeyType::choices,
        .fallback = "[\"displacement\", \"velocity\"]",
-       .words = {"displacement", "velocity", "von_mises", "volume_ratio", "mass", "volume", "body"},
+       .words = {"displacement", "velocity", "von_mises", "volume_ratio", "mass", "volume", "body", "history"},
        .meaning = "What each phyxel carries beside its position, in m, m/s, Pa, 1, kg, m^3 and 1."},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
@@ -294,6 +299,11 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "damping", .unit = "1/s", .fallback = "0",
        .range = between(0, 1e12),
        .meaning = "Slows every velocity v by damping * v each second; 0: none."},
+      {.section = "body.material", .name = "viscosity", .unit = "s", .fallback = "0",
+       .range = between(0, 1e9),
+       .meaning = "Kelvin-Voigt damping, in proportion to the stiffness: a relaxation time tau. A "
+           "mode of angular frequency omega is damped by the share tau omega / 2 of critical "
+           "damping; rigid motion is not damped. 0: none."},
       {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = between(0, 1e6),
        .meaning = "Strength of hourglass control, as a share of E (`young`, or what follows from "
            "the parameters of a law without it): energy of what does not "
@@ -314,6 +324,8 @@ std::vector<SceneKey> body_keys() {
        .otherwise = "the body's", .range = between(0, stiffest), .meaning = "As in `[body.material]`."},
       {.section = "body.inclusion", .name = "damping", .unit = "1/s", .otherwise = "the body's",
        .range = between(0, 1e12), .meaning = "As in `[body.material]`."},
+      {.section = "body.inclusion", .name = "viscosity", .unit = "s", .otherwise = "the body's",
+       .range = between(0, 1e9), .meaning = "As in `[body.material]`."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
        .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},

@@ -84,9 +84,16 @@ void visit_material(const char* section, const Material& m, Visit&& visit) {
   if (m.custom_law || has_parameter(m.law, "poisson")) visit(section, "poisson", m.poisson);
   visit(section, "density", m.density);
   visit(section, "law", m.law);
-  for (const auto& [name, value] : m.parameters) visit(section, name.c_str(), value);
+  for (const auto& [name, value] : m.parameters) {
+    if (value.is_vector()) {
+      visit(section, name.c_str(), value.vector());
+    } else {
+      visit(section, name.c_str(), value.number());
+    }
+  }
   visit(section, "volume_stiffness", m.volume_stiffness);
   visit(section, "damping", m.damping);
+  visit(section, "viscosity", m.viscosity);
 }
 
 template <class Visit>

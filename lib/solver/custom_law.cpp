@@ -54,6 +54,17 @@ void check_derivative(const CustomLaw& law, double young, const Mat3d& grad_u) {
 
 CustomLaw::~CustomLaw() = default;
 
+double CustomLaw::energy(const Mat3d& grad_u, std::span<const double>) const {
+  return energy(grad_u);
+}
+Mat3d CustomLaw::first_piola_stress(const Mat3d& grad_u, std::span<double>, double) const {
+  return first_piola_stress(grad_u);
+}
+Mat3d CustomLaw::elastic_stress(const Mat3d& grad_u, std::span<const double>) const {
+  return first_piola_stress(grad_u);
+}
+double CustomLaw::plastic_work(std::span<const double>) const { return 0; }
+
 void check_custom_law(const CustomLaw& law, double young) {
   check_rest(law, young);
   for (const Mat3d& grad_u : deformations) check_derivative(law, young, grad_u);

@@ -1,15 +1,18 @@
 #include "phyxel/diagnostics.hpp"
 
 #include <fmt/format.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "phyxel/error.hpp"
+#include "phyxel/history.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/boundary_conditions.hpp"
 #include "solver/first_error.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
@@ -22,14 +25,6 @@ bool all_finite(const Mat3d& m) {
   double sum = 0;
   for (int e = 0; e < 9; ++e) sum += m(e / 3, e % 3);
   return std::isfinite(sum);
-}
-
-/// P of the law and of volume conservation [Pa].
-Mat3d first_piola_stress(const PartLaw& law, const VolumeConservation<double>& volume,
-                         const Mat3d& grad_u) {
-  Mat3d p = law.first_piola_stress(grad_u);
-  if (volume.stiffness > 0) p += volume.first_piola_stress(grad_u);
-  return p;
 }
 
 /// sqrt(3/2 s:s) of the deviator of σ = P Fᵀ / det F.
@@ -75,27 +70,34 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   const std::span<const Vec3d> external = backend.external_forces();
   std::vector<Vec3d> applied(external.begin(), external.end());
   if (!model.loads.empty()) applied.resize(force.size());
-  for (const Load& load : model.loads) {
-    const double scale = load.scale_at(now.time);
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      const Index i = load.phyxels[k];
-      applied[i] += scale * load.force[k];
-      if (model.owns(i)) all.load_energy.add(-scale * dot(load.force[k], state.displacement[i]));
-    }
-  }
-  std::vector<Vec3d> free(model.motions.empty() ? 0 : force.size(), {1, 1, 1});
-  for (const Motion& motion : model.motions) {
-    for (const Index i : motion.phyxels) free[i] = motion.along_axes({}, free[i]);
-  }
+  for_each_load(model, now.time, [&](Index i, Vec3d load) {
+    applied[i] += load;
+    if (model.owns(i)) all.load_energy.add(-dot(load, state.displacement[i]));
+  });
+  const std::vector<Vec3d> free = free_axes(model);
+  const std::vector<std::string> columns = history_columns(model);
 
+  std::vector<PartLaw> laws;
+  std::vector<PartHistory> histories;
+  std::size_t most_numbers = 0;
+  for (const Part& part : model.parts) {
+    laws.emplace_back(part.material);
+    histories.emplace_back(state, part.material, columns);
+    most_numbers = std::max(most_numbers, histories.back().size());
+  }
+  const int threads = std::max(1, backend.threads());
+  std::vector<std::vector<double>> rooms(static_cast<std::size_t>(threads),
+                                         std::vector<double>(most_numbers));
   FirstError error;  // of a caller's law
-#pragma omp parallel num_threads(std::max(1, backend.threads()))
+#pragma omp parallel num_threads(threads)
   {
     Totals own;
-    for (const Part& part : model.parts) {
+    std::vector<double>& numbers = rooms[static_cast<std::size_t>(omp_get_thread_num())];
+    for (std::size_t p = 0; p < model.parts.size(); ++p) {
+      const Part& part = model.parts[p];
       const Material& m = part.material;
-      const PartLaw law(m);
-      const VolumeConservation<double> volume_law{m.volume_stiffness};
+      const PartLaw& law = laws[p];
+      const PartHistory& history = histories[p];
       const double kappa = hourglass_stiffness(model, part);
       const DampedFlow half = damped_flow(m.damping, now.lag);
 #pragma omp for schedule(static) nowait
@@ -110,16 +112,18 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
         Vec3d change = half.gain * acceleration - (1 - half.keep) * state.velocity[i];
         if (!free.empty()) change = by_components(free[i], change);
         const Vec3d v = state.velocity[i] + change;
-        const Vec3d p = model.mass[i] * v;
-        own.kinetic_energy.add(0.5 * dot(p, v));
-        own.momentum.add(p);
-        own.angular_momentum.add(cross(x, p));
+        const Vec3d momentum = model.mass[i] * v;
+        own.kinetic_energy.add(0.5 * dot(momentum, v));
+        own.momentum.add(momentum);
+        own.angular_momentum.add(cross(x, momentum));
         own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
-        const auto energy = [&] { return law.energy(gradient[i]); };
-        own.strain_energy.add(model.volume[i] * (m.custom_law ? error.caught(energy) : energy()));
-        if (m.volume_stiffness > 0) {
-          own.volume_energy.add(model.volume[i] * volume_law.energy(gradient[i]));
-        }
+        const PointResponse<double> response = error.caught([&] {
+          return law.after_step(gradient[i], history.of(i, numbers), state.history_interval);
+        });
+        own.strain_energy.add(model.volume[i] * response.strain_energy);
+        own.volume_energy.add(model.volume[i] * response.volume_energy);
+        own.plastic_work.add(model.volume[i] * response.plastic_work);
+        own.viscous_work.add(model.volume[i] * response.viscous_work);
         if (kappa > 0) own.hourglass_energy.add(hourglass_energy(kappa, residual[i]));
         own.inverted += volume_change(gradient[i]) <= -1;
         own.internal_force.add(force[i]);
@@ -168,14 +172,22 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
                    std::vector<double>* volume_ratio) {
   std::vector<Mat3d> gradient;
   backend.displacement_gradients(gradient);
+  const std::vector<std::string> columns = history_columns(model);
+  State state;
+  if (von_mises && !columns.empty()) backend.download(state);
   if (von_mises) von_mises->resize(gradient.size());
   if (volume_ratio) volume_ratio->resize(gradient.size());
   for (const Part& part : model.parts) {
     const PartLaw law(part.material);
-    const VolumeConservation<double> volume{part.material.volume_stiffness};
-    for (Index i = part.begin; i < part.end; ++i) {
+    const PartHistory history(state, part.material, columns);
+    std::vector<double> numbers(history.size());
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
       const Mat3d& g = gradient[i];
-      if (von_mises) (*von_mises)[i] = von_mises_stress(first_piola_stress(law, volume, g), g);
+      if (von_mises) {
+        const PointResponse<double> response =
+            law.after_step(g, history.of(i, numbers), state.history_interval);
+        (*von_mises)[i] = von_mises_stress(response.first_piola_stress, g);
+      }
       if (volume_ratio) (*volume_ratio)[i] = 1 + volume_change(g);
     }
   }

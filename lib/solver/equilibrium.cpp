@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "phyxel/error.hpp"
+#include "solver/boundary_conditions.hpp"
 #include "solver/newton.hpp"
 #include "solver/rigid_support.hpp"
 
@@ -20,15 +21,13 @@ Balance whole_balance(const Model& model, const Newton& newton) {
   const OwnedVectors& vectors = newton.vectors();
   Balance balance;
   balance.target = vectors.make();
-  balance.free.assign(balance.target.size(), {1, 1, 1});
+  balance.free = free_axes(model);
+  balance.free.resize(balance.target.size(), {1, 1, 1});
   for (const Motion& motion : model.motions) {
     if (motion.velocity != Vec3d{} || motion.amplitude != Vec3d{}) {
       throw InputError(
           "a motion with a velocity or an amplitude never ends: allowed in a search for "
           "equilibrium are fixed phyxels and motions by a displacement");
-    }
-    for (const Index i : motion.phyxels) {
-      balance.free[i] = motion.along_axes({}, balance.free[i]);
     }
   }
   balance.applied = vectors.make();
@@ -116,6 +115,8 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   Balance balance = whole_balance(model, newton);
   refuse_unsupported_bodies(model, balance);
   Equilibrium found;
+  backend.set_history_interval(0);
+  backend.download(found.state);
   found.state.displacement = options.start ? *options.start : vectors.make();
   found.state.velocity = vectors.make();
   NewtonReport report;
@@ -143,6 +144,10 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   found.residual = report.residual;
   vectors.refresh_ghosts(found.state.displacement);
   backend.upload(found.state);
+  backend.commit_history();
+  State committed;
+  backend.download(committed);
+  found.state.history = std::move(committed.history);
   return found;
 }
 

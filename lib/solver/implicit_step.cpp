@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "phyxel/error.hpp"
+#include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
 namespace {
@@ -17,18 +18,14 @@ const double share_of_step = 1 - std::sqrt(0.5);  // γ
 }  // namespace
 
 ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
-    : model_(model), newton_(model, backend, most_newton_steps) {
+    : model_(model), backend_(backend), newton_(model, backend, most_newton_steps) {
   const OwnedVectors& vectors = newton_.vectors();
   balance_.target = vectors.make();
   balance_.centre = vectors.make();
   balance_.applied = vectors.make();
   balance_.weight.resize(balance_.target.size());
-  balance_.free.assign(balance_.target.size(), {1, 1, 1});
-  for (const Motion& motion : model.motions) {
-    for (const Index i : motion.phyxels) {
-      balance_.free[i] = motion.along_axes({}, balance_.free[i]);
-    }
-  }
+  balance_.free = free_axes(model);
+  balance_.free.resize(balance_.target.size(), {1, 1, 1});
   for (const Part& part : model.parts) {
     if (part.material.damping > 0) damping_.resize(balance_.target.size(), 0);
   }
@@ -41,22 +38,8 @@ ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
 void ImplicitStep::find_applied(double time) {
   newton_.vectors().for_each(
       [&](Index i) { balance_.applied[i] = model_.mass[i] * model_.gravity; });
-  for (const Load& load : model_.loads) {
-    const double scale = load.scale_at(time);
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      balance_.applied[load.phyxels[k]] += scale * load.force[k];
-    }
-  }
+  add_loads(model_, time, balance_.applied);
   newton_.add_external_forces(balance_.applied);
-}
-
-void ImplicitStep::find_targets(double time, Vector& target) const {
-  for (const Motion& motion : model_.motions) {
-    const Path path = motion.path_at(time);
-    for (const Index i : motion.phyxels) {
-      target[i] = motion.along_axes(path.at(model_.position[i]), target[i]);
-    }
-  }
 }
 
 /// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): v' is put into the first, which leaves a
@@ -64,7 +47,7 @@ void ImplicitStep::find_targets(double time, Vector& target) const {
 void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u, Vector& v) {
   const OwnedVectors& vectors = newton_.vectors();
   find_applied(time);
-  find_targets(time, balance_.target);
+  prescribe_displacements(model_, time, balance_.target);
   const auto slowed = [&](Index i) { return damping_.empty() ? 1.0 : 1 + damping_[i] * s; };
   vectors.for_each([&](Index i) {
     balance_.weight[i] = model_.mass[i] * slowed(i) / (s * s);
@@ -119,6 +102,7 @@ void ImplicitStep::take_both_stages(State& state) {
   const Vector u = state.displacement, v = state.velocity;
   Vector& u2 = state.displacement;
   Vector& v2 = state.velocity;
+  backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);
   // From the first stage's speed and acceleration over the rest of the step.
   Vector from = vectors.make();
@@ -127,15 +111,22 @@ void ImplicitStep::take_both_stages(State& state) {
     from[i] = u[i] + rest * v2[i];
     v2[i] = v[i] + rest * acceleration;
   });
+  backend_.set_history_interval(dt);
   take_stage(end, s, from, u2, v2);
   Vector before = vectors.make(), after = vectors.make();
-  find_targets(begin, before);
-  find_targets(end, after);
+  prescribe_displacements(model_, begin, before);
+  prescribe_displacements(model_, end, after);
   vectors.for_each([&](Index i) {
     const Vec3d along_path = (1 / dt) * (after[i] - before[i]);
     v2[i] = by_components(balance_.free[i], v2[i]) + along_path;
   });
   vectors.refresh_ghosts(u2);
+  backend_.put_displacements(u2);
+  backend_.commit_history();
+  State history;
+  backend_.download(history);
+  state.history = std::move(history.history);
+  state.history_interval = history.history_interval;
   ++state.step;
   state.time = end;
 }

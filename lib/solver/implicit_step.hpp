@@ -27,8 +27,6 @@ class ImplicitStep {
  private:
   using Vector = Newton::Vector;
   void find_applied(double time);
-  /// What is held or moved stands where it is at `time`.
-  void find_targets(double time, Vector& target) const;
   /// A stage of length s [s] that ends at `time`.
   /// @param from,v U and V; @param u where the search begins
   /// u and v are those after it.
@@ -36,6 +34,7 @@ class ImplicitStep {
   void take_both_stages(State& state);
 
   const Model& model_;
+  Backend& backend_;
   Newton newton_;
   Balance balance_;
   std::vector<double> damping_;  ///< [1/s], shape [n]; empty: none.

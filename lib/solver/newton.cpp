@@ -138,15 +138,16 @@ Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
 }
 
 void Newton::put(const Vector& u) {
-  placed_.displacement = u;
-  placed_.velocity.resize(u.size());
-  vectors_.refresh_ghosts(placed_.displacement);
-  backend_.upload(placed_);
+  placed_ = u;
+  vectors_.refresh_ghosts(placed_);
+  backend_.put_displacements(placed_);
 }
 
 /// Right after `forces` at u [J].
 double Newton::potential(const Balance& balance, const Vector& u) {
-  const double elastic = diagnose(model_, backend_, 0, 1).elastic_energy();
+  // With the potentials whose derivatives plastic and viscous stresses are over one step.
+  const Diagnostics now = diagnose(model_, backend_, 0, 1);
+  const double elastic = now.elastic_energy() + now.plastic_work + 0.5 * now.viscous_work;
   ++evaluations_;
   double inert = 0;
   if (!balance.weight.empty()) {

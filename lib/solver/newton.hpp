@@ -83,7 +83,7 @@ class Newton {
   OwnedVectors vectors_;
   double difference_;              ///< How far stiffness moves phyxels at most [m].
   std::vector<double> stiffness_;  ///< About that of each phyxel against its neighbours [N/m].
-  State placed_;
+  Vector placed_;
   std::int64_t evaluations_ = 0;
   NewtonObserver observer_;
   NewtonProgress progress_;

@@ -6,6 +6,7 @@
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
+#include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/owned_vectors.hpp"
 
@@ -21,11 +22,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.velocity.resize(state.displacement.size());
   if (scene.solver.method == Method::equilibrium) return state;  // what moves has yet to go there
   std::vector<Vec3d> loaded(model.loads.empty() ? 0 : state.displacement.size());  // [N]
-  for (const Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      loaded[load.phyxels[k]] += load.scale_at(0) * load.force[k];
-    }
-  }
+  add_loads(model, 0, loaded);
   for (const Part& part : model.parts) {
     const BodyRequest& body = scene.bodies[static_cast<std::size_t>(part.body)];
 #pragma omp parallel for schedule(static)
@@ -37,12 +34,11 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
     }
   }
   for (const Motion& motion : model.motions) {
-    const Path start = motion.path_at(0);
     for (const Index i : motion.phyxels) {
-      state.displacement[i] = motion.along_axes(start.at(model.position[i]), state.displacement[i]);
       state.velocity[i] = motion.along_axes({}, state.velocity[i]);
     }
   }
+  prescribe_displacements(model, 0, state.displacement);
   return state;
 }
 
@@ -75,11 +71,32 @@ void Solver::observe(NewtonObserver observer) {
   observer_ = std::move(observer);
 }
 
-void Solver::step() {
+void Solver::step(std::int64_t count, bool move_surfels) {
+  if (method_ == Method::verlet) {
+    const std::int64_t most = backend_.best_steps();  // a law that throws does so in the first step of a call
+    while (count > 0) {
+      const std::int64_t some = std::min(count, most);
+      backend_.step(steps_, dt_, static_cast<int>(some), move_surfels);
+      steps_ += some;
+      count -= some;
+    }
+    return;
+  }
+  for (; count > 0; --count) {
+    step_by_newton();
+    ++steps_;
+    if (move_surfels) backend_.update_surfels();
+  }
+}
+
+int Solver::steps_to(std::int64_t limit) const {
+  const std::int64_t most = method_ == Method::verlet ? backend_.best_steps() : 1;
+  return static_cast<int>(std::clamp<std::int64_t>(limit - steps_, 1, most));
+}
+
+void Solver::step_by_newton() {
   switch (method_) {
     case Method::verlet:
-      backend_.stress();              // u -> ∇u -> ε -> σ -> Q
-      backend_.advance(time(), dt_);  // gather of Q -> f -> loads -> Verlet -> u⁺
       break;
     case Method::implicit:
       try {
@@ -99,7 +116,6 @@ void Solver::step() {
       break;
     }
   }
-  ++steps_;
 }
 
 void Looks::halve_step() {
@@ -120,16 +136,8 @@ void Solver::halve_step() {
   backend_.internal_forces(force);
   const std::span<const Vec3d> external = backend_.external_forces();
   for (std::size_t i = 0; i < external.size(); ++i) force[i] += external[i];
-  for (const Load& load : model.loads) {
-    const double scale = load.scale_at(time());
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      force[load.phyxels[k]] += scale * load.force[k];
-    }
-  }
-  std::vector<Vec3d> free(model.motions.empty() ? 0 : force.size(), {1, 1, 1});
-  for (const Motion& motion : model.motions) {
-    for (const Index i : motion.phyxels) free[i] = motion.along_axes({}, free[i]);
-  }
+  add_loads(model, time(), force);
+  const std::vector<Vec3d> free = free_axes(model);
   // A quarter of a step on, under constant force: v' = a - c v.
   const double ahead = dt_ / 4;
   for (const Part& part : model.parts) {

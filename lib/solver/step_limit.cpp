@@ -16,7 +16,7 @@ namespace phyxel {
 namespace {
 
 /// K x is minus the difference of the forces at two displacements so close to each other that only
-/// its linear part shows. Of a share, vectors have its own phyxels, and their products those of all
+/// its linear part shows; what laws remember is held, since unloading is elastic. Of a share, vectors have its own phyxels, and their products those of all
 /// ranks.
 class HostVibration final : public Vibration {
  public:
@@ -32,8 +32,8 @@ class HostVibration final : public Vibration {
         current_(vectors_.make()),
         next_(vectors_.make()),
         distance_(distance) {
-    backend_.upload(present_);
-    backend_.internal_forces(there_);
+    backend_.put_displacements(present_.displacement);
+    backend_.internal_forces(there_, HistoryUse::frozen);
     vectors_.for_each([&](Index i) { current_[i] = start_component(model.global_id(i)); });
     const double length = std::sqrt(vectors_.product(current_, current_));
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
@@ -51,8 +51,8 @@ class HostVibration final : public Vibration {
           present_.displacement[i] + (amplitude / std::sqrt(model_.mass[i])) * current_[i];
     });
     vectors_.refresh_ghosts(moved_.displacement);
-    backend_.upload(moved_);
-    backend_.internal_forces(force_);
+    backend_.put_displacements(moved_.displacement);
+    backend_.internal_forces(force_, HistoryUse::frozen);
     vectors_.for_each([&](Index i) {
       next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * (force_[i] - there_[i]) -
                  beta * previous_[i];
@@ -213,7 +213,7 @@ StepLimit present_step_limit(const Model& model, Backend& backend) {
     vectors.refresh_ghosts(present.displacement);
     HostVibration vibration(model, backend, present, distance);
     found = largest_frequency(model, vibration, 0.02);
-    backend.upload(present);
+    backend.put_displacements(present.displacement);
   }
   StepLimit limit;
   limit.omega_max = found.omega;

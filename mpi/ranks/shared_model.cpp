@@ -103,7 +103,7 @@ std::vector<double> SharedModel::gathered(Quantity quantity, std::span<const dou
 State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) const {
   struct Header {
     std::int64_t step;
-    double time, dt;
+    double time, dt, history_interval;
     Looks looks;
   };
   Header now{};
@@ -116,7 +116,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
     }
     const State header = checkpoint->state(0, 0);
-    now = {header.step, header.time, header.dt, header.looks};
+    now = {header.step, header.time, header.dt, header.history_interval, header.looks};
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -125,6 +125,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.step = now.step;
   state.time = now.time;
   state.dt = now.dt;
+  state.history_interval = now.history_interval;
   state.looks = now.looks;
   return state;
 }

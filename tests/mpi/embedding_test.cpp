@@ -106,7 +106,7 @@ TEST_F(Embedding, HalvesOfTheRanksStepBodiesOfTheirOwn) {
     const auto backend = shared.make_backend(Precision::double_, 1);
     const double dt = 0.5 * step_limit(shared.here(), *backend).largest_step;
     Solver solver(*backend, initial_state(shared.here(), scene, dt));
-    for (int s = 0; s < 30; ++s) solver.step();
+    solver.step(30);
     return diagnose(shared.here(), *backend, solver.steps(), dt).largest_speed;
   };
   Ranks half(handle());

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 
 #include "phyxel/custom_law.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
 #include "phyxel/material.hpp"
 #include "support/clouds.hpp"
@@ -24,6 +26,24 @@ inline Material rubber_of(const std::string& law) {
     }
   }
   return material;
+}
+
+/// A law of the list with the parameters of a material.
+template <class Law>
+Law law_of(Material material) {
+  material.law = Law::name;
+  using Real = std::remove_cvref_t<decltype(Law{}.wave_stiffness({1, 1, 1}))>;
+  return make_law<Law, Real>(chosen_law(material).constants.data());
+}
+
+/// Why a material is refused; "" if it is not.
+inline std::string law_refusal(const Material& material) {
+  try {
+    chosen_law(material);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
 }
 
 /// The library's neo-Hookean law once more, so many times as stiff.

@@ -89,7 +89,7 @@ Solution ringing(const Discretisation& d, double reference,
   const auto look = std::max<std::int64_t>(1, static_cast<std::int64_t>(0.01 / reference / m.dt));
   const auto most = static_cast<std::int64_t>(2 * (periods + 2) / reference / m.dt);
   while (crossings.count() <= periods && solver.steps() < most) {
-    for (std::int64_t s = 0; s < look; ++s) solver.step();
+    solver.step(look);
     crossings.add(solver.time(), signal(m, solver.state()));
   }
   const double found = crossings.count() > periods ? crossings.frequency() : 0;
@@ -161,7 +161,7 @@ Solution spinning(const Discretisation& d) {
   // The body springs out at first, and its energy with the step's error: means of a hundred looks.
   double early = 0, late = 0, turned = 0, pushed = 0, speed = 0;
   for (int k = 0; k < looks; ++k) {
-    for (std::int64_t s = 0; s < each; ++s) solver.step();
+    solver.step(each);
     const Diagnostics now = look();
     if (now.bad_phyxel >= 0) {  // it has flown apart: nothing stays
       turned = pushed = late = HUGE_VAL;
@@ -271,7 +271,7 @@ Left left_to_itself(const Motions& under_load, const Motions& free, const Scene&
   const Diagnostics begin = look();
   double early = 0, late = 0, turned = 0;
   for (int k = 0; k < looks; ++k) {
-    for (std::int64_t s = 0; s < steps / looks; ++s) solver.step();
+    solver.step(steps / looks);
     const Diagnostics now = look();
     if (now.bad_phyxel >= 0) {
       turned = late = HUGE_VAL;

@@ -26,7 +26,7 @@ double steps_per_second(PaperBackend& backend, const Model& model, const PaperRe
   Solver solver(backend, state);
   const auto steps_take = [&](int steps) {
     const auto start = Clock::now();
-    for (int s = 0; s < steps; ++s) solver.step();
+    solver.step(steps);
     backend.wait();
     return seconds_since(start);
   };
@@ -153,7 +153,7 @@ struct SpunState {
 
 SpunState spin(PaperBackend& backend, const Spinning& bar, double dt, std::int64_t steps) {
   Solver solver(backend, initial_state(bar.model, bar.scene, dt));
-  for (std::int64_t s = 0; s < steps; ++s) solver.step();
+  solver.step(steps);
   SpunState state;
   state.displacement = solver.state().displacement;
   std::vector<Mat3d> gradient;

@@ -227,7 +227,7 @@ std::optional<double> Run::forecast() {
   if (scene_.solver.method == Method::equilibrium) return std::nullopt;
   const auto timed = [&](std::int64_t steps) {
     const auto start = Clock::now();
-    for (std::int64_t k = 0; k < steps; ++k) solver_.step();
+    solver_.step(static_cast<int>(steps));
     backend_->wait();
     return std::max(1e-9, seconds_since(start)) / static_cast<double>(steps);
   };
@@ -237,7 +237,10 @@ std::optional<double> Run::forecast() {
   return (more > 2 ? timed(more) : first) * static_cast<double>(plan_.steps);
 }
 
-std::int64_t Run::agree_interval() { return ranks().size() > 1 ? 10 : 1; }
+std::int64_t Run::agree_interval() const {
+  // Ranks meet seldom; a device has many steps between two calls anyway.
+  return ranks().size() > 1 && backend_->best_steps() == 1 ? 10 : 1;
+}
 
 bool Run::anyone(bool here) { return ranks().largest(std::int64_t{here}) != 0; }
 

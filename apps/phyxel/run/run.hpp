@@ -92,7 +92,7 @@ class Run {
   /// Whether this rank speaks and writes.
   static bool leads() { return ranks().rank() == 0; }
   /// Ranks ask each other now and then, and one alone itself after every step.
-  static std::int64_t agree_interval();
+  std::int64_t agree_interval() const;
   static bool anyone(bool here);
 
   /// How long a rank may stay where it is before it is named.

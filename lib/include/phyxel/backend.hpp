@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/physics/law.hpp"
 #include "phyxel/share.hpp"
 #include "phyxel/state.hpp"
 
@@ -67,7 +68,8 @@ struct StateView {
 };
 
 /// Owns the live arrays of one device and the kernels over them. `upload` and `download` copy all
-/// of a state in and out; on the CPU `view` shows it where it is.
+/// of a state in and out; on the CPU `view` shows it where it is. `step` alone changes the state;
+/// all other verbs evaluate it as it is, and leave what laws remember untouched.
 class Backend {
  public:
   virtual ~Backend() = default;
@@ -78,10 +80,12 @@ class Backend {
   virtual Index size() const = 0;
   /// Threads of the CPU that share the work; 0: it is another device's.
   virtual int threads() const = 0;
-  /// Copies a state in: shapes [n, 3], in the order of the model's phyxels.
-  /// @throws InputError for another number of phyxels
+  /// Copies a state in: shapes [n, 3], in the order of the model's phyxels, and its history: none
+  /// is the virgin material.
+  /// @throws InputError for another number of phyxels, a value that is not finite, or a history of
+  ///   other laws
   virtual void upload(const State& state) = 0;
-  /// Copies the present displacements and velocities out, in that order.
+  /// Copies the present displacements, velocities and history out, in that order.
   virtual void download(State& state) const = 0;
   /// The state where it is; nothing where that is no memory of the CPU.
   virtual std::optional<StateView> view() const { return std::nullopt; }
@@ -97,18 +101,34 @@ class Backend {
   /// Those that act [N], shape [n] or empty.
   virtual std::span<const Vec3d> external_forces() const { return {}; }
 
-  /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q of each phyxel.
-  virtual void stress() = 0;
-  /// Pass 2: gathers Q over the inverse neighbourhood into forces, adds gravity and loads, and
-  /// takes one Verlet step of `dt` from `time`; motions are applied to the result.
-  virtual void advance(double time, double dt) = 0;
+  /// Takes `count` steps of Verlet's method of `dt` [s], the first of them from t = first * dt.
+  /// Each has two passes: displacements -> gradient -> stress -> pair stress Q of each phyxel, and
+  /// Q gathered over the inverse neighbourhood -> forces, gravity and loads -> Verlet -> motions.
+  /// Stresses commit history. The bits of the result do not depend on how steps are divided into
+  /// calls. Steps may be under way when it returns.
+  /// @param move_surfels whether surfels are brought along after each step (`update_surfels`)
+  virtual void step(std::int64_t first, double dt, int count = 1, bool move_surfels = false) = 0;
 
-  /// Steps may be under way when `stress` and `advance` return; this waits for them.
-  /// @throws DeviceError
+  /// The most steps that one call of `step` makes cheaper: a device is busy with them while the
+  /// caller does something else.
+  virtual int best_steps() const { return 1; }
+
+  /// Waits for steps that are under way. @throws DeviceError
   virtual void wait() const {}
 
+  /// Puts phyxels elsewhere for evaluations, and leaves velocities and history as they are.
+  /// @param displacement [m], shape [n], of a share with its ghosts'
+  virtual void put_displacements(std::span<const Vec3d> displacement);
+  /// Sets the time from the history to the present displacements [s], over which evaluations take
+  /// rates, for methods that find displacements by themselves.
+  virtual void set_history_interval([[maybe_unused]] double interval) {}
+  /// Ends a step of such a method: the history becomes that of the present displacements, and the
+  /// interval 0.
+  virtual void commit_history() {}
   /// Internal forces [N] at the present displacements, shape [n, 3] (runs both passes).
-  virtual void internal_forces(std::vector<Vec3d>& force) = 0;
+  /// @param use `trial`: as the next step will find them; `frozen`: the derivative of the energy
+  ///   that is stored
+  virtual void internal_forces(std::vector<Vec3d>& force, HistoryUse use = HistoryUse::trial) = 0;
   /// Displacement gradients at the present displacements, shape [n].
   virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
   /// Σ_j w_ij |u_j - u_i - ∇u_i x_ij|² at the present displacements [m²], shape [n]: what hourglass
@@ -151,6 +171,10 @@ class Backend {
 /// Makes sure that a state has a displacement and a velocity for each phyxel; every backend asks
 /// this of what is uploaded. @throws InputError with both counts and the one that is allowed
 void check_sizes(const State& state, Index phyxels);
+
+/// Makes sure that there is one external force for each phyxel, or none.
+/// @throws InputError with both counts and those that are allowed
+void check_external_forces(std::span<const Vec3d> force, Index phyxels);
 
 /// The CPU backend: OpenMP over SIMD packs of phyxels. The model must outlive it.
 /// @param threads 0: OpenMP's choice.

@@ -21,11 +21,24 @@ enum class Quantity {
   von_mises,
   volume_ratio,
   surfel_position,  ///< Deformed.
-  surfel_normal
+  surfel_normal,
+  history  ///< The first column of a state's history; further ones follow (`history_quantity`).
 };
+
+/// Column k of a state's history.
+constexpr Quantity history_quantity(std::size_t k) {
+  return static_cast<Quantity>(static_cast<std::size_t>(Quantity::history) + k);
+}
+/// True for a column of a state's history.
+constexpr bool is_history(Quantity quantity) { return quantity >= Quantity::history; }
+/// Which one.
+constexpr std::size_t history_column(Quantity quantity) {
+  return static_cast<std::size_t>(quantity) - static_cast<std::size_t>(Quantity::history);
+}
 
 /// The components of a quantity.
 constexpr std::size_t width_of(Quantity quantity) {
+  if (is_history(quantity)) return 1;
   switch (quantity) {
     case Quantity::mass:
     case Quantity::volume:

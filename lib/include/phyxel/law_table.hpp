@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "phyxel/material.hpp"
 #include "phyxel/physics/laws.hpp"
@@ -17,6 +18,7 @@ struct LawEntry {
   const char* meaning;                       ///< One sentence about it.
   std::span<const LawParameter> parameters;  ///< In the order in which `constants` takes them.
   bool is_linear;                            ///< True if it never stiffens.
+  std::span<const HistoryNumber> history;    ///< The numbers that it remembers of a phyxel.
 };
 
 /// All laws, in the order of `Laws`.
@@ -32,8 +34,9 @@ bool has_parameter(std::string_view law, std::string_view parameter);
 /// A material's law, ready for a kernel.
 struct ChosenLaw {
   int index = 0;  ///< In `Laws`.
-  /// The law's constants, then the stiffness of volume conservation [Pa].
-  std::array<double, Laws::most_constants + 1> constants{};
+  /// The law's constants, then the stiffness of volume conservation [Pa], then the relaxation time
+  /// of viscosity [s].
+  std::array<double, Laws::most_constants + 2> constants{};
   bool operator==(const ChosenLaw&) const = default;
 };
 
@@ -42,6 +45,12 @@ struct ChosenLaw {
 /// lacks
 ///   or does not allow
 ChosenLaw chosen_law(const Material& material);
+
+/// The names of the numbers that a phyxel of a material remembers, in the order in which its law
+/// holds them: those of the law, then those of viscosity. Empty for an elastic material without
+/// viscosity.
+/// @throws InputError as `chosen_law`
+std::vector<std::string> history_names(const Material& material);
 
 /// The modulus [Pa] that the strength of hourglass control is a share of: Young's, unless the law
 /// names another (`hourglass_modulus` in its file), as one that has no Young's modulus does.

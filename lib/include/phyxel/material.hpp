@@ -1,16 +1,42 @@
 /// Material of a body and how its volume shares are found.
 #pragma once
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "phyxel/physics/hooke.hpp"
+#include "phyxel/types.hpp"
 
 namespace phyxel {
 
 class CustomLaw;
+
+/// The value of a law's parameter: a number, or the three of a vector.
+class ParameterValue {
+ public:
+  ParameterValue() = default;
+  ParameterValue(double number) : numbers_{number, 0, 0} {}  // NOLINT: a number is a value
+  ParameterValue(Vec3d vector) : numbers_{vector.x, vector.y, vector.z}, count_(3) {}  // NOLINT
+
+  /// Its numbers, shape [1] or [3].
+  std::span<const double> numbers() const { return {numbers_.data(), count_}; }
+  /// The number, of a parameter that is one; of a vector its first component.
+  double number() const { return numbers_[0]; }
+  /// The vector, of a parameter that is one.
+  Vec3d vector() const { return {numbers_[0], numbers_[1], numbers_[2]}; }
+  bool is_vector() const { return count_ == 3; }
+  /// "0.3" or "[1, 0, 0]".
+  std::string text() const;
+  bool operator==(const ParameterValue&) const = default;
+
+ private:
+  std::array<double, 3> numbers_{};
+  std::size_t count_ = 1;
+};
 
 /// The material of a body: a law, its parameters, and terms beside it.
 struct Material {
@@ -21,10 +47,11 @@ struct Material {
   std::string law = "st-venant-kirchhoff";
   /// The law's other parameters by name, in SI. `validate` refuses names that the law does not
   /// have.
-  std::map<std::string, double> parameters = {};
+  std::map<std::string, ParameterValue> parameters = {};
   /// Stiffness k_v [Pa] of volume conservation (Mueller et al. 2004); 0: no such term.
   double volume_stiffness = 0;
-  double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
+  double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
+  double viscosity = 0;  ///< Relaxation time τ of Kelvin–Voigt damping [s]; 0: none.
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
   /// support for the body. Unset: `default_hourglass`, in scene files and in code alike; the parts
   /// of a model have it set.

@@ -162,7 +162,7 @@ struct OutputRequest {
   bool phyxels = true;              ///< Write the phyxel family.
   bool surface = true;              ///< Write the deformed surface family.
   /// Phyxel fields beside the positions: "displacement", "velocity", "von_mises" [Pa],
-  /// "volume_ratio", "mass", "volume", "body".
+  /// "volume_ratio", "mass", "volume", "body", "history".
   std::vector<std::string> fields = {"displacement", "velocity"};
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
   /// True if `fields` contains the field.

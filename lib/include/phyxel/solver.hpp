@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -92,10 +93,14 @@ class Solver {
   /// nobody.
   void observe(NewtonObserver observer);
 
+  /// Takes `count` steps. @param move_surfels whether surfels are brought along after each
   /// @throws DivergedError if Newton's method finds no balance; InterruptedError if the observer
   ///   stops it: the state is then that of the last whole step, or the last that a search for rest
   ///   has accepted, from which a solver that starts there goes on to the bit
-  void step();
+  void step(std::int64_t count = 1, bool move_surfels = false);
+  /// The number of steps to ask for at once: as many as the backend takes best, but not beyond step
+  /// `limit`; at least 1.
+  int steps_to(std::int64_t limit) const;
   /// Halves the step of Verlet's method: the present time stays, step and dt change by a factor of
   /// two, and velocities move from t - dt/2 to t - dt/4 by the present forces. Exact in powers of
   /// two, so that times after a restart are the same bits. Of a share: collective.
@@ -114,6 +119,8 @@ class Solver {
   SolverWork work() const;
 
  private:
+  void step_by_newton();
+
   const Model* model_ = nullptr;  ///< Of a method that needs it.
   Backend& backend_;
   Method method_ = Method::verlet;
@@ -149,6 +156,10 @@ class StepShortener {
   /// @throws DivergedError, saying which phyxel, its stretch and when, if `most_halvings` are not
   ///   enough or a displacement is not finite
   int look(Solver& solver, int halvings);
+  /// The step before which `look` has to be called next.
+  std::int64_t next_look(Solver& solver) const {
+    return active_ ? solver.looks().next : std::numeric_limits<std::int64_t>::max();
+  }
   /// Whether any law can stiffen.
   bool active() const { return active_; }
   /// The fewest steps between two looks: half the number of steps in which a wave crosses the

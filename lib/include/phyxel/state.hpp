@@ -1,6 +1,7 @@
 /// The variables of a simulation that change from step to step, which checkpoints hold.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "phyxel/types.hpp"
@@ -35,11 +36,24 @@ struct Watched {
   bool operator==(const Watched&) const = default;
 };
 
+/// One number of every phyxel's history, by its name (`HistoryNumber`).
+struct HistoryColumn {
+  std::string name;
+  std::vector<double> values;  ///< Shape [n]; 0 where a phyxel's law has no such number.
+  bool operator==(const HistoryColumn&) const = default;
+};
+
 /// The state of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.
   /// v(t - dt/2) [m/s], shape [n, 3]: (u(t) - u(t - dt)) / dt; of implicit steps v(t).
   std::vector<Vec3d> velocity;
+  /// What the laws remember, column by column (phyxel/history.hpp). Empty for the virgin material,
+  /// and for laws that remember nothing.
+  std::vector<HistoryColumn> history;
+  /// Time from the history to the displacements [s]: the last step, after Verlet's; 0: they belong
+  /// together, so that nothing has a rate.
+  double history_interval = 0;
   double time = 0;  ///< t [s] = step * dt.
   std::int64_t step = 0;
   double dt = 0;  ///< [s]
@@ -77,16 +91,19 @@ struct Diagnostics {
   double strain_energy = 0;     ///< [J]
   double volume_energy = 0;     ///< [J], of the volume-conservation term.
   double hourglass_energy = 0;  ///< [J], of hourglass control.
+  double plastic_work = 0;      ///< [J], turned into heat since the virgin state.
+  double viscous_work = 0;      ///< [J], turned into heat by viscosity since the start.
   double gravity_energy = 0;    ///< [J], zero at rest.
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// Energy of the deformation [J].
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
   /// Kinetic and elastic energy [J], without the potentials of gravity and loads.
   double kinetic_and_elastic_energy() const { return kinetic_energy + elastic_energy(); }
-  /// Total energy [J], constant in a scene without damping, motions and growing loads
-  /// (`is_conservative`).
+  /// Total energy [J], with what has become heat: constant in a scene without mass-proportional
+  /// damping, motions and growing loads (`is_conservative`).
   double total_energy() const {
-    return kinetic_and_elastic_energy() + gravity_energy + load_energy;
+    return kinetic_and_elastic_energy() + plastic_work + viscous_work + gravity_energy +
+           load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

@@ -10,6 +10,7 @@
 
 #include "solver/pack.hpp"
 #include "support/deformations.hpp"
+#include "support/laws.hpp"
 
 namespace phyxel {
 namespace {
@@ -17,7 +18,14 @@ namespace {
 using namespace phyxel::testing;
 
 constexpr double young = 2.6, poisson = 0.3;
-const Hencky<double> law = Hencky<double>::of(young, poisson);
+template <class Real>
+Hencky<Real> hencky_of(double young_modulus, double poisson_ratio) {
+  Material m;
+  m.young = young_modulus;
+  m.poisson = poisson_ratio;
+  return law_of<Hencky<Real>>(m);
+}
+const Hencky<double> law = hencky_of<double>(young, poisson);
 
 static_assert(std::is_trivially_copyable_v<Hencky<float>> && sizeof(Hencky<float>) == 8);
 
@@ -226,7 +234,7 @@ TEST(Hencky, PushesBackWhatIsFlattenedOrInsideOut) {
                       V3(1e-20, 1, 1), V3(1e3, 1e3, -1e3), V3(100, 0.01, 0.01)}) {
     EXPECT_TRUE(stress(M3(s.asDiagonal())).allFinite()) << s.transpose();
     EXPECT_TRUE(std::isfinite(energy(s.asDiagonal()))) << s.transpose();
-    const Hencky<float> in_single = Hencky<float>::of(young, poisson);
+    const Hencky<float> in_single = hencky_of<float>(young, poisson);
     EXPECT_TRUE(eigen(in_single.first_piola_stress(grad_u<float>(s.asDiagonal()))).allFinite())
         << s.transpose();
   }
@@ -247,7 +255,7 @@ template <class T, int W>
 void expect_lanes_to_have_the_bits_of_scalars() {
   using P = Pack<T, W>;
   Deformations any(11);
-  const Hencky<T> scalar = Hencky<T>::of(young, poisson);
+  const Hencky<T> scalar = hencky_of<T>(young, poisson);
   const auto wide = packed<Hencky<P>, P>(scalar);
   for (int k = 0; k < 100; ++k) {
     Mat3<T> g[W];
@@ -271,7 +279,7 @@ TEST(Hencky, LanesOfAPackHaveTheBitsOfScalars) {
 
 class HenckyWaves : public ::testing::TestWithParam<double> {};
 TEST_P(HenckyWaves, StiffnessIsBoundedAndNotByMuchMore) {
-  const Hencky<double> of = Hencky<double>::of(1, GetParam());
+  const Hencky<double> of = hencky_of<double>(1, GetParam());
   const double at_rest = of.lambda + 2 * of.mu;
   // To rounding.
   EXPECT_NEAR(of.wave_stiffness({1, 1, 1}), at_rest, 1e-14 * at_rest);

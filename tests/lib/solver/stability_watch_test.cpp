@@ -124,7 +124,7 @@ Diagnostics watched_to(double end, const Model& model, const Scene& scene, StepP
   StabilityWatch watch(model, diagnose(model, *backend, solver.now()));
   Diagnostics now;
   while (solver.time() < end) {
-    for (int s = 0; s < 10; ++s) solver.step();
+    solver.step(10);
     now = diagnose(model, *backend, solver.now());
     EXPECT_NO_THROW(watch.check(now));
   }

@@ -203,7 +203,7 @@ TEST(StepShortener, HalvesAStepWithoutAJump) {
   const auto backend = make_test_backend(model, Precision::double_, 2);
   const double dt = 0.3 * step_limit(model, 1).largest_step;
   Solver solver(model, *backend, initial_state(model, scene, dt), Method::verlet);
-  for (int s = 0; s < 200; ++s) solver.step();
+  solver.step(200);
   const Diagnostics before = diagnose(model, *backend, solver.now());
   const double time = solver.time();
   solver.looks() = {

@@ -11,7 +11,17 @@
 ///   wave_stiffness(stretches)    an upper bound of ρc² over all plane waves [Pa]
 ///   at_rest(volume_stiffness)    the linear law that it is at small displacements
 ///
-/// of which all but `constants` and `at_rest` run on GPUs too. It may have
+/// of which all but `constants` run on GPUs too. A law that remembers (plasticity) has a history:
+///
+///   struct State                 its numbers, each a `Real`; all zero: the virgin material
+///   static constexpr HistoryNumber history[];       their names, in the order of the members
+///   energy(grad_u, state)        the energy density that is stored [J/m³]
+///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] at the end of a step of dt [s];
+///                                `state` becomes that of its end
+///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] while the history stays
+///   plastic_work(state)          work turned into heat since the virgin state [J/m³]
+///
+/// in place of `energy` and `first_piola_stress` of ∇u alone. A law may have
 ///
 ///   static constexpr bool is_linear = true;         it never stiffens
 ///   static double hourglass_modulus(std::span<const double> parameters);
@@ -51,9 +61,20 @@ struct LawParameter {
   double fallback = std::numeric_limits<double>::quiet_NaN();
   /// A required parameter's value in measurements of speed, where E = 1e6 Pa, and in tests.
   double typical = 0;
+  /// 1: a number; 3: a vector, each component of which is in the range. `constants` takes the
+  /// components one after the other. A vector has no fallback but this one, and no typical value.
+  int count = 1;
+  double vector_fallback[3] = {0, 0, 0};
 
   /// True if the user has to give it.
-  constexpr bool required() const { return fallback != fallback; }
+  constexpr bool required() const { return count == 1 && fallback != fallback; }
+};
+
+/// One number of a law's history, as checkpoints, frames and NumPy know it. Laws whose numbers have
+/// the same name mean the same.
+struct HistoryNumber {
+  const char* name;  ///< E.g. "equivalent_plastic_strain".
+  const char* unit;  ///< In SI; "" for a pure number.
 };
 
 /// Young's modulus, which most laws have.
@@ -88,10 +109,98 @@ inline constexpr bool needs_many_registers = [] {
   return false;
 }();
 
-/// Two laws that act side by side: energies, stresses and stiffnesses add.
+/// The history of a law that has none: empty, so that it takes no argument, array, load or store.
+struct NoHistory {};
+
+namespace detail {
+template <class Law>
+struct HistoryOf {
+  using type = NoHistory;
+};
+template <class Law>
+requires requires { typename Law::State; }
+struct HistoryOf<Law> {
+  using type = typename Law::State;
+};
+}  // namespace detail
+
+/// The history of one phyxel under a law; `NoHistory` for an elastic one.
+template <class Law>
+using HistoryOf = typename detail::HistoryOf<Law>::type;
+
+/// True for a law with a history.
+template <class Law>
+inline constexpr bool has_history = !std::is_empty_v<HistoryOf<Law>>;
+
+/// The number of scalars in a phyxel's history. `Real` is the scalar of the law.
+template <class Law, class Real>
+inline constexpr int history_numbers =
+    has_history<Law> ? static_cast<int>(sizeof(HistoryOf<Law>) / sizeof(Real)) : 0;
+
+/// What an evaluation of stresses does with histories.
+enum class HistoryUse {
+  commit,  ///< As at the end of a step, and the history becomes that of its end.
+  trial,   ///< As at the end of a step; the history stays what it was.
+  frozen   ///< The history stays, and the material responds elastically: ∂ψ/∂∇u.
+};
+
+/// First Piola stress [Pa] of a law with or without a history, at the end of a step of `dt` [s].
+/// @param history at the step's start; becomes that of its end
+template <class Law, class Real>
+PHYXEL_HD Mat3<Real> stress_after_step(const Law& law, const Mat3<Real>& grad_u,
+                                       [[maybe_unused]] HistoryOf<Law>& history,
+                                       [[maybe_unused]] Real dt) {
+  if constexpr (has_history<Law>) {
+    return law.first_piola_stress(grad_u, history, dt);
+  } else {
+    return law.first_piola_stress(grad_u);
+  }
+}
+/// ∂ψ/∂∇u [Pa] of a law with or without a history, while the history stays.
+template <class Law, class Real>
+PHYXEL_HD Mat3<Real> elastic_stress(const Law& law, const Mat3<Real>& grad_u,
+                                    [[maybe_unused]] const HistoryOf<Law>& history) {
+  if constexpr (has_history<Law>) {
+    return law.elastic_stress(grad_u, history);
+  } else {
+    return law.first_piola_stress(grad_u);
+  }
+}
+/// Energy density that is stored [J/m³].
+template <class Law, class Real>
+PHYXEL_HD Real stored_energy(const Law& law, const Mat3<Real>& grad_u,
+                             [[maybe_unused]] const HistoryOf<Law>& history) {
+  if constexpr (has_history<Law>) {
+    return law.energy(grad_u, history);
+  } else {
+    return law.energy(grad_u);
+  }
+}
+/// Plastic work since the virgin state [J/m³]; 0 for a law without any.
+template <class Real, class Law>
+PHYXEL_HD Real plastic_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
+  if constexpr (requires { law.plastic_work(history); }) {
+    return law.plastic_work(history);
+  } else {
+    return Real(0);
+  }
+}
+/// Work of viscosity since the start [J/m³]; 0 for a law without any.
+template <class Real, class Law>
+PHYXEL_HD Real viscous_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
+  if constexpr (requires { law.viscous_work(history); }) {
+    return law.viscous_work(history);
+  } else {
+    return Real(0);
+  }
+}
+
+/// Two laws that act side by side: energies, stresses and stiffnesses add. The second has no
+/// history.
 template <class First, class Second>
 struct SumOf {
   static constexpr bool many_registers = needs_many_registers<First>;
+  using State = HistoryOf<First>;
 
   First first;
   Second second;
@@ -101,11 +210,34 @@ struct SumOf {
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return first.energy(grad_u) + second.energy(grad_u);
   }
+  /// ψ of both [J/m³], of a first law with a history.
+  template <class Real>
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u, const State& state) const {
+    return first.energy(grad_u, state) + second.energy(grad_u);
+  }
   /// P of both [Pa].
   template <class Real>
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return first.first_piola_stress(grad_u) + second.first_piola_stress(grad_u);
   }
+  /// P of both [Pa], of a first law with a history.
+  template <class Real>
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u, State& state, Real dt) const {
+    return first.first_piola_stress(grad_u, state, dt) + second.first_piola_stress(grad_u);
+  }
+  /// ∂ψ/∂∇u of both [Pa] while the history stays.
+  template <class Real>
+  PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u, const State& state) const {
+    return first.elastic_stress(grad_u, state) + second.first_piola_stress(grad_u);
+  }
+  /// Plastic work of the first law [J/m³].
+  PHYXEL_HD auto plastic_work(const State& state) const
+  requires requires(const First& law) { law.plastic_work(state); }
+  {
+    return first.plastic_work(state);
+  }
+  /// The linear law that both are at small displacements; the second is `VolumeConservation`.
+  PHYXEL_HD auto at_rest() const { return first.at_rest(second.stiffness); }
   /// An upper bound of ρc² [Pa].
   template <class Real>
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
@@ -118,6 +250,13 @@ struct SumOf {
 template <template <class> class... Law>
 struct LawList {
   static constexpr int size = sizeof...(Law);
+  /// The index of a law.
+  template <template <class> class Wanted>
+  static constexpr int index_of = [] {
+    int index = 0, found = -1;
+    ((found = std::is_same_v<Law<double>, Wanted<double>> ? index : found, ++index), ...);
+    return found;
+  }();
   /// The number of constants of the law that has the most.
   static constexpr int most_constants = [] {
     int most = 0;

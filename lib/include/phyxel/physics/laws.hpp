@@ -4,16 +4,20 @@
 
 #include "phyxel/physics/laws/corotated.hpp"
 #include "phyxel/physics/laws/hencky.hpp"
+#include "phyxel/physics/laws/j2.hpp"
 #include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
+#include "phyxel/physics/laws/orthotropic.hpp"
 #include "phyxel/physics/laws/small_strain.hpp"
 #include "phyxel/physics/laws/st_venant_kirchhoff.hpp"
+#include "phyxel/physics/laws/viscosity.hpp"
 #include "phyxel/physics/laws/volume_conservation.hpp"
 
 namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
-using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin>;
+using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
+                     Orthotropic, J2>;
 
 /// The factor by which a material is stiffer than at rest, at most: 1 at rest.
 /// @param law its index in `Laws`. @param volume_stiffness of volume conservation [Pa]; 0: none
@@ -25,6 +29,59 @@ PHYXEL_HD Real stiffening(int law, const Constant* constants, Real volume_stiffn
   return Laws::with<Real>(law, constants, [&](const auto& elastic) {
     return (elastic.wave_stiffness(stretches) + volume.wave_stiffness(stretches)) /
            (elastic.wave_stiffness(rest) + volume_stiffness);
+  });
+}
+
+/// How the material of a phyxel responds at the end of a step.
+template <class Real>
+struct PointResponse {
+  Mat3<Real> first_piola_stress;          ///< P of law, volume conservation and viscosity [Pa].
+  Real strain_energy{}, volume_energy{};  ///< Stored [J/m³].
+  Real plastic_work{}, viscous_work{};    ///< Turned into heat so far [J/m³].
+};
+
+/// The response of a law with its history, volume conservation and viscosity.
+/// @param law its index in `Laws`
+/// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
+///   time of viscosity [s] (`ChosenLaw`)
+/// @param history gives number k of the phyxel's history at the step's start
+/// @param dt length of the step [s]
+template <class Real, class Constant, class History>
+PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* constants,
+                                                  const Mat3<Real>& grad_u, const History& history,
+                                                  Real dt) {
+  return Laws::with<Real>(law, constants, [&](const auto& own) {
+    using Law = std::decay_t<decltype(own)>;
+    using Solid = SumOf<Law, VolumeConservation<Real>>;
+    using Viscous = WithViscosity<Solid, Real>;
+    const auto* const beside = constants + constants_of_law<Law, Real>;
+    const Solid solid{own, {static_cast<Real>(beside[0])}};
+    const Real relaxation_time = static_cast<Real>(beside[1]);
+    const auto read = [&](auto& state, int numbers) {
+      Real values[history_numbers<Viscous, Real>];
+      for (int k = 0; k < numbers; ++k) values[k] = history(k);
+      memcpy(static_cast<void*>(&state), values, static_cast<std::size_t>(numbers) * sizeof(Real));
+    };
+    PointResponse<Real> response;
+    HistoryOf<Law> state{};
+    if (relaxation_time > Real(0)) {
+      typename Viscous::State all{};
+      read(all, history_numbers<Viscous, Real>);
+      const Viscous viscous{solid, relaxation_time};
+      response.first_piola_stress = viscous.first_piola_stress(grad_u, all, dt);
+      response.viscous_work = all.viscous_work;
+      state = all.law;
+    } else {
+      if constexpr (has_history<Law>) read(state, history_numbers<Law, Real>);
+      response.first_piola_stress = stress_after_step(own, grad_u, state, dt);
+      if (solid.second.stiffness > Real(0)) {
+        response.first_piola_stress += solid.second.first_piola_stress(grad_u);
+      }
+    }
+    response.strain_energy = stored_energy(own, grad_u, state);
+    response.plastic_work = plastic_work<Real>(own, state);
+    if (solid.second.stiffness > Real(0)) response.volume_energy = solid.second.energy(grad_u);
+    return response;
   });
 }
 

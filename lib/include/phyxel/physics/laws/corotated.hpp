@@ -51,7 +51,7 @@ struct Corotated {
     return two_mu + fmax(hooke.lambda, across);
   }
   /// Hooke's law in Cauchy's strain.
-  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }
 };

@@ -183,12 +183,6 @@ struct Hencky {
 
   Real lambda, mu;  ///< Lamé's parameters [Pa].
 
-  /// @param young E [Pa]
-  /// @param poisson ν
-  static Hencky of(double young, double poisson) {
-    return {Real(lame_lambda(young, poisson)), Real(lame_mu(young, poisson))};
-  }
-
   /// ψ [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return energy(HenckyStrain<Real>::of(grad_u));
@@ -204,7 +198,7 @@ struct Hencky {
     return HenckyStrain<Real>::of(grad_u).first_piola_stress(lambda, mu);
   }
   /// Hooke's law in Cauchy's strain.
-  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{{lambda, mu}}.at_rest(volume_stiffness);
   }
   /// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp).

@@ -15,55 +15,80 @@
 /// flow turns L into the triangular factor of L exp(-Δε_p): no inverse of F is taken.
 #pragma once
 
+#include <array>
 #include <cmath>
-#include <sstream>
-#include <string>
+#include <span>
 #include <type_traits>
 
 #include "phyxel/physics/laws/hencky.hpp"
 
 namespace phyxel {
 
-/// A J2 material in a user's terms. Members not given have no effect.
-struct J2Parameters {
-  double young = 0;              ///< E [Pa]
-  double poisson = 0;            ///< ν
-  double yield_stress = 0;       ///< σ₀ [Pa], > 0
-  double hardening = 0;          ///< H [Pa], dσ/dε̄ of linear hardening, >= 0
-  double saturation_stress = 0;  ///< σ_∞ [Pa] of Voce's law, >= σ₀; 0: no such hardening
-  double saturation_rate = 0;    ///< δ, >= 0
-};
-
-/// Why a material cannot be; empty if it can. Names the parameter, its value and what is allowed.
-inline std::string refusal_of(const J2Parameters& p) {
-  std::ostringstream text;
-  const auto refuse = [&](const char* name, double value, const char* allowed) {
-    text << name << " is " << value << "; it must be " << allowed;
-    return text.str();
-  };
-  if (!(p.young > 0)) return refuse("young", p.young, "positive [Pa]");
-  if (!(p.poisson > -1 && p.poisson < 0.5)) {
-    return refuse("poisson", p.poisson, "larger than -1 and smaller than 0.5");
-  }
-  if (!(p.yield_stress > 0)) return refuse("yield_stress", p.yield_stress, "positive [Pa]");
-  if (!(p.hardening >= 0)) {
-    return refuse("hardening", p.hardening,
-                  "0 (perfect plasticity) or positive [Pa]: a body that softens has no answer that "
-                  "does not depend on the spacing of phyxels");
-  }
-  if (p.saturation_stress != 0 && !(p.saturation_stress >= p.yield_stress)) {
-    return refuse("saturation_stress", p.saturation_stress,
-                  "0 (no saturation) or at least yield_stress [Pa]");
-  }
-  if (!(p.saturation_rate >= 0)) {
-    return refuse("saturation_rate", p.saturation_rate, "0 or positive");
-  }
-  return {};
-}
-
 /// Finite-strain J2 plasticity with linear and Voce hardening.
 template <class Real>
 struct J2 {
+  static constexpr const char* name = "j2";
+  static constexpr const char* meaning =
+      "metals: Hencky's law until the von Mises stress reaches yield_stress, then plastic flow with "
+      "linear hardening, Voce's, or none";
+  static constexpr LawParameter parameters[] = {
+      young_modulus,
+      poisson_ratio,
+      {.name = "yield_stress",
+       .unit = "Pa",
+       .low = 1e-12,
+       .high = 1e18,
+       .open = false,
+       .meaning = "Flow stress of the virgin material.",
+       .typical = 1e5},
+      {.name = "hardening",
+       .unit = "Pa",
+       .low = 0,
+       .high = 1e18,
+       .open = false,
+       .meaning = "Growth of the flow stress with the equivalent plastic strain; 0: none. A body "
+                  "that softens has no answer that does not depend on the spacing of phyxels.",
+       .fallback = 0},
+      {.name = "saturation_stress",
+       .unit = "Pa",
+       .low = 0,
+       .high = 1e18,
+       .open = false,
+       .meaning = "Flow stress that Voce's hardening approaches, yield_stress at least; 0: none.",
+       .fallback = 0},
+      {.name = "saturation_rate",
+       .unit = "",
+       .low = 0,
+       .high = 1e6,
+       .open = false,
+       .meaning = "Rate of that approach: exp(-rate * plastic strain).",
+       .fallback = 0}};
+  static constexpr bool many_registers = true;
+
+  /// Voce's law may not soften.
+  static const char* unmet(std::span<const double> parameters) {
+    return parameters[4] == 0 || parameters[4] >= parameters[2]
+               ? ""
+               : "saturation_stress = 0, or saturation_stress >= yield_stress";
+  }
+  /// λ, μ, σ₀, H, σ_∞ [Pa] and δ.
+  static std::array<double, 6> constants(std::span<const double> parameters) {
+    const std::array<double, 2> lame = lame_constants(parameters);
+    const double yield = parameters[2], saturation = parameters[4];
+    return {lame[0],       lame[1],      yield,
+            parameters[3], saturation == 0 ? yield : saturation, parameters[5]};
+  }
+  /// The smaller of E and 10 σ₀ [Pa]: residuals go on growing while the material flows, and would
+  /// hold shapes that the metal gives up.
+  static double hourglass_modulus(std::span<const double> parameters) {
+    return parameters[0] < 10 * parameters[2] ? parameters[0] : 10 * parameters[2];
+  }
+
+  static constexpr HistoryNumber history[] = {
+      {"inverse_plastic_factor_xx", ""}, {"inverse_plastic_factor_yx", ""},
+      {"inverse_plastic_factor_yy", ""}, {"inverse_plastic_factor_zx", ""},
+      {"inverse_plastic_factor_zy", ""}, {"inverse_plastic_factor_zz", ""},
+      {"equivalent_plastic_strain", ""}};
   /// The history of a phyxel; all zero: never yielded.
   struct State {
     /// L - I by rows: xx; yx yy; zx zy zz.
@@ -77,14 +102,6 @@ struct J2 {
   Real saturation_stress;  ///< σ_∞ [Pa]; σ₀: no saturation
   Real saturation_rate;    ///< δ
 
-  /// @param p allowed parameters (refusal_of)
-  static J2 of(const J2Parameters& p) {
-    const Hencky<Real> elastic = Hencky<Real>::of(p.young, p.poisson);
-    const double saturation = p.saturation_stress == 0 ? p.yield_stress : p.saturation_stress;
-    return {elastic.lambda,    elastic.mu,       Real(p.yield_stress),
-            Real(p.hardening), Real(saturation), Real(p.saturation_rate)};
-  }
-
   /// σ_y(ε̄) [Pa].
   PHYXEL_HD Real flow_stress(Real equivalent_plastic_strain) const {
     return fused(hardening, equivalent_plastic_strain, yield_stress) -
@@ -95,12 +112,21 @@ struct J2 {
     return Hencky<Real>{lambda, mu}.energy(elastic_gradient(grad_u, state));
   }
   /// Plastic work ∫ σ_y dε̄ since the virgin state [J/m³].
-  PHYXEL_HD Real dissipated(const State& state) const {
+  PHYXEL_HD Real plastic_work(const State& state) const {
     const Real e = state.equivalent_plastic_strain;
     const Real rate = where_larger(saturation_rate, Real(0), saturation_rate, Real(1));
     const Real linear = e * fused(Real(0.5) * hardening, e, yield_stress);
     const Real late = e + exp_minus_one(rate * e) / rate;
     return linear + where_larger(saturation_rate, Real(0), saturates() * late, Real(0));
+  }
+  /// Hencky's stress [Pa] of F L, seen from F: ∂ψ/∂∇u while the history stays.
+  PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u, const State& state) const {
+    const Hencky<Real> elastic{lambda, mu};
+    return times_transpose(elastic.first_piola_stress(elastic_gradient(grad_u, state)), state);
+  }
+  /// Hencky's law at rest.
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
+    return Hencky<Real>{lambda, mu}.at_rest(volume_stiffness);
   }
   /// First Piola stress [Pa] at the end of a step. Does not depend on the rate: dt is not looked
   /// at.

@@ -87,7 +87,7 @@ struct MooneyRivlin {
     return fused(Real(2), fused(c01, squares, c10), volume * area * area);
   }
   /// Hooke's law in Cauchy's strain.
-  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     const Hooke<Real> hooke{volume - Real(2) * c10, Real(2) * (c10 + c01)};
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }

@@ -59,7 +59,7 @@ struct NeoHookean {
            bulk() * area * area;
   }
   /// Hooke's law in Cauchy's strain.
-  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }
   /// μ' [Pa].

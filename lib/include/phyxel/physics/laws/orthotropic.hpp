@@ -4,9 +4,9 @@
 /// axes (Lekhnitskii 1963, Theory of elasticity of an anisotropic elastic body, section 5).
 #pragma once
 
+#include <array>
 #include <cmath>
-#include <sstream>
-#include <string>
+#include <span>
 
 #include "phyxel/physics/laws/hencky.hpp"
 #include "phyxel/physics/strain.hpp"
@@ -14,131 +14,38 @@
 
 namespace phyxel {
 
-/// An orthotropic material in a user's terms. Under uniaxial stress along axis i the strain along j
-/// is -ν_ij times that along i; ν_ij/E_i = ν_ji/E_j.
-struct OrthotropicParameters {
-  double young1 = 0, young2 = 0, young3 = 0;           ///< E₁, E₂, E₃ [Pa], > 0
-  double poisson12 = 0, poisson13 = 0, poisson23 = 0;  ///< ν₁₂, ν₁₃, ν₂₃
-  double shear12 = 0, shear13 = 0, shear23 = 0;        ///< G₁₂, G₁₃, G₂₃ [Pa], > 0
-  Vec3d axis1{1, 0, 0};  ///< The first axis in the body at rest, of any length.
-  Vec3d axis2{0, 1, 0};  ///< The second, of any length; its part along the first is taken away.
-};
-
-/// Why a material cannot be; empty if it can. Names the parameter, or the leading sub-determinant
-/// of the matrix of compliance (scaled to a diagonal of ones) that is not positive, and its value.
-inline std::string refusal_of(const OrthotropicParameters& p) {
-  std::ostringstream text;
-  const struct {
-    const char* name;
-    double value;
-  } moduli[] = {{"young1", p.young1},   {"young2", p.young2},   {"young3", p.young3},
-                {"shear12", p.shear12}, {"shear13", p.shear13}, {"shear23", p.shear23}};
-  for (const auto& modulus : moduli) {
-    if (!(modulus.value > 0)) {
-      text << modulus.name << " is " << modulus.value << "; it must be positive [Pa]";
-      return text.str();
-    }
-  }
-  const double s12 = p.poisson12 * p.poisson12 * p.young2 / p.young1;
-  const double s13 = p.poisson13 * p.poisson13 * p.young3 / p.young1;
-  const double s23 = p.poisson23 * p.poisson23 * p.young3 / p.young2;
-  const double all =
-      1 - s12 - s13 - s23 - 2 * p.poisson12 * p.poisson13 * p.poisson23 * p.young3 / p.young1;
-  const auto refuse = [&](const char* name, const char* formula, double value) {
-    text << "the stiffness is not positive definite: " << name << ", " << formula << ", is "
-         << value << "; it must be positive";
-    return text.str();
-  };
-  if (!(1 - s12 > 0)) {
-    return refuse("the second leading sub-determinant of the compliance", "1 - nu12^2 E2/E1",
-                  1 - s12);
-  }
-  if (!(all > 0)) {
-    return refuse("the third leading sub-determinant of the compliance",
-                  "1 - nu12^2 E2/E1 - nu13^2 E3/E1 - nu23^2 E3/E2 - 2 nu12 nu13 nu23 E3/E1", all);
-  }
-  const Vec3d first = normalised(p.axis1);
-  const Vec3d rest = p.axis2 - dot(p.axis2, first) * first;
-  if (!(norm(first) > 0) || !(norm(rest) > 1e-6 * norm(p.axis2))) {
-    text << "axis1 (" << p.axis1.x << ", " << p.axis1.y << ", " << p.axis1.z << ") and axis2 ("
-         << p.axis2.x << ", " << p.axis2.y << ", " << p.axis2.z
-         << ") must be finite, not zero and not parallel";
-    return text.str();
-  }
-  return {};
-}
-
-/// St Venant–Kirchhoff with nine constants in the material's axes.
+/// Nine constants of a stiffness tensor and the axes that they are measured along.
 template <class Real>
-struct Orthotropic {
-  Real c11, c22, c33;  ///< [Pa] S_ii of E_ii, in the material's axes
-  Real c12, c13, c23;  ///< [Pa] S_ii of E_jj
-  Real g12, g13, g23;  ///< [Pa] half of S_ij of E_ij: shear moduli
+struct OrthotropicStiffness {
+  Real c11, c22, c33;  ///< [Pa] S_ii of E_ii, in the material's axes.
+  Real c12, c13, c23;  ///< [Pa] S_ii of E_jj.
+  Real g12, g13, g23;  ///< [Pa] half of S_ij of E_ij: shear moduli.
   Real axes[3][3];     ///< Column i: the i-th axis of the material in the body at rest.
 
-  /// @param p allowed parameters (refusal_of)
-  static Orthotropic of(const OrthotropicParameters& p) {
-    const double n12 = p.poisson12, n13 = p.poisson13, n23 = p.poisson23;
-    const double e1 = p.young1, e2 = p.young2, e3 = p.young3;
-    const double n21 = n12 * e2 / e1, n31 = n13 * e3 / e1, n32 = n23 * e3 / e2;
-    const double all = 1 - n12 * n21 - n13 * n31 - n23 * n32 - 2 * n21 * n32 * n13;
-    Orthotropic law{Real(e1 * (1 - n23 * n32) / all),
-                    Real(e2 * (1 - n13 * n31) / all),
-                    Real(e3 * (1 - n12 * n21) / all),
-                    Real(e2 * (n12 + n32 * n13) / all),
-                    Real(e3 * (n13 + n12 * n23) / all),
-                    Real(e3 * (n23 + n21 * n13) / all),
-                    Real(p.shear12),
-                    Real(p.shear13),
-                    Real(p.shear23),
-                    {}};
-    const Vec3d x = normalised(p.axis1);
-    const Vec3d y = normalised(p.axis2 - dot(p.axis2, x) * x), z = cross(x, y);
-    const Vec3d columns[3] = {x, y, z};
-    for (int c = 0; c < 3; ++c) {
-      law.axes[0][c] = Real(columns[c].x);
-      law.axes[1][c] = Real(columns[c].y);
-      law.axes[2][c] = Real(columns[c].z);
-    }
-    return law;
+  /// ½ e : C : e [J/m³].
+  PHYXEL_HD Real energy(const Sym3<Real>& strain) const {
+    const Sym3<Real> e = in_axes(strain);
+    return Real(0.5) * contract(e, stress_in_axes(e));
   }
-
-  /// ½ E : S [J/m³].
-  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
-    const Sym3<Real> e = in_axes(green_strain(grad_u));
-    return Real(0.5) * contract(e, stress(e));
-  }
-  /// F S [Pa].
-  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+  /// C : e [Pa].
+  PHYXEL_HD Mat3<Real> stress(const Sym3<Real>& strain) const {
     const Mat3<Real> r = frame();
-    const Mat3<Real> s = r * stress(in_axes(green_strain(grad_u))) * transpose(r);
-    return fused(grad_u, s, s);
+    return r * full(stress_in_axes(in_axes(strain))) * transpose(r);
   }
-  /// An upper bound of the stiffness of plane waves [Pa], whatever their direction in the
-  /// material's axes (stiffening.hpp). That of a bᵀ is (w bᵀ) : C : (w bᵀ) + b·S b with w = Fᵀa.
-  /// The first term is at most that of rest times the square of the largest stretch. The second is
-  ///   e₁ (b bᵀ) : C : I - Σ (e₁ - e_k) (b bᵀ) : C : (n_k n_kᵀ)
-  /// of principal strains e_k, the largest e₁, and directions n_k.
-  PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
-    const auto strain = [](Real stretch) { return Real(0.5) * (stretch * stretch - Real(1)); };
-    const Real most = strain(s.largest);
-    const Real behind = (most - strain(s.middle)) + (most - strain(s.smallest));
-    const Real r1 = c11 + c12 + c13, r2 = c12 + c22 + c23, r3 = c13 + c23 + c33;
-    const Real together = larger(larger(most * r1, most * r2), most * r3);
-    // (b bᵀ) : C : (n nᵀ) >= the smallest entry of C with 2 g taken from its diagonal, less 4/3 of
-    // what shear moduli differ from g by.
-    const Real high = larger(larger(g12, g13), g23), low = smaller(smaller(g12, g13), g23);
-    const Real diagonal = smaller(smaller(c11, c22), c33) - (high + low);
-    const Real least =
-        smaller(diagonal, smaller(smaller(c12, c13), c23)) - Real(2.0 / 3) * (high - low);
-    return fused(wave_stiffness_of_rest(), s.largest * s.largest, together - least * behind);
-  }
-  /// An upper bound of that at rest [Pa]: λ + 2μ where C is isotropic.
-  PHYXEL_HD Real wave_stiffness_of_rest() const {
+  /// An upper bound of the stiffness of plane waves at rest [Pa]: λ + 2μ where C is isotropic.
+  PHYXEL_HD Real wave_stiffness() const {
     WaveBound<Real> bound;
     bound.add_diagonal(c11), bound.add_diagonal(c22), bound.add_diagonal(c33);
     bound.add_pair(c12 + g12, g12), bound.add_pair(c13 + g13, g13), bound.add_pair(c23 + g23, g23);
     return bound.value();
+  }
+  /// The same with a stiffness [Pa] of the volume beside it.
+  PHYXEL_HD OrthotropicStiffness with_volume(Real volume_stiffness) const {
+    OrthotropicStiffness both = *this;
+    for (Real* c : {&both.c11, &both.c22, &both.c33, &both.c12, &both.c13, &both.c23}) {
+      *c = *c + volume_stiffness;
+    }
+    return both;
   }
 
  private:
@@ -147,19 +54,184 @@ struct Orthotropic {
     for (int e = 0; e < 9; ++e) r(e / 3, e % 3) = axes[e / 3][e % 3];
     return r;
   }
-  /// Rᵀ s R.
-  PHYXEL_HD Sym3<Real> in_axes(const Sym3<Real>& s) const {
-    const Mat3<Real> r = frame(), m = transpose(r) * full(s) * r;
+  /// Rᵀ e R.
+  PHYXEL_HD Sym3<Real> in_axes(const Sym3<Real>& e) const {
+    const Mat3<Real> r = frame(), m = transpose(r) * full(e) * r;
     return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
   }
   /// C : e in the material's axes [Pa].
-  PHYXEL_HD Sym3<Real> stress(const Sym3<Real>& e) const {
+  PHYXEL_HD Sym3<Real> stress_in_axes(const Sym3<Real>& e) const {
     return {fused(c13, e.zz, fused(c12, e.yy, c11 * e.xx)),
             Real(2) * g12 * e.xy,
             Real(2) * g13 * e.xz,
             fused(c23, e.zz, fused(c22, e.yy, c12 * e.xx)),
             Real(2) * g23 * e.yz,
             fused(c33, e.zz, fused(c23, e.yy, c13 * e.xx))};
+  }
+};
+
+/// The linear law with nine constants, P = C : ε with Cauchy's strain: what `Orthotropic` is at
+/// small displacements.
+template <class Real>
+struct SmallStrainOrthotropic {
+  OrthotropicStiffness<Real> stiffness;
+
+  /// P [Pa].
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    return stiffness.stress(cauchy_strain(grad_u));
+  }
+  /// An upper bound of the stiffness of plane waves [Pa], in every state.
+  PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>&) const {
+    return stiffness.wave_stiffness();
+  }
+};
+
+/// St Venant–Kirchhoff with nine constants in the material's axes.
+template <class Real>
+struct Orthotropic {
+  static constexpr const char* name = "orthotropic";
+  static constexpr const char* meaning =
+      "wood, layers, bone: nine constants along three axes, in Green's strain; the paper's tensor C "
+      "without its isotropy";
+
+ private:
+  static constexpr LawParameter modulus(const char* name, const char* meaning, double typical) {
+    return {.name = name,
+            .unit = "Pa",
+            .low = 1e-12,
+            .high = 1e18,
+            .open = false,
+            .meaning = meaning,
+            .typical = typical};
+  }
+  static constexpr LawParameter ratio(const char* name, const char* meaning, double typical) {
+    return {.name = name,
+            .unit = "",
+            .low = -1e3,
+            .high = 1e3,
+            .open = false,
+            .meaning = meaning,
+            .typical = typical};
+  }
+  static constexpr LawParameter axis(const char* name, const char* meaning, double x, double y) {
+    return {.name = name,
+            .unit = "",
+            .low = -1e12,
+            .high = 1e12,
+            .open = false,
+            .meaning = meaning,
+            .count = 3,
+            .vector_fallback = {x, y, 0}};
+  }
+
+ public:
+  static constexpr LawParameter parameters[] = {
+      modulus("young1", "Young's modulus along the first axis.", 1.2e6),
+      modulus("young2", "Young's modulus along the second axis.", 8e5),
+      modulus("young3", "Young's modulus along the third axis.", 5e5),
+      ratio("poisson12",
+            "Poisson's ratio: strain along axis 2 is -poisson12 times that along axis 1, under stress "
+            "along axis 1. poisson21 = poisson12 young2/young1.",
+            0.3),
+      ratio("poisson13", "Poisson's ratio of axes 1 and 3, likewise.", 0.25),
+      ratio("poisson23", "Poisson's ratio of axes 2 and 3, likewise.", 0.2),
+      modulus("shear12", "Shear modulus between axes 1 and 2.", 4e5),
+      modulus("shear13", "Shear modulus between axes 1 and 3.", 3e5),
+      modulus("shear23", "Shear modulus between axes 2 and 3.", 2.5e5),
+      axis("axis1", "The first axis in the placed body at rest, of any length.", 1, 0),
+      axis("axis2",
+           "The second axis, of any length, not parallel to the first; its part along the first is "
+           "taken away.",
+           0, 1)};
+
+  /// Names the leading sub-determinant of the compliance, scaled to a diagonal of ones, that is not
+  /// positive: then the stiffness is not positive definite either.
+  static const char* unmet(std::span<const double> p) {
+    const double e1 = p[0], e2 = p[1], e3 = p[2], n12 = p[3], n13 = p[4], n23 = p[5];
+    const double s12 = n12 * n12 * e2 / e1, s13 = n13 * n13 * e3 / e1, s23 = n23 * n23 * e3 / e2;
+    if (!(1 - s12 > 0)) {
+      return "a positive definite stiffness: its second sub-determinant, 1 - poisson12^2 "
+             "young2/young1, > 0";
+    }
+    if (!(1 - s12 - s13 - s23 - 2 * n12 * n13 * n23 * e3 / e1 > 0)) {
+      return "a positive definite stiffness: its third sub-determinant, 1 - poisson12^2 "
+             "young2/young1 - poisson13^2 young3/young1 - poisson23^2 young3/young2 - 2 poisson12 "
+             "poisson13 poisson23 young3/young1, > 0";
+    }
+    const Vec3d x = normalised(Vec3d{p[9], p[10], p[11]}), second{p[12], p[13], p[14]};
+    const Vec3d rest = second - dot(second, x) * x;
+    if (!(norm(x) > 0) || !(norm(rest) > 1e-6 * norm(second))) {
+      return "axis1 and axis2 that are not zero and not parallel";
+    }
+    return "";
+  }
+  /// The members of `OrthotropicStiffness`.
+  static std::array<double, 18> constants(std::span<const double> p) {
+    const double e1 = p[0], e2 = p[1], e3 = p[2], n12 = p[3], n13 = p[4], n23 = p[5];
+    const double n21 = n12 * e2 / e1, n31 = n13 * e3 / e1, n32 = n23 * e3 / e2;
+    const double all = 1 - n12 * n21 - n13 * n31 - n23 * n32 - 2 * n21 * n32 * n13;
+    const Vec3d second{p[12], p[13], p[14]};
+    const Vec3d x = normalised(Vec3d{p[9], p[10], p[11]});
+    const Vec3d y = normalised(second - dot(second, x) * x), z = cross(x, y);
+    return {e1 * (1 - n23 * n32) / all,
+            e2 * (1 - n13 * n31) / all,
+            e3 * (1 - n12 * n21) / all,
+            e2 * (n12 + n32 * n13) / all,
+            e3 * (n13 + n12 * n23) / all,
+            e3 * (n23 + n21 * n13) / all,
+            p[6],
+            p[7],
+            p[8],
+            x.x,
+            y.x,
+            z.x,
+            x.y,
+            y.y,
+            z.y,
+            x.z,
+            y.z,
+            z.z};
+  }
+  /// The smallest of the three E [Pa].
+  static double hourglass_modulus(std::span<const double> p) {
+    const double least = p[0] < p[1] ? p[0] : p[1];
+    return least < p[2] ? least : p[2];
+  }
+
+  OrthotropicStiffness<Real> stiffness;
+
+  /// ½ E : C : E [J/m³].
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    return stiffness.energy(green_strain(grad_u));
+  }
+  /// F C : E [Pa].
+  PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    const Mat3<Real> s = stiffness.stress(green_strain(grad_u));
+    return fused(grad_u, s, s);
+  }
+  /// The same constants in Cauchy's strain.
+  PHYXEL_HD SmallStrainOrthotropic<Real> at_rest(Real volume_stiffness) const {
+    return {stiffness.with_volume(volume_stiffness)};
+  }
+  /// An upper bound of the stiffness of plane waves [Pa], whatever their direction in the
+  /// material's axes (physics/law.hpp). That of a bᵀ is (w bᵀ) : C : (w bᵀ) + b·S b with w = Fᵀa.
+  /// The first term is at most that of rest times the square of the largest stretch. The second is
+  ///   e₁ (b bᵀ) : C : I - Σ (e₁ - e_k) (b bᵀ) : C : (n_k n_kᵀ)
+  /// of principal strains e_k, the largest e₁, and directions n_k.
+  PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
+    const OrthotropicStiffness<Real>& c = stiffness;
+    const auto strain = [](Real stretch) { return Real(0.5) * (stretch * stretch - Real(1)); };
+    const Real most = strain(s.largest);
+    const Real behind = (most - strain(s.middle)) + (most - strain(s.smallest));
+    const Real r1 = c.c11 + c.c12 + c.c13, r2 = c.c12 + c.c22 + c.c23, r3 = c.c13 + c.c23 + c.c33;
+    const Real together = larger(larger(most * r1, most * r2), most * r3);
+    // (b bᵀ) : C : (n nᵀ) >= the smallest entry of C with 2 g taken from its diagonal, less 4/3 of
+    // what shear moduli differ from g by.
+    const Real high = larger(larger(c.g12, c.g13), c.g23), low = smaller(smaller(c.g12, c.g13), c.g23);
+    const Real diagonal = smaller(smaller(c.c11, c.c22), c.c33) - (high + low);
+    const Real least =
+        smaller(diagonal, smaller(smaller(c.c12, c.c13), c.c23)) - Real(2.0 / 3) * (high - low);
+    return fused(c.wave_stiffness(), s.largest * s.largest, together - least * behind);
   }
 };
 

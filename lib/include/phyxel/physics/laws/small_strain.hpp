@@ -40,7 +40,7 @@ struct SmallStrain {
     return hooke.lambda + Real(2) * hooke.mu;
   }
   /// The same law, with the stiffness of volume conservation [Pa] added to λ.
-  SmallStrain at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain at_rest(Real volume_stiffness) const {
     return {{hooke.lambda + volume_stiffness, hooke.mu}};
   }
 };

@@ -37,7 +37,7 @@ struct StVenantKirchhoff {
     return (hooke.lambda + Real(2) * hooke.mu) * s.largest * s.largest + stress;
   }
   /// Hooke's law in Cauchy's strain.
-  SmallStrain<Real> at_rest(Real volume_stiffness) const {
+  PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }
 };

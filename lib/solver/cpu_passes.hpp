@@ -1,0 +1,448 @@
+/// The two passes of a step on the CPU: W phyxels at a time over the neighbour lists.
+///
+/// Memory moved per phyxel and step, float, k neighbours, one body with symmetric lists:
+///   pass 1 reads  one 32-byte record (X, 1/h², u) per neighbour, mostly from cache, 4 k of
+///   indices,
+///          24 of A⁻¹, 4 of v, and writes 36 of a 64-byte record (Q beside X, 1/h²);
+///   pass 2 reads  one 64-byte record per neighbour, mostly from cache, 4 k of indices, 12 of b,
+///          4 of 1/m, reads and writes 24 of (u, v) and writes 12 of the first record.
+#pragma once
+
+#include <omp.h>
+
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "phyxel/custom_law.hpp"
+#include "phyxel/law_table.hpp"
+#include "phyxel/physics/weight.hpp"
+#include "solver/boundary_conditions.hpp"
+#include "solver/cpu_arrays.hpp"
+#include "solver/first_error.hpp"
+
+namespace phyxel {
+
+/// A caller's law for the phyxels of a pack, one by one. What it throws is kept until the threads
+/// have met.
+template <class P>
+class LaneByLane {
+ public:
+  LaneByLane(const CustomLaw& law, FirstError& error) : law_(law), error_(error) {}
+
+  /// P of each lane [Pa]. @param numbers the history of the pack, shape [numbers, lanes]; `use` says
+  /// what becomes of it
+  template <class Real>
+  Mat3<P> first_piola_stress(const Mat3<P>& grad_u, Real* numbers, std::size_t count, HistoryUse use,
+                             double dt) const {
+    constexpr int width = sizeof(P) / sizeof(Real);
+    return error_.caught([&] {
+      Mat3<P> stress;
+      std::vector<double> history(count);
+      for (int l = 0; l < width; ++l) {
+        Mat3d of_lane;
+        for (int e = 0; e < 9; ++e) of_lane(e / 3, e % 3) = grad_u(e / 3, e % 3)[l];
+        for (std::size_t k = 0; k < count; ++k) history[k] = numbers[k * width + l];
+        if (count == 0) {
+          of_lane = law_.first_piola_stress(of_lane);
+        } else if (use == HistoryUse::frozen) {
+          of_lane = law_.elastic_stress(of_lane, history);
+        } else {
+          of_lane = law_.first_piola_stress(of_lane, std::span(history), dt);
+        }
+        if (use == HistoryUse::commit) {
+          for (std::size_t k = 0; k < count; ++k) {
+            numbers[k * width + l] = static_cast<Real>(history[k]);
+          }
+        }
+        for (int e = 0; e < 9; ++e) {
+          stress(e / 3, e % 3).lanes[l] = static_cast<Real>(of_lane(e / 3, e % 3));
+        }
+      }
+      return stress;
+    });
+  }
+
+ private:
+  const CustomLaw& law_;
+  FirstError& error_;
+};
+
+template <class Real, class StateReal>
+class CpuPasses : public CpuArrays<Real, StateReal> {
+  using Arrays = CpuArrays<Real, StateReal>;
+
+ public:
+  using Arrays::W;
+  using typename Arrays::P;
+  using typename Arrays::S;
+
+  /// @param threads of OpenMP
+  CpuPasses(const Model& model, int threads)
+      : CpuPasses(model, threads, boundary_phyxels(model)) {}
+
+ protected:
+  using Arrays::applied_;
+  using Arrays::closing_;
+  using Arrays::displacement_;
+  using Arrays::history_;
+  using Arrays::history_interval_;
+  using Arrays::history_start_;
+  using Arrays::inverse_;
+  using Arrays::inverse_mass_;
+  using Arrays::layout_;
+  using Arrays::lists_;
+  using Arrays::model_;
+  using Arrays::moment_offset_;
+  using Arrays::points_;
+  using Arrays::pull_;
+  using Arrays::stresses_;
+  using Arrays::velocity_;
+  using Arrays::volume_;
+
+  // --- runs of packs ----------------------------------------------------------------------------
+
+  /// Neighbouring bodies of one material: one loop over all of them.
+  struct Run {
+    Material material;
+    ChosenLaw law;     ///< Unused with a custom law.
+    double hourglass;  ///< κ [N/m]
+    PackRange range;
+  };
+
+  std::vector<Run> find_runs(const PackRange& (Layout::*range_of)(std::size_t) const) const {
+    std::vector<Run> runs;
+    for (std::size_t part = 0; part < model_.parts.size(); ++part) {
+      const Material& material = model_.parts[part].material;
+      const double hourglass = hourglass_stiffness(model_, model_.parts[part]);
+      const PackRange range = (layout_.*range_of)(part);
+      if (range.begin == range.end) continue;
+      if (!runs.empty() && runs.back().material == material && runs.back().hourglass == hourglass) {
+        runs.back().range.end = range.end;
+      } else {
+        const ChosenLaw law = material.custom_law ? ChosenLaw{} : chosen_law(material);
+        runs.push_back({material, law, hourglass, range});
+      }
+    }
+    return runs;
+  }
+
+  /// Threads worth waking: 400 phyxels take a thread some 10 microseconds, a barrier about one; but
+  /// where other programs want the cores, a barrier waits for a thread that is not running.
+  int threads_for(PackRange range) const {
+    return std::clamp((range.end - range.begin) * W / 400, 1, threads_);
+  }
+
+  /// Interior packs in pieces, between which messages under way may advance; each is worth waking
+  /// all threads for.
+  void cut_interior() {
+    constexpr Index most_pieces = 8, least_phyxels = 2000;
+    Index packs = 0;
+    for (const Run& run : interior_runs_) packs += run.range.end - run.range.begin;
+    const Index each = std::max(packs / most_pieces + 1, least_phyxels * threads_ / W);
+    Index room = 0;  // of the last piece
+    for (Run run : interior_runs_) {
+      const Index end = run.range.end;
+      while (run.range.begin < end) {
+        if (room == 0) {
+          interior_pieces_.emplace_back();
+          room = each;
+        }
+        run.range.end = std::min(end, run.range.begin + room);
+        room -= run.range.end - run.range.begin;
+        interior_pieces_.back().push_back(run);
+        run.range.begin = run.range.end;
+      }
+    }
+  }
+
+  /// Does the work of a pass: first on the boundary, whose values other ranks wait for, then on the
+  /// interior, while they travel. Ghosts have their owners' values when it returns.
+  /// @param work(runs) finds the values
+  template <class Work>
+  void pass(const Records& values, Work&& work) {
+    if (!model_.share) return work(interior_runs_);
+    HaloTransport& halo = *model_.share->transport;
+    work(boundary_runs_);
+    halo.start(values);
+    for (const std::vector<Run>& piece : interior_pieces_) {
+      work(piece);
+      halo.progress();
+    }
+    halo.finish();
+  }
+
+  /// Sets the phyxels that motions prescribe, those of the boundary or all others.
+  void follow_motions(double time, double dt, bool of_boundary) {
+    for (const Motion& motion : model_.motions) {
+      const Path before = motion.path_at(time), after = motion.path_at(time + dt);
+      for (const Index i : motion.phyxels) {
+        if ((!boundary_.empty() && boundary_[i]) != of_boundary) continue;
+        const Index slot = layout_.slot(i);
+        const Vec3d x = model_.position[i], u = after.at(x);
+        this->set_state(i, motion.along_axes(u, this->get3(displacement_, slot)),
+                        motion.along_axes((u - before.at(x)) / dt, this->get3(velocity_, slot)));
+      }
+    }
+  }
+
+  // --- the two neighbour loops ------------------------------------------------------------------
+
+  /// Calls visit(x_ij, u_ij, w_ij) for the neighbours of the phyxels of pack p.
+  template <class Visit>
+  PHYXEL_HD void visit_neighbours(Index p, Visit&& visit) const {
+    const Vec3<P> x_i = this->point_of(p, PointRecord::position),
+                  u_i = this->point_of(p, PointRecord::displacement);
+    const P inverse_h_squared = this->own_point_value(p, PointRecord::inverse_h_squared);
+    const Index* end = lists_.indices.data() + lists_.start[p + 1];
+    for (const Index* j = lists_.indices.data() + lists_.start[p]; j != end; j += W) {
+      P point[PointRecord::size];
+      load_records<PointRecord::size>(points_.data(), j, point);
+      const Vec3<P> x_ij = this->vec3_at(point, PointRecord::position) - x_i;
+      const Vec3<P> u_ij = this->vec3_at(point, PointRecord::displacement) - u_i;
+      visit(x_ij, u_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared));
+    }
+  }
+
+  /// The sums over the neighbours of the phyxels of pack p.
+  template <bool pulls>
+  PHYXEL_HD NeighbourSums<P> sums_of(Index p) const {
+    NeighbourSums<P> sums;
+    visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
+      sums.template add<pulls>(x_ij, u_ij, w);
+    });
+    return sums;
+  }
+  /// What stresses of the phyxels of pack p are made of.
+  template <bool closed>
+  PHYXEL_HD PointConstants<P> constants_of(Index p, P hourglass) const {
+    PointConstants<P> point{load<P>(&volume_[p * W]), this->inverse_moment_of(p), hourglass};
+    if constexpr (closed) {
+      point.moment_offset = this->template vec3_of<P>(moment_offset_, p);
+      point.closing = this->template vec3_of<P>(closing_, p);
+    }
+    return point;
+  }
+  /// ∇u of the phyxels of pack p, as their stresses see it.
+  Mat3<P> whole_gradient_of(Index p) const {
+    if (closing_.empty()) {
+      return displacement_gradient(sums_of<false>(p).gradient, this->inverse_moment_of(p));
+    }
+    const NeighbourSums<P> sums = sums_of<true>(p);
+    const PointConstants<P> point = constants_of<true>(p, P(0));
+    return seen_gradient<true>(displacement_gradient(sums.gradient, point.inverse_moment),
+                               sums.pull, point);
+  }
+
+  /// Pass 2: internal forces on the phyxels of pack p, but for how they are pulled.
+  template <bool Closed>
+  PHYXEL_HD Vec3<P> force_of(Index p) const {
+    const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
+    Index own[W];
+    for (int l = 0; l < W; ++l) own[l] = p * W + l;
+    P record[StressRecord::size];
+    load_records<StressRecord::size>(stresses_.data(), own, record);
+    const Vec3<P> x_i = this->vec3_at(record, StressRecord::position);
+    Vec3<P> force = own_force(this->mat3_at(record), this->template vec3_of<P>(moment_offset_, p));
+    const Vec3<P> t_i = this->vec3_at(record, StressRecord::closing_stress);
+    const Index* end = lists.indices.data() + lists.start[p + 1];
+    for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
+      load_records<StressRecord::size>(stresses_.data(), j, record);
+      const Vec3<P> x_ij = this->vec3_at(record, StressRecord::position) - x_i;
+      const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
+      add_neighbour_force(force, this->mat3_at(record), x_ij, w_ji);
+      if constexpr (Closed) {
+        add_closing_force(force, t_i, this->vec3_at(record, StressRecord::closing_stress), w_ji);
+      }
+    }
+    return force;
+  }
+
+  // --- pass 1 -----------------------------------------------------------------------------------
+
+  /// Finds the stresses of all phyxels, and their history as `use` says.
+  void find_stresses(const std::vector<Run>& runs, HistoryUse use) {
+    for (const Run& run : runs) {
+      for_each_law(run, use, [&](const auto& stress_of) {
+        if (!closing_.empty()) {
+          find_stresses<true, true>(stress_of, run);  // costs what the second alone does
+        } else {
+          run.hourglass > 0 ? find_stresses<true, false>(stress_of, run)
+                            : find_stresses<false, false>(stress_of, run);
+        }
+      });
+    }
+  }
+  /// @param stress_of P [Pa] of a pack and its ∇u
+  template <bool Controlled, bool Closed, class StressOf>
+  void find_stresses(const StressOf& stress_of, const Run& run) {
+    const PackRange range = run.range;
+    const P kappa(static_cast<Real>(run.hourglass));
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+    for (Index p = range.begin; p < range.end; ++p) {
+      const PointStress<P> stress = point_stress<Controlled, Closed>(
+          sums_of < Controlled || Closed > (p), constants_of<Closed>(p, kappa),
+          [&](const Mat3<P>& grad_u) { return stress_of(p, grad_u); });
+      if constexpr (Closed) this->store_closing_stress(p, stress.closing_stress);
+      if constexpr (Controlled) {
+        if (!pull_.empty()) this->store3(pull_, p, stress.hourglass_force);
+      }
+      this->store_pair_stress(p, stress.pair_stress);
+    }
+  }
+
+  /// Calls apply(stress_of) with the law of a run: the one place where terms chosen at run time
+  /// become code chosen at compile time. `stress_of(p, grad_u)` is P [Pa] of the phyxels of pack p,
+  /// whose history becomes what `use` says.
+  template <class Apply>
+  void for_each_law(const Run& run, HistoryUse use, Apply&& apply) {
+    const Material& m = run.material;
+    const VolumeConservation<P> volume{P(m.volume_stiffness)};
+    if (m.custom_law) return apply_custom_law(run, use, apply);
+    Laws::with<P>(run.law.index, run.law.constants.data(), [&]<class Law>(const Law& law) {
+      const auto apply_to = [&](const auto& whole) {
+        apply([&](Index p, const Mat3<P>& grad_u) { return stress_of(whole, p, grad_u, use); });
+      };
+      if (m.viscosity > 0) {
+        using Solid = SumOf<Law, VolumeConservation<P>>;
+        return apply_to(WithViscosity<Solid, P>{{law, volume}, P(m.viscosity)});
+      }
+      m.volume_stiffness > 0 ? apply_to(SumOf<Law, VolumeConservation<P>>{law, volume})
+                             : apply_to(law);
+    });
+  }
+  /// P of the phyxels of pack p [Pa].
+  template <class Law>
+  PHYXEL_HD Mat3<P> stress_of(const Law& law, Index p, const Mat3<P>& grad_u, HistoryUse use) {
+    if constexpr (!has_history<Law>) {
+      return law.first_piola_stress(grad_u);
+    } else {
+      auto history = this->template history_of<Law>(p);
+      if (use == HistoryUse::frozen) return law.elastic_stress(grad_u, history);
+      const Mat3<P> stress = law.first_piola_stress(grad_u, history, P(history_interval_));
+      if (use == HistoryUse::commit) this->template set_history<Law>(p, history);
+      return stress;
+    }
+  }
+  /// The same for a caller's law. A law that throws leaves the history of before.
+  template <class Apply>
+  void apply_custom_law(const Run& run, HistoryUse use, Apply&& apply) {
+    const Material& m = run.material;
+    const auto numbers = m.custom_law->history().size();
+    const VolumeConservation<P> volume{P(m.volume_stiffness)};
+    const WithViscosity<Stressless, P> viscosity{{{P(m.lame_lambda()), P(m.lame_mu())}, volume},
+                                                 P(m.viscosity)};
+    const bool remembers = numbers > 0 || m.viscosity > 0;
+    const AlignedVector<Real> before =
+        remembers && use == HistoryUse::commit ? history_ : AlignedVector<Real>{};
+    FirstError error;
+    const LaneByLane<P> law(*m.custom_law, error);
+    apply([&](Index p, const Mat3<P>& grad_u) {
+      Real* history = remembers ? &history_[history_start_[p]] : nullptr;
+      Mat3<P> stress =
+          law.first_piola_stress(grad_u, history, numbers, use, history_interval_);
+      if (m.volume_stiffness > 0) stress += volume.first_piola_stress(grad_u);
+      if (m.viscosity > 0 && use != HistoryUse::frozen) {
+        stress += stress_beside(viscosity, history + numbers * W, grad_u, use);
+      }
+      return stress;
+    });
+    try {
+      error.rethrow();
+    } catch (...) {
+      if (!before.empty()) history_ = before;
+      throw;
+    }
+  }
+  /// A law of `WithViscosity` alone, whose wrapped law is a caller's.
+  struct Stressless {
+    Hooke<P> hooke;
+    VolumeConservation<P> volume;
+    PHYXEL_HD Mat3<P> first_piola_stress(const Mat3<P>&) const { return {}; }
+    PHYXEL_HD SmallStrain<P> at_rest() const {
+      return SmallStrain<P>{hooke}.at_rest(volume.stiffness);
+    }
+  };
+  /// The viscous stress beside a caller's law. @param numbers its history
+  Mat3<P> stress_beside(const WithViscosity<Stressless, P>& law, Real* numbers,
+                        const Mat3<P>& grad_u, HistoryUse use) const {
+    using Law = WithViscosity<Stressless, P>;
+    constexpr int count = history_numbers<Law, P>;
+    typename Law::State state;
+    P values[count];
+    for (int k = 0; k < count; ++k) values[k] = load<P>(numbers + k * W);
+    std::memcpy(static_cast<void*>(&state), values, sizeof(values));
+    const Mat3<P> stress = law.first_piola_stress(grad_u, state, P(history_interval_));
+    if (use != HistoryUse::commit) return stress;
+    std::memcpy(static_cast<void*>(values), &state, sizeof(values));
+    for (int k = 0; k < count; ++k) store(numbers + k * W, values[k]);
+    return stress;
+  }
+
+  // --- pass 2 -----------------------------------------------------------------------------------
+
+  /// Takes a step of the phyxels of a run, by the code for the terms that the scene has.
+  void advance_run(const Run& run, double dt) {
+    const bool damped = run.material.damping > 0;
+    if (!closing_.empty()) {
+      damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
+    } else if (applied_.empty() && pull_.empty()) {
+      damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
+    } else {
+      damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
+    }
+  }
+
+  /// Force, gravity and the Verlet step. @tparam More whether hourglass or applied forces may act
+  template <bool Damped, bool More, bool Closed = false>
+  void advance_run(const Run& run, double dt) {
+    const DampedFlow flow = damped_flow(run.material.damping, dt);
+    const S keep(flow.keep), gain(flow.gain), step(dt);
+    const Vec3<S> gravity{S(model_.gravity.x), S(model_.gravity.y), S(model_.gravity.z)};
+    const PackRange range = run.range;
+#pragma omp parallel for schedule(static) num_threads(threads_for(range))
+    for (Index p = range.begin; p < range.end; ++p) {
+      Vec3<P> force = force_of<Closed>(p);
+      if constexpr (More) {
+        if (!pull_.empty()) force += this->template vec3_of<P>(pull_, p);
+        if (!applied_.empty()) force += this->template vec3_of<P>(applied_, p);
+      }
+      const Vec3<P> f_over_m = load<P>(&inverse_mass_[p * W]) * force;
+      const Vec3<S> acceleration =
+          Vec3<S>{convert<StateReal>(f_over_m.x), convert<StateReal>(f_over_m.y),
+                  convert<StateReal>(f_over_m.z)} +
+          gravity;
+      const PointMotion<S> after = moved<Damped>(
+          PointMotion<S>{this->template vec3_of<S>(velocity_, p),
+                         this->template vec3_of<S>(displacement_, p)},
+          acceleration, step, keep, gain);
+      this->store3(velocity_, p, after.velocity);
+      this->store3(displacement_, p, after.displacement);
+      const Vec3<P> u{convert<Real>(after.displacement.x), convert<Real>(after.displacement.y),
+                      convert<Real>(after.displacement.z)};
+      for (int l = 0; l < W; ++l) {
+        Real* record = this->point_record(p * W + l) + PointRecord::displacement;
+        record[0] = u.x[l];
+        record[1] = u.y[l];
+        record[2] = u.z[l];
+      }
+    }
+  }
+
+  int threads_;
+  std::vector<char> boundary_;  // of a share: whether each phyxel is exchanged
+  std::vector<Run> boundary_runs_, interior_runs_;
+  std::vector<std::vector<Run>> interior_pieces_;
+
+ private:
+  CpuPasses(const Model& model, int threads, std::vector<char> boundary)
+      : Arrays(model, boundary),
+        threads_(threads),
+        boundary_(std::move(boundary)),
+        boundary_runs_(find_runs(&Layout::boundary)),
+        interior_runs_(find_runs(&Layout::interior)) {
+    cut_interior();
+  }
+};
+
+}  // namespace phyxel
