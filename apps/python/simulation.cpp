@@ -12,6 +12,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
+#include "phyxel/history.hpp"
 #include "phyxel/solver.hpp"
 #include "scene/scene_error.hpp"
 #include "stages.hpp"
@@ -158,7 +159,8 @@ class Simulation {
     return solver_->state();
   }
 
-  void set_state(const py::object& displacement, const py::object& velocity) {
+  void set_state(const py::object& displacement, const py::object& velocity,
+                 const py::object& history) {
     const auto turn = my_turn();
     State state = solver_->state();
     const auto n = static_cast<py::ssize_t>(model_.size());
@@ -166,6 +168,14 @@ class Simulation {
       state.displacement = vectors_from(displacement, "displacement", n);
     }
     if (!velocity.is_none()) state.velocity = vectors_from(velocity, "velocity", n);
+    if (!history.is_none()) {
+      state.history.clear();
+      for (const auto& [name, values] : history.cast<py::dict>()) {
+        state.history.push_back(
+            {name.cast<std::string>(), values.cast<std::vector<double>>()});
+      }
+      checked_history(state, history_columns(model_), model_.size());
+    }
     const py::gil_scoped_release others;
     start(state);
   }
@@ -430,8 +440,9 @@ void add_simulation(py::module_& module) {
           },
           "Deformed surfels [m] and their normals, both (m, 3), copies.")
       .def("set_state", &Simulation::set_state, "displacement"_a = py::none(),
-           "velocity"_a = py::none(),
-           "Replaces displacements [m], velocities [m/s] or both, (n, 3); time goes on.")
+           "velocity"_a = py::none(), "history"_a = py::none(),
+           "Replaces displacements [m], velocities [m/s], both (n, 3), or history, {name: (n,)};\n"
+           "time goes on. An empty history is the virgin material.")
       .def_property_readonly(
           "live", [](py::object self) { return self.cast<Simulation&>().live(self); },
           "The state without a copy (on the CPU): see Live.")
@@ -441,6 +452,17 @@ void add_simulation(py::module_& module) {
       .def_property_readonly(
           "velocity", [](const Simulation& s) { return taken(s.state().velocity); },
           "v half a step before [m/s], (n, 3), a copy.")
+      .def_property_readonly(
+          "history",
+          [](const Simulation& s) {
+            py::dict columns;
+            for (HistoryColumn& column : s.state().history) {
+              columns[py::str(column.name)] = taken(std::move(column.values));
+            }
+            return columns;
+          },
+          "What the laws remember at the last step: {name: (n,)}, copies; e.g.\n"
+          "equivalent_plastic_strain. Empty for elastic materials without viscosity.")
       .def_property(
           "external_forces",
           [](py::object self) {

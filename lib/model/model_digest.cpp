@@ -61,7 +61,7 @@ std::uint64_t digest_of_phyxels(const Model& model) {
 
 }  // namespace
 
-std::uint64_t model_digest(const Model& model) {
+std::uint64_t model_digest_before_4(const Model& model) {
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
                                                                        &XXH3_freeState);
   XXH3_64bits_reset(state.get());
@@ -101,6 +101,14 @@ std::uint64_t model_digest(const Model& model) {
     add(state.get(), std::vector<double>{load.ramp});
   }
   return XXH3_64bits_digest(state.get());
+}
+
+std::uint64_t model_digest(const Model& model) {
+  struct {
+    std::uint64_t rest;
+    Vec3d gravity;
+  } const all{model_digest_before_4(model), model.gravity};
+  return XXH3_64bits(&all, sizeof(all));
 }
 
 }  // namespace phyxel

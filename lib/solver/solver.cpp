@@ -1,5 +1,7 @@
 #include "phyxel/solver.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -42,12 +44,34 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   return state;
 }
 
+namespace {
+
+/// @throws InputError with the first phyxel whose state is not finite, and its values
+void check_finite(const State& state) {
+  const auto check = [](const char* name, const std::vector<Vec3d>& values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const Vec3d& v = values[i];
+      if (is_finite(v)) continue;
+      throw InputError(fmt::format("{} of phyxel {} is ({}, {}, {}); allowed: finite numbers", name,
+                                   i, v.x, v.y, v.z));
+    }
+  };
+  check("displacement [m]", state.displacement);
+  check("velocity [m/s]", state.velocity);
+  if (!(state.dt > 0) || !std::isfinite(state.dt)) {
+    throw InputError(fmt::format("dt = {} s of a state; allowed: dt > 0, finite", state.dt));
+  }
+}
+
+}  // namespace
+
 Solver::Solver(Backend& backend, const State& start)
     : backend_(backend),
       steps_(start.step),
       first_step_(start.step),
       dt_(start.dt),
       looks_(start.looks) {
+  check_finite(start);
   backend_.upload(start);
 }
 

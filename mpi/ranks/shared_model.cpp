@@ -60,6 +60,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     here_ = clouds ? build_model(scene, *clouds, device_) : build_model(scene, device_);
     shares_ = {here_.size(), here_.size(), 0};
     digest_ = model_digest(here_);
+  digest_before_4_ = model_digest_before_4(here_);
     return;
   }
   std::unique_ptr<ShareSurveyor> surveyor;
@@ -76,6 +77,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
   if (ranks_.leads()) triangles_ = triangles_of(built.surfaces);
   partitioner_ = partitioner_name(built.partitioner);
   digest_ = model_digest(here_);
+  digest_before_4_ = model_digest_before_4(here_);
   std::int64_t own = 0;
   for (const Part& part : here_.parts) own += part.owned_end() - part.begin;
   const std::int64_t ghosts = here_.size() - own;
@@ -111,7 +113,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));
     if (!ranks_.leads()) return;
-    if (checkpoint->info().model_digest != digest_ ||
+    if (!wrote(checkpoint->info()) ||
         checkpoint->phyxels() != here_.global_count()) {
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
     }

@@ -81,6 +81,7 @@ std::optional<Checkpoint> Run::checkpoint_for_all() {
   if (ranks().broadcast(std::vector<char>{found.has_value()}).front() == 0) return std::nullopt;
   if (!found) found.emplace();
   const auto share = [](auto& value) { value = ranks().broadcast(std::vector{value}).front(); };
+  share(found->info.version);
   share(found->info.model_digest);
   share(found->info.watched);
   share(found->info.frames_written);
@@ -123,7 +124,7 @@ void Run::check_resumed() const {
   }
   const bool as_many =
       !checkpoint_reader_ || checkpoint_reader_->phyxels() == model().global_count();
-  if (begin_->info.model_digest != shared_.digest() || !as_many) {
+  if (!shared_.wrote(begin_->info) || !as_many) {
     throw InputError(
         fmt::format("{}: the checkpoint belongs to another model: bodies (what body.mesh, "
                     "body.file and body.cloud hold, too), materials, neighbourhoods, loads and "

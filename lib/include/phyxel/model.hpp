@@ -161,6 +161,8 @@ std::vector<char> held_phyxels(const Model& model);
 /// follows; so it is the same whatever device built them. A checkpoint carries it, so that a state
 /// never continues on another body. Of a share it is that of the whole, and collective.
 std::uint64_t model_digest(const Model& model);
+/// The digest that checkpoints before version 4 hold: without gravity.
+std::uint64_t model_digest_before_4(const Model& model);
 
 /// The rest cloud of one body of a scene: shape, mesh or file; scaled, rotated, moved into place.
 Cloud make_cloud(const BodyRequest& request);

@@ -48,6 +48,10 @@ class SharedModel {
   /// What this rank steps. A state says nothing of its ghosts: see `Model::owns`.
   const Model& here() const { return here_; }
   std::uint64_t digest() const { return digest_; }  ///< Of the whole, as `model_digest`.
+  /// True if a checkpoint was written by a run of this model.
+  bool wrote(const CheckpointInfo& info) const {
+    return info.model_digest == (info.version < 4 ? digest_before_4_ : digest_);
+  }
   /// Phyxels of each rank.
   struct Shares {
     std::int64_t fewest = 0, most = 0, most_ghosts = 0;
@@ -85,7 +89,7 @@ class SharedModel {
   Model here_;
   std::unique_ptr<const RowRedistribution> exchange_;
   std::vector<Triangle> triangles_;  // of a share's whole
-  std::uint64_t digest_ = 0;
+  std::uint64_t digest_ = 0, digest_before_4_ = 0;
   Shares shares_;
   std::string partitioner_;
 };

@@ -70,8 +70,8 @@ TEST_F(CheckpointVersions, TwoIsReadWithoutParameters) {
 
 TEST_F(CheckpointVersions, OthersAreRefusedByNumber) {
   EXPECT_THAT(refusal_of(written(1)),
-              HasSubstr("format version 1; this program reads versions 2 to 3"));
-  EXPECT_THAT(refusal_of(written(4)), HasSubstr("format version 4"));
+              HasSubstr("format version 1; this program reads versions 2 to 4"));
+  EXPECT_THAT(refusal_of(written(5)), HasSubstr("format version 5"));
 }
 
 TEST_F(CheckpointVersions, LooksThatNoRunTookAreRefused) {
