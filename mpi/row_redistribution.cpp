@@ -93,8 +93,8 @@ State RowRedistribution::scattered(Index length,
     some.history.resize(columns);
     if (columns == 0) state.history.clear();
     for (HistoryColumn& column : some.history) {
-      const std::vector<char> name = ranks_.broadcast(
-          std::vector<char>(column.name.begin(), column.name.end()));
+      const std::vector<char> name =
+          ranks_.broadcast(std::vector<char>(column.name.begin(), column.name.end()));
       column.name.assign(name.begin(), name.end());
       column.values = ranks_.broadcast(std::move(column.values));
     }

@@ -26,7 +26,8 @@ std::string moduli_of(const Material& m) {
 std::string terms_of(const Part& part) {
   const Material& m = part.material;
   std::string terms = m.custom_law ? m.custom_law->name() : m.law;
-  for (const auto& [name, value] : m.parameters) terms += fmt::format(", {} = {}", name, value.text());
+  for (const auto& [name, value] : m.parameters)
+    terms += fmt::format(", {} = {}", name, value.text());
   if (m.volume_stiffness > 0)
     terms += fmt::format(", volume conservation ({:g} Pa)", m.volume_stiffness);
   if (m.hourglass.value_or(0) > 0) {

@@ -9,10 +9,10 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/history.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
-#include "phyxel/history.hpp"
 #include "phyxel/solver.hpp"
 #include "scene/scene_error.hpp"
 #include "stages.hpp"
@@ -171,8 +171,7 @@ class Simulation {
     if (!history.is_none()) {
       state.history.clear();
       for (const auto& [name, values] : history.cast<py::dict>()) {
-        state.history.push_back(
-            {name.cast<std::string>(), values.cast<std::vector<double>>()});
+        state.history.push_back({name.cast<std::string>(), values.cast<std::vector<double>>()});
       }
       checked_history(state, history_columns(model_), model_.size());
     }

@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kind = "checkpoint";
-constexpr std::int64_t version = 4;  // with history
+constexpr std::int64_t version = 4;         // with history
 constexpr std::int64_t oldest_version = 2;  // without parameters
 constexpr std::size_t kept = 2;
 // Phyxels whose values are looked at together.
@@ -149,10 +149,10 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
     const std::string& name = state.history[k].name;
     columns += name + '\n';
     if (k == 0) out.group("/state/history");
-    write_later(out,
-                {history_path(name), info.precision != Precision::double_, phyxels,
-                 {history_quantity(k)}},
-                values);
+    write_later(
+        out,
+        {history_path(name), info.precision != Precision::double_, phyxels, {history_quantity(k)}},
+        values);
   }
   if (!columns.empty()) out.text("/state/history_columns", columns);
 
@@ -259,8 +259,8 @@ State CheckpointReader::state(Index begin, Index end) const {
   state.velocity = read("/state/velocity");
   for (HistoryColumn& column : state.history) {
     const std::string path = history_path(column.name);
-    column.values = file_->numbers(path, static_cast<std::size_t>(begin),
-                                   static_cast<std::size_t>(end));
+    column.values =
+        file_->numbers(path, static_cast<std::size_t>(begin), static_cast<std::size_t>(end));
     check_finite(*file_, path, column.values, begin);
   }
   return state;

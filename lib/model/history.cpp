@@ -36,8 +36,8 @@ std::vector<std::size_t> columns_of(const Material& material,
                                     const std::vector<std::string>& columns) {
   std::vector<std::size_t> places;
   for (const std::string& name : history_names(material)) {
-    places.push_back(static_cast<std::size_t>(
-        std::find(columns.begin(), columns.end(), name) - columns.begin()));
+    places.push_back(static_cast<std::size_t>(std::find(columns.begin(), columns.end(), name) -
+                                              columns.begin()));
   }
   return places;
 }
@@ -49,10 +49,10 @@ std::vector<const HistoryColumn*> checked_history(const State& state,
   if (state.history.empty()) return ordered;
   const auto refuse = [&](const std::string& what) {
     throw InputError(fmt::format("history of a state: {}; allowed: {}", what,
-                                 columns.empty() ? "none, as the materials of this model remember "
-                                                   "nothing"
-                                                 : fmt::format("none, or {}",
-                                                               fmt::join(columns, ", "))));
+                                 columns.empty()
+                                     ? "none, as the materials of this model remember "
+                                       "nothing"
+                                     : fmt::format("none, or {}", fmt::join(columns, ", "))));
   };
   for (const HistoryColumn& column : state.history) {
     if (std::find(columns.begin(), columns.end(), column.name) == columns.end()) {

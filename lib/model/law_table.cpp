@@ -40,8 +40,8 @@ constexpr std::span<const HistoryNumber> history_of_law() {
 std::vector<LawEntry> make_table() {
   std::vector<LawEntry> table;
   Laws::for_each<double>([&]<class Law>(std::type_identity<Law>) {
-    table.push_back({Law::name, Law::meaning, Law::parameters, is_linear<Law>(),
-                     history_of_law<Law>()});
+    table.push_back(
+        {Law::name, Law::meaning, Law::parameters, is_linear<Law>(), history_of_law<Law>()});
   });
   return table;
 }
@@ -70,11 +70,10 @@ void check_together(const std::vector<double>& values) {
     if (needed.empty()) return;
     std::vector<std::string> found;
     for (std::size_t k = 0; const LawParameter& p : Law::parameters) {
-      found.push_back(fmt::format("{} = {}", p.name,
-                                  p.count == 1 ? ParameterValue(values[k]).text()
-                                               : ParameterValue(Vec3d{values[k], values[k + 1],
-                                                                      values[k + 2]})
-                                                     .text()));
+      found.push_back(fmt::format(
+          "{} = {}", p.name,
+          p.count == 1 ? ParameterValue(values[k]).text()
+                       : ParameterValue(Vec3d{values[k], values[k + 1], values[k + 2]}).text()));
       k += static_cast<std::size_t>(p.count);
     }
     throw InputError(fmt::format("{} found, which law \"{}\" does not allow together; allowed: {}",
@@ -90,8 +89,8 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
     if (std::none_of(law.parameters.begin(), law.parameters.end(), is_it)) {
       std::vector<std::string> names;
       for (const LawParameter& p : law.parameters) names.emplace_back(p.name);
-      throw InputError(fmt::format("{} = {} found, which law \"{}\" does not have; allowed: {}", name,
-                                   value.text(), law.name, fmt::join(names, ", ")));
+      throw InputError(fmt::format("{} = {} found, which law \"{}\" does not have; allowed: {}",
+                                   name, value.text(), law.name, fmt::join(names, ", ")));
     }
   }
   for (const LawParameter& parameter : law.parameters) {

@@ -336,7 +336,7 @@ class CpuArrays {
   AlignedVector<Real> closing_;  // of closed gradients; likewise
   std::vector<std::string> history_columns_;
   std::vector<std::vector<std::size_t>> columns_of_part_;  // of the numbers of its law
-  std::vector<std::size_t> history_start_;                 // [packs + 1]; empty unless laws remember
+  std::vector<std::size_t> history_start_;  // [packs + 1]; empty unless laws remember
   AlignedVector<Real> history_;
   double history_interval_ = 0;  // from the history to the displacements [s]
   std::vector<Index> padding_;   // slots without a phyxel

@@ -230,7 +230,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   std::vector<Vec3d> external_force_;
-  std::optional<double> load_time_;               // of `applied_`, once it is summed
+  std::optional<double> load_time_;  // of `applied_`, once it is summed
   double load_scales_ = 0;
   std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
   SurfelState moved_surfels_;                     // of `update_surfels`

@@ -30,11 +30,11 @@ class LaneByLane {
  public:
   LaneByLane(const CustomLaw& law, FirstError& error) : law_(law), error_(error) {}
 
-  /// P of each lane [Pa]. @param numbers the history of the pack, shape [numbers, lanes]; `use` says
-  /// what becomes of it
+  /// P of each lane [Pa]. @param numbers the history of the pack, shape [numbers, lanes]; `use`
+  /// says what becomes of it
   template <class Real>
-  Mat3<P> first_piola_stress(const Mat3<P>& grad_u, Real* numbers, std::size_t count, HistoryUse use,
-                             double dt) const {
+  Mat3<P> first_piola_stress(const Mat3<P>& grad_u, Real* numbers, std::size_t count,
+                             HistoryUse use, double dt) const {
     constexpr int width = sizeof(P) / sizeof(Real);
     return error_.caught([&] {
       Mat3<P> stress;
@@ -78,8 +78,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   using typename Arrays::S;
 
   /// @param threads of OpenMP
-  CpuPasses(const Model& model, int threads)
-      : CpuPasses(model, threads, boundary_phyxels(model)) {}
+  CpuPasses(const Model& model, int threads) : CpuPasses(model, threads, boundary_phyxels(model)) {}
 
  protected:
   using Arrays::applied_;
@@ -208,9 +207,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   template <bool pulls>
   PHYXEL_HD NeighbourSums<P> sums_of(Index p) const {
     NeighbourSums<P> sums;
-    visit_neighbours(p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) {
-      sums.template add<pulls>(x_ij, u_ij, w);
-    });
+    visit_neighbours(
+        p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) { sums.template add<pulls>(x_ij, u_ij, w); });
     return sums;
   }
   /// What stresses of the phyxels of pack p are made of.
@@ -339,8 +337,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     const LaneByLane<P> law(*m.custom_law, error);
     apply([&](Index p, const Mat3<P>& grad_u) {
       Real* history = remembers ? &history_[history_start_[p]] : nullptr;
-      Mat3<P> stress =
-          law.first_piola_stress(grad_u, history, numbers, use, history_interval_);
+      Mat3<P> stress = law.first_piola_stress(grad_u, history, numbers, use, history_interval_);
       if (m.volume_stiffness > 0) stress += volume.first_piola_stress(grad_u);
       if (m.viscosity > 0 && use != HistoryUse::frozen) {
         stress += stress_beside(viscosity, history + numbers * W, grad_u, use);
@@ -412,10 +409,10 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
           Vec3<S>{convert<StateReal>(f_over_m.x), convert<StateReal>(f_over_m.y),
                   convert<StateReal>(f_over_m.z)} +
           gravity;
-      const PointMotion<S> after = moved<Damped>(
-          PointMotion<S>{this->template vec3_of<S>(velocity_, p),
-                         this->template vec3_of<S>(displacement_, p)},
-          acceleration, step, keep, gain);
+      const PointMotion<S> after =
+          moved<Damped>(PointMotion<S>{this->template vec3_of<S>(velocity_, p),
+                                       this->template vec3_of<S>(displacement_, p)},
+                        acceleration, step, keep, gain);
       this->store3(velocity_, p, after.velocity);
       this->store3(displacement_, p, after.displacement);
       const Vec3<P> u{convert<Real>(after.displacement.x), convert<Real>(after.displacement.y),

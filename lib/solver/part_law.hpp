@@ -1,5 +1,5 @@
-/// The material of a part as sums over phyxels in double see it: a caller's law or one of ours, with
-/// what it remembers, volume conservation and viscosity.
+/// The material of a part as sums over phyxels in double see it: a caller's law or one of ours,
+/// with what it remembers, volume conservation and viscosity.
 #pragma once
 
 #include <array>
@@ -40,8 +40,7 @@ class PartLaw {
   }
 
  private:
-  PointResponse<double> of_custom(const Mat3d& grad_u, std::span<double> history,
-                                  double dt) const {
+  PointResponse<double> of_custom(const Mat3d& grad_u, std::span<double> history, double dt) const {
     PointResponse<double> response;
     const std::span<double> own = history.first(custom_numbers_);
     if (own.empty()) {
@@ -53,16 +52,18 @@ class PartLaw {
       response.plastic_work = custom_->plastic_work(own);
     }
     const double stiffness = material_.volume_stiffness;
-    // What stands beside the caller's law: as beside Hooke's law at rest, whose stress is zero here.
+    // What stands beside the caller's law: as beside Hooke's law at rest, whose stress is zero
+    // here.
     const std::array<double, 4> beside{material_.lame_lambda(), material_.lame_mu(), stiffness,
                                        material_.viscosity};
     if (stiffness > 0 || material_.viscosity > 0) {
-      const auto number = [&](int k) { return history[custom_numbers_ + static_cast<std::size_t>(k)]; };
+      const auto number = [&](int k) {
+        return history[custom_numbers_ + static_cast<std::size_t>(k)];
+      };
       constexpr int hooke = Laws::index_of<SmallStrain>;
       const PointResponse<double> with =
           response_after_step<double>(hooke, beside.data(), grad_u, number, dt);
-      const Mat3d of_hooke =
-          SmallStrain<double>{{beside[0], beside[1]}}.first_piola_stress(grad_u);
+      const Mat3d of_hooke = SmallStrain<double>{{beside[0], beside[1]}}.first_piola_stress(grad_u);
       response.first_piola_stress += with.first_piola_stress + (-1.0) * of_hooke;
       response.volume_energy = with.volume_energy;
       response.viscous_work = with.viscous_work;

@@ -97,7 +97,8 @@ void Solver::observe(NewtonObserver observer) {
 
 void Solver::step(std::int64_t count, bool move_surfels) {
   if (method_ == Method::verlet) {
-    const std::int64_t most = backend_.best_steps();  // a law that throws does so in the first step of a call
+    const std::int64_t most =
+        backend_.best_steps();  // a law that throws does so in the first step of a call
     while (count > 0) {
       const std::int64_t some = std::min(count, most);
       backend_.step(steps_, dt_, static_cast<int>(some), move_surfels);

@@ -16,8 +16,8 @@ namespace phyxel {
 namespace {
 
 /// K x is minus the difference of the forces at two displacements so close to each other that only
-/// its linear part shows; what laws remember is held, since unloading is elastic. Of a share, vectors have its own phyxels, and their products those of all
-/// ranks.
+/// its linear part shows; what laws remember is held, since unloading is elastic. Of a share,
+/// vectors have its own phyxels, and their products those of all ranks.
 class HostVibration final : public Vibration {
  public:
   /// @param present where forces are linear; with its ghosts

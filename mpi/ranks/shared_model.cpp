@@ -60,7 +60,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     here_ = clouds ? build_model(scene, *clouds, device_) : build_model(scene, device_);
     shares_ = {here_.size(), here_.size(), 0};
     digest_ = model_digest(here_);
-  digest_before_4_ = model_digest_before_4(here_);
+    digest_before_4_ = model_digest_before_4(here_);
     return;
   }
   std::unique_ptr<ShareSurveyor> surveyor;
@@ -113,8 +113,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));
     if (!ranks_.leads()) return;
-    if (!wrote(checkpoint->info()) ||
-        checkpoint->phyxels() != here_.global_count()) {
+    if (!wrote(checkpoint->info()) || checkpoint->phyxels() != here_.global_count()) {
       throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
     }
     const State header = checkpoint->state(0, 0);

@@ -23,9 +23,8 @@ void Run::take_step(Progress& progress) {
     }
   }
   const auto next = [&](std::int64_t every) { return (solver_.steps() / every + 1) * every; };
-  const std::int64_t limit =
-      std::min({plan_.steps, next(plan_.steps_per_frame), next(watch_interval),
-                shortener_.next_look(solver_)});
+  const std::int64_t limit = std::min({plan_.steps, next(plan_.steps_per_frame),
+                                       next(watch_interval), shortener_.next_look(solver_)});
   naming(scene_, [&] { solver_.step(solver_.steps_to(limit)); });  // a search may be refused
 }
 

@@ -38,8 +38,7 @@ class CustomLaw {
   /// P [Pa] at the end of a step.
   /// @param numbers the history at its start; becomes that at its end, shape [history().size()]
   /// @param dt length of the step [s]; 0: no time has passed
-  virtual Mat3d first_piola_stress(const Mat3d& grad_u, std::span<double> numbers,
-                                   double dt) const;
+  virtual Mat3d first_piola_stress(const Mat3d& grad_u, std::span<double> numbers, double dt) const;
   /// ∂ψ/∂∇u [Pa] while the history stays.
   virtual Mat3d elastic_stress(const Mat3d& grad_u, std::span<const double> numbers) const;
   /// Work that has been turned into heat since the virgin state [J/m³].

@@ -126,7 +126,7 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
     EXPECT_TRUE(back.info.watched == info.watched);
     EXPECT_EQ(back.info.frames_written, info.frames_written);
     EXPECT_EQ(back.info.parameters, info.parameters);
-    EXPECT_EQ(back.info.version, 3);
+    EXPECT_EQ(back.info.version, 4);
   }
 }
 

@@ -131,8 +131,7 @@ TEST(Viscosity, WithoutAStepThereIsNoRate) {
 
 TEST(Viscosity, StandsBesideALawWithAHistory) {
   Deformations any(5);
-  const J2<double> metal =
-      copper<double>(0.1);
+  const J2<double> metal = copper<double>(0.1);
   const DampedMetal both{metal, relaxation};
   DampedMetal::State state;
   J2<double>::State alone;

@@ -1,5 +1,5 @@
-/// Bodies whose laws remember: steps commit history, evaluations do not, the energy that plastic and
-/// viscous work take is accounted for, and a restart goes on to the bit.
+/// Bodies whose laws remember: steps commit history, evaluations do not, the energy that plastic
+/// and viscous work take is accounted for, and a restart goes on to the bit.
 #include "phyxel/history.hpp"
 
 #include <gmock/gmock.h>
@@ -184,22 +184,27 @@ TEST(History, TheEnergyLedgerIsClosed) {
   for (const double viscosity : {0.0, 2e-4}) {
     Material m = soft_metal();
     m.viscosity = viscosity;
-    const Impact impact(m);
-    const double dt = 0.5 * impact.dt;
-    const auto backend = make_test_backend(impact.model, Precision::double_);
-    Solver solver(*backend, initial_state(impact.model, impact.scene, dt));
-    const double start = diagnose(impact.model, *backend, solver.now()).total_energy();
-    double worst = 0;
-    Diagnostics now;
-    for (int k = 0; k < 40; ++k) {
-      solver.step(20);
-      now = diagnose(impact.model, *backend, solver.now());
-      worst = std::max(worst, std::abs(now.total_energy() / start - 1));
-    }
-    EXPECT_GT(now.plastic_work, 0.3 * start);
-    if (viscosity > 0) EXPECT_GT(now.viscous_work, 0.01 * start);
-    // Of second order in the step, but for the rate's lag of half a step. Measured: see below.
-    EXPECT_LE(worst, viscosity > 0 ? 4e-3 : 1e-3) << viscosity;
+    const Impact impact(m, -0.4);
+    const auto worst_in_steps_of = [&](double dt) {
+      const auto backend = make_test_backend(impact.model, Precision::double_);
+      Solver solver(*backend, initial_state(impact.model, impact.scene, dt));
+      const double start = diagnose(impact.model, *backend, solver.now()).total_energy();
+      double worst = 0;
+      Diagnostics now;
+      while (solver.time() < 0.25) {
+        solver.step(40);
+        now = diagnose(impact.model, *backend, solver.now());
+        worst = std::max(worst, std::abs(now.total_energy() / start - 1));
+      }
+      EXPECT_GT(now.plastic_work, 0.2 * start);
+      if (viscosity > 0) EXPECT_GT(now.viscous_work, 0.01 * start);
+      return worst;
+    };
+    const double coarse = worst_in_steps_of(0.5 * impact.dt),
+                 fine = worst_in_steps_of(0.25 * impact.dt);
+    // It falls at least as fast as the step, measured: as its square. What is left is the step's.
+    EXPECT_LE(fine, 1e-3) << viscosity;
+    EXPECT_GE(coarse / fine, 1.8) << viscosity;
   }
 }
 
@@ -283,58 +288,39 @@ TEST(History, OfOtherLawsIsRefusedByName) {
 /// A block pulled and pushed beyond yield carries the closed form's stress: uniaxial stress is
 /// σ₀ + H ε̄ in Kirchhoff's measure, whatever the cycles before.
 TEST(History, ABlockUnderUniaxialCyclesHasTheClosedForm) {
-  Material m = soft_metal();
-  m.poisson = 0.3;
-  Scene scene = one_body(m);
-  scene.solver.method = Method::equilibrium;
-  scene.solver.precision = Precision::double_;
-  const Cloud cloud = lattice(4, 3, 3, 0.1);
-  const double length = 0.3;
-  // Symmetry planes at x, y and z = 0, so that the stress is uniform.
-  Selection x0, y0, z0, x1;
-  x0.box = Selection::Box{{-1, -1, -1}, {0.01, 1, 1}};
-  y0.box = Selection::Box{{-1, -1, -1}, {1, 0.01, 1}};
-  z0.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.01}};
-  x1.box = Selection::Box{{0.29, -1, -1}, {1, 1, 1}};
-  scene.bodies[0].fixed = {{x0, {true, false, false}},
-                           {y0, {false, true, false}},
-                           {z0, {false, false, true}}};
-  const std::vector<double> path{0.03, 0.06, 0.02, -0.03, 0.05, 0.09};
-  State state;
-  double equivalent = 0, plastic = 0;  // of the closed form
-  const double yield = 1e3, hardening = 5e3, young = m.young;
-  for (const double stretch : path) {
-    scene.bodies[0].motions.clear();
-    MotionRequest motion;
-    motion.select = x1;
-    motion.displacement = {stretch * length, 0, 0};
-    motion.duration = 1;
-    motion.axes = {true, false, false};
-    scene.bodies[0].motions.push_back(motion);
-    const Model model = model_of(scene, cloud);
-    const auto backend = make_test_backend(model, Precision::double_);
-    if (!state.displacement.empty()) backend->upload(state);
-    EquilibriumOptions options;
-    if (!state.displacement.empty()) options.start = &state.displacement;
-    state = find_equilibrium(model, *backend, options).state;
-    // The closed form, in logarithmic strain.
-    const double strain = std::log1p(stretch), trial = young * (strain - plastic);
-    const double excess = std::abs(trial) - (yield + hardening * equivalent);
-    if (excess > 0) {
-      const double increment = excess / (young + hardening);
-      equivalent += increment;
-      plastic += trial > 0 ? increment : -increment;
-    }
-    const double kirchhoff = young * (strain - plastic);
-    for (std::size_t i = 0; i < state.displacement.size(); ++i) {
-      // The search leaves 1e-8 of the forces.
-      EXPECT_NEAR(state.history[6].values[i], equivalent, 1e-6 * std::max(equivalent, 1e-2));
-    }
-    std::vector<double> von_mises, ratio;
-    stress_fields(model, *backend, &von_mises, &ratio);
-    for (std::size_t i = 0; i < von_mises.size(); ++i) {
-      // Cauchy's measure: over the change of volume.
-      EXPECT_NEAR(von_mises[i] * ratio[i] / std::abs(kirchhoff), 1, 1e-6) << stretch;
+  const Material m = soft_metal();
+  const Model model = model_of(one_body(m), lattice(5, 4, 4, 0.1, 0.2));
+  const double yield = 1e3, hardening = 5e3;
+  for (const Precision precision : all_precisions) {
+    const auto backend = make_test_backend(model, precision);
+    backend->upload(state_of(std::vector<Vec3d>(model.position.size())));
+    double equivalent = 0, plastic = 0;  // of the closed form
+    for (const double stretch : {0.03, 0.06, 0.02, -0.03, 0.05, 0.09, 0.0}) {
+      // In logarithmic strain; the sides follow by Poisson's ratio, and by half of what has flown.
+      const double strain = std::log1p(stretch), trial = m.young * (strain - plastic);
+      const double excess = std::abs(trial) - (yield + hardening * equivalent);
+      if (excess > 0) {
+        const double increment = excess / (m.young + hardening);
+        equivalent += increment;
+        plastic += trial > 0 ? increment : -increment;
+      }
+      const double elastic = strain - plastic, kirchhoff = m.young * elastic;
+      const double side = std::expm1(-m.poisson * elastic - 0.5 * plastic);
+      std::vector<Vec3d> u;
+      for (const Vec3d& x : model.position) u.push_back({stretch * x.x, side * x.y, side * x.z});
+      backend->put_displacements(u);
+      backend->commit_history();
+      State state;
+      backend->download(state);
+      std::vector<double> von_mises, ratio;
+      stress_fields(model, *backend, &von_mises, &ratio);
+      // Rounding of strains of some percent over a yield strain of one.
+      const double tolerance = precision == Precision::double_ ? 1e-10 : 3e-5;
+      for (std::size_t i = 0; i < u.size(); ++i) {
+        EXPECT_NEAR(state.history[6].values[i] / equivalent, 1, tolerance);
+        // Cauchy's measure: over the change of volume.
+        EXPECT_NEAR(von_mises[i] * ratio[i] / std::abs(kirchhoff), 1, tolerance) << stretch;
+      }
     }
   }
 }
@@ -382,7 +368,11 @@ TEST(History, ACallersLawMayRememberToo) {
   own.volume_stiffness = 2e4;
   Material borrowed = own;
   borrowed.custom_law = std::make_shared<Borrowed>(own);
-  const Impact one(own), other(borrowed);
+  Impact one(own), other(borrowed);
+  for (Impact* impact : {&one, &other}) {  // of other moduli
+    impact->scene.bodies[0].material.hourglass = 0;
+    impact->model = model_of(impact->scene, impact->cloud);
+  }
   const auto backend = make_cpu_backend(one.model, Precision::double_, 2),
              custom = make_cpu_backend(other.model, Precision::double_, 2);
   Solver solver(*backend, initial_state(one.model, one.scene, one.dt)),
@@ -407,10 +397,10 @@ TEST(History, ALawThatThrowsCommitsNothing) {
   class Fragile final : public CustomLaw {
    public:
     std::string name() const override { return "fragile"; }
-    double energy(const Mat3d& g) const override { return 5e4 * contract(cauchy_strain(g), cauchy_strain(g)); }
-    Mat3d first_piola_stress(const Mat3d& g) const override {
-      return 1e5 * full(cauchy_strain(g));
+    double energy(const Mat3d& g) const override {
+      return 5e4 * contract(cauchy_strain(g), cauchy_strain(g));
     }
+    Mat3d first_piola_stress(const Mat3d& g) const override { return 1e5 * full(cauchy_strain(g)); }
     std::vector<std::string> history() const override { return {"evaluations"}; }
     Mat3d first_piola_stress(const Mat3d& g, std::span<double> numbers, double) const override {
       numbers[0] += 1;
@@ -436,7 +426,7 @@ TEST(History, KelvinVoigtDampsABarsModeAsTheFormulaSays) {
   Material m = rubber();
   m.poisson = 0;
   m.law = "hencky";
-  const double length = 1.1, spacing = 0.1;
+  const double length = 1.2, spacing = 0.1;  // of cells
   const Cloud cloud = lattice(12, 3, 3, spacing);
   const double omega = std::numbers::pi / length * std::sqrt(m.young / m.density);
   m.viscosity = 0.04 / omega;  // ξ = 0.02
@@ -444,8 +434,11 @@ TEST(History, KelvinVoigtDampsABarsModeAsTheFormulaSays) {
   const Model model = model_of(scene, cloud);
   const double dt = 0.3 * step_limit(model).largest_step;
   State start = initial_state(model, scene, dt);
+  const auto mode = [&](Index i) {
+    return std::sin(std::numbers::pi * (model.position[i].x / length - 0.5));
+  };
   for (Index i = 0; i < model.size(); ++i) {
-    start.displacement[i].x = 1e-4 * std::cos(std::numbers::pi * model.position[i].x / length);
+    start.displacement[i].x = 1e-4 * mode(i);
   }
   const auto backend = make_test_backend(model, Precision::double_);
   Solver solver(*backend, start);
@@ -453,15 +446,14 @@ TEST(History, KelvinVoigtDampsABarsModeAsTheFormulaSays) {
     const State now = solver.state();
     double sum = 0;
     for (Index i = 0; i < model.size(); ++i) {
-      sum += model.mass[i] * now.displacement[i].x *
-             std::cos(std::numbers::pi * model.position[i].x / length);
+      sum += model.mass[i] * now.displacement[i].x * mode(i);
     }
     return sum;
   };
   // Peaks of the projection, by parabolas.
   std::vector<double> peak, when;
   double a = projection(), b = a;
-  while (peak.size() < 4) {
+  while (peak.size() < 5) {
     solver.step();
     const double c = projection();
     if (b > a && b >= c && solver.steps() > 5) {
@@ -471,11 +463,12 @@ TEST(History, KelvinVoigtDampsABarsModeAsTheFormulaSays) {
     }
     a = b, b = c;
   }
-  // The body's own frequency, which the spacing shifts by some percent.
-  const double damped = 2 * std::numbers::pi * 3 / (when[3] - when[0]);
+  // From the second peak on, when higher modes have died. The body's own frequency, which the
+  // spacing shifts by some percent.
+  const double damped = 2 * std::numbers::pi * 3 / (when[4] - when[1]);
   const double tau = m.viscosity, own = damped * (1 + tau * tau * damped * damped / 8);
   const double expected = std::numbers::pi * tau * own / std::sqrt(1 - tau * tau * own * own / 4);
-  EXPECT_NEAR(std::log(peak[0] / peak[3]) / 3 / expected, 1, 1e-2);
+  EXPECT_NEAR(std::log(peak[1] / peak[4]) / 3 / expected, 1, 1e-2);
 }
 
 }  // namespace

@@ -16,7 +16,8 @@
 ///   struct State                 its numbers, each a `Real`; all zero: the virgin material
 ///   static constexpr HistoryNumber history[];       their names, in the order of the members
 ///   energy(grad_u, state)        the energy density that is stored [J/m³]
-///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] at the end of a step of dt [s];
+///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] at the end of a step of dt
+///   [s];
 ///                                `state` becomes that of its end
 ///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] while the history stays
 ///   plastic_work(state)          work turned into heat since the virgin state [J/m³]
@@ -134,8 +135,9 @@ inline constexpr bool has_history = !std::is_empty_v<HistoryOf<Law>>;
 
 /// The number of scalars in a phyxel's history. `Real` is the scalar of the law.
 template <class Law, class Real>
-inline constexpr int history_numbers =
-    has_history<Law> ? static_cast<int>(sizeof(HistoryOf<Law>) / sizeof(Real)) : 0;
+inline constexpr int history_numbers = has_history<Law>
+                                           ? static_cast<int>(sizeof(HistoryOf<Law>) / sizeof(Real))
+                                           : 0;
 
 /// What an evaluation of stresses does with histories.
 enum class HistoryUse {
@@ -231,11 +233,10 @@ struct SumOf {
     return first.elastic_stress(grad_u, state) + second.first_piola_stress(grad_u);
   }
   /// Plastic work of the first law [J/m³].
-  PHYXEL_HD auto plastic_work(const State& state) const
-  requires requires(const First& law) { law.plastic_work(state); }
-  {
-    return first.plastic_work(state);
+  PHYXEL_HD auto plastic_work(const State& state) const requires requires(const First& law) {
+    law.plastic_work(state);
   }
+  { return first.plastic_work(state); }
   /// The linear law that both are at small displacements; the second is `VolumeConservation`.
   PHYXEL_HD auto at_rest() const { return first.at_rest(second.stiffness); }
   /// An upper bound of ρc² [Pa].

@@ -29,9 +29,9 @@ struct NeighbourSums {
 /// What a phyxel's stress is made of beside its displacement gradient.
 template <class Real>
 struct PointConstants {
-  Real volume;              ///< v [m³]
-  Sym3<Real> inverse_moment;  ///< A⁻¹ [1/m²]
-  Real hourglass{};           ///< κ [N/m], of hourglass control.
+  Real volume;                            ///< v [m³]
+  Sym3<Real> inverse_moment;              ///< A⁻¹ [1/m²]
+  Real hourglass{};                       ///< κ [N/m], of hourglass control.
   Vec3<Real> moment_offset{}, closing{};  ///< b [m] and ĉ [1/m], of closed gradients.
 };
 

@@ -29,7 +29,8 @@ template <class Real>
 struct J2 {
   static constexpr const char* name = "j2";
   static constexpr const char* meaning =
-      "metals: Hencky's law until the von Mises stress reaches yield_stress, then plastic flow with "
+      "metals: Hencky's law until the von Mises stress reaches yield_stress, then plastic flow "
+      "with "
       "linear hardening, Voce's, or none";
   static constexpr LawParameter parameters[] = {
       young_modulus,
@@ -75,8 +76,8 @@ struct J2 {
   static std::array<double, 6> constants(std::span<const double> parameters) {
     const std::array<double, 2> lame = lame_constants(parameters);
     const double yield = parameters[2], saturation = parameters[4];
-    return {lame[0],       lame[1],      yield,
-            parameters[3], saturation == 0 ? yield : saturation, parameters[5]};
+    return {lame[0],      lame[1], yield, parameters[3], saturation == 0 ? yield : saturation,
+            parameters[5]};
   }
   /// The smaller of E and 10 σ₀ [Pa]: residuals go on growing while the material flows, and would
   /// hold shapes that the metal gives up.

@@ -91,7 +91,8 @@ template <class Real>
 struct Orthotropic {
   static constexpr const char* name = "orthotropic";
   static constexpr const char* meaning =
-      "wood, layers, bone: nine constants along three axes, in Green's strain; the paper's tensor C "
+      "wood, layers, bone: nine constants along three axes, in Green's strain; the paper's tensor "
+      "C "
       "without its isotropy";
 
  private:
@@ -130,7 +131,8 @@ struct Orthotropic {
       modulus("young2", "Young's modulus along the second axis.", 8e5),
       modulus("young3", "Young's modulus along the third axis.", 5e5),
       ratio("poisson12",
-            "Poisson's ratio: strain along axis 2 is -poisson12 times that along axis 1, under stress "
+            "Poisson's ratio: strain along axis 2 is -poisson12 times that along axis 1, under "
+            "stress "
             "along axis 1. poisson21 = poisson12 young2/young1.",
             0.3),
       ratio("poisson13", "Poisson's ratio of axes 1 and 3, likewise.", 0.25),
@@ -227,7 +229,8 @@ struct Orthotropic {
     const Real together = larger(larger(most * r1, most * r2), most * r3);
     // (b bᵀ) : C : (n nᵀ) >= the smallest entry of C with 2 g taken from its diagonal, less 4/3 of
     // what shear moduli differ from g by.
-    const Real high = larger(larger(c.g12, c.g13), c.g23), low = smaller(smaller(c.g12, c.g13), c.g23);
+    const Real high = larger(larger(c.g12, c.g13), c.g23),
+               low = smaller(smaller(c.g12, c.g13), c.g23);
     const Real diagonal = smaller(smaller(c.c11, c.c22), c.c33) - (high + low);
     const Real least =
         smaller(diagonal, smaller(smaller(c.c12, c.c13), c.c23)) - Real(2.0 / 3) * (high - low);

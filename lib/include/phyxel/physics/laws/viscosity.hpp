@@ -2,11 +2,11 @@
 ///
 /// A viscous second Piola stress of the rate of Green's strain:
 ///   S_v = τ C : Ė,   Ė = (E - E_last)/Δt,   P += F S_v
-/// with the stiffness C of the law at rest. E does not see a rotation, however large in one step: rigid motion costs nothing, and momenta
-/// are kept (F S_v Fᵀ is symmetric). A difference of ∇u in place of E would make a stress of (1 -
-/// cos φ)/Δt of a rotation by φ. Of Hooke's C it is 2 η dev Ė + ζ tr(Ė) I with η = τ μ and ζ = τ
-/// (λ + ⅔ μ). Damping is in proportion to stiffness: a mode of angular frequency ω is damped by the
-/// share τ ω/2 of critical damping.
+/// with the stiffness C of the law at rest. E does not see a rotation, however large in one step:
+/// rigid motion costs nothing, and momenta are kept (F S_v Fᵀ is symmetric). A difference of ∇u in
+/// place of E would make a stress of (1 - cos φ)/Δt of a rotation by φ. Of Hooke's C it is 2 η dev
+/// Ė + ζ tr(Ė) I with η = τ μ and ζ = τ (λ + ⅔ μ). Damping is in proportion to stiffness: a mode of
+/// angular frequency ω is damped by the share τ ω/2 of critical damping.
 #pragma once
 
 #include "phyxel/physics/law.hpp"
@@ -28,10 +28,10 @@ struct WithViscosity {
     Real viscous_work{};                       ///< [J/m³] since the start.
   };
   /// The names of the last seven numbers, which stand behind those of the wrapped law.
-  static constexpr HistoryNumber history[] = {
-      {"last_strain_xx", ""}, {"last_strain_xy", ""}, {"last_strain_xz", ""},
-      {"last_strain_yy", ""}, {"last_strain_yz", ""}, {"last_strain_zz", ""},
-      {"viscous_work", "J/m^3"}};
+  static constexpr HistoryNumber history[] = {{"last_strain_xx", ""},   {"last_strain_xy", ""},
+                                              {"last_strain_xz", ""},   {"last_strain_yy", ""},
+                                              {"last_strain_yz", ""},   {"last_strain_zz", ""},
+                                              {"viscous_work", "J/m^3"}};
 
   Law law;
   Real relaxation_time;  ///< τ [s]
@@ -94,8 +94,7 @@ struct WithViscosity {
   }
   /// s : e.
   PHYXEL_HD static Real work_of(const Mat3<Real>& s, const Sym3<Real>& e) {
-    return contract(
-        Sym3<Real>{s(0, 0), s(0, 1), s(0, 2), s(1, 1), s(1, 2), s(2, 2)}, e);
+    return contract(Sym3<Real>{s(0, 0), s(0, 1), s(0, 2), s(1, 1), s(1, 2), s(2, 2)}, e);
   }
 };
 
