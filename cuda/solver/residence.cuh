@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 
 #include "solver/device_model.cuh"
 #include "solver/resident.cuh"
@@ -12,17 +13,25 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Residence {
  public:
-  /// Steps that may wait to be launched together.
+  /// Steps of one launch, at most.
   static constexpr int most_steps = 256;
 
-  /// Nothing unless each body fits a cluster, or all bodies fit at once; gradients must be as they
-  /// come, and bodies of one material.
-  static std::unique_ptr<Residence> of(const DeviceModel<Real, StateReal>& model) {
-    if (model.closed() || model.model().has_inclusions()) return nullptr;
+  /// The residence of a model, and why there is one or none, in words.
+  struct Attempt {
+    std::unique_ptr<Residence> residence;  ///< Null: the model cannot be resident.
+    std::string reason;
+  };
+  /// Makes a model resident if each body fits a cluster, or all bodies fit at once.
+  static Attempt of(const DeviceModel<Real, StateReal>& model) {
+    if (model.closed()) return {nullptr, "closed gradients go by tiles"};
+    if (model.model().has_inclusions()) return {nullptr, "bodies with inclusions go by tiles"};
     std::unique_ptr<Residence> residence(new Residence(model));
-    return residence->make() ? std::move(residence) : nullptr;
+    std::string reason = residence->make();
+    if (!residence->kernel_) residence.reset();
+    return {std::move(residence), std::move(reason)};
   }
 
+  /// The way of launching, in words.
   std::string describe() const {
     return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
@@ -48,12 +57,19 @@ class Residence {
 
   explicit Residence(const DeviceModel<Real, StateReal>& model) : m_(model) {}
 
-  bool make() {
+  /// Makes all that launches need, or leaves `kernel_` null. @returns why, in words
+  std::string make() {
     constexpr Index most_places = 1 << 18;  // far more than fit any GPU of today
     const DeviceTiling& on_device = m_.tiling();
-    if (m_.size() == 0 || on_device.places() > most_places || !may_fit()) return false;
+    if (m_.size() == 0) return "there are no phyxels";
+    const std::string too_large =
+        "neighbours of " + m_.subject() + " do not fit the GPU's shared memory";
+    if (on_device.places() > most_places || !may_fit()) return too_large;
     const ResidentPlan plan = make_resident_plan(fetched_tiling(on_device));
-    if (!fits_clusters(plan) && !fits_at_once(plan)) return false;
+    if (!fits_clusters(plan) && !fits_at_once(plan)) {
+      kernel_ = nullptr;
+      return too_large;
+    }
 
     const std::string what = "what stays in shared memory of " + m_.subject();
     slices_ = sent(plan.slices, what);
@@ -81,7 +97,8 @@ class Residence {
              plan.most_destinations,
              {plan.longest[0], second_longest(plan)}};
     clear_mail();
-    return true;
+    return cluster_ ? "each body fits the shared memory of a cluster"
+                    : "all bodies fit the GPU's shared memory at once";
   }
   void weigh(const ResidentPlan& plan, const std::string& what) {
     constexpr unsigned threads = 256;
