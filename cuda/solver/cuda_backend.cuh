@@ -1,4 +1,4 @@
-/// The production solver on one GPU: decides how steps are launched.
+/// The production solver on one GPU.
 #pragma once
 
 #include <algorithm>
@@ -6,11 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "solver/boundary.cuh"
 #include "solver/cuda_backend.hpp"
-#include "solver/device_model.cuh"
+#include "solver/launch_path.cuh"
 #include "solver/passes.cuh"
-#include "solver/residence.cuh"
 #include "solver/step_graph.cuh"
 #include "solver/stiffening.cuh"
 #include "solver/surfels.cuh"
@@ -26,35 +24,29 @@ class CudaBackend final : public Backend {
       : m_(model, device),
         halo_(m_.share() ? std::make_unique<DeviceHalo<Real, StateReal>>(m_, transport) : nullptr),
         boundary_(m_),
-        passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())) {
-    bool recordable = path == CudaPath::automatic && !boundary_.changes();
-    if (recordable && !m_.share()) residence_ = Residence<Real, StateReal>::of(m_);
-    recordable = recordable && !residence_ && m_.size() <= most_recorded;
-    // Ranks launch alike, or one would wait for what another has not launched yet.
-    if (m_.share()) {
-      recordable = recordable && halo_->is_direct();
-      recordable = m_.share()->communicator->smallest(recordable) > 0;
-    }
-    recorded_ = recordable;
-    has_surfels_ = !model.surfels.position.empty();
+        passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())),
+        path_(choose_path(m_, halo_.get(), boundary_, path)),
+        has_surfels_(!model.surfels.position.empty()) {
     if (m_.share()) has_surfels_ = m_.share()->communicator->largest(has_surfels_) > 0;
   }
 
   std::string name() const override {
     const char* precision = m_.mixed ? "mixed" : sizeof(Real) == 4 ? "float" : "double";
     const std::string path =
-        residence_
-            ? residence_->describe()
+        path_.residence
+            ? path_.residence->describe()
             : "tiles of " + std::to_string(tile_size) +
-                  (recorded_ ? ", graphs of " + std::to_string(steps_together) + " steps" : "");
+                  (path_.recorded ? ", graphs of " + std::to_string(steps_together) + " steps"
+                                  : "");
     return m_.device().name + ", " + precision + ", " + path;
   }
+  std::string path_reason() const override { return path_.reason; }
   Index size() const override { return m_.size(); }
   int threads() const override { return 0; }
 
   void upload(const State& state) override {
     check_sizes(state, size());
-    settle();
+    m_.use_device();
     passes_->receive_displacements();
     m_.wait();
     if (m_.share()) m_.share()->communicator->largest(0);  // the others have come as far
@@ -62,7 +54,7 @@ class CudaBackend final : public Backend {
     m_.put(state);
   }
   void download(State& state) const override {
-    settle();
+    m_.use_device();
     passes_->receive_displacements();
     m_.wait();
     m_.take(state);
@@ -74,7 +66,7 @@ class CudaBackend final : public Backend {
                        std::to_string(size()) + " phyxels: allowed are " + std::to_string(size()) +
                        " or none");
     }
-    settle();
+    m_.use_device();
     m_.wait();  // steps under way may read the forces that were set before
     const bool had_loads = m_.fields().load;
     std::vector<Real> values(force.empty() ? 0 : 3 * m_.places(), Real(0));
@@ -94,46 +86,34 @@ class CudaBackend final : public Backend {
   }
   std::span<const Vec3d> external_forces() const override { return external_force_; }
 
-  void stress() override {
-    if (steps_may_wait()) return;
+  void step(std::int64_t first, double dt, int count, bool move_surfels) override {
     m_.use_device();
-    passes_->stress();
-  }
-
-  void advance(double time, double dt) override {
     if (dt != m_.dt()) {
-      settle();
       for (StepGraph& graph : graphs_) graph.forget();
       m_.send_constants(dt);
     }
-    if (steps_may_wait()) {
-      if (open_) close_step(Then::nothing);
-      open_ = true;
-      return;
+    const SurfelAdvection<Real, StateReal>* surfels =
+        move_surfels && has_surfels_ ? &surfels_of_model() : nullptr;
+    while (count > 0) {
+      const int launched = launch_steps(static_cast<double>(first) * dt, count, surfels);
+      bound_queue(launched);
+      if (halo_) halo_->count_steps(launched);
+      first += launched;
+      count -= launched;
     }
-    m_.use_device();
-    boundary_.sum_loads(time);
-    if (fresh_ || boundary_.changes()) {
-      passes_->advance(dt);
-      boundary_.follow_paths(time, dt);
-      if (fresh_) boundary_.put_held_at_rest();
-      passes_->send_displacements();
-    } else {
-      passes_->advance_and_send(dt);
-    }
-    if (halo_) halo_->count_steps(1);
-    fresh_ = false;
-    bound_queue(1);
+  }
+  int best_steps() const override {
+    return path_.residence ? path_.residence->most_steps : path_.recorded ? steps_together : 1;
   }
 
   void wait() const override {
     const Phase phase("waiting for the GPU");
-    settle();
+    m_.use_device();
     m_.wait();
   }
 
   std::optional<Diagnostics> diagnostics(const Instant& now) override {
-    settle();
+    m_.use_device();
     boundary_.sum_loads(now.time);
     const DeviceArray<Real> forces = passes_->forces(),
                             gradients = m_.fields().pull ? passes_->gradients_and_residuals()
@@ -158,7 +138,7 @@ class CudaBackend final : public Backend {
   }
 
   std::optional<Stiffening> stiffening() override {
-    settle();
+    m_.use_device();
     const Index tiles = m_.tiles();
     // Kept for small bodies, for which an allocation costs as much as many steps.
     DeviceArray<Real> gradients = std::move(stiffening_gradients_);
@@ -185,7 +165,7 @@ class CudaBackend final : public Backend {
   }
 
   void internal_forces(std::vector<Vec3d>& force) override {
-    settle();
+    m_.use_device();
     const DeviceArray<Real> forces = passes_->forces();
     wait();
     const std::vector<Real> values = fetched(forces);
@@ -197,7 +177,7 @@ class CudaBackend final : public Backend {
   }
 
   void displacement_gradients(std::vector<Mat3d>& gradient) override {
-    settle();
+    m_.use_device();
     const DeviceArray<Real> gradients = passes_->gradients();
     wait();
     const std::vector<Real> values = fetched(gradients);
@@ -211,7 +191,7 @@ class CudaBackend final : public Backend {
   }
 
   void fit_residuals(std::vector<double>& residual) override {
-    settle();
+    m_.use_device();
     const DeviceArray<Real> rows = passes_->gradients_and_residuals();
     wait();
     const std::vector<Real> values = fetched(rows);
@@ -222,27 +202,19 @@ class CudaBackend final : public Backend {
   }
 
   std::unique_ptr<Vibration> vibration() override {
-    settle();
+    m_.use_device();
     passes_->receive_displacements();
     return std::make_unique<CudaVibration<Real, StateReal>>(m_, *passes_);
   }
   std::unique_ptr<Vibration> vibration_at_present(double distance) override {
-    settle();
+    m_.use_device();
     return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, *passes_, distance);
   }
 
   void update_surfels() override {
     if (!has_surfels_) return;
-    if (!surfels_) {
-      settle();
-      surfels_.emplace(m_, residence_ ? steps_together : 0);
-    }
-    if (open_) {
-      close_step(Then::surfels);
-    } else {
-      settle();
-      surfels_->launch(*passes_);
-    }
+    m_.use_device();
+    surfels_of_model().launch(*passes_);
   }
   void advect_surfels(SurfelState& out) override {
     update_surfels();
@@ -257,7 +229,9 @@ class CudaBackend final : public Backend {
   std::vector<ArrayBytes> memory() const override {
     std::vector<ArrayBytes> list;
     m_.add_memory(list);
-    if (residence_) list.push_back({"what stays in shared memory", residence_->bytes()});
+    if (path_.residence) {
+      list.push_back({"what stays in shared memory", path_.residence->bytes()});
+    }
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
     if (stiffest_.size() > 0) {
@@ -270,74 +244,69 @@ class CudaBackend final : public Backend {
   std::size_t step_traffic() const override { return m_.step_traffic(); }
   std::optional<Exchanges> exchanges() const override {
     if (!halo_) return std::nullopt;
-    settle();
+    m_.use_device();
     return Exchanges{halo_->describe(), halo_->traffic()};
   }
 
  private:
-  /// Steps of a graph or of a trail, and bodies for which a graph is worth while: a step of more
-  /// phyxels takes longer than its launches.
-  static constexpr int steps_together = 16;
-  static constexpr Index most_recorded = 4'000'000;
   /// Tile slots of which gradients stay allocated between two looks at how stiff they are.
   static constexpr std::size_t most_kept = 1'000'000;
   std::string gradients_name() const { return "displacement gradients of " + m_.subject(); }
-  /// What follows a step, before the next.
-  enum class Then { nothing, surfels };
+  using Advection = SurfelAdvection<Real, StateReal>;
 
-  /// Whether steps are launched many at a time. The first step after an upload is not: it sees held
-  /// phyxels where they were put.
-  bool steps_may_wait() const { return (residence_ || recorded_) && !fresh_; }
-
-  /// The last step is now known whole. Steps that wait together are alike.
-  void close_step(Then then) const {
-    open_ = false;
-    if (pending_ > 0 && then != pending_then_) launch_pending();
-    pending_then_ = then;
-    const bool resident = residence_ && then == Then::nothing;
-    const int most = resident ? residence_->most_steps : steps_together;
-    if (++pending_ == most) launch_pending();
-  }
-  void launch_pending() const {
-    m_.use_device();
-    const int steps = std::exchange(pending_, 0);  // once, whatever happens
-    bound_queue(steps);
-    if (halo_) halo_->count_steps(steps);
-    const bool surfels = pending_then_ == Then::surfels;
-    if (residence_) {
-      residence_->launch(m_.dt(), steps, surfels ? surfels_->trail() : Trail<Real, StateReal>{});
-      if (surfels) surfels_->launch_trail(steps);
-      return;
+  /// Launches the next steps that go together, at most `left`, from a time [s].
+  /// @param surfels to be moved after each step, or null
+  /// @returns the number of steps
+  int launch_steps(double time, int left, const Advection* surfels) {
+    // The first step after an upload sees held phyxels where they were put, and then sets them.
+    if (!fresh_ && path_.residence) {
+      const int steps = std::min(left, surfels ? steps_together : path_.residence->most_steps);
+      path_.residence->launch(m_.dt(), steps,
+                              surfels ? surfels->trail() : Trail<Real, StateReal>{});
+      if (surfels) surfels->launch_trail(steps);
+      return steps;
     }
-    const auto launch = [&](int count) {
-      for (int s = 0; s < count; ++s) {
-        passes_->stress();
-        passes_->advance_and_send(m_.dt());
-        if (surfels) surfels_->launch(*passes_);
-      }
-    };
-    // Surfels of a share are brought together by the host.
-    const bool recorded =
-        steps == steps_together && !launches_are_waited_for() && !(surfels && m_.share());
-    if (!recorded) return launch(steps);
+    if (!fresh_ && left >= steps_together && graph_serves(surfels)) {
+      graphs_[surfels != nullptr].launch(m_.stream(), [&] {
+        for (int s = 0; s < steps_together; ++s) launch_step(time, surfels);
+      });
+      return steps_together;
+    }
+    launch_step(time, surfels);
+    return 1;
+  }
+  /// True if the next steps may be those of a graph.
+  bool graph_serves(const Advection* surfels) const {
+    if (!path_.recorded || launches_are_waited_for()) return false;
+    if (surfels && m_.share()) return false;  // the host brings surfels of a share together
     // A graph begins as it ends: with displacements on their way.
-    if (halo_ && !halo_->is_under_way(Sent::displacements)) {
-      launch(1);
-      return launch(steps - 1);
-    }
-    graphs_[surfels].launch(m_.stream(), [&] { launch(steps); });
+    return !halo_ || halo_->is_under_way(Sent::displacements);
   }
-  /// Makes this device the current one and launches the steps that wait for it.
-  void settle() const {
-    m_.use_device();
-    if (open_) close_step(Then::nothing);
-    if (pending_ > 0) launch_pending();
+  /// Launches one step of the present size from a time [s].
+  void launch_step(double time, const Advection* surfels) {
+    passes_->stress();
+    boundary_.sum_loads(time);
+    if (fresh_ || boundary_.changes()) {
+      passes_->advance(m_.dt());
+      boundary_.follow_paths(time, m_.dt());
+      if (fresh_) boundary_.put_held_at_rest();
+      passes_->send_displacements();
+    } else {
+      passes_->advance_and_send(m_.dt());
+    }
+    fresh_ = false;
+    if (surfels) surfels->launch(*passes_);
+  }
+  /// The surfels, which are brought to the device when they are first asked for.
+  Advection& surfels_of_model() {
+    if (!surfels_) surfels_.emplace(m_, path_.residence ? steps_together : 0);
+    return *surfels_;
   }
 
   /// Lets the host run ahead by some ten milliseconds of steps, not by the hundreds that the queue
   /// takes: a signal would wait for them all.
-  void bound_queue(int steps) const {
-    const int most = residence_ ? 2 * residence_->most_steps : 128;
+  void bound_queue(int steps) {
+    const int most = path_.residence ? 2 * path_.residence->most_steps : 128;
     const auto ahead = static_cast<int>(std::clamp<std::size_t>(
         50'000'000 / std::max<std::size_t>(m_.places(), 1), 1, static_cast<std::size_t>(most)));
     if ((steps_since_mark_ += steps) < ahead) return;
@@ -352,22 +321,17 @@ class CudaBackend final : public Backend {
   std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // of a share
   Boundary<Real, StateReal> boundary_;
   std::unique_ptr<Passes<Real, StateReal>> passes_;
-  std::unique_ptr<Residence<Real, StateReal>> residence_;
+  LaunchPath<Real, StateReal> path_;
   std::vector<Vec3d> external_force_;
-  std::optional<SurfelAdvection<Real, StateReal>> surfels_;  // once they have been asked for
-  bool has_surfels_ = false;                                 // this or another rank
-  bool recorded_ = false;                                    // steps go through a graph
-  bool fresh_ = true;  // no step has been taken since the last upload
-  // Steps that wait to be launched: whole ones, and one of which it is not known what follows.
-  mutable int pending_ = 0;
-  mutable Then pending_then_ = Then::nothing;
-  mutable bool open_ = false;
-  mutable StepGraph graphs_[2];             // by what follows
+  std::optional<Advection> surfels_;        // once they have been asked for
+  bool has_surfels_;                        // this or another rank
+  bool fresh_ = true;                       // no step has been taken since the last upload
+  StepGraph graphs_[2];                     // without surfels, and with
   DeviceArray<Real> stiffening_gradients_;  // of small bodies, once they have been looked at
   DeviceArray<TileStiffening> stiffest_;    // of each tile, likewise
   Event marks_[2];
-  mutable int steps_since_mark_ = 0;
-  mutable unsigned batches_ = 0;
+  int steps_since_mark_ = 0;
+  unsigned batches_ = 0;
 };
 
 }  // namespace phyxel::cuda

@@ -16,39 +16,13 @@
 #include "phyxel/law_table.hpp"
 #include "setup/device_tiling.hpp"
 #include "setup/primitives.cuh"
-#include "solver/crossings.cuh"
 #include "solver/diagnose.cuh"
+#include "solver/host_arrays.cuh"
 #include "solver/hourglass.hpp"
 #include "solver/kernels.cuh"
+#include "solver/stream.cuh"
 
 namespace phyxel::cuda {
-
-/// The queue of a model's launches. It waits for what goes through CUDA's default queue, copies
-/// above all, and that waits for it.
-class Stream {
- public:
-  Stream() { PHYXEL_CUDA(cudaStreamCreate(&stream_)); }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
-  ~Stream() { cudaStreamDestroy(stream_); }
-  cudaStream_t get() const { return stream_; }
-
- private:
-  cudaStream_t stream_ = nullptr;
-};
-
-/// A point in a queue of launches that can be waited for.
-class Event {
- public:
-  Event() { PHYXEL_CUDA(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming)); }
-  Event(const Event&) = delete;
-  Event& operator=(const Event&) = delete;
-  ~Event() { cudaEventDestroy(event_); }
-  cudaEvent_t get() const { return event_; }
-
- private:
-  cudaEvent_t event_ = nullptr;
-};
 
 /// CUDA allocates and shares memory in pages of this size [bytes]; smaller allocations lie
 /// together.
@@ -71,7 +45,11 @@ class DeviceModel {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
-    if (share()) own_supports_ = share()->communicator->largest(own_supports_) > 0;
+    closed_ = !model.closing.empty();
+    if (share()) {
+      own_supports_ = share()->communicator->largest(own_supports_) > 0;
+      closed_ = share()->communicator->largest(closed_) > 0;
+    }
     last_launch_.subject = subject_ = std::to_string(model.size()) + " phyxels";
     lists_ = view_of(tiling_.neighbours);
     second_lists_ = view_of(tiling_.second());
@@ -93,7 +71,7 @@ class DeviceModel {
   Index boundary_tiles() const { return tiling_.boundary_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
-  bool closed() const { return !model_.closing.empty(); }         ///< Whether gradients are.
+  bool closed() const { return closed_; }  ///< True if a body's gradients are, here or elsewhere.
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
 
   const AllFields& fields() const { return fields_; }
@@ -120,9 +98,14 @@ class DeviceModel {
   }
   /// Of each place, the number of its phyxel in the whole model; -1: nobody.
   const Index* number_at() const { return share() ? number_at_.data() : tiling_.phyxel_at.data(); }
-  /// What `Fields::points` and `stresses` lie in (see `Points::in`).
+  /// Pair stresses and closing stresses, of a closed model.
+  ClosedStresses<Real> closed_stresses() const {
+    return {fields_.stresses, fields_.closing_stresses};
+  }
+  /// What `Fields::points`, `stresses` and `closing_stresses` lie in (see `Points::in`).
   void* points_memory() const { return points_.data(); }
   void* stresses_memory() const { return stresses_.data(); }
+  void* closing_stresses_memory() const { return closing_stresses_.data(); }
 
   /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
   /// digits in float.
@@ -345,7 +328,7 @@ class DeviceModel {
     }
     if (closed()) {
       closing_ = sent(closing_by_place(), "closing vectors" + of);
-      closing_stresses_ = {ClosingStresses<Real>::bytes * places(), "closing stresses" + of};
+      closing_stresses_ = {ClosingStresses<Real>::bytes * places() + more, "closing stresses" + of};
       closing_stresses_.clear();
       fields_.closing_stresses = ClosingStresses<Real>::in(closing_stresses_.data(), places());
     }
@@ -371,9 +354,10 @@ class DeviceModel {
     if constexpr (mixed) displacement_.clear();
   }
 
+  /// ĉ as rows [3, places], zero where a rank has none.
   std::vector<Real> closing_by_place() const {
     std::vector<Real> values(3 * places());
-    for (Index i = 0; i < size(); ++i) {
+    for (Index i = 0; i < static_cast<Index>(model_.closing.size()); ++i) {
       const auto place = static_cast<std::size_t>(tiling_.place[i]);
       const Vec3<Real> c = to<Real>(model_.closing[i]);
       values[place] = c.x;
@@ -438,7 +422,7 @@ class DeviceModel {
   DeviceTiling tiling_;
   Stream stream_;
   int most_shared_memory_ = 0;
-  bool own_supports_ = false;
+  bool own_supports_ = false, closed_ = false;
   std::string subject_;
   double dt_ = -1;
   mutable Launch last_launch_;

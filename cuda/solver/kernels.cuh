@@ -15,7 +15,7 @@
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
-#include "solver/peers.cuh"
+#include "solver/fused_halo.cuh"
 #include "solver/records.cuh"
 
 namespace phyxel::cuda {
@@ -220,11 +220,11 @@ enum class Beyond { nothing, hourglass, closing };
 /// the gradients are stored, and nothing else is written.
 /// @tparam Law one of `Laws`, or its sum with `VolumeConservation`
 template <class Real, class StateReal, class Law, Beyond beyond, bool only_gradient,
-          class Others = Alone>
+          class Halo = NoHalo>
 __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
-           const __grid_constant__ Others others) {
+           const __grid_constant__ Halo exchange) {
   extern __shared__ __align__(16) char image[];
   Index tile = first_tile + static_cast<Index>(blockIdx.x);
   if constexpr (only_gradient) {
@@ -232,7 +232,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
   }
   const unsigned place = place_of(tile);
   const TileLists::Row row = lists.rows[place / warp_size];
-  others.before(tile);
+  exchange.before(tile);
   fetch_tile(f.points, lists, tile, image);
   prefetch_rows(f.moment_constants + warp_place_of(tile), f.places, 7);
   const uint4 first = first_entries(lists, row);
@@ -291,7 +291,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
       set_column3(f.pull, f.places, place, pull_force(body.hourglass, pull));
     }
     f.stresses.set(place, {own.x, q});
-    others.after(tile);
+    exchange.after(tile);
   }
 }
 
@@ -299,17 +299,17 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
 /// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of
 /// loads and pulls is added; with `closed` what closing stresses do.
 template <class Real, class StateReal, bool own_supports, bool damped, bool more, bool only_force,
-          class Others = Alone, bool closed = false>
+          class Halo = NoHalo, bool closed = false>
 __global__ void __launch_bounds__(tile_size,
                                   closed ? pass_2_blocks_closed<Real> : pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force,
-           const __grid_constant__ Others others) {
+           const __grid_constant__ Halo exchange) {
   extern __shared__ __align__(16) char image[];
   const Index tile = first_tile + static_cast<Index>(blockIdx.x);
   const unsigned place = place_of(tile);
   const TileLists::Row row = lists.rows[place / warp_size];
-  others.before(tile);
+  exchange.before(tile);
   fetch_tile(f.stresses, lists, tile, image);
   // Behind the records: closing stresses, then a support of each point.
   char* closings = image + Stresses<Real>::bytes * lists.slots;
@@ -375,7 +375,7 @@ __global__ void __launch_bounds__(tile_size,
     }
     f.points.set(place, point);
   }
-  others.after(tile);
+  exchange.after(tile);
 }
 
 }  // namespace phyxel::cuda

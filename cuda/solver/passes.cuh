@@ -9,31 +9,38 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Passes {
   using AllFields = Fields<Real, StateReal>;
-  template <class Others>
-  using Pass1 = void (*)(AllFields, DeviceLists, Index, Gradients<Real>, Others);
-  template <class Others>
-  using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*, Others);
-  using Meeting1 = Meeting<Stresses<Real>>;
-  using Meeting2 = Meeting<Points<Real>>;
+  template <class Halo>
+  using Pass1 = void (*)(AllFields, DeviceLists, Index, Gradients<Real>, Halo);
+  template <class Halo>
+  using Pass2 = void (*)(AllFields, DeviceLists, Index, StateReal, Real*, Halo);
+  using Fused1 = FusedHalo<Stresses<Real>>;
+  using FusedClosed1 = FusedHalo<ClosedStresses<Real>>;
+  using Fused2 = FusedHalo<Points<Real>>;
 
  public:
   /// @param halo of a share, or null
   Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo)
       : m_(model),
         halo_(halo),
-        direct_(halo ? halo->in_passes() : nullptr),
+        direct_(halo ? halo->fused() : nullptr),
         interior_(m_.boundary_tiles(), m_.tiles(), *this),
         boundary_(0, m_.boundary_tiles(), *this),
-        meeting_(0, direct_ ? m_.tiles() : 0, *this) {
-    linear_ = runs_of<Pass1<Alone>>(0, m_.tiles(),
-                                    [&](const Material& m) { return linear_pass_1_of(m); });
+        fused_(0, direct_ && !m_.closed() ? m_.tiles() : 0, *this),
+        fused_closed_(0, direct_ && m_.closed() ? m_.tiles() : 0, *this) {
+    linear_ = runs_of<Pass1<NoHalo>>(0, m_.tiles(),
+                                     [&](const Material& m) { return linear_pass_1_of(m); });
   }
 
   /// What ghosts are not needed for is launched before they are waited for.
   void stress() const {
     if (direct_) {
-      const bool waits = halo_->pass_meets(Sent::displacements, Sent::stresses);
-      return meeting_.stress(direct_->meeting_of_pass_1(waits));
+      const bool waits = halo_->begin_fused_pass(Sent::displacements, Sent::stresses);
+      if (m_.closed()) {
+        fused_closed_.stress(direct_->template of_pass_1<ClosedStresses<Real>>(waits));
+      } else {
+        fused_.stress(direct_->template of_pass_1<Stresses<Real>>(waits));
+      }
+      return;
     }
     interior_.stress({});
     receive(Sent::displacements);
@@ -48,8 +55,13 @@ class Passes {
   }
   void advance_and_send(double dt) const {
     if (direct_) {
-      const bool waits = halo_->pass_meets(Sent::stresses, Sent::displacements);
-      return meeting_.advance(dt, direct_->meeting_of_pass_2(waits));
+      const bool waits = halo_->begin_fused_pass(Sent::stresses, Sent::displacements);
+      if (m_.closed()) {
+        fused_closed_.advance(dt, direct_->of_pass_2(waits));
+      } else {
+        fused_.advance(dt, direct_->of_pass_2(waits));
+      }
+      return;
     }
     advance(dt);
     send_displacements();
@@ -71,14 +83,14 @@ class Passes {
     AllFields fields = m_.fields();
     fields.tiles = constants;
     receive(Sent::displacements);
-    for (const auto& run : linear_) launch_pass_1<Alone>(fields, run, {}, {});
+    for (const auto& run : linear_) launch_pass_1<NoHalo>(fields, run, {}, {});
     send(Sent::stresses);
   }
   /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
   void gather(Real* forces) const {
     receive(Sent::stresses);
-    launch_pass_2<Alone>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
-                         StateReal(0), forces, {});
+    launch_pass_2<NoHalo>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
+                          StateReal(0), forces, {});
   }
   /// Of ghosts: zero.
   DeviceArray<Real> forces() const {
@@ -102,11 +114,11 @@ class Passes {
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
     using Any = StVenantKirchhoff<Real>;  // gradients know no law
-    launch_pass_1<Alone>(m_.fields(),
-                         {m_.closed() ? pass_1<Real, StateReal, Any, Beyond::closing, true>
-                                      : pass_1<Real, StateReal, Any, Beyond::nothing, true>,
-                          0, tiles},
-                         gradients, {});
+    launch_pass_1<NoHalo>(m_.fields(),
+                          {m_.closed() ? pass_1<Real, StateReal, Any, Beyond::closing, true>
+                                       : pass_1<Real, StateReal, Any, Beyond::nothing, true>,
+                           0, tiles},
+                          gradients, {});
   }
 
  private:
@@ -134,30 +146,30 @@ class Passes {
     return runs;
   }
   /// The launches of a step that serve tiles side by side.
-  template <class Others1, class Others2>
+  template <class Halo1, class Halo2>
   struct Runs {
     Runs(Index begin, Index end, const Passes& passes)
         : of(passes),
-          pass_1(of.template runs_of<Pass1<Others1>>(
-              begin, end, [&](const Material& m) { return of.template pass_1_of<Others1>(m); })),
-          pass_2(of.template runs_of<Pass2<Others2>>(begin, end, [&](const Material& m) {
-            return of.m_.own_supports() ? of.template pass_2_of<true, Others2>(m)
-                                        : of.template pass_2_of<false, Others2>(m);
+          pass_1(of.template runs_of<Pass1<Halo1>>(
+              begin, end, [&](const Material& m) { return of.template pass_1_of<Halo1>(m); })),
+          pass_2(of.template runs_of<Pass2<Halo2>>(begin, end, [&](const Material& m) {
+            return of.m_.own_supports() ? of.template pass_2_of<true, Halo2>(m)
+                                        : of.template pass_2_of<false, Halo2>(m);
           })) {}
-    void stress(const Others1& others) const {
+    void stress(const Halo1& exchange) const {
       for (const auto& run : pass_1) {
-        of.template launch_pass_1<Others1>(of.m_.fields(), run, {}, others);
+        of.template launch_pass_1<Halo1>(of.m_.fields(), run, {}, exchange);
       }
     }
-    void advance(double dt, const Others2& others) const {
+    void advance(double dt, const Halo2& exchange) const {
       for (const auto& run : pass_2) {
-        of.template launch_pass_2<Others2>(run, static_cast<StateReal>(dt), nullptr, others);
+        of.template launch_pass_2<Halo2>(run, static_cast<StateReal>(dt), nullptr, exchange);
       }
     }
 
     const Passes& of;
-    std::vector<Run<Pass1<Others1>>> pass_1;
-    std::vector<Run<Pass2<Others2>>> pass_2;
+    std::vector<Run<Pass1<Halo1>>> pass_1;
+    std::vector<Run<Pass2<Halo2>>> pass_2;
   };
 
   void send(Sent what) const {
@@ -173,81 +185,85 @@ class Passes {
   }
 
   /// Terms chosen at run time become kernels: the one place.
-  template <class Others>
-  Pass1<Others> pass_1_of(const Material& m) const {
-    if constexpr (std::is_same_v<Others, Alone>) {  // shares have no closed gradients
-      if (m_.closed()) return pass_1_of<Beyond::closing, Others>(m);
+  template <class Halo>
+  Pass1<Halo> pass_1_of(const Material& m) const {
+    if constexpr (std::is_same_v<Halo, FusedClosed1>) {
+      return pass_1_of<Beyond::closing, Halo>(m);
+    } else {
+      if constexpr (std::is_same_v<Halo, NoHalo>) {
+        if (m_.closed()) return pass_1_of<Beyond::closing, Halo>(m);
+      }
+      return m.hourglass > 0 ? pass_1_of<Beyond::hourglass, Halo>(m)
+                             : pass_1_of<Beyond::nothing, Halo>(m);
     }
-    return m.hourglass > 0 ? pass_1_of<Beyond::hourglass, Others>(m)
-                           : pass_1_of<Beyond::nothing, Others>(m);
   }
-  template <Beyond beyond, class Others>
-  static Pass1<Others> pass_1_of(const Material& m) {
+  template <Beyond beyond, class Halo>
+  static Pass1<Halo> pass_1_of(const Material& m) {
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using WithVolume = SumOf<Law, VolumeConservation<Real>>;
       return m.volume_stiffness > 0
-                 ? Pass1<Others>(cuda::pass_1<Real, StateReal, WithVolume, beyond, false, Others>)
-                 : cuda::pass_1<Real, StateReal, Law, beyond, false, Others>;
+                 ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, beyond, false, Halo>)
+                 : cuda::pass_1<Real, StateReal, Law, beyond, false, Halo>;
     });
   }
   /// Pass 1 by the linear law that a material has at rest.
-  Pass1<Alone> linear_pass_1_of(const Material& m) const {
+  Pass1<NoHalo> linear_pass_1_of(const Material& m) const {
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using Linear = decltype(std::declval<Law>().at_rest(Real()));
       if (m_.closed()) {
-        return Pass1<Alone>(cuda::pass_1<Real, StateReal, Linear, Beyond::closing, false>);
+        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, Beyond::closing, false>);
       }
       return m_.fields().pull
-                 ? Pass1<Alone>(cuda::pass_1<Real, StateReal, Linear, Beyond::hourglass, false>)
+                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, Beyond::hourglass, false>)
                  : cuda::pass_1<Real, StateReal, Linear, Beyond::nothing, false>;
     });
   }
-  template <bool own_supports, class Others>
-  Pass2<Others> pass_2_of(const Material& m) const {
-    if constexpr (std::is_same_v<Others, Alone>) {
-      if (m_.closed()) {
-        return m.damping > 0
-                   ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others, true>
-                   : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others, true>;
-      }
+  template <bool own_supports, class Halo>
+  Pass2<Halo> pass_2_of(const Material& m) const {
+    if (m_.closed()) {
+      return m.damping > 0
+                 ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo, true>
+                 : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo, true>;
     }
     const bool more = m_.fields().load || m_.fields().pull;
     if (m.damping > 0) {
-      return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Others>
-                  : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Others>;
+      return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo>
+                  : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Halo>;
     }
-    return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Others>
-                : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Others>;
+    return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo>
+                : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Halo>;
   }
 
   template <bool closed>
-  Pass2<Alone> gather_of() const {
+  Pass2<NoHalo> gather_of() const {
     return m_.own_supports()
-               ? cuda::pass_2<Real, StateReal, true, false, false, true, Alone, closed>
-               : cuda::pass_2<Real, StateReal, false, false, false, true, Alone, closed>;
+               ? cuda::pass_2<Real, StateReal, true, false, false, true, NoHalo, closed>
+               : cuda::pass_2<Real, StateReal, false, false, false, true, NoHalo, closed>;
   }
 
-  template <class Others>
-  void launch_pass_1(const AllFields& fields, const Run<Pass1<Others>>& run,
-                     Gradients<Real> gradients, const Others& others) const {
+  template <class Halo>
+  void launch_pass_1(const AllFields& fields, const Run<Pass1<Halo>>& run,
+                     Gradients<Real> gradients, const Halo& exchange) const {
     m_.launch_blocks("pass_1", run.kernel, static_cast<unsigned>(run.tiles),
                      Points<Real>::bytes * m_.lists().slots, false, fields, m_.lists(),
-                     run.first_tile, gradients, others);
+                     run.first_tile, gradients, exchange);
   }
-  template <class Others>
-  void launch_pass_2(const Run<Pass2<Others>>& run, StateReal dt, Real* force,
-                     const Others& others) const {
+  template <class Halo>
+  void launch_pass_2(const Run<Pass2<Halo>>& run, StateReal dt, Real* force,
+                     const Halo& exchange) const {
     m_.launch_blocks("pass_2", run.kernel, static_cast<unsigned>(run.tiles),
                      m_.pass_2_bytes(m_.second_lists().slots), false, m_.fields(),
-                     m_.second_lists(), run.first_tile, dt, force, others);
+                     m_.second_lists(), run.first_tile, dt, force, exchange);
   }
 
   const DeviceModel<Real, StateReal>& m_;
   const DeviceHalo<Real, StateReal>* halo_;
   const DirectExchange<Real, StateReal>* direct_;
-  Runs<Alone, Alone> interior_, boundary_;
-  std::vector<Run<Pass1<Alone>>> linear_;  // all tiles, by the laws at rest
-  Runs<Meeting1, Meeting2> meeting_;       // all tiles, where passes exchange by themselves
+  Runs<NoHalo, NoHalo> interior_, boundary_;
+  std::vector<Run<Pass1<NoHalo>>> linear_;  // all tiles, by the laws at rest
+  // All tiles, where passes exchange by themselves.
+  Runs<Fused1, Fused2> fused_;
+  Runs<FusedClosed1, Fused2> fused_closed_;
 };
 
 }  // namespace phyxel::cuda

@@ -247,6 +247,14 @@ struct ClosingStresses {
     return s;
   }
 
+  __device__ Vec3<Real> get(std::size_t place) const {
+    const Word first = word[0][place];
+    if constexpr (words == 1) {
+      return {first.x, first.y, first.z};
+    } else {
+      return {first.x, first.y, word[1][place].x};
+    }
+  }
   __device__ void set(std::size_t place, Vec3<Real> t) const {
     if constexpr (words == 1) {
       word[0][place] = {t.x, t.y, t.z, 0};
@@ -271,6 +279,27 @@ struct ClosingStresses {
       const auto second = *reinterpret_cast<const Word*>(image + offset + 16 * slots);
       return {first.x, first.y, second.x};
     }
+  }
+};
+
+/// The stresses of each place where gradients are closed, as they travel between ranks: what
+/// `Stresses` holds, and the closing stress.
+template <class Real>
+struct ClosedStresses {
+  static constexpr int bytes = Stresses<Real>::bytes + ClosingStresses<Real>::bytes;
+  Stresses<Real> stresses;
+  ClosingStresses<Real> closing;
+
+  struct Value {
+    typename Stresses<Real>::Value stress;
+    Vec3<Real> t;
+  };
+  __device__ Value get(std::size_t place) const {
+    return {stresses.get(place), closing.get(place)};
+  }
+  __device__ void set(std::size_t place, const Value& v) const {
+    stresses.set(place, v.stress);
+    closing.set(place, v.t);
   }
 };
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 
 #include "solver/device_model.cuh"
 #include "solver/resident.cuh"
@@ -12,17 +13,23 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Residence {
  public:
-  /// Steps that may wait to be launched together.
+  /// Steps of one launch, at most.
   static constexpr int most_steps = 256;
 
-  /// Nothing unless each body fits a cluster, or all bodies fit at once; gradients must be as they
-  /// come, and bodies of one material.
-  static std::unique_ptr<Residence> of(const DeviceModel<Real, StateReal>& model) {
-    if (model.closed() || model.model().has_inclusions()) return nullptr;
+  /// The residence of a model, and why there is one or none, in words.
+  struct Attempt {
+    std::unique_ptr<Residence> residence;  ///< Null: the model cannot be resident.
+    std::string reason;
+  };
+  /// Makes a model resident if each body fits a cluster, or all bodies fit at once.
+  static Attempt of(const DeviceModel<Real, StateReal>& model) {
     std::unique_ptr<Residence> residence(new Residence(model));
-    return residence->make() ? std::move(residence) : nullptr;
+    std::string reason = residence->make();
+    if (!residence->kernel_) residence.reset();
+    return {std::move(residence), std::move(reason)};
   }
 
+  /// The way of launching, in words.
   std::string describe() const {
     return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
@@ -33,7 +40,7 @@ class Residence {
   }
 
   void launch(double dt, int steps, Trail<Real, StateReal> trail = {}) {
-    if (next_tag_ > 0xF000'0000U) clear_mail();
+    if (next_tag_ > 0xF000'0000U) clear_mailboxes();
     Fields<Real, StateReal> fields = m_.fields();
     auto step = static_cast<StateReal>(dt);
     unsigned tag = std::exchange(next_tag_, next_tag_ + 2 * static_cast<unsigned>(steps) + 1);
@@ -48,12 +55,19 @@ class Residence {
 
   explicit Residence(const DeviceModel<Real, StateReal>& model) : m_(model) {}
 
-  bool make() {
+  /// Makes all that launches need, or leaves `kernel_` null. @returns why, in words
+  std::string make() {
     constexpr Index most_places = 1 << 18;  // far more than fit any GPU of today
     const DeviceTiling& on_device = m_.tiling();
-    if (m_.size() == 0 || on_device.places() > most_places || !may_fit()) return false;
+    if (m_.size() == 0) return "there are no phyxels";
+    const std::string too_large =
+        "neighbours of " + m_.subject() + " do not fit the GPU's shared memory";
+    if (on_device.places() > most_places || !may_fit()) return too_large;
     const ResidentPlan plan = make_resident_plan(fetched_tiling(on_device));
-    if (!fits_clusters(plan) && !fits_at_once(plan)) return false;
+    if (!fits_clusters(plan) && !fits_at_once(plan)) {
+      kernel_ = nullptr;
+      return too_large;
+    }
 
     const std::string what = "what stays in shared memory of " + m_.subject();
     slices_ = sent(plan.slices, what);
@@ -66,8 +80,8 @@ class Residence {
     }
     slice_of_block_ = sent(slice_of_block, what);
     if (!cluster_) {
-      displacements_ = {displacement_letters<Real> * m_.places(), what};
-      stresses_ = {stress_letters<Real> * m_.places(), what};
+      displacements_ = {displacement_packets<Real> * m_.places(), what};
+      stresses_ = {stress_packets_each() * m_.places(), what};
     }
     view_ = {slices_.data(),
              place_.data(),
@@ -80,14 +94,15 @@ class Residence {
              plan.most_slots,
              plan.most_destinations,
              {plan.longest[0], second_longest(plan)}};
-    clear_mail();
-    return true;
+    clear_mailboxes();
+    return cluster_ ? "each body fits the shared memory of a cluster"
+                    : "all bodies fit the GPU's shared memory at once";
   }
   void weigh(const ResidentPlan& plan, const std::string& what) {
     constexpr unsigned threads = 256;
     const DeviceArray<std::uint16_t> entries = sent(plan.entries, what);
     pairs_ = {plan.entries.size(), what};
-    if (hourglass()) weights_ = {plan.entries.size(), what};
+    if (kept_weights() != KeptWeights::none) weights_ = {plan.entries.size(), what};
     const auto slices = static_cast<unsigned>(plan.slices.size());
     weigh_pairs<<<slices, threads, 0, m_.stream()>>>(m_.fields(), slices_.data(), place_.data(),
                                                      entries.data(), m_.tiling().inverse ? 2 : 1,
@@ -97,43 +112,64 @@ class Residence {
   }
   /// Before a plan is made, which takes its time.
   bool may_fit() const {
-    const bool in_clusters = std::all_of(
-        m_.model().parts.begin(), m_.model().parts.end(),
-        [](const Part& part) { return part.end - part.begin <= most_cluster_blocks * slice_size; });
+    const bool in_clusters =
+        std::all_of(m_.model().parts.begin(), m_.model().parts.end(), [&](const Part& part) {
+          Index slices = 0;
+          for (const Part& beside : m_.model().parts_of_body(part)) {
+            slices += (beside.end - beside.begin + slice_size - 1) / slice_size;
+          }
+          return slices <= most_cluster_blocks;
+        });
     const std::size_t shared = static_cast<std::size_t>(m_.device().multiprocessors) *
                                static_cast<std::size_t>(m_.most_shared_memory());
     return in_clusters ||
            static_cast<std::size_t>(m_.model().pairs()) * sizeof(Pair<Real>) <= shared;
   }
   bool hourglass() const { return m_.fields().pull; }
+  KeptWeights kept_weights() const {
+    return m_.closed()   ? KeptWeights::both_passes
+           : hourglass() ? KeptWeights::first_pass
+                         : KeptWeights::none;
+  }
+  int stress_packets_each() const {
+    return m_.closed() ? stress_packets<Real, true> : stress_packets<Real, false>;
+  }
   int second_longest(const ResidentPlan& plan) const {
     return m_.tiling().inverse ? plan.longest[1] : 0;
   }
-  template <class Post>
-  void use_post(const ResidentPlan& plan) {
+  template <class Channel>
+  void use_channel(const ResidentPlan& plan) {
+    kernel_ =
+        m_.closed() ? kernel<Channel, AnyLaw, true, true>() : kernel_without_closing<Channel>();
+    threads_ = Channel::threads;
+    shared_bytes_ = ResidentMemory<Real>::bytes(
+        plan.most_slots, plan.longest[0], second_longest(plan), stress_packets_each(),
+        kept_weights(), Channel::bytes(plan.most_slots, plan.most_destinations));
+  }
+  template <class Channel, class Law, bool controlled, bool closed>
+  static const void* kernel() {
+    return reinterpret_cast<const void*>(
+        resident_steps<Real, StateReal, Channel, Law, controlled, closed>);
+  }
+  template <class Channel>
+  const void* kernel_without_closing() const {
     // Without hourglass control the default law alone has a kernel of its own; others may have it.
     const auto kernel_of = [&]<class Law>(std::type_identity<Law>) {
       constexpr bool controlled = !std::is_same_v<Law, StVenantKirchhoff<Real>>;
-      return hourglass()
-                 ? reinterpret_cast<const void*>(resident_steps<Real, StateReal, Post, Law, true>)
-                 : reinterpret_cast<const void*>(
-                       resident_steps<Real, StateReal, Post, Law, controlled>);
+      return hourglass() ? kernel<Channel, Law, true, false>()
+                         : kernel<Channel, Law, controlled, false>();
     };
     const auto& parts = m_.model().parts;
     const int law = chosen_law(parts.front().material).index;
     const auto is_alike = [&](const Part& part) { return chosen_law(part.material).index == law; };
-    kernel_ = std::all_of(parts.begin(), parts.end(), is_alike)
-                  ? Laws::with_type<Real>(law, kernel_of)
-                  : kernel_of(std::type_identity<AnyLaw>{});
-    threads_ = Post::threads;
-    shared_bytes_ = ResidentMemory<Real>::bytes(
-        plan.most_slots, plan.longest[0], second_longest(plan), hourglass(),
-        Post::bytes(plan.most_slots, plan.most_destinations));
+    return std::all_of(parts.begin(), parts.end(), is_alike)
+               ? Laws::with_type<Real>(law, kernel_of)
+               : kernel_of(std::type_identity<AnyLaw>{});
   }
   /// One cluster a body, as many blocks each as the largest has slices.
   bool fits_clusters(const ResidentPlan& plan) {
     if (m_.device().major < 9) return false;
-    use_post<ClusterPost<Real>>(plan);
+    use_channel<ClusterChannel<Real>>(plan);
     const auto blocks = static_cast<std::size_t>(plan.bodies) * plan.most_slices;
     // Bodies of very different sizes would leave most blocks idle.
     if (plan.most_slices > most_cluster_blocks || blocks > 2 * plan.slices.size() ||
@@ -151,7 +187,7 @@ class Residence {
     return error == cudaSuccess && clusters > 0;
   }
   bool fits_at_once(const ResidentPlan& plan) {
-    use_post<MailPost<Real>>(plan);
+    use_channel<MailboxChannel<Real>>(plan);
     cluster_ = 0;
     blocks_ = static_cast<unsigned>(plan.slices.size());
     if (shared_bytes_ > m_.most_shared_memory()) return false;
@@ -188,27 +224,27 @@ class Residence {
     LaunchOf& operator=(const LaunchOf&) = delete;
   };
 
-  void clear_mail() {
+  void clear_mailboxes() {
     next_tag_ = 1;
-    for (const DeviceArray<Letter>* mail : {&displacements_, &stresses_}) {
-      if (mail->bytes() == 0) continue;
-      PHYXEL_CUDA(cudaMemsetAsync(mail->data(), 0, mail->bytes(), m_.stream()));
+    for (const DeviceArray<Packet>* boxes : {&displacements_, &stresses_}) {
+      if (boxes->bytes() == 0) continue;
+      PHYXEL_CUDA(cudaMemsetAsync(boxes->data(), 0, boxes->bytes(), m_.stream()));
     }
   }
 
   const DeviceModel<Real, StateReal>& m_;
   const void* kernel_ = nullptr;
-  int cluster_ = 0;  // blocks of one; 0: by mail
+  int cluster_ = 0;  // blocks of one; 0: by mailboxes
   unsigned blocks_ = 0, threads_ = 0;
   int shared_bytes_ = 0;
-  unsigned next_tag_ = 1;  // of the mail
+  unsigned next_tag_ = 1;  // of packets in mailboxes
   DeviceArray<Slice> slices_;
   DeviceArray<int> slice_of_block_;
   DeviceArray<Index> place_;
   DeviceArray<Pair<Real>> pairs_;
   DeviceArray<Real> weights_;
   DeviceArray<std::uint32_t> destinations_;
-  DeviceArray<Letter> displacements_, stresses_;
+  DeviceArray<Packet> displacements_, stresses_;
   ResidentView<Real> view_{};
 };
 

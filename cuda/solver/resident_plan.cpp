@@ -1,6 +1,7 @@
 #include "solver/resident_plan.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <unordered_map>
 
 #include "setup/wait_free.hpp"
@@ -35,10 +36,37 @@ class Image {
   std::vector<Index> place_;
 };
 
+/// Slices by their first places.
+using SliceAt = std::unordered_map<Index, std::size_t>;
+
+/// Finds which slices reach each other, and so make a body, and ranks them.
+void find_bodies(const SliceAt& slice_at, ResidentPlan& plan) {
+  std::vector<std::size_t> root(plan.slices.size());
+  std::iota(root.begin(), root.end(), std::size_t{0});
+  const auto root_of = [&](std::size_t s) {
+    while (root[s] != s) s = root[s] = root[root[s]];
+    return s;
+  };
+  for (std::size_t s = 0; s < plan.slices.size(); ++s) {
+    const Slice& slice = plan.slices[s];
+    for (int slot = slice_size; slot < slice.slots; ++slot) {
+      const Index place = plan.place[slice.first_slot + slot];
+      if (place < 0) continue;
+      const std::size_t a = root_of(s), b = root_of(slice_at.at(place - place % slice_size));
+      root[std::max(a, b)] = std::min(a, b);  // the first slice of a body is its root
+    }
+  }
+  std::vector<int> slices(plan.slices.size(), 0);  // of the body of each root, so far
+  for (std::size_t s = 0; s < plan.slices.size(); ++s) {
+    const std::size_t first = root_of(s);
+    plan.slices[s].body = first == s ? plan.bodies++ : plan.slices[first].body;
+    plan.slices[s].rank = slices[first]++;
+    plan.most_slices = std::max(plan.most_slices, slices[first]);
+  }
+}
+
 /// Tells every slice who else needs its phyxels.
-void find_destinations(ResidentPlan& plan) {
-  std::unordered_map<Index, std::size_t> slice_at;  // by first place
-  for (std::size_t s = 0; s < plan.slices.size(); ++s) slice_at[plan.slices[s].first_place] = s;
+void find_destinations(const SliceAt& slice_at, ResidentPlan& plan) {
   std::vector<std::array<std::vector<std::uint32_t>, slice_size>> of_slice(plan.slices.size());
   for (Slice& slice : plan.slices) {
     for (int slot = slice_size; slot < slice.slots; ++slot) {
@@ -77,13 +105,6 @@ ResidentPlan make_resident_plan(const Tiling& tiling) {
     Image image(tiling, first);
     Slice slice;
     slice.first_place = first;
-    const bool same_body =
-        !plan.slices.empty() &&
-        tiling.part[tile] == tiling.part[plan.slices.back().first_place / tile_size];
-    if (!same_body) ++plan.bodies;
-    slice.body = plan.bodies - 1;
-    slice.rank = same_body ? plan.slices.back().rank + 1 : 0;
-    plan.most_slices = std::max(plan.most_slices, slice.rank + 1);
     for (int pass = 0; pass < 2; ++pass) {
       const TileLists& list = *lists[pass];
       Slice::Rows& rows = slice.rows[pass];
@@ -119,7 +140,10 @@ ResidentPlan make_resident_plan(const Tiling& tiling) {
     plan.most_slots = std::max(plan.most_slots, slice.slots);
     plan.slices.push_back(slice);
   }
-  find_destinations(plan);
+  SliceAt slice_at;
+  for (std::size_t s = 0; s < plan.slices.size(); ++s) slice_at[plan.slices[s].first_place] = s;
+  find_bodies(slice_at, plan);
+  find_destinations(slice_at, plan);
   return plan;
 }
 

@@ -21,7 +21,7 @@ struct Slice {
   int slots = 0;          ///< Of its image, a multiple of 8.
   int first_slot = 0;     ///< Where its slots begin in `ResidentPlan::place`.
   int halo = 0;           ///< Slots of other slices' phyxels.
-  Index body = 0;         ///< Bodies that have phyxels, counted from 0.
+  Index body = 0;         ///< Slices that reach each other make a body, counted from 0.
   int rank = 0;           ///< Among the slices of its body.
   /// Who else has a slot for phyxel p: destinations[first_destination + k * slice_size + p].
   int first_destination = 0, destinations = 0;

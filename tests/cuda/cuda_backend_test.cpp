@@ -20,8 +20,9 @@ using namespace phyxel::testing;
 struct Case {
   const char* name;
   bool adaptive, capped, everything;
-  bool closed = false;    ///< Gradients of the first body,
-  bool one_each = false;  ///< whose neighbour has supports of its own.
+  bool closed = false;      ///< Gradients of the first body,
+  bool one_each = false;    ///< whose neighbour has supports of its own.
+  bool inclusions = false;  ///< Of other materials, in the first body.
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -61,19 +62,33 @@ Scene scene_of(const Case& c) {
     motion.frequency = 3;
     second.motions.push_back(motion);
   }
+  if (c.inclusions) {
+    Material hard = first.material, light = first.material;
+    hard.young *= 4;
+    hard.law = "neo-hookean";
+    light.poisson = 0.1;
+    light.density *= 0.5;
+    light.damping = 3;
+    first.inclusions = {
+        {.select = {.ball = Selection::Ball{{0.5, 0.3, 0.4}, 0.3}}, .material = hard},
+        {.select = {.box = Selection::Box{{0.9, -1, -1}, {3, 3, 3}}}, .material = light}};
+  }
   return scene;
 }
-Model model_of_case(const Case& c) {
-  std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3), lattice(9, 14, 8, 0.12, 0.1, 4)};
-  if (c.closed) {
-    clouds[0] = make_shape({.name = "block",
-                            .size = {1.6, 1.2, 1.4},
+/// A block with a surface, which its gradients are closed to, with a corner at the origin.
+Cloud block(Vec3d size) {
+  Cloud cloud = make_shape({.name = "block",
+                            .size = size,
                             .spacing = 0.1,
                             .jitter = 0.2,
                             .placement = ShapeRequest::Placement::nodes});
-    for (Vec3d& x : clouds[0].position) x += Vec3d{0.8, 0.6, 0.7};
-    for (Vec3d& x : clouds[0].surface.position) x += Vec3d{0.8, 0.6, 0.7};
-  }
+  for (Vec3d& x : cloud.position) x += 0.5 * size;
+  for (Vec3d& x : cloud.surface.position) x += 0.5 * size;
+  return cloud;
+}
+Model model_of_case(const Case& c) {
+  std::vector<Cloud> clouds{lattice(17, 13, 15, 0.1, 0.2, 3), lattice(9, 14, 8, 0.12, 0.1, 4)};
+  if (c.closed) clouds[0] = block({1.6, 1.2, 1.4});
   return build_model(scene_of(c), clouds);
 }
 
@@ -214,6 +229,11 @@ const std::vector<Cloud>& small_clouds() {
                                          lattice(9, 5, 8, 0.12, 0.1, 4)};
   return clouds;
 }
+/// The same sizes, the first with a surface.
+std::vector<Cloud> with_surface(std::vector<Cloud> clouds, Vec3d size) {
+  clouds[0] = block(size);
+  return clouds;
+}
 /// Many, of which one takes fewer blocks than the others.
 std::vector<Cloud> many_clouds() {
   std::vector<Cloud> clouds(20, lattice(7, 5, 6, 0.1, 0.2, 5));
@@ -256,15 +276,6 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
   }
 }
 
-/// Steps of sizes of their own. @returns the time after them
-double advance_by(Backend& backend, double time, int steps, double dt) {
-  for (int s = 0; s < steps; ++s) {
-    backend.step(std::llround(time / dt), dt);
-    time += dt;
-  }
-  return time;
-}
-
 TEST(CudaResidenceOf, BodiesWithListsOfTheirOwnForEachPassInEveryPrecision) {
   const Case terms{"", true, true, true};
   Scene scene = scene_of(terms);
@@ -281,8 +292,8 @@ TEST(CudaResidenceOf, BodiesWithListsOfTheirOwnForEachPassInEveryPrecision) {
     EXPECT_NE(resident->name().find("resident"), std::string::npos) << resident->name();
     for (Backend* backend : {resident.get(), launched.get()}) {
       backend->upload(initial_state(model, scene, dt));
-      const double time = advance_by(*backend, 0, 13, dt);
-      advance_by(*backend, time, 17, 2 * dt);  // while steps wait to be launched
+      backend->step(0, dt, 13);
+      backend->step(7, 2 * dt, 17);  // while steps are under way
     }
     State a, b;
     resident->download(a);
@@ -306,10 +317,10 @@ TEST(CudaGraphs, EqualLaunchesToTheLastBit) {
     start.displacement = random_deformation(model, 0.003);
     for (const auto& [backend, out] : {std::pair{&recorded, &a}, std::pair{&launched, &b}}) {
       (*backend)->upload(start);
-      double time = advance_by(**backend, 0, 21, dt);
-      (*backend)->download(*out);  // with steps that wait
-      time = advance_by(**backend, time, 17, dt);
-      advance_by(**backend, time, 22, 1.5 * dt);  // in the middle of a graph, which is then void
+      (*backend)->step(0, dt, 21);
+      (*backend)->download(*out);  // with steps under way
+      (*backend)->step(21, dt, 17);
+      (*backend)->step(25, 1.5 * dt, 22);  // a graph of the step before is then void
       (*backend)->download(*out);
     }
     EXPECT_TRUE(a.displacement == b.displacement) << recorded->name();
@@ -329,6 +340,34 @@ INSTANTIATE_TEST_SUITE_P(
         ResidentCase{"ClusterEverything", "clusters", {"", false, false, true}, small_clouds()},
         ResidentCase{
             "ClusterAdaptiveEverything", "clusters", {"", true, false, true}, small_clouds()},
+        ResidentCase{"MailInclusions",
+                     "blocks",
+                     {"", false, false, true, false, false, true},
+                     large_clouds()},
+        ResidentCase{"ClusterInclusions",
+                     "clusters",
+                     {"", false, false, true, false, false, true},
+                     small_clouds()},
+        ResidentCase{"MailClosed",
+                     "blocks",
+                     {"", false, false, false, true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"MailClosedBesideAdaptive",
+                     "blocks",
+                     {"", false, false, true, true, true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"ClusterClosed",
+                     "clusters",
+                     {"", false, false, false, true},
+                     with_surface(small_clouds(), {1.3, 0.4, 0.6})},
+        ResidentCase{"ClusterClosedBesideAdaptive",
+                     "clusters",
+                     {"", false, false, true, true, true},
+                     with_surface(small_clouds(), {1.3, 0.4, 0.6})},
+        ResidentCase{"ClusterClosedInclusions",
+                     "clusters",
+                     {"", false, false, true, true, false, true},
+                     with_surface(small_clouds(), {1.3, 0.4, 0.6})},
         ResidentCase{"ManyClusters", "clusters", {"", false, false, false}, many_clouds()}),
     [](const auto& test) { return std::string(test.param.name); });
 
@@ -380,7 +419,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"AdaptiveEverything", true, false, true},
                       Case{"Closed", false, false, false, true},
                       Case{"ClosedEverything", false, false, true, true},
-                      Case{"ClosedBesideAdaptive", false, false, true, true, true}),
+                      Case{"ClosedBesideAdaptive", false, false, true, true, true},
+                      Case{"Inclusions", false, false, true, false, false, true}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(CudaSurfels, EqualTheCpus) {

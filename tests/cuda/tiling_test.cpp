@@ -70,7 +70,19 @@ Model two_bodies() {
   return build_model(scene, clouds);
 }
 
+/// A body of three materials and, too far off to be its neighbour, another.
+Model inclusions() {
+  Scene scene = one_body();
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[0].inclusions = {
+      {.select = {.ball = Selection::Ball{{0.5, 0.4, 0.3}, 0.3}}, .material = rubber()},
+      {.select = {.box = Selection::Box{{0.9, -1, -1}, {3, 3, 3}}}, .material = rubber()}};
+  const std::vector<Cloud> clouds{lattice(12, 9, 8, 0.1, 0.2), lattice(5, 6, 7, 0.1, 0.2)};
+  return build_model(scene, clouds);
+}
+
 class Tiling : public ::testing::TestWithParam<Case> {};
+class ResidentSlices : public Tiling {};
 
 TEST_P(Tiling, PlacesEveryPhyxelOnce) {
   const Model model = GetParam().make();
@@ -210,7 +222,7 @@ TEST_P(Tiling, EightLanesNeverWaitForAColumn) {
 }
 
 /// Slices of a tile walk the same neighbours in the same order, in slots of the same columns.
-TEST_P(Tiling, SlicesKeepItsOrder) {
+TEST_P(ResidentSlices, KeepTheOrderOfTheirTile) {
   const Model model = GetParam().make();
   const cuda::Tiling tiling = make_tiling(model);
   const ResidentPlan plan = make_resident_plan(tiling);
@@ -248,6 +260,47 @@ TEST_P(Tiling, SlicesKeepItsOrder) {
   EXPECT_EQ(seen, model.size());
 }
 
+/// Slices that reach each other make a body, whatever their materials; and what a slice sends goes
+/// to the slots of its body's slices that have those phyxels.
+TEST_P(ResidentSlices, ThatReachEachOtherMakeABody) {
+  const Model model = GetParam().make();
+  const cuda::Tiling tiling = make_tiling(model);
+  const ResidentPlan plan = make_resident_plan(tiling);
+  std::map<std::pair<Index, int>, const Slice*> of_rank;
+  std::map<Index, const Slice*> at;
+  int most = 0;
+  for (const Slice& slice : plan.slices) {
+    EXPECT_TRUE(of_rank.emplace(std::pair{slice.body, slice.rank}, &slice).second);
+    at[slice.first_place] = &slice;
+    EXPECT_GE(slice.rank, 0);
+    EXPECT_TRUE(slice.body >= 0 && slice.body < plan.bodies);
+    most = std::max(most, slice.rank + 1);
+  }
+  EXPECT_EQ(plan.most_slices, most);
+  EXPECT_EQ(plan.bodies, static_cast<Index>(model.parts.back().body + 1));
+  std::size_t sent = 0, received = 0;
+  for (const Slice& slice : plan.slices) {
+    const Part& part = model.parts[tiling.part[slice.first_place / tile_size]];
+    EXPECT_EQ(slice.body, part.body);
+    EXPECT_TRUE(slice.rank == 0 || of_rank.contains({slice.body, slice.rank - 1}));
+    for (int slot = slice_size; slot < slice.slots; ++slot) {
+      const Index place = plan.place[slice.first_slot + slot];
+      if (place < 0) continue;
+      ++received;
+      EXPECT_EQ(at.at(place - place % slice_size)->body, slice.body);
+    }
+    for (int k = 0; k < slice.destinations * slice_size; ++k) {
+      const std::uint32_t to = plan.destinations[slice.first_destination + k];
+      if (to == nobody) continue;
+      ++sent;
+      const Slice& other = *of_rank.at({slice.body, static_cast<int>(to >> 16)});
+      EXPECT_EQ(plan.place[other.first_slot + static_cast<int>(to & 0xFFFF)],
+                slice.first_place + k % slice_size);
+    }
+  }
+  EXPECT_EQ(sent, received);
+}
+
 TEST_P(Tiling, IsTheSameOnAnyNumberOfThreads) {
   const Model model = GetParam().make();
   omp_set_num_threads(1);
@@ -263,6 +316,12 @@ INSTANTIATE_TEST_SUITE_P(Models, Tiling,
                          ::testing::Values(Case{"Jittered", jittered}, Case{"Single", single},
                                            Case{"Thread", thread}, Case{"Adaptive", adaptive},
                                            Case{"TwoBodies", two_bodies}),
+                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Models, ResidentSlices,
+                         ::testing::Values(Case{"Jittered", jittered}, Case{"Single", single},
+                                           Case{"Thread", thread}, Case{"Adaptive", adaptive},
+                                           Case{"TwoBodies", two_bodies},
+                                           Case{"Inclusions", inclusions}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(TileLists, AreNotMuchLongerThanTheirNeighbours) {

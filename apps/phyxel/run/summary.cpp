@@ -46,7 +46,8 @@ void Run::say_plan() const {
   fmt::print("{}: {}\n", program_version(),
              scene_.title.empty() ? scene_.file.string() : scene_.title);
   fmt::print("{}", describe_model(scene_, model(), boundary_));
-  fmt::print("  device      {}\n", backend_->name());
+  const std::string why = backend_->path_reason();
+  fmt::print("  device      {}{}\n", backend_->name(), why.empty() ? "" : " (" + why + ")");
   if (ranks().size() > 1) {
     const SharedModel::Shares& shares = shared_.shares();
     fmt::print(

@@ -76,6 +76,8 @@ class Backend {
 
   /// e.g. "cpu, float, 2 threads, 16 lanes".
   virtual std::string name() const = 0;
+  /// Why steps are launched as `name` says, in words; empty where there is no choice.
+  virtual std::string path_reason() const { return {}; }
   /// Phyxels of the model, n; of a share with its ghosts.
   virtual Index size() const = 0;
   /// Threads of the CPU that share the work; 0: it is another device's.

@@ -14,16 +14,16 @@ namespace phyxel::cuda {
 enum class Sent : int { stresses, displacements };
 inline constexpr int kinds_sent = 2;
 
-/// One record's way: from a place here to a place of a peer.
-struct Crossing {
+/// The copy of one record from a place here to a place of a peer.
+struct RemoteCopy {
   Index here, there;
   int peer;
 };
 
-__device__ inline void raise(unsigned* flag, unsigned value) {
+__device__ inline void raise_flag(unsigned* flag, unsigned value) {
   asm volatile("st.release.sys.global.u32 [%0], %1;" ::"l"(flag), "r"(value) : "memory");
 }
-__device__ inline unsigned look_at(const unsigned* flag) {
+__device__ inline unsigned read_flag(const unsigned* flag) {
   unsigned value;
   asm volatile("ld.acquire.sys.global.u32 %0, [%1];" : "=r"(value) : "l"(flag) : "memory");
   return value;
@@ -46,7 +46,7 @@ __device__ inline void wait_for_flags(const Signals& signals, bool measures) {
   if (measures) asm volatile("mov.u64 %0, %globaltimer;" : "=l"(start));
   for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
        p += static_cast<int>(blockDim.x)) {
-    while (static_cast<int>(look_at(signals.here + p) - next) < 0) __nanosleep(50);
+    while (static_cast<int>(read_flag(signals.here + p) - next) < 0) __nanosleep(50);
   }
   __syncthreads();
   if (!measures || threadIdx.x > 0) return;
@@ -56,12 +56,12 @@ __device__ inline void wait_for_flags(const Signals& signals, bool measures) {
 /// By one thread, when all blocks that wait for the exchange have.
 __device__ inline void mark_received(const Signals& signals) { ++*signals.received; }
 
-/// All threads of a block store the records of `crossings` with the peers.
+/// All threads of a block store records with the peers.
 template <class Records>
-__device__ void store(const Records& records, const Records* peers, const Crossing* crossings,
+__device__ void store(const Records& records, const Records* peers, const RemoteCopy* copies,
                       int begin, int end, int stride) {
   for (int k = begin; k < end; k += stride) {
-    const Crossing c = crossings[k];
+    const RemoteCopy c = copies[k];
     peers[c.peer].set(static_cast<std::size_t>(c.there),
                       records.get(static_cast<std::size_t>(c.here)));
   }
@@ -86,16 +86,16 @@ __device__ inline bool tell_if_last(const Signals& signals, unsigned blocks) {
   }
   for (int p = static_cast<int>(threadIdx.x); p < signals.peers;
        p += static_cast<int>(blockDim.x)) {
-    raise(signals.there[p], exchanges);
+    raise_flag(signals.there[p], exchanges);
   }
   return true;
 }
 
 template <class Records>
 __global__ void store_at_peers(const __grid_constant__ Records records, const Records* peers,
-                               const Crossing* crossings, int count,
+                               const RemoteCopy* copies, int count,
                                const __grid_constant__ Signals signals) {
-  store(records, peers, crossings, static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x), count,
+  store(records, peers, copies, static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x), count,
         static_cast<int>(gridDim.x * blockDim.x));
   tell_if_last(signals, gridDim.x);
 }
@@ -106,18 +106,18 @@ static __global__ void wait_for_peers(const __grid_constant__ Signals signals) {
 }
 
 /// A pass that has no ghosts, or whose ghosts are there.
-struct Alone {
+struct NoHalo {
   static __device__ void before(Index /*tile*/) {}
   static __device__ void after(Index /*tile*/) {}
 };
 
 /// A pass of which the first tiles wait for ghosts and store `Records` with the peers.
 template <class Records>
-struct Meeting {
+struct FusedHalo {
   Signals awaited, told;
-  Index tiles;         ///< That meet; at least one.
-  const Index* first;  ///< Of each of them, in `crossings`, shape [tiles + 1].
-  const Crossing* crossings;
+  Index tiles;         ///< Boundary tiles, at least one.
+  const Index* first;  ///< The first copy of each of them, shape [tiles + 1].
+  const RemoteCopy* copies;
   Records own;
   const Records* peers;
   bool waits;  ///< Or the ghosts are there.
@@ -129,7 +129,7 @@ struct Meeting {
   __device__ void after(Index tile) const {
     if (tile >= tiles) return;
     __syncthreads();  // before records of other threads are read
-    store(own, peers, crossings, first[tile] + static_cast<int>(threadIdx.x), first[tile + 1],
+    store(own, peers, copies, first[tile] + static_cast<int>(threadIdx.x), first[tile + 1],
           static_cast<int>(blockDim.x));
     if (tell_if_last(told, static_cast<unsigned>(tiles)) && threadIdx.x == 0 && waits) {
       mark_received(awaited);

@@ -1,4 +1,4 @@
-/// What crosses between the host's arrays, by phyxel and in double, and the fields, by place.
+/// Copies between the host's arrays, by phyxel and in double, and the fields, by place.
 #pragma once
 
 #include "phyxel/types.hpp"
@@ -62,7 +62,7 @@ __global__ void put_state(Fields<Real, StateReal> f, const Index* phyxel_at,
   f.points.set(place, point);
 }
 
-/// And back.
+/// Displacements and velocities by phyxel, out of the fields.
 template <class Real, class StateReal>
 __global__ void take_state(Fields<Real, StateReal> f, const Index* phyxel_at, Vec3d* displacement,
                            Vec3d* velocity) {
