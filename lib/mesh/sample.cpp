@@ -16,14 +16,13 @@
 namespace phyxel {
 namespace {
 
-/// Sample points for each phyxel during relaxation. The more, the less a centroid is off by chance
-/// (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and the more memory is needed;
-/// for a few phyxels, more cost nothing.
+/// Number of sample points for each phyxel during relaxation. More samples give centroids with
+/// less noise (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and take more memory.
 double samples_per_phyxel(Index phyxels) { return std::max(64.0, 20000.0 / phyxels); }
 
 void check_memory(Index phyxels) {
-  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 darts of 40, and 200 in sums,
-  // hashes and results.
+  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 candidates of 40 bytes, and
+  // 200 bytes in sums, hashes and results.
   const double bytes = phyxels * (24 * samples_per_phyxel(phyxels) + 12 * 40 + 200);
   const double memory =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
@@ -35,8 +34,8 @@ void check_memory(Index phyxels) {
   }
 }
 
-/// Refuses sizes whose squares and cubes would leave the range of the numbers in use, or whose
-/// coordinates hold no shape. @returns the surface's extent [m].
+/// Refuses a surface whose size would overflow or underflow when cubed, or whose coordinates are
+/// too coarse for its shape. @returns the surface's extent [m].
 double check_extent(const Surface& surface) {
   constexpr double smallest = 1e-30, largest = 1e31;  // [m]
   Vec3d low = surface.position[surface.triangle[0][0]], high = low;
@@ -88,7 +87,7 @@ void check_request(const Surface& surface, const SampleRequest& request) {
   }
 }
 
-/// Multiplies all lengths by 2^exponent, which rounds nothing.
+/// Multiplies positions by 2^exponent, without rounding.
 void scale(std::vector<Vec3d>& position, int exponent) {
   for (Vec3d& p : position) {
     p = {std::ldexp(p.x, exponent), std::ldexp(p.y, exponent), std::ldexp(p.z, exponent)};
@@ -117,13 +116,13 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
   const double doubtful = static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
   if (doubtful <= 0.4) return;
   throw InputError(fmt::format(
-      "the surface is too open to tell inside from outside: for {:.0f}% of the points inside, the "
-      "winding number is not near a whole number ({})",
+      "the surface is too open to tell inside from outside: {:.0f}% of the interior points have an "
+      "ambiguous winding number ({})",
       100 * doubtful, defects.describe()));
 }
 
-/// Each phyxel's share of `volume`: of the sample points, on voxels half as large as those of the
-/// relaxation, it gets those nearest to it.
+/// Share of each phyxel in the volume: the number of sample points nearest to it, on voxels half as
+/// large as those of the relaxation.
 std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
                                    double voxel, double spacing, std::uint64_t seed,
                                    double& sampled_volume) {
@@ -143,13 +142,13 @@ std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vect
       &stage);
   sampled_volume = static_cast<double>(tally.samples) * std::pow(0.5 * voxel, 3);
   std::vector<double> share(site.size());
-  // A phyxel too small to be seen still has a place of its own: half a sample's worth.
+  // A phyxel without sample points gets the volume of half a sample.
   for (std::size_t i = 0; i < site.size(); ++i) share[i] = std::max(0.5, double(count[i]));
   stage.finish();
   return share;
 }
 
-/// Mean and smallest distance to the nearest phyxel; zero for a single one.
+/// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
 void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& report) {
   const auto n = static_cast<std::ptrdiff_t>(site.size());
   if (n < 2) return;
@@ -164,7 +163,7 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
       nearest2 = std::min(nearest2, dot(d, d));
     };
     const double cell = hash.cell_size();
-    // With rings 0 to r looked at, nothing nearer than r cells has been missed.
+    // After rings 0 to r, each site nearer than r cells has been visited.
     int ring = 0;
     for (; ring < 4; ++ring) {
       hash.visit_ring(site[i], ring, compare);
@@ -177,7 +176,8 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
 }
 
-/// A few samples inside an overlap, or beside a fold, are no matter.
+/// Refuses phyxels on a surface that is open or overlaps itself. A few samples inside an overlap
+/// or beside a fold are tolerated.
 void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::string& defects) {
   constexpr double allowed = 1e-3;
   const double repeated = static_cast<double>(tally.repeated) / static_cast<double>(tally.samples);
@@ -197,7 +197,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   found.defects = inspect_surface(surface);
   const std::string defects = found.defects.describe();
 
-  // Worked on at a size of one to two, so that floats hold whatever is derived from it.
+  // The surface is scaled to a size of one to two, the range in which float offsets are accurate.
   const int exponent = -std::ilogb(check_extent(surface));
   Cloud cloud;
   cloud.surface = surface;
@@ -234,8 +234,8 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
       static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
   if (!closed) {
     found.warnings.push_back(fmt::format(
-        "the surface is not closed ({}); for {:.2g}% of the points inside that is a matter of "
-        "opinion",
+        "the surface is not closed ({}); {:.2g}% of the interior points have an ambiguous winding "
+        "number",
         defects, 100 * found.doubtful_fraction));
   }
 
@@ -261,7 +261,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   SampledVoronoi voronoi(std::move(blocks));
   voronoi.relax(cloud.position, spacing, request.relaxations, on_surface);
 
-  // Where the body is thin or hollow, the centroid of a cell may lie outside.
+  // In a thin or hollow body, the centroid of a cell may lie outside.
   std::vector<std::uint8_t> outside(cloud.position.size());
   const auto n = static_cast<std::ptrdiff_t>(cloud.position.size());
 #pragma omp parallel for schedule(dynamic, 256)
@@ -274,13 +274,13 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
 
   double sampled_volume = 0;
   cloud.volume = voronoi_shares(sampler, cloud.position, voxel, spacing, seed + 2, sampled_volume);
-  // The divergence theorem counts space that the surface covers twice, twice.
+  // The divergence theorem counts regions with a winding number of two twice.
   const bool exact = closed && tally.repeated == 0;
   found.volume = exact ? enclosed_volume(cloud.surface) : sampled_volume;
   if (tally.repeated > 0) {
     found.warnings.push_back(fmt::format(
-        "the surface overlaps itself: {:.2g}% of the inside lies in it more than once, and counts "
-        "once",
+        "the surface overlaps itself: {:.2g}% of the inside has a winding number above 1, and "
+        "counts once",
         100 * static_cast<double>(tally.repeated) / static_cast<double>(tally.samples)));
   }
   const double total = std::accumulate(cloud.volume.begin(), cloud.volume.end(), 0.0);
