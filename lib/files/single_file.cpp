@@ -1,4 +1,4 @@
-/// A whole trajectory in one temporal VTKHDF file.
+/// Export of a trajectory to one temporal VTKHDF file.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,14 +20,14 @@ namespace fs = std::filesystem;
 const std::string grid = "/VTKHDF/";
 const std::string point_data = "/VTKHDF/PointData/";
 
-/// An array of a frame with the type and the width it has there.
+/// An array of a frame, with its type and its number of columns.
 struct Field {
   std::string name;
   bool integer = false;
   std::size_t columns = 0;
 };
 
-/// Adds an array that has one frame's rows behind another's. Each is read when it is written.
+/// Adds an array that concatenates the rows of the frames. Each frame is read when it is written.
 template <class T>
 void gather(Hdf5Writer& out, const std::string& path, const std::vector<SeriesEntry>& entries,
             std::size_t points, std::size_t columns) {
@@ -87,7 +87,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
     times.push_back(entry.time);
   }
 
-  // In memory but for the arrays of all frames, so that a full disk never meets HDF5.
+  // In memory except for the concatenated arrays, so that HDF5 never writes to a full disk.
   Hdf5Writer out;
   out.group("/VTKHDF");
   const std::int64_t version[] = {2, 0};
@@ -117,7 +117,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.attribute("/phyxel", "title", first.text_attribute("/phyxel", "title"));
   out.text("/phyxel/scene", first.text("/phyxel/scene"));
 
-  // Parts, cells and connectivity stay where they are in every step: stored once.
+  // Parts, cells and connectivity are the same in every step, and are stored once.
   const std::vector<std::int64_t> zeros(steps, 0), ones(steps, 1);
   out.group("/VTKHDF/Steps");
   out.attribute("/VTKHDF/Steps", "NSteps", static_cast<std::int64_t>(steps));

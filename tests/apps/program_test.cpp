@@ -289,7 +289,7 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
       {{"run", "beam.toml", "--threads", "0"}, "--threads 0: out of range: allowed 1 to"},
       {{"run", "beam.toml", "--step", "nan"}, "--step nan: out of range: allowed > 0"},
       {{"run", "beam.toml", "--out", "/proc/phyxel"}, "/proc/phyxel: the output folder cannot"},
-      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5: the output folder cannot be made"},
+      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5: the output folder cannot be created"},
       {{"sample", "missing.obj", "--phyxels", "10", "--out", "a.h5"}, "missing.obj: no such file"},
       {{"sample", "empty.obj", "--phyxels", "10", "--out", "a.h5"}, "empty.obj: the file is empty"},
       {{"sample", "nan.obj", "--phyxels", "10", "--out", "a.h5"},
