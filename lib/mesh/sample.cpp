@@ -188,45 +188,88 @@ void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::st
       closed ? "overlaps itself" : fmt::format("is not closed ({})", defects)));
 }
 
+/// A surface ready for sampling.
+struct PreparedSurface {
+  Surface surface;           ///< Scaled to a size of one to two, with its triangles turned outward.
+  int exponent;              ///< The scale is 2^exponent.
+  SurfaceTopology topology;  ///< Connectivity of the scaled surface.
+  std::string defects;       ///< Description of the original surface's defects.
+};
+
+/// Inspects, scales, cleans and orients a surface, and reports its defects and each change.
+PreparedSurface prepare(const Surface& surface, SampleReport& found) {
+  const Stage inspecting("inspecting the surface");
+  found.defects = inspect_surface(surface);
+  // The surface is scaled to a size of one to two, the range in which float offsets are accurate.
+  PreparedSurface made{.surface = surface,
+                       .exponent = -std::ilogb(check_extent(surface)),
+                       .topology = {},
+                       .defects = found.defects.describe()};
+  scale(made.surface.position, made.exponent);
+  if (found.defects.unused_vertices > 0) {
+    drop_unused_vertices(made.surface);
+    found.warnings.push_back(fmt::format("{} vertices that no triangle uses were left out",
+                                         found.defects.unused_vertices));
+  }
+  for (std::string& done : orient(made.surface)) found.warnings.push_back(std::move(done));
+  made.surface.normal = vertex_normals(made.surface.position, made.surface.triangle);
+  made.topology = connect(made.surface);
+  return made;
+}
+
+/// Adds to `site` the phyxels that lie on the surface, if the request and the surface allow them.
+/// @param spacing cube root of the volume of a phyxel [m], adjusted to the phyxels on the surface
+void place_on_surface(const PreparedSurface& prepared, const SampleTally& tally, double volume,
+                      const SampleRequest& request, std::vector<Vec3d>& site, double& spacing,
+                      SampleReport& found) {
+  if (!request.on_surface.value_or(true)) return;
+  try {
+    refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
+    SurfaceSites sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels,
+                                  request.seed + 3, request.relaxations);
+    site = std::move(sites.position);
+    spacing = sites.spacing;
+  } catch (const InputError& error) {
+    if (request.on_surface) throw;
+    found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
+  }
+}
+
+/// Moves sites that relaxation has left outside to a sample point of their cells: in a thin or
+/// hollow body, the centroid of a cell may lie outside. The first `fixed` sites stay.
+void bring_inside(const InsideSampler& sampler, SampledVoronoi& voronoi, std::vector<Vec3d>& site,
+                  double spacing, std::size_t fixed) {
+  std::vector<std::uint8_t> outside(site.size());
+  const auto n = static_cast<std::ptrdiff_t>(site.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
+    outside[i] = !sampler.inside(site[i]);
+  }
+  if (std::count(outside.begin(), outside.end(), 1) > 0) {
+    voronoi.snap(site, spacing, outside, fixed);
+  }
+}
+
 }  // namespace
 
 Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
   check_request(surface, request);
   SampleReport found;
-  Stage inspecting("inspecting the surface");
-  found.defects = inspect_surface(surface);
-  const std::string defects = found.defects.describe();
+  PreparedSurface prepared = prepare(surface, found);
+  const bool closed = prepared.topology.closed;
+  const InsideSampler sampler(prepared.surface, closed);
 
-  // The surface is scaled to a size of one to two, the range in which float offsets are accurate.
-  const int exponent = -std::ilogb(check_extent(surface));
-  Cloud cloud;
-  cloud.surface = surface;
-  scale(cloud.surface.position, exponent);
-  if (found.defects.unused_vertices > 0) {
-    drop_unused_vertices(cloud.surface);
-    found.warnings.push_back(fmt::format("{} vertices that no triangle uses were left out",
-                                         found.defects.unused_vertices));
-  }
-  for (std::string& done : orient(cloud.surface)) found.warnings.push_back(std::move(done));
-  cloud.surface.normal = vertex_normals(cloud.surface.position, cloud.surface.triangle);
-  const SurfaceTopology topology = connect(cloud.surface);
-  const bool closed = topology.closed;
-  const InsideSampler sampler(cloud.surface, closed);
-  inspecting.finish();
-
-  const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
   const std::uint64_t seed = request.seed;
   InsideFilling filling;
   fill_inside(sampler,
               {.phyxels = request.phyxels,
-               .samples = wanted,
+               .samples = request.phyxels * samples_per_phyxel(request.phyxels),
                .seed = seed,
-               .triangles = cloud.surface.triangle.size(),
-               .volume = closed ? std::optional(enclosed_volume(cloud.surface)) : std::nullopt,
-               .exponent = exponent,
-               .defects = defects},
+               .triangles = prepared.surface.triangle.size(),
+               .volume = closed ? std::optional(enclosed_volume(prepared.surface)) : std::nullopt,
+               .exponent = prepared.exponent,
+               .defects = prepared.defects},
               filling);
-  std::vector<SampleBlock>& blocks = filling.blocks;
   const SampleTally& tally = filling.tally;
   const double voxel = filling.voxel;
   refuse_if_too_open(tally, found.defects, closed);
@@ -236,47 +279,27 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
     found.warnings.push_back(fmt::format(
         "the surface is not closed ({}); {:.2g}% of the interior points have an ambiguous winding "
         "number",
-        defects, 100 * found.doubtful_fraction));
+        prepared.defects, 100 * found.doubtful_fraction));
   }
 
+  Cloud cloud;
   const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
   double spacing = std::cbrt(rough_volume / request.phyxels);
-  if (request.on_surface.value_or(true)) {
-    try {
-      refuse_surface_phyxels(tally, closed, defects);
-      SurfaceSites sites = sites_on(cloud.surface, topology, rough_volume, request.phyxels,
-                                    seed + 3, request.relaxations);
-      cloud.position = std::move(sites.position);
-      spacing = sites.spacing;
-    } catch (const InputError& error) {
-      if (request.on_surface) throw;
-      found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
-    }
-  }
+  place_on_surface(prepared, tally, rough_volume, request, cloud.position, spacing, found);
   const std::size_t on_surface = cloud.position.size();
   found.on_surface = static_cast<Index>(on_surface);
-  const std::vector<Vec3d> within =
-      throw_darts(blocks, request.phyxels - found.on_surface, spacing, seed + 1, cloud.position);
+  const std::vector<Vec3d> within = throw_darts(filling.blocks, request.phyxels - found.on_surface,
+                                                spacing, seed + 1, cloud.position);
   cloud.position.insert(cloud.position.end(), within.begin(), within.end());
-  SampledVoronoi voronoi(std::move(blocks));
+  SampledVoronoi voronoi(std::move(filling.blocks));
   voronoi.relax(cloud.position, spacing, request.relaxations, on_surface);
-
-  // In a thin or hollow body, the centroid of a cell may lie outside.
-  std::vector<std::uint8_t> outside(cloud.position.size());
-  const auto n = static_cast<std::ptrdiff_t>(cloud.position.size());
-#pragma omp parallel for schedule(dynamic, 256)
-  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(on_surface); i < n; ++i) {
-    outside[i] = !sampler.inside(cloud.position[i]);
-  }
-  if (std::count(outside.begin(), outside.end(), 1) > 0) {
-    voronoi.snap(cloud.position, spacing, outside, on_surface);
-  }
+  bring_inside(sampler, voronoi, cloud.position, spacing, on_surface);
 
   double sampled_volume = 0;
   cloud.volume = voronoi_shares(sampler, cloud.position, voxel, spacing, seed + 2, sampled_volume);
   // The divergence theorem counts regions with a winding number of two twice.
   const bool exact = closed && tally.repeated == 0;
-  found.volume = exact ? enclosed_volume(cloud.surface) : sampled_volume;
+  found.volume = exact ? enclosed_volume(prepared.surface) : sampled_volume;
   if (tally.repeated > 0) {
     found.warnings.push_back(fmt::format(
         "the surface overlaps itself: {:.2g}% of the inside has a winding number above 1, and "
@@ -287,8 +310,10 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   for (double& v : cloud.volume) v *= found.volume / total;
 
   measure_gaps(cloud.position, spacing, found);
+  cloud.surface = std::move(prepared.surface);
   order_along_curve(cloud);
 
+  const int exponent = prepared.exponent;
   scale(cloud.surface.position, -exponent);
   scale(cloud.position, -exponent);
   for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);
