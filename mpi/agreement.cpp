@@ -42,7 +42,7 @@ void MpiCommunicator::collectively(const std::function<void()>& work) const {
       broadcast(std::vector<char>(message.begin(), message.end()), from);
   const int agreed = broadcast(std::vector<int>{code}, from).front();
   message.assign(words.begin(), words.end());
-  // What fails everywhere is nobody's own.
+  // An error of all ranks needs no rank number.
   if (failures < size_) message = fmt::format("rank {} of {}: {}", from, size_, message);
   throw AgreedError(static_cast<ExitCode>(agreed), message);
 }

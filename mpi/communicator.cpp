@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <mpi.h>
 #if __has_include(<mpi-ext.h>)
-#include <mpi-ext.h>  // Open MPI's: whether it takes device memory
+#include <mpi-ext.h>  // Open MPI's query of CUDA support
 #endif
 
 #include <algorithm>
@@ -26,7 +26,7 @@ void check_mpi(int code, const char* call) {
 
 namespace {
 
-/// Counts of MPI are ints, and some networks fail above: larger messages go in pieces.
+/// Largest message [bytes]: MPI's counts are ints, so larger messages are split.
 constexpr std::size_t most_bytes = std::size_t{1} << 30;
 
 template <class T>
@@ -45,7 +45,7 @@ void in_pieces(std::size_t bytes, Call&& call) {
   }
 }
 
-/// MPI is called by one thread, beside which others run: OpenMP's, and the writer's.
+/// The required thread level: one thread calls MPI, while those of OpenMP and of the writer run.
 constexpr int needed_level = MPI_THREAD_FUNNELED;
 
 const char* name_of_level(int level) {
@@ -61,27 +61,28 @@ const char* name_of_level(int level) {
   }
 }
 
-/// @throws Error naming the level that MPI runs with and the one that is needed
+/// Checks MPI's thread level and that this is the main thread.
+/// @throws Error naming the level that MPI runs with and the one that is required
 void check_threads() {
   int level = 0, is_main = 0;
   PHYXEL_MPI_CALL(MPI_Query_thread(&level));
   if (level < needed_level) {
     throw Error(ExitCode::bad_input,
-                fmt::format("MPI runs with the thread level {}: needed is {} or a higher one, by "
+                fmt::format("MPI runs with the thread level {}; allowed: {} or a higher one, by "
                             "MPI_Init_thread",
                             name_of_level(level), name_of_level(needed_level)));
   }
   PHYXEL_MPI_CALL(MPI_Is_thread_main(&is_main));
   if (level < MPI_THREAD_SERIALIZED && !is_main) {
-    throw Error(ExitCode::bad_input,
-                fmt::format("MPI runs with the thread level {}: allowed is the thread that has "
-                            "started MPI, and no other",
-                            name_of_level(level)));
+    throw Error(
+        ExitCode::bad_input,
+        fmt::format("MPI runs with the thread level {}; allowed: calls from the thread that "
+                    "has started MPI",
+                    name_of_level(level)));
   }
 }
 
-/// The caller's communicator, duplicated. Errors of the duplicate, and of no other communicator,
-/// come back as return values.
+/// Duplicates the caller's communicator. Errors of the duplicate alone are returned as codes.
 MPI_Comm duplicate_of(MPI_Comm callers) {
   MPI_Comm own = MPI_COMM_NULL;
   PHYXEL_MPI_CALL(MPI_Comm_dup(callers, &own));
@@ -108,14 +109,13 @@ MpiCommunicator::MpiCommunicator(CommunicatorHandle callers) : native_(std::make
   MPI_Initialized(&running);
   if (!running) {
     throw Error(ExitCode::bad_input,
-                "a communicator was given, but MPI does not run: allowed is one of a program that "
-                "has called MPI_Init_thread");
+                "a communicator was given, but MPI does not run; allowed: after MPI_Init_thread");
   }
   check_threads();
   MPI_Comm all = MPI_Comm_f2c(callers.fortran);
   if (all == MPI_COMM_NULL) {
     throw Error(ExitCode::bad_input,
-                "MPI_COMM_NULL was given: allowed are communicators that this rank belongs to");
+                "MPI_COMM_NULL was given; allowed: a communicator to which this rank belongs");
   }
   native_->all = duplicate_of(all);
   describe_hosts();
@@ -129,7 +129,7 @@ void MpiCommunicator::describe_hosts() {
   PHYXEL_MPI_CALL(MPI_Comm_split_type(all, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host));
   PHYXEL_MPI_CALL(MPI_Comm_rank(host, &host_rank_));
   PHYXEL_MPI_CALL(MPI_Comm_size(host, &host_size_));
-  int first = rank_;  // of this host
+  int first = rank_;  // becomes the first rank of this host
   PHYXEL_MPI_CALL(MPI_Bcast(&first, 1, MPI_INT, 0, host));
   hosts_.resize(static_cast<std::size_t>(size_));
   PHYXEL_MPI_CALL(MPI_Allgather(&first, 1, MPI_INT, hosts_.data(), 1, MPI_INT, all));
@@ -154,7 +154,7 @@ void MpiCommunicator::barrier() const {
   if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(native_->all));
 }
 
-// MPI may add in any order; a sum of numbers that were gathered has one.
+// MPI may add in any order; gathered numbers are summed in the order of ranks.
 double MpiCommunicator::sum(double value) const {
   const std::vector<double> all = gathered(std::span<const double>(&value, 1));
   return std::accumulate(all.begin(), all.end(), 0.0);
@@ -236,7 +236,7 @@ void MpiCommunicator::exchange(const std::vector<std::span<const std::byte>>& se
     });
   }
   copy_bytes(send.at(rank_), receive.at(rank_));
-  if (size_ == 1) return;  // MPI may not run
+  if (size_ == 1) return;  // MPI may not have been started
   PHYXEL_MPI_CALL(
       MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
 }
@@ -285,7 +285,7 @@ bool mpi_takes_device_memory() {
 #ifdef MPIX_CUDA_AWARE_SUPPORT
   return MPIX_Query_cuda_support() != 0;
 #else
-  return false;  // or it would have a word for it
+  return false;  // an MPI with CUDA support would define the query
 #endif
 }
 
@@ -294,7 +294,7 @@ std::string mpi_description() {
   int length = 0;
   MPI_Get_library_version(text, &length);
   std::string name(text);
-  name = name.substr(0, name.find_first_of(",\n"));  // Open MPI goes on about who built it
+  name = name.substr(0, name.find_first_of(",\n"));  // Open MPI appends the packager's name
 #ifdef MPIX_CUDA_AWARE_SUPPORT
   name += mpi_takes_device_memory() ? ", CUDA-aware" : ", not CUDA-aware";
 #endif

@@ -1,5 +1,5 @@
-/// The ranks of a run over MPI: one, unless mpirun or srun has started several. No MPI header is
-/// needed to include this.
+/// The communicator of a run over MPI: one rank, unless mpirun or srun has started several. This
+/// header does not include MPI's.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +20,15 @@
 
 namespace phyxel {
 
-/// What is said where std::bad_alloc ends a program.
+/// The message where std::bad_alloc ends a program.
 inline constexpr const char* out_of_memory =
     "out of memory: fewer phyxels, or a machine with more memory, are needed";
 
-/// Values for each rank, or from each: one rank's after the other's.
+/// Values for each rank, or from each rank, concatenated in the order of ranks.
 template <class T>
 struct ByRank {
   Bulk<T> values;
-  std::vector<std::size_t> begin{0};  ///< Of each rank's, and where all end; shape [ranks + 1].
+  std::vector<std::size_t> begin{0};  ///< First value of each rank, and the end, shape [ranks + 1].
 
   std::span<const T> of(int rank) const {
     const auto r = static_cast<std::size_t>(rank);
@@ -36,44 +36,43 @@ struct ByRank {
   }
 };
 
-/// Tags of messages between two ranks. Messages of a caller never meet them: they travel in a
-/// duplicate of its communicator.
+/// Tags of messages between two ranks, in a duplicate of the caller's communicator.
 enum class Tag : int { alltoallv = 1, halo = 2 };
 
-/// The ranks of a run, in a duplicate of an MPI communicator: messages, tags and errors of the
-/// caller's own are not touched. Every function but `rank`, `size`, `host_of` and `abort` is
-/// collective: all ranks call it, in the same order. The thread that constructs it calls it.
+/// A duplicate of an MPI communicator, so that the caller's messages, tags and error handlers are
+/// not touched. Functions are collective (all ranks call them in the same order), except `rank`,
+/// `size`, `host_of` and `abort`. Only the thread that constructed the object may call them.
 class MpiCommunicator final : public Communicator {
  public:
-  /// One rank, without MPI.
+  /// Constructs a communicator of one rank, without MPI.
   MpiCommunicator() = default;
-  /// All ranks of the program, MPI_COMM_WORLD. Starts MPI unless it runs.
-  /// @throws Error if MPI does not start or supports fewer threads than are needed, or if there are
-  ///   several ranks in a build without it
+  /// Duplicates MPI_COMM_WORLD. Starts MPI unless it runs.
+  /// @throws Error if MPI does not start, if its thread level is too low, or if there are several
+  ///   ranks in a build without MPI
   MpiCommunicator(int& argc, char**& argv);
-  /// The ranks of a caller's communicator. Collective over it; MPI must run.
-  /// @throws Error naming both levels if MPI was started for fewer threads than are needed
+  /// Duplicates a caller's communicator. Collective over it; MPI must run.
+  /// @throws Error naming both levels if MPI's thread level is too low
   explicit MpiCommunicator(CommunicatorHandle callers);
-  /// Local. MPI keeps the duplicate until it ends, unless `close` has released it.
+  /// Local. Without `close`, the duplicate lives until MPI ends.
   ~MpiCommunicator() override;
   MpiCommunicator(const MpiCommunicator&) = delete;
   MpiCommunicator& operator=(const MpiCommunicator&) = delete;
 
   /// Releases the duplicate, and ends MPI if the constructor has started it. Waits for messages
-  /// whose `Transfers` are gone. No other function may be called after it.
+  /// whose `Transfers` have been destroyed. No other function may be called afterwards.
   void close();
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-  /// Ranks of this host, and which of them this is: for the choice of a GPU.
+  /// Number of ranks on this host, by which a GPU is chosen.
   int host_size() const { return host_size_; }
-  int host_rank() const { return host_rank_; }
-  /// Ranks of one host have the same number, whatever it is.
+  int host_rank() const { return host_rank_; }  ///< Number of this rank among them.
+  /// A number of the rank's host, which ranks of one host share.
   int host_of(int rank) const { return hosts_[rank]; }
 
   void barrier() const;
 
-  /// Over all ranks, in the order of ranks, so that every run gets the same bits.
+  /// Sum over the ranks, in their order, so that each run gets the same bits.
   double sum(double value) const;
   std::int64_t sum(std::int64_t value) const;
   double largest(double value) const override;
@@ -81,15 +80,15 @@ class MpiCommunicator final : public Communicator {
   double smallest(double value) const override;
   std::int64_t smallest(std::int64_t value) const;
 
-  /// Element by element, in place.
+  /// Element-wise sum over the ranks, in place.
   void add(std::span<std::int64_t> values) const override;
 
-  /// The values of all ranks, one after the other, on every rank.
+  /// The values of all ranks, concatenated, on each rank.
   template <class T>
   std::vector<T> gathered(std::span<const T> values) const {
     return from_bytes<T>(gathered_bytes(std::as_bytes(values)));
   }
-  /// `values` of rank `from`, on every rank.
+  /// The values of rank `from`, on each rank.
   template <class T>
   std::vector<T> broadcast(std::vector<T> values, int from = 0) const {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -122,7 +121,7 @@ class MpiCommunicator final : public Communicator {
     exchange(out, in);
     return received;
   }
-  /// The same for large arrays, each one array with the offsets of the ranks.
+  /// All-to-all exchange of large arrays, each with the offsets of the ranks.
   template <class T>
   ByRank<T> alltoallv(const ByRank<T>& send) const {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -145,13 +144,12 @@ class MpiCommunicator final : public Communicator {
     return received;
   }
 
-  /// Does the work of this rank, which must not communicate; then all agree how it went.
-  /// @throws AgreedError on every rank if it threw on any, with the message and the exit code of
-  /// the
-  ///   first rank that failed; what it threw, if there is one rank
+  /// Runs `work`, which must not communicate, on each rank, and then agrees on the outcome.
+  /// @throws AgreedError on each rank if `work` threw on any, with the message and the exit code of
+  ///   the first rank that failed; with one rank, what `work` threw
   void collectively(const std::function<void()>& work) const;
 
-  /// `make()`, which must not communicate, on every rank. @throws AgreedError as `collectively`
+  /// Returns `make()`, which must not communicate. @throws AgreedError as `collectively`
   template <class Make>
   auto agreed(Make&& make) const {
     std::optional<decltype(make())> made;
@@ -159,10 +157,10 @@ class MpiCommunicator final : public Communicator {
     return std::move(*made);
   }
 
-  /// Ends all ranks at once, for errors that no rank but this knows of.
+  /// Ends all ranks at once, for an error that other ranks cannot detect.
   [[noreturn]] void abort(ExitCode code) const;
 
-  /// The duplicate, for those who include mpi/native.hpp; null without MPI.
+  /// The duplicate, for files that include mpi/native.hpp; null without MPI.
   struct Native;
   const std::shared_ptr<Native>& native() const { return native_; }
 
@@ -177,45 +175,46 @@ class MpiCommunicator final : public Communicator {
   }
   std::vector<std::byte> gathered_bytes(std::span<const std::byte> bytes) const;
   void broadcast_bytes(std::span<std::byte> bytes, int from) const;
-  /// Sends numbers[r] to rank r and returns the number received from each rank.
+  /// Sends numbers[r] to rank r, and returns the number received from each rank.
   std::vector<std::int64_t> alltoall(const std::vector<std::int64_t>& numbers) const;
-  /// Both sides know the lengths.
+  /// Exchanges messages whose lengths both sides know.
   void exchange(const std::vector<std::span<const std::byte>>& send,
                 const std::vector<std::span<std::byte>>& receive) const;
 
   int rank_ = 0, size_ = 1, host_rank_ = 0, host_size_ = 1;
-  std::vector<int> hosts_{0};  // of each rank
+  std::vector<int> hosts_{0};  // host number of each rank
   std::shared_ptr<Native> native_;
 };
 
-/// Whether mpirun, srun or another launcher has started this program as one of several.
+/// True if mpirun, srun or another launcher has started this program as one of several ranks.
 bool launched_as_rank();
 
-/// Whether messages may be in a GPU's memory, as the MPI library says that runs.
+/// True if the MPI library reports that messages may be in a GPU's memory.
 bool mpi_takes_device_memory();
 
-/// e.g. "Open MPI v4.1.4, not CUDA-aware", or that there is none.
+/// Description of the MPI library, e.g. "Open MPI v4.1.4, not CUDA-aware".
 std::string mpi_description();
 
-/// Messages under way between this rank and others, whose lengths both sides know. Not collective.
+/// Non-blocking messages between this rank and others, whose lengths both sides know. Not
+/// collective.
 class Transfers {
  public:
   Transfers(const MpiCommunicator& ranks, Tag tag);
-  /// Local. Messages that are still under way are left to the communicator, and with them the
-  /// memory that `keep` has named: no active request is freed.
+  /// Local. Active requests, and the memory given to `keep`, are handed to the communicator, which
+  /// completes them.
   ~Transfers();
   Transfers(const Transfers&) = delete;
   Transfers& operator=(const Transfers&) = delete;
 
-  /// Starts to receive a message. The bytes must not be touched until `wait` has returned.
+  /// Starts to receive a message. `bytes` must not be accessed until `wait` has returned.
   void receive(int from, std::span<std::byte> bytes);
-  /// Starts to send a message; likewise.
+  /// Starts to send a message. `bytes` must not be changed until `wait` has returned.
   void send(int to, std::span<const std::byte> bytes);
-  /// The owner of the memory that messages are received into and sent from.
+  /// Keeps the owner of the messages' memory alive until the messages are complete.
   void keep(std::shared_ptr<void> memory);
-  /// Lets MPI work on the messages. Many an MPI moves large ones in its calls alone.
+  /// Lets MPI make progress: many MPI libraries transfer large messages only during calls.
   void progress();
-  /// Waits until all messages have arrived, here and there.
+  /// Waits until all messages have been sent and received.
   void wait();
 
  private:

@@ -7,7 +7,7 @@
 
 namespace phyxel {
 
-/// On all threads. @param to of the same length
+/// Copies bytes on all threads. @param to must have the same length
 inline void copy_bytes(std::span<const std::byte> from, std::span<std::byte> to) {
   constexpr std::size_t piece = std::size_t{4} << 20;
 #pragma omp parallel for schedule(static)

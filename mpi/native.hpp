@@ -1,4 +1,4 @@
-/// The MPI communicator behind a `MpiCommunicator`, for the files that call MPI.
+/// The MPI communicator of an `MpiCommunicator`, for files that call MPI.
 #pragma once
 
 #include <mpi.h>
@@ -13,8 +13,8 @@ namespace phyxel {
 
 struct MpiCommunicator::Native {
   MPI_Comm all = MPI_COMM_NULL;  ///< The duplicate; null once closed.
-  bool started_here = false;     ///< True if MPI was started for it.
-  /// Messages under way whose `Transfers` are gone, and the memory that they are in.
+  bool started_here = false;     ///< True if the constructor started MPI.
+  /// Active requests whose `Transfers` were destroyed, with the owner of their memory.
   struct Left {
     std::vector<MPI_Request> requests;
     std::shared_ptr<void> memory;
@@ -22,7 +22,7 @@ struct MpiCommunicator::Native {
   std::list<Left> left;
 };
 
-/// @throws Error naming the call
+/// Checks MPI's return code. @throws Error naming the call
 void check_mpi(int code, const char* call);
 #define PHYXEL_MPI_CALL(call) check_mpi(call, #call)
 

@@ -13,7 +13,8 @@
 namespace phyxel {
 namespace {
 
-/// One that all ranks have open. It is not closed by itself: after an error that would hang.
+/// A file that all ranks have open. The destructor does not close it: after an error that would
+/// hang.
 class SharedFile {
  public:
   SharedFile(const MpiCommunicator& ranks, const std::string& file, const std::string& path)
@@ -62,10 +63,9 @@ class SharedFile {
   void demand(bool good) const {
     if (ranks_.smallest(std::int64_t{good}) == 1) return;
     if (ranks_.rank() == 0) {
-      throw OutputError(
-          fmt::format("{}: {} could not be written by all ranks together", name_, path_));
+      throw OutputError(fmt::format("{}: {} could not be written collectively", name_, path_));
     }
-    ranks_.barrier();  // until the first rank ends all
+    ranks_.barrier();  // waits until the first rank ends all
   }
 
   const MpiCommunicator& ranks_;
@@ -79,12 +79,11 @@ bool can_write_collectively() { return H5open() >= 0; }
 
 void write_collectively(const MpiCommunicator& ranks, const std::string& file,
                         const FileArray& array, Index length, const RowsOf& rows) {
-  // Or else HDF5 would hang: a rank that cannot open it leaves the others waiting.
+  // Checked before HDF5 opens the file, which would hang if one rank could not.
   ranks.collectively([&] {
     if (::access(file.c_str(), R_OK | W_OK) == 0) return;
     throw OutputError(fmt::format(
-        "{}: cannot be opened by all ranks: allowed are folders on a file system that all see",
-        file));
+        "{}: cannot be opened by all ranks; allowed: a folder on a shared file system", file));
   });
   SharedFile out(ranks, file, array.path);
   const std::size_t width = width_of(array.terms[0]);

@@ -1,4 +1,4 @@
-/// Arrays of one HDF5 file, written by all ranks at once.
+/// Collective writing of the arrays of an HDF5 file.
 #pragma once
 
 #include <cstddef>
@@ -11,18 +11,19 @@
 
 namespace phyxel {
 
-/// Whether HDF5 is a parallel one. Then it starts here, if it has not yet, and talks to MPI.
+/// True if HDF5 is parallel. HDF5, which calls MPI, is then initialised unless it was before.
 bool can_write_collectively();
 
-/// What each rank writes of an array next: its values, one row after the other. Collective.
+/// Returns the rows that this rank writes next, row by row, from the range of each rank.
+/// Collective.
 using RowsOf = std::function<std::vector<double>(std::span<const RowRange> of_ranks)>;
 
-/// Writes an array whose place is taken on the disk, since MPI-IO may hang on a full one; each rank
-/// takes stretches of at most `length` rows, one after the other. Collective.
-/// @param file must be laid out; what tells where arrays are may be changed, and is to be restored
-/// @throws AgreedError if a rank does not see it; OutputError on the first rank, whereupon it must
-/// end all: a parallel file that could not
-///   be written cannot be closed
+/// Writes an array whose disk space is allocated, since MPI-IO may hang on a full disk. Each rank
+/// writes ranges of at most `length` rows, one after the other. Collective.
+/// @param file must have its layout, which HDF5 may change and the caller must restore
+/// @throws AgreedError if a rank cannot open the file
+/// @throws OutputError on the first rank, which must then end all ranks: a parallel file that could
+///   not be written cannot be closed
 void write_collectively(const MpiCommunicator& ranks, const std::string& file,
                         const FileArray& array, Index length, const RowsOf& rows);
 

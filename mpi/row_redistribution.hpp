@@ -1,5 +1,5 @@
-/// Redistribution of rows: the values of a share's phyxels, which each rank has in its own order,
-/// to ranks that want ranges of the whole model's, and back.
+/// Redistribution of rows: from shares, which have the values of their phyxels in their own order,
+/// to ranges of the whole model's rows, and back.
 #pragma once
 
 #include <functional>
@@ -13,34 +13,33 @@
 
 namespace phyxel {
 
-/// Phyxels, or surfels, [begin, end) of the whole model.
+/// Range [begin, end) of global ids of phyxels or surfels.
 struct RowRange {
   Index begin = 0, end = 0;
 };
 
 class RowRedistribution {
  public:
-  /// @param share must outlive this
+  /// @param share must outlive this object
   RowRedistribution(const MpiCommunicator& ranks, const Model& share);
 
-  /// The values of the range that this rank wants. Collective.
-  /// @param here values of all phyxels or surfels of this rank
-  /// @param wanted the range that each rank wants
+  /// Returns the values of this rank's range. Collective.
+  /// @param here values of the phyxels or surfels of this rank's share
+  /// @param wanted the range of each rank
   std::vector<double> redistributed(Quantity quantity, std::span<const double> here,
                                     std::span<const RowRange> wanted) const;
-  /// The same, on the first rank alone.
+  /// Returns the values of one range on the first rank, and nothing on other ranks. Collective.
   std::vector<double> gathered(Quantity quantity, std::span<const double> here,
                                RowRange wanted) const;
 
-  /// This rank's share of a state, at most `length` phyxels of which are in any other memory.
-  /// Collective.
-  /// @param read the state of some phyxels of the whole; called on the first rank
+  /// Returns this rank's share of a state that the first rank reads in ranges of at most `length`
+  /// phyxels. Collective. @param read returns the state of a range; called on the first rank
   State scattered(Index length, const std::function<State(Index begin, Index end)>& read) const;
 
  private:
-  /// Where some of the whole model's phyxels, or surfels, are here.
+  /// Map from global ids to indices of the share.
   struct Places {
-    std::vector<Index> number, here;  // by number
+    std::vector<Index> number, here;  // global id, ascending, and index in the share
 
     struct Range {
       std::size_t begin, end;

@@ -39,9 +39,9 @@ struct Watchdog::SharedHeartbeats {
     own_heartbeat = own;
     thread = std::thread([this] { watch(); });
   }
-  /// Local: other ranks' threads may still read this rank's memory, which MPI keeps.
+  /// Local: other ranks may still read this rank's memory, which lives until MPI ends.
   ~SharedHeartbeats() { stop(); }
-  /// Collective.
+  /// Ends the watch and releases the shared memory. Collective.
   void close() {
     stop();
     MPI_Win_free(&window);
@@ -66,8 +66,8 @@ struct Watchdog::SharedHeartbeats {
     while (!changed.wait_for(lock, pause, [&] { return leave; })) {
       const std::int64_t now = Heartbeat::now();
       const std::int64_t last_look = own->watching.exchange(now);
-      if (1e-9 * static_cast<double>(now - last_look) > limit) continue;  // it was this one
-      // One speaks: the first whose thread has looked lately.
+      if (1e-9 * static_cast<double>(now - last_look) > limit) continue;  // this rank was suspended
+      // The first rank whose thread is awake reports.
       const auto awake = [&](const Heartbeat* p) {
         return p == own || (!p->ended && 1e-9 * static_cast<double>(now - p->watching) < limit);
       };
@@ -77,15 +77,15 @@ struct Watchdog::SharedHeartbeats {
   }
   void look_at(std::size_t k, std::int64_t now) {
     Heartbeat& beat = *beats[k];
-    // Even one that waits looks about; unless its process has been stopped, or its host is too
-    // busy.
+    // The thread of a waiting rank still runs, unless its process was stopped or its host is
+    // overloaded.
     const std::int64_t last = beat.waiting ? beat.watching : beat.since;
     const double still = 1e-9 * static_cast<double>(now - last);
     const std::int64_t step = beat.step;
     if (beat.ended || still < limit || beat.named_at.exchange(step) == step) return;
     fmt::print(stderr,
-               "phyxel: {}rank {} of {} has not come on for {:.0f} s, since step {}; the "
-               "others wait for it\n",
+               "phyxel: {}rank {} of {} has made no progress for {:.0f} s, since step {}; the "
+               "other ranks wait for it\n",
                warning_word(), numbers[k], all, still, step);
   }
 
@@ -94,8 +94,8 @@ struct Watchdog::SharedHeartbeats {
   MPI_Comm host = MPI_COMM_NULL;
   MPI_Win window = MPI_WIN_NULL;
   Heartbeat* own = nullptr;
-  std::vector<Heartbeat*> beats;  // of the ranks of this host
-  std::vector<int> numbers;       // of those ranks
+  std::vector<Heartbeat*> beats;  // heartbeats of the ranks of this host
+  std::vector<int> numbers;       // numbers of those ranks
   std::mutex mutex;
   std::condition_variable changed;
   bool leave = false;

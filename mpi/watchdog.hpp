@@ -1,4 +1,4 @@
-/// Names the rank that the others wait for.
+/// A watchdog that reports a rank for which the others wait.
 #pragma once
 
 #include <cstdint>
@@ -8,23 +8,23 @@
 
 namespace phyxel {
 
-/// A thread of each rank that looks at the ranks of its host, which tell in shared memory how far
-/// they have come and whether they wait for others: one that does neither for long is named on
-/// stderr, once for each step that it is stuck in, by the first rank whose own thread still runs.
+/// A thread of each rank that monitors the ranks of its host, whose heartbeats in shared memory say
+/// which step they have reached and whether they wait for other ranks. A rank that neither steps
+/// nor waits for too long is reported on stderr, once for each step, by the first rank whose own
+/// thread still runs.
 class Watchdog {
  public:
-  /// Collective. @param limit how long is long [s]; 0: nobody looks
+  /// Starts the watch. Collective. @param limit time until a rank is reported [s]; 0: no watch
   Watchdog(const MpiCommunicator& ranks, double limit);
-  /// Local: this rank is no longer watched. MPI keeps the shared memory until it ends, unless
-  /// `close` has released it.
+  /// Local: ends the watch of this rank. Without `close`, the shared memory lives until MPI ends.
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  /// Ends the watch and releases the memory that ranks share. Collective.
+  /// Ends the watch and releases the shared memory. Collective.
   void close();
 
-  /// This rank is alive, and has come to this step.
+  /// Reports that this rank has reached a step.
   void beat(std::int64_t step) const;
 
  private:

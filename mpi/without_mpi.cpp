@@ -1,4 +1,4 @@
-/// One rank, for builds without MPI.
+/// The communicator of one rank, for builds without MPI.
 #include <cstdlib>
 
 #include "mpi/communicator.hpp"
@@ -12,11 +12,11 @@ MpiCommunicator::MpiCommunicator(int&, char**&) {
     const char* number = std::getenv(variable);
     return number && std::atoi(number) > limit;
   };
-  // PMIx tells no number of ranks, but Slurm does.
+  // PMIx does not provide the number of ranks; Slurm does.
   const bool by_slurm = std::getenv("PMIX_RANK") && above("SLURM_NTASKS", 1);
   if (above("OMPI_COMM_WORLD_SIZE", 1) || above("PMI_SIZE", 1) || above("PMIX_RANK", 0) ||
       by_slurm) {
-    throw Error(ExitCode::bad_input, "built without MPI: allowed is one rank, without mpirun");
+    throw Error(ExitCode::bad_input, "built without MPI; allowed: one rank, without mpirun");
   }
 }
 MpiCommunicator::MpiCommunicator(CommunicatorHandle) {
@@ -50,7 +50,7 @@ void MpiCommunicator::exchange(const std::vector<std::span<const std::byte>>& se
 }
 
 struct Transfers::Requests {};
-Transfers::Transfers(const MpiCommunicator&, Tag tag) : tag_(tag) {}  // there is nobody
+Transfers::Transfers(const MpiCommunicator&, Tag tag) : tag_(tag) {}  // there are no other ranks
 Transfers::~Transfers() = default;
 void Transfers::receive(int, std::span<std::byte>) {}
 void Transfers::send(int, std::span<const std::byte>) {}
@@ -59,10 +59,10 @@ void Transfers::progress() {}
 void Transfers::wait() {}
 
 bool mpi_takes_device_memory() { return false; }
-std::string mpi_description() { return "none: this program was built without it"; }
+std::string mpi_description() { return "none: this program was built without MPI"; }
 
 struct Watchdog::SharedHeartbeats {};
-Watchdog::Watchdog(const MpiCommunicator&, double) {}  // there is nobody
+Watchdog::Watchdog(const MpiCommunicator&, double) {}  // there are no other ranks
 Watchdog::~Watchdog() = default;
 void Watchdog::close() {}
 void Watchdog::beat(std::int64_t) const {}

@@ -1,4 +1,4 @@
-/// Serial HDF5: the first rank writes.
+/// Substitute for builds with serial HDF5, where the first rank writes.
 #include "mpi/parallel_file.hpp"
 
 namespace phyxel {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int displacement = 3, pair_stress = 9, force = 3;
 
-/// Adds the parts, other than `own`, of some phyxels.
+/// Adds the parts of some phyxels to `parts`, except `own`.
 void add_parts(std::vector<int>& parts, std::span<const Index> phyxels,
                const std::vector<int>& part_of, int own) {
   for (const Index i : phyxels) {
@@ -30,7 +30,7 @@ ExchangeSize exchange_size(const Model& model, const std::vector<int>& part_of) 
   for (Index j = 0; j < model.size(); ++j) {
     const int own = part_of[j];
     parts.clear();
-    add_parts(parts, hood.inverse().row(j), part_of, own);  // those whose phyxels push j
+    add_parts(parts, hood.inverse().row(j), part_of, own);  // parts whose phyxels exert forces on j
     pairs += static_cast<std::int64_t>(parts.size());
     pushed_ghosts += count_distinct(parts);
     add_parts(parts, hood.neighbours.row(j), part_of, own);

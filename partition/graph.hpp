@@ -1,4 +1,4 @@
-/// What is cut into parts: phyxels, or groups of them, and who needs whom.
+/// The dual graph that partitioners cut: phyxels or groups of them, and their neighbours.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,12 @@
 
 namespace phyxel {
 
-/// Vertices with what they cost, edges with what crosses them. Symmetric, without loops.
+/// A symmetric graph without loops, in CSR form. Vertex weights are computational costs, edge
+/// weights communication costs.
 struct Graph {
   std::vector<Offset> offsets{0};           ///< Shape [vertices + 1].
   std::vector<Index> neighbours;            ///< Ascending in each row.
-  std::vector<std::int64_t> edge_weight;    ///< Of each entry, the same both ways; empty: 1 each.
+  std::vector<std::int64_t> edge_weight;    ///< Symmetric, one for each entry; if empty, all are 1.
   std::vector<std::int64_t> vertex_weight;  ///< Shape [vertices].
   std::vector<Vec3d> centre;                ///< [m], shape [vertices].
 
@@ -27,25 +28,26 @@ struct Graph {
   std::int64_t total_weight() const;
 };
 
-/// Weight of each part, shape [parts].
+/// Sum of the vertex weights of each part, shape [parts].
 std::vector<std::int64_t> part_weights(const Graph& graph, const std::vector<int>& part_of,
                                        int parts);
 
-/// A vertex for each phyxel, an edge where one is a neighbour of the other. A phyxel costs its
-/// neighbours and one more, an edge 1.
+/// The dual graph of a model: a vertex for each phyxel, and an edge between two phyxels if either
+/// is a neighbour of the other. The weight of a vertex is one plus its number of neighbours, that
+/// of an edge is 1.
 Graph phyxel_graph(const Model& model);
 
-/// Phyxels gathered in groups: the group of each, shape [n].
+/// Groups of phyxels that a partition does not cut.
 struct Groups {
   std::vector<Index> of;
   Index count = 0;
 };
 
-/// `size` at a time along Hilbert's curve, each body from the start of a group: what a GPU keeps
-/// together as a tile.
+/// Groups of `size` consecutive phyxels along the Hilbert curve, starting anew with each body: the
+/// tiles of a GPU.
 Groups curve_groups(const Model& model, int size);
 
-/// A vertex for each group: weights are the sums of what it stands for, its centre the mean.
+/// The graph of groups. Weights are sums over the phyxels of a group, and its centre is their mean.
 Graph grouped_graph(const Graph& graph, const Groups& groups);
 
 }  // namespace phyxel

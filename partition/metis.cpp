@@ -13,7 +13,7 @@
 namespace phyxel {
 namespace {
 
-/// METIS adds weights up in its own integers: they are scaled to fit, and stay at least one.
+/// Scales weights so that their sum fits METIS's integers; each stays at least one.
 std::vector<idx_t> fitted(const std::vector<std::int64_t>& weights) {
   constexpr double most = static_cast<double>(std::numeric_limits<idx_t>::max()) / 4;
   double sum = 0;
@@ -28,8 +28,8 @@ std::vector<idx_t> fitted(const std::vector<std::int64_t>& weights) {
   return fit;
 }
 
-/// Gives each empty part the lightest vertex of the heaviest part: METIS leaves parts empty where
-/// there are hardly more vertices than parts.
+/// Gives each empty part the lightest vertex of the heaviest part: METIS may leave parts empty if
+/// there are few vertices for each.
 void fill_empty_parts(const Graph& graph, int parts, std::vector<int>& part_of) {
   std::vector<std::int64_t> weight = part_weights(graph, part_of, parts);
   std::vector<Index> count(static_cast<std::size_t>(parts), 0);
@@ -62,8 +62,8 @@ void check(int outcome, const Graph& graph) {
   if (outcome == METIS_OK) return;
   if (outcome == METIS_ERROR_MEMORY) {
     throw InputError(fmt::format(
-        "METIS: no memory for {} vertices with {} entries; allowed: groups of phyxels instead of "
-        "phyxels, or the partitioners curve and bisection",
+        "METIS: not enough memory for {} vertices with {} entries; allowed: groups of phyxels "
+        "instead of phyxels, or the partitioners curve and bisection",
         graph.vertices(), graph.offsets.back()));
   }
   throw Error(ExitCode::bad_input, fmt::format("METIS failed with code {}", outcome));
@@ -101,7 +101,7 @@ std::vector<int> metis_partition(const Graph& graph, int parts) {
     return result;
   };
   std::vector<int> part_of = cut_by(METIS_PartGraphKway);
-  // On bodies in pieces it misses its own tolerance; halving again and again then keeps it.
+  // On disconnected bodies k-way partitioning misses its tolerance; recursive bisection keeps it.
   const std::int64_t heaviest =
       *std::max_element(graph.vertex_weight.begin(), graph.vertex_weight.end());
   const double fair = 1.01 * static_cast<double>(graph.total_weight()) / parts;

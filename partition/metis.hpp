@@ -1,4 +1,4 @@
-/// METIS behind a function of ours: the only file that includes metis.h is its source.
+/// Interface to METIS; only its source includes metis.h.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,10 @@
 
 namespace phyxel {
 
-/// k-way parts of few cut edges, weights balanced to 1%.
-/// @param parts at least 2, fewer than vertices
-/// @throws InputError for graphs that METIS's indices cannot name; Error if it fails
+/// A k-way partition with a small edge cut and weights balanced to 1%.
+/// @param parts at least 2, and fewer than the graph has vertices
+/// @throws InputError if the graph is too large for METIS's indices
+/// @throws Error if METIS fails
 std::vector<int> metis_partition(const Graph& graph, int parts);
 
 }  // namespace phyxel

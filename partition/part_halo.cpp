@@ -29,7 +29,8 @@ std::vector<PartHalo> make_part_halos(const Graph& graph, const std::vector<int>
         std::any_of(row.begin(), row.end(), [&](Index w) { return part_of[w] != part_of[v]; });
     if (at_boundary) halo.boundary.push_back(v);
   }
-  std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()), -1);  // the last part
+  // The last part that has listed each vertex as a ghost.
+  std::vector<int> seen_by(static_cast<std::size_t>(graph.vertices()), -1);
   for (PartHalo& halo : halos) {
     for (const Index v : halo.boundary) {
       for (const Index w : graph.row(v)) {

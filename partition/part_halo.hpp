@@ -1,5 +1,4 @@
-/// The halo of each part of a graph: its ghosts, and which part sends what to which; plain values,
-/// made and checked without ranks.
+/// The halo of each part of a graph: its ghosts, and its send and receive lists.
 #pragma once
 
 #include <vector>
@@ -8,21 +7,21 @@
 
 namespace phyxel {
 
-/// One part's view. All lists name vertices of the whole graph, ascending.
+/// The halo of one part. Lists are vertices of the whole graph, ascending.
 struct PartHalo {
   int part = 0;
   std::vector<Index> owned;
-  std::vector<Index> boundary;  ///< Owned ones with a neighbour that is not.
+  std::vector<Index> boundary;  ///< Owned vertices with a neighbour of another part.
   std::vector<Index> ghosts;    ///< Neighbours of owned vertices that other parts own.
-  /// What one other part and this one exchange.
+  /// The vertices that this part and another one exchange.
   struct Peer {
     int part = 0;
     std::vector<Index> send, receive;
   };
-  std::vector<Peer> peers;  ///< Ascending; those with anything to send or to receive.
+  std::vector<Peer> peers;  ///< Parts to send to or receive from, ascending.
 };
 
-/// The halos of all parts.
+/// Builds the halos of all parts.
 std::vector<PartHalo> make_part_halos(const Graph& graph, const std::vector<int>& part_of,
                                       int parts);
 

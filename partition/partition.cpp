@@ -14,7 +14,7 @@
 namespace phyxel {
 namespace {
 
-/// Vertices in order, cut where the shares of weight end.
+/// Cuts an ordered list of vertices into parts of equal weight.
 std::vector<int> cut_in_order(const Graph& graph, const std::vector<Index>& order, int parts) {
   std::vector<int> part_of(order.size());
   const auto n = static_cast<Index>(order.size());
@@ -24,8 +24,8 @@ std::vector<int> cut_in_order(const Graph& graph, const std::vector<Index>& orde
   Index in_part = 0;
   for (Index k = 0; k < n; ++k) {
     const auto weight = static_cast<double>(graph.vertex_weight[order[k]]);
-    // To the part in whose share its middle lies; but never leaves one empty, nor fewer vertices
-    // than parts that are still to be filled.
+    // A vertex belongs to the part whose share contains the middle of its weight, unless that would
+    // leave this part or a later one without a vertex.
     const bool full = before + weight / 2 >= share * (part + 1) || n - k <= parts - 1 - part;
     if (in_part > 0 && part < parts - 1 && full) {
       ++part;
@@ -65,8 +65,8 @@ class Bisection {
     split(begin, middle, first_part, lower);
     split(middle, end, first_part + lower, parts - lower);
   }
-  /// Where lower / parts of the weight lie before; both sides keep a vertex for each part if they
-  /// can.
+  /// The position before which the fraction `lower` / `parts` of the weight lies; both sides keep a
+  /// vertex for each part if possible.
   Iterator cut_at(Iterator begin, Iterator end, int lower, int parts) const {
     double total = 0;
     for (Iterator v = begin; v != end; ++v) total += static_cast<double>(graph_.vertex_weight[*v]);
@@ -132,7 +132,7 @@ std::vector<int> make_partition(const Graph& graph, int parts, Partitioner parti
   const Index n = graph.vertices();
   if (parts == 1) return std::vector<int>(static_cast<std::size_t>(n), 0);
   if (partitioner == Partitioner::bisection) return Bisection(graph, parts).result();
-  // As many parts as vertices, or more: nothing to choose.
+  // With as many parts as vertices or more, METIS has no choice, and refuses.
   if (partitioner == Partitioner::metis && n > parts) return metis_partition(graph, parts);
   return cut_in_order(graph, curve_order(graph.centre, 0, n), parts);
 }
@@ -168,7 +168,7 @@ PartitionQuality PartCounts::quality() const {
     vertices += static_cast<double>(counts.vertices(p));
   }
   const double each = total / std::max(1.0, vertices), mean = total / parts_;
-  q.cut = counts.cut() / 2;  // seen from both ends
+  q.cut = counts.cut() / 2;  // each edge was counted from both ends
   if (mean > 0) q.imbalance = -1, q.slowest = 0;
   for (int p = 0; p < parts_; ++p) {
     const auto weight = static_cast<double>(counts.weight(p));

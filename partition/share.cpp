@@ -8,7 +8,7 @@
 namespace phyxel {
 namespace {
 
-/// What kind a phyxel is for a part, in the order in which each body has them.
+/// The kind of a phyxel for a part, in the order in which a body of a share lists them.
 enum Kind : char { absent, owned, ghost };
 
 class Maker {
@@ -94,7 +94,7 @@ class Maker {
     out_.model.parts.push_back(own);
   }
 
-  /// Of each phyxel that is here, what the whole has of it.
+  /// The values of the share's phyxels, from those of the whole model.
   template <class T>
   std::vector<T> own_of(const std::vector<T>& whole) const {
     const std::vector<Index>& number = out_.share.global_id;
@@ -138,8 +138,8 @@ class Maker {
   const Model& whole_;
   const std::vector<int>& part_of_;
   bool has_lists_;
-  std::vector<char> kind_;   // of each phyxel of the whole
-  std::vector<Index> here_;  // where it is here; -1: nowhere
+  std::vector<char> kind_;   // kind of each phyxel of the whole model
+  std::vector<Index> here_;  // its index in the share, or -1
   ModelShare out_;
 };
 

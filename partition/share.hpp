@@ -1,4 +1,4 @@
-/// What one rank has of a model.
+/// Extraction of one rank's share from a model.
 #pragma once
 
 #include <vector>
@@ -8,19 +8,19 @@
 
 namespace phyxel {
 
-/// A share that is not connected with the other ranks yet.
+/// A share without connections to other ranks.
 struct ModelShare {
-  Model model;             ///< `share` is null.
-  Share share;             ///< Without communicator, plan and transport.
-  std::vector<int> owner;  ///< The part that each phyxel belongs to, shape [n].
+  Model model;             ///< The phyxels of the share; `share` is null.
+  Share share;             ///< The lists of the share; communicator, plan and transport are unset.
+  std::vector<int> owner;  ///< The part that owns each phyxel, shape [n].
 };
 
-/// The phyxels that a plan owns and their ghosts, and the surfels whose first carrier it owns.
-/// Lists keep the order that they have in the whole model, so that sums run alike; they are whole
-/// for own phyxels and empty for ghosts; there are none if the whole model's are left to a device.
+/// The share of a part: the phyxels that it owns, their ghosts, and the surfels whose first carrier
+/// it owns. Neighbour lists keep the whole model's order, so that sums round alike. They are
+/// complete for owned phyxels, empty for ghosts, and absent if a device will build them.
 ModelShare share_of(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of);
 
-/// Values of all phyxels of the whole model, for those of a share.
+/// Values of a share's phyxels, from those of the whole model.
 template <class T>
 std::vector<T> values_of(const Share& share, const std::vector<T>& whole) {
   std::vector<T> values;

@@ -1,4 +1,4 @@
-/// Writing beside the stepping: jobs on a thread of their own.
+/// Asynchronous output: jobs on a thread of their own.
 #pragma once
 
 #include <atomic>
@@ -10,30 +10,31 @@
 
 namespace phyxel::app {
 
-/// Does jobs one after the other, in the order they come, while the caller goes on. One job may
-/// wait while another is done; whoever has a third waits. What a job throws ends all work: the job
-/// that waits is dropped, and every later call throws the same.
+/// A thread that runs jobs in the order of submission while the caller continues. The queue has
+/// room for one job beside the running one; a third blocks the caller. An exception of a job ends
+/// the work: the queued job is dropped, and each later call throws that exception.
 class BackgroundWriter {
  public:
-  /// @throws std::system_error if no thread can be started.
+  /// @throws std::system_error if no thread can be started
   BackgroundWriter();
-  /// Does what still waits. An error of that is lost: `finish` tells.
+  /// Runs the queued job. Its error is lost; call `finish` to receive it.
   ~BackgroundWriter();
   BackgroundWriter(const BackgroundWriter&) = delete;
   BackgroundWriter& operator=(const BackgroundWriter&) = delete;
 
-  /// Hands a job over, as soon as none waits. It is destroyed when it is done, with what it holds.
-  /// @throws what an earlier job threw.
+  /// Queues a job, after waiting for room. The job is destroyed as soon as it is done.
+  /// @throws the exception of an earlier job
   void submit(std::function<void()> job);
 
-  /// Returns when no job waits, so that what the next one is to hold need not be there before.
-  /// @throws what an earlier job threw.
+  /// Waits until the queue is empty, so that the data of the next job can be made as late as
+  /// possible.
+  /// @throws the exception of an earlier job
   void wait_for_room();
 
-  /// Returns when all jobs are done. @throws what one of them threw.
+  /// Waits until all jobs are done. @throws the exception of a job
   void finish();
 
-  /// Cheap enough for every step. @throws what a job threw.
+  /// Checks for an error, at the price of an atomic load. @throws the exception of a job
   void check();
 
  private:
@@ -45,8 +46,8 @@ class BackgroundWriter {
   std::function<void()> waiting_;
   bool busy_ = false, ending_ = false;
   std::exception_ptr error_;
-  std::atomic<bool> failed_ = false;  // error_ is set
-  std::thread thread_;                // last: it uses all the others
+  std::atomic<bool> failed_ = false;  // true once error_ is set
+  std::thread thread_;                // last, since it uses the other members
 };
 
 }  // namespace phyxel::app

@@ -1,4 +1,4 @@
-/// phyxel bench: speeds beside the error they are reached at and the machine's own limits.
+/// phyxel bench: speed, beside the error and the limits of the machine.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <omp.h>
@@ -36,8 +36,8 @@ struct BenchOptions {
   TableOptions table;
 };
 
-/// Bytes per second that `threads` threads copy between arrays far larger than any cache; read and
-/// write both counted. Best of five.
+/// Copy bandwidth of `threads` threads between arrays far larger than the caches [bytes/s], reads
+/// and writes counted; the best of five.
 double copy_bandwidth(int threads) {
   const std::size_t count = std::size_t{1} << 25;  // 256 MiB of double
   std::vector<double> from(count, 1.0), to(count, 0.0);
@@ -51,8 +51,8 @@ double copy_bandwidth(int threads) {
   return to[count / 2] == 1.0 ? best : 0;
 }
 
-/// Nanoseconds in which two cores answer each other through a cache line; best of five. What it
-/// costs to share a body between threads: virtual machines move their cores about, and this tells.
+/// Round-trip time of two cores through a cache line [ns], the best of five. It bounds the cost of
+/// synchronising threads, and shows whether a virtual machine moves its cores.
 double core_round_trip() {
   constexpr int trips = 2000;
   double best = HUGE_VAL;
@@ -74,14 +74,14 @@ double core_round_trip() {
   return best;
 }
 
-/// A cube, or one of the bodies of the 2008 paper.
+/// The cloud of a cube, or of a body of the 2008 paper.
 Cloud bench_cloud(const std::string& shape, Index n, bool surfels) {
   return shape == "cube" ? bench_cube(n, surfels) : make_shape({.name = shape, .surface = surfels});
 }
 
 const std::vector<std::string> all_terms = bench_terms();
 
-/// A deformation of 10%.
+/// A state with strains of 10%.
 State deformed(const Model& model) {
   std::mt19937_64 engine(3);
   State state;
@@ -103,15 +103,15 @@ std::vector<Vec3d> forces_of(Backend& backend, const State& state) {
   return force;
 }
 
-/// Forces in double to compare with, on the same device; none of bodies for which a second backend
-/// may not fit.
+/// Reference forces in double [N] on the same device; empty for bodies so large that a second
+/// backend may not fit.
 std::vector<Vec3d> exact_forces(const Model& model, const ChosenDevice& device) {
   constexpr Index most = 50'000'000;
   if (model.size() > most) return {};
   return forces_of(*make_backend(model, Precision::double_, device, 0), deformed(model));
 }
 
-/// Largest difference from the exact vectors, over the largest of those.
+/// Largest difference from the exact vectors, relative to the largest of them.
 std::string largest_error(const std::vector<Vec3d>& vectors, const std::vector<Vec3d>& exact) {
   double worst = 0, largest = 0;
   for (std::size_t i = 0; i < vectors.size(); ++i) {
@@ -121,12 +121,12 @@ std::string largest_error(const std::vector<Vec3d>& vectors, const std::vector<V
   return fmt::format("{:.2e}", worst / largest);
 }
 
-/// Of internal forces; "" without exact ones.
+/// Relative error of internal forces; "" without exact ones.
 std::string force_error(const Model& model, Backend& backend, const std::vector<Vec3d>& exact) {
   return exact.empty() ? "" : largest_error(forces_of(backend, deformed(model)), exact);
 }
 
-/// How a backend steps: what follows its precision in its name.
+/// How a backend steps: the part of its name after the precision.
 std::string path_of(const Backend& backend) {
   std::string name = backend.name();
   for (int parts = 0; parts < 2; ++parts) name = name.substr(name.find(", ") + 2);
@@ -134,15 +134,15 @@ std::string path_of(const Backend& backend) {
   return name;
 }
 
-/// What one row of `bench step` measures.
+/// A row of `bench step`.
 struct StepCase {
   std::string terms;
   Index size;
-  double factor;  ///< Of the support.
+  double factor;  ///< Support factor.
 };
 
 std::vector<StepCase> step_cases(const BenchOptions& options) {
-  // The paper's bodies have one size each.
+  // A body of the paper has one size.
   const std::vector<Index> sizes = options.shape == "cube" ? options.sizes : std::vector<Index>{0};
   std::vector<StepCase> cases;
   for (const std::string& terms : options.terms) {
@@ -167,7 +167,7 @@ void bench_step(const BenchOptions& options) {
                       "pairs_per_s", "bytes_per_phyxel_step", "bytes_per_s", "copy_bytes_per_s",
                       "memory_bytes_per_phyxel", "force_error", "core_round_trip_ns"},
                      device_facts(device));
-  // A GPU has no thread counts: 0 stands for it.
+  // The thread count of a GPU is 0.
   const std::vector<int> all_threads = device.gpu ? std::vector<int>{0} : options.threads;
   std::vector<double> copy;
   for (const int threads : all_threads) {
@@ -177,7 +177,7 @@ void bench_step(const BenchOptions& options) {
     const Scene scene = bench_scene(terms, factor, options.bodies);
     std::vector<Cloud> clouds;
     const bool surfels = terms == "surfels";
-    // Closed gradients need a surface, too, which then stays at rest.
+    // Closed gradients need a surface, which then is not moved.
     clouds.push_back(bench_cloud(options.shape, size, surfels || terms == "closure"));
     clouds.resize(scene.bodies.size(), clouds[0]);
     const Model model = build_model(scene, clouds, device);
@@ -188,7 +188,7 @@ void bench_step(const BenchOptions& options) {
         const int threads = all_threads[t];
         const auto backend = make_backend(model, precision_option(precision), device, threads);
         const std::string error = force_error(model, *backend, exact);
-        // A tenth of the sound step: any speed, no risk.
+        // The speed does not depend on the step; a tenth of the acoustic step is always stable.
         const double dt =
             0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
         Solver solver(*backend, initial_state(model, scene, dt));
@@ -227,8 +227,8 @@ void bench_step(const BenchOptions& options) {
   }
 }
 
-/// A cantilever of known deflection, settled in every precision on every cloud. Double comes first,
-/// asked for or not: it tells when the beam has settled, and how much of the others is rounding.
+/// Settles a cantilever of known deflection in each precision on each cloud. Double always comes
+/// first: it determines when the beam has settled, and how much of the other errors is rounding.
 void bench_cantilever(const BenchOptions& options) {
   const ChosenDevice device = choose_device(options.device);
   std::vector<Precision> precisions{Precision::double_};
@@ -303,7 +303,7 @@ void add_bench_step(CLI::App& bench) {
   command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
       ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
   add_factors(*command, *options);
-  command->add_option("--bodies", options->bodies, "How many of them, side by side")
+  command->add_option("--bodies", options->bodies, "Number of bodies, side by side")
       ->check(CLI::Range(1, 100'000));
   command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
       ->check(CLI::Range(0.01, 60.0));
@@ -317,7 +317,8 @@ void add_bench_step(CLI::App& bench) {
 
 void add_bench_cantilever(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
-      "cantilever", "Time to the known deflection of a beam, beside discretisation and rounding");
+      "cantilever",
+      "Time to the known deflection of a beam, with discretisation and rounding errors");
   auto options = std::make_shared<BenchOptions>();
   options->across = {4, 6, 8, 12, 16, 24};
   options->factors = {1.4, 1.6, 1.8, 2};
@@ -340,7 +341,7 @@ void add_bench_cantilever(CLI::App& bench) {
 }  // namespace
 
 void add_bench(CLI::App& program) {
-  CLI::App* bench = program.add_subcommand("bench", "Measure speed beside error and bandwidth");
+  CLI::App* bench = program.add_subcommand("bench", "Measure speed, with errors and bandwidth");
   bench->require_subcommand(1);
   add_bench_step(*bench);
   add_bench_cantilever(*bench);
@@ -350,7 +351,7 @@ void add_bench(CLI::App& program) {
       "  phyxel bench step\n"
       "  phyxel bench cantilever --across 4,8\n"
       "  mpirun -n 2 phyxel bench scaling\n"
-      "Each has more: phyxel bench step --help");
+      "More: phyxel bench step --help");
 }
 
 }  // namespace phyxel::app

@@ -8,8 +8,8 @@
 namespace phyxel::app {
 namespace {
 
-/// A law's name in tables of `bench step`. The two laws of Hooke go by their strain, as in tables
-/// of earlier versions.
+/// A law's name in tables of `bench step`. The two laws of Hooke are named by their strain, as in
+/// tables of earlier versions.
 std::string term_of(const LawEntry& law) {
   const std::string name = law.name;
   if (name == StVenantKirchhoff<double>::name) return "green";

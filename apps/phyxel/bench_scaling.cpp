@@ -32,11 +32,11 @@ struct Options {
   int repeats = 5;
   TableOptions table;
   std::string device = "cpu", transport = "auto";
-  bool weak = false;         ///< Sizes are of one rank.
-  bool without_one = false;  ///< One rank alone is not measured.
+  bool weak = false;         ///< True if sizes are those of one rank.
+  bool without_one = false;  ///< True if the first rank alone is not measured.
 };
 
-/// A jittered cube of about so many phyxels, under gravity.
+/// A jittered cube of about `phyxels` phyxels under gravity.
 Scene cube_scene(Index phyxels) {
   Scene scene;
   scene.time.end = 1;
@@ -54,7 +54,7 @@ Scene cube_scene(Index phyxels) {
   return scene;
 }
 
-/// Distinct ones. Collective.
+/// Number of different GPUs of all ranks. Collective.
 std::size_t gpus_of_ranks(const ChosenDevice& device) {
   const std::vector<int> indices = ranks().gathered(std::span<const int>(&device.gpu->index, 1));
   std::set<std::pair<int, int>> gpus;
@@ -62,7 +62,7 @@ std::size_t gpus_of_ranks(const ChosenDevice& device) {
   return gpus.size();
 }
 
-/// A body that steps in turns with others.
+/// A body whose steps are timed, in turn with those of another body.
 class Stepped {
  public:
   Stepped(const Model& model, const Scene& scene, Precision precision, const ChosenDevice& device,
@@ -70,7 +70,7 @@ class Stepped {
       : backend_(make_backend(model, precision, device, 1, options.transport)),
         solver_(*backend_, initial_state(model, scene, step_of(scene))) {}
 
-  /// @returns seconds
+  /// Takes steps. @returns their time [s]
   double take(std::int64_t steps) {
     const auto start = Clock::now();
     for (std::int64_t s = 0; s < steps; ++s) solver_.step();
@@ -80,7 +80,7 @@ class Stepped {
   const Backend& backend() const { return *backend_; }
 
  private:
-  /// A tenth of the sound step: any speed, no risk.
+  /// A tenth of the acoustic step [s]: always stable, and the speed does not depend on it.
   static double step_of(const Scene& scene) {
     const BodyRequest& body = scene.bodies[0];
     return 0.1 * body.source.shape.spacing / pressure_wave_speed(body.material);
@@ -92,20 +92,20 @@ class Stepped {
 
 struct Measured {
   Median steps_per_s;
-  std::optional<Median> alone_per_s;          // steps of one rank's body, by the first rank
-  double bytes_per_step = 0, exchanging = 0;  // of the rank that has most; share of the time
+  std::optional<Median> alone_per_s;          // steps per second of the first rank alone
+  double bytes_per_step = 0, exchanging = 0;  // of the rank with most; share of the time
   std::string transport;
-  double upload = 0;  // what a device is given after the share is there [s]
+  double upload = 0;  // time to construct and upload the backend [s]
 };
 
-/// What takes steps, and how many make a repeat.
+/// Repeated timings of a number of steps that fill the length of a repeat.
 class Repeats {
  public:
-  /// @param take takes so many steps and gives the seconds; all ranks get the same
+  /// @param take takes a number of steps and returns their time [s], equal on all ranks
   Repeats(std::function<double(std::int64_t)> take, const ChosenDevice& device,
           const Options& options)
       : take_(std::move(take)) {
-    take_(device.gpu ? 64 : 2);  // two graphs of steps, and the step before them
+    take_(device.gpu ? 64 : 2);  // warm-up; on a GPU two graphs of steps and the step before them
     const double one = device.gpu ? take_(64) / 64 : take_(5) / 5;
     steps_ = std::max<std::int64_t>(2, std::llround(options.seconds / one));
   }
@@ -125,8 +125,9 @@ class Repeats {
   std::vector<double> rates_;
 };
 
-/// All ranks and, in turn with them, the first one alone: the machine may be slower a minute later.
-/// @param one what the first rank steps alone; null on the others, and if nobody does
+/// Measures all ranks and, in turn with them, the first rank alone, since the machine's speed
+/// drifts.
+/// @param one model of the first rank alone; null on other ranks, and if it is not measured
 Measured measure(const SharedModel& ensemble, const Scene& scene, const Model* one,
                  const Scene& scene_of_one, Precision precision, const ChosenDevice& device,
                  const Options& options) {
@@ -159,7 +160,7 @@ Measured measure(const SharedModel& ensemble, const Scene& scene, const Model* o
              shared.backend().exchanges() ? shared.backend().exchanges()->transport : "none",
              upload};
   if (by_one) m.alone_per_s = by_one->per_second();
-  ranks().barrier();  // before memory that others store into goes
+  ranks().barrier();  // before memory into which other ranks store is freed
   return m;
 }
 
@@ -225,12 +226,12 @@ std::vector<std::string> row_of(const SharedModel& ensemble, const std::string& 
 void bench_scaling(const Options& options) {
   const bool leads = ranks().rank() == 0, alone = ranks().size() == 1;
   const ChosenDevice device = choose_device(options.device);
-  // Of all ranks, which may be bound to some.
+  // The cores of all ranks, each of which may be bound to some.
   const auto cores = static_cast<int>(std::min<std::int64_t>(
       ranks().sum(std::int64_t{omp_get_num_procs()}), sysconf(_SC_NPROCESSORS_ONLN)));
   Facts facts = device_facts(device);
   if (device.gpu) facts.emplace_back("gpus", std::to_string(gpus_of_ranks(device)));
-  std::optional<PrintedTable> table;  // of the first rank
+  std::optional<PrintedTable> table;  // on the first rank
   ranks().collectively([&] {
     if (leads) table.emplace(options.table, columns, facts, cores);
   });
@@ -254,7 +255,7 @@ void bench_scaling(const Options& options) {
       for (const std::string& precision : options.precisions) {
         const Measured m = measure(ensemble, scene, one ? &*one : nullptr, scene_of_one,
                                    precision_option(precision), device, options);
-        // Of the host, so far: if larger bodies come last, of this one.
+        // The peak of the host so far, which is this body's if larger bodies come last.
         const double host_gb = 1e-9 * ranks().size() * ranks().largest(peak_memory());
         ranks().collectively([&] {
           if (!table) return;
@@ -271,14 +272,14 @@ void bench_scaling(const Options& options) {
 
 void add_bench_scaling(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
-      "scaling", "Steps per second of a cube on the ranks that mpirun has started, or on one");
+      "scaling", "Measure the steps per second of a cube on mpirun's ranks, or on one");
   auto options = std::make_shared<Options>();
   command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
-  command->add_flag("--weak", options->weak, "Sizes are those of a rank, not of the body");
+  command->add_flag("--weak", options->weak, "Sizes are those of one rank, not of the body");
   command->add_flag("--without-one", options->without_one,
-                    "Do not measure the first rank alone in turn with all, as speed-ups need it");
+                    "Do not measure the first rank alone, with which speed-ups are computed");
   command->add_option("--partitioner", options->partitioners, "metis, curve, bisection, auto")
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_choices()));

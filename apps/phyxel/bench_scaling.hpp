@@ -1,4 +1,4 @@
-/// phyxel bench scaling: one body on the ranks that mpirun has started.
+/// phyxel bench scaling: the speed of a body on the ranks that mpirun has started.
 #pragma once
 
 #include <CLI/CLI.hpp>

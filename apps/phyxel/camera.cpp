@@ -10,8 +10,8 @@
 namespace phyxel::app {
 namespace {
 
-constexpr double field_of_view = 30 * std::numbers::pi / 180;  // of the shorter side
-constexpr double filled = 0.86;  // share of the image that the points may take, each way
+constexpr double field_of_view = 30 * std::numbers::pi / 180;  // along the shorter side [rad]
+constexpr double filled = 0.86;  // largest share of the image that the points take along each side
 
 }  // namespace
 
@@ -47,8 +47,8 @@ CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up) {
   slope_y_ = filled * 0.5 * height / camera_.focal;
 }
 
-// A point (x, y, z) in the camera's axes is seen from an eye at e if |x - e_x| <= s_x (z - e_z) and
-// the same for y: four half-spaces for the eye, of which only the tightest of all points count.
+// A point (x, y, z) in the camera's axes is visible from an eye at e if |x - e_x| <= s_x (z - e_z),
+// and likewise for y. Each point gives four half-spaces for the eye; the tightest are kept.
 void CameraFit::include(std::span<const Vec3d> points) {
   for (const Vec3d& p : points) {
     if (!is_finite(p)) continue;
@@ -73,9 +73,8 @@ double CameraFit::extent() const {
 Camera CameraFit::camera() const {
   Camera fitted = camera_;
   if (empty()) return fitted;
-  // Never nearer than half the extent: a body seen along its axis would else touch the lens. Depths
-  // stay above what coordinates far from the origin resolve; a single point, which no distance
-  // makes smaller, is seen from well beyond.
+  // The distance is at least half the extent, or the camera would touch a body seen along its axis,
+  // and above the resolution of coordinates far from the origin; a single point is seen from afar.
   const double magnitude =
       std::max({std::abs(low_x_), std::abs(high_x_), std::abs(low_y_), std::abs(high_y_),
                 std::abs(nearest_), std::abs(farthest_), 1e-9});

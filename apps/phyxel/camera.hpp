@@ -1,4 +1,4 @@
-/// A perspective camera, and the tightest one that sees given points from a given side.
+/// A perspective camera, and the fit of a camera to points.
 #pragma once
 
 #include <limits>
@@ -8,7 +8,7 @@
 
 namespace phyxel::app {
 
-/// Pinhole camera. Image coordinates are pixels, x right, y down, pixel (0, 0) covering [0, 1)².
+/// A pinhole camera. Image coordinates are pixels, x right, y down; pixel (0, 0) covers [0, 1)².
 struct Camera {
   int width = 0, height = 0;  ///< Image size [px].
   Vec3d eye;                  ///< [m]
@@ -21,15 +21,16 @@ struct Camera {
   Place project(Vec3d point) const;
 };
 
-/// Finds the camera that looks along a given direction and sees every point it was told of.
+/// Fit of the nearest camera with a given direction that sees all points.
 class CameraFit {
  public:
-  /// @param up need not be orthogonal to `view`; if it is parallel to it or zero, another axis is
-  ///   taken. @throws InputError for a zero or non-finite `view`, or an image size below 16 or
-  ///   above 16384 pixels.
+  /// @param up need not be orthogonal to `view`; if it is parallel to it or zero, a coordinate axis
+  ///   replaces it
+  /// @throws InputError for a zero or non-finite `view`, or an image size below 16 or above 16384
+  ///   pixels
   CameraFit(int width, int height, Vec3d view, Vec3d up);
 
-  /// Non-finite points are skipped.
+  /// Adds points. Non-finite points are skipped.
   void include(std::span<const Vec3d> points);
   bool empty() const { return !(nearest_ <= farthest_); }
   double extent() const;  ///< Largest extent of the points along the camera's axes [m].
@@ -37,9 +38,9 @@ class CameraFit {
 
  private:
   Camera camera_;
-  double slope_x_ = 0, slope_y_ = 0;  // half width and half height of the view per unit of depth
+  double slope_x_ = 0, slope_y_ = 0;  // half width and half height of the view at depth 1
   static constexpr double infinity_ = std::numeric_limits<double>::infinity();
-  // The four sides of the frustum as bounds on the eye, and the extremes along the axes [m].
+  // The bounds on the eye from the four sides of the frustum, and the extremes along the axes [m].
   double left_ = -infinity_, right_ = infinity_, below_ = -infinity_, above_ = infinity_;
   double nearest_ = infinity_, farthest_ = -infinity_;
   double low_x_ = infinity_, high_x_ = -infinity_, low_y_ = infinity_, high_y_ = -infinity_;

@@ -14,10 +14,10 @@ namespace {
 constexpr double L = cantilever_length, A = cantilever_height * cantilever_height, I = A * A / 12;
 const Material& m = cantilever_material;
 
-/// Frames until the scene ends: four times what a beam twice as soft as Timoshenko's takes.
+/// Number of frames of the scene: four times what a beam twice as soft as Timoshenko's needs.
 constexpr double most_frames = 200;
 
-/// Mean of the loaded layer, along the load [m].
+/// Mean displacement of the loaded layer along the load [m].
 double deflection_of(const Model& model, const State& state) {
   double sum = 0;
   for (const Index i : model.loads[0].phyxels) sum -= state.displacement[i].z;
@@ -31,14 +31,14 @@ Scene cantilever_scene(int across, double factor) {
   const double first_mode = 1.8751 * 1.8751 * std::sqrt(m.young * I / (m.density * A)) / (L * L);
   BodyRequest beam;
   beam.name = fmt::format("cantilever, {} across, factor {:g}", across, factor);
-  // Layers lie in the middle of their cells: one cell more than between the first and the last.
+  // Layers are in the middle of cells, so there is one cell more than gaps between layers.
   beam.source.shape = {.name = "beam",
                        .size = {L + spacing, cantilever_height, cantilever_height},
                        .spacing = spacing,
                        .surface = false};
   beam.material = m;
   beam.material.damping = 2 * first_mode;
-  // Six neighbours at one spacing, four of those at √2.
+  // The ten nearest are six neighbours at one spacing, and four at √2 spacings.
   beam.neighbourhood.radius = factor * (6 + 4 * std::sqrt(2)) / 10 * spacing;
   beam.fixed.push_back({.select = {.region = "x-"}});
   beam.loads.push_back({.select = {.region = "x+"}, .force = {0, 0, -cantilever_shear}});

@@ -10,7 +10,7 @@ constexpr double first_hue = 165, golden_angle = 137.508;  // [degrees]
 
 double body_hue(Index body) { return first_hue + golden_angle * static_cast<double>(body); }
 
-/// sRGB transfer function (IEC 61966-2-1), tabulated over [0, 1].
+/// Table of the sRGB transfer function (IEC 61966-2-1) over [0, 1].
 std::array<std::uint8_t, 8193> make_encoding() {
   std::array<std::uint8_t, 8193> table{};
   for (std::size_t k = 0; k < table.size(); ++k) {
@@ -41,7 +41,7 @@ Colour dot_colour(Index body) { return oklch(0.36, 0.13, body_hue(body) + 130); 
 
 std::uint8_t encode(float linear) {
   static const auto table = make_encoding();
-  // Written so that NaN, which normals that are not finite lead to, is black.
+  // NaN, from normals that are not finite, becomes black.
   const float clipped = linear > 0 ? std::min(linear, 1.0f) : 0.0f;
   return table[static_cast<std::size_t>(clipped * 8192 + 0.5f)];
 }

@@ -1,5 +1,5 @@
-/// The subcommands of the program; one file each, `<name>.cpp`. Each adds itself to the parser
-/// and throws `phyxel::Error` for what main() turns into a message and an exit code.
+/// The subcommands of the program, one file each, `<name>.cpp`. Each function adds a subcommand to
+/// the parser, whose errors (`phyxel::Error`) main() turns into a message and an exit code.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,7 +7,6 @@
 namespace phyxel::app {
 
 void add_run(CLI::App& program);
-void add_check(CLI::App& program);
 void add_sample(CLI::App& program);
 void add_info(CLI::App& program);
 void add_export(CLI::App& program);

@@ -13,7 +13,7 @@
 namespace phyxel::app {
 namespace {
 
-/// American spelling, small letters, no dashes in front: as words are compared.
+/// A word in American spelling and small letters, without leading dashes, for comparison.
 std::string plain(std::string_view word) {
   word.remove_prefix(std::min(word.find_first_not_of('-'), word.size()));
   std::string text(word);
@@ -29,7 +29,7 @@ std::string plain(std::string_view word) {
   return text;
 }
 
-/// " (did you mean "--force"?)" for the known word nearest to the typed one, or "".
+/// The suggestion " (did you mean "--force"?)" of the nearest known word; "" if none is near.
 std::string meant(const std::string& word, const std::vector<std::string>& known) {
   const std::string typed = plain(word);
   std::vector<std::string> names;
@@ -66,12 +66,12 @@ const CLI::Option* option_named(const CLI::App& command, const std::string& word
   return nullptr;
 }
 
-/// What people type that no command has, as `plain` spells it, and what there is instead.
+/// Frequent unknown options, as `plain` spells them, and their alternatives.
 constexpr std::pair<std::string_view, std::string_view> instead[] = {
     {"color", "colours are for terminals, and NO_COLOR=1 turns them off"},
     {"no-color", "NO_COLOR=1 in the environment turns colours off"}};
 
-/// "; "phyxel run" has --until" if the program or another command has the option, or "".
+/// The hint "; "phyxel run" has --until" if the program or another command has the option; else "".
 std::string elsewhere(const CLI::App& program, const std::string& word) {
   const std::string typed = plain(word);
   for (const auto& [known, what] : instead) {
@@ -92,7 +92,7 @@ std::string elsewhere(const CLI::App& program, const std::string& word) {
   return "";
 }
 
-/// A walk over the words as they were typed.
+/// The typed words, checked one after the other against the commands and options.
 class Words {
  public:
   Words(const CLI::App& program, int argc, const char* const* argv)
@@ -127,7 +127,7 @@ class Words {
   }
 
  private:
-  /// What is wrong with an option, if anything; passes over its values.
+  /// The error of an option, if any; skips its values.
   std::optional<std::string> option(const std::string& word) {
     const std::string name = word.substr(0, word.find('='));
     const CLI::Option* known = option_named(*command_, name);
@@ -144,10 +144,10 @@ class Words {
     typed_.emplace_back(known, typed);
     return {};
   }
-  /// What is wrong with a command, if anything.
+  /// The error of a command, if any.
   std::optional<std::string> command(const std::string& word) {
     const auto parts = parts_of(*command_);
-    if (parts.empty()) return {};  // an argument
+    if (parts.empty()) return {};  // the word is an argument
     std::vector<std::string> known;
     for (const CLI::App* part : parts) {
       known.push_back(part->get_name());

@@ -1,4 +1,4 @@
-/// What is wrong with a command line, in one line.
+/// Error messages for command lines.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -6,8 +6,9 @@
 
 namespace phyxel::app {
 
-/// The first word that is no command or option, with the nearest one that is; else the option and
-/// value as they were typed, and what CLI11 says of them. Without "phyxel: error: " and a line end.
+/// The error of a command line in one line: the first unknown command or option, with the nearest
+/// known one; otherwise the option and its value as typed, with CLI11's message. The text has
+/// neither "phyxel: error: " nor a line end.
 std::string complaint(const CLI::App& program, const CLI::ParseError& error, int argc,
                       const char* const* argv);
 

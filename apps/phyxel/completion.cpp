@@ -1,4 +1,4 @@
-/// phyxel completion: scripts for shells, made from the options as they are.
+/// phyxel completion: completion scripts for shells, made from the parser's options.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 namespace phyxel::app {
 namespace {
 
-/// A command and all below it.
+/// A command and its subcommands.
 struct Node {
-  std::string path;  ///< "", "bench", "bench step"
+  std::string path;  ///< Words of the command, e.g. "bench step"; "" for the program.
   const CLI::App* app;
 };
 
@@ -45,8 +45,8 @@ std::vector<std::string> subcommands_of(const CLI::App& app) {
   return names;
 }
 
-/// One function: the words typed so far name a command, whose options and subcommands follow; else
-/// files.
+/// The bash script: a function that offers the options and subcommands of the command typed so far,
+/// or else files.
 std::string bash_script(const CLI::App& program) {
   std::string known, options, subcommands;
   for (const auto& [path, app] : commands_of(program)) {
@@ -82,7 +82,7 @@ std::string zsh_script(const CLI::App& program) {
          script.substr(line);
 }
 
-/// In single quotes, the first line only.
+/// The first line of a text in single quotes.
 std::string fish_text(std::string text) {
   text = text.substr(0, text.find('\n'));
   std::string quoted;
@@ -93,7 +93,7 @@ std::string fish_text(std::string text) {
   return "'" + quoted + "'";
 }
 
-/// True while just these commands were typed.
+/// The fish condition that exactly the commands of `path` were typed.
 std::string fish_condition(const std::string& path, const CLI::App& app) {
   if (path.empty()) return "__fish_use_subcommand";
   std::string condition = "__fish_seen_subcommand_from " + path.substr(path.rfind(' ') + 1);
@@ -131,15 +131,14 @@ std::string fish_script(const CLI::App& program) {
 }  // namespace
 
 void add_completion(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("completion", "Print what makes a shell complete phyxel's options");
+  CLI::App* command = program.add_subcommand("completion", "Print a completion script for a shell");
   auto shell = std::make_shared<std::string>();
   command->add_option("shell", *shell, "bash, zsh or fish")
       ->required()
       ->check(CLI::IsMember({"bash", "zsh", "fish"}));
   command->footer(
       "Examples:\n"
-      "  eval \"$(phyxel completion bash)\"        now; add it to ~/.bashrc for always\n"
+      "  eval \"$(phyxel completion bash)\"        now; in ~/.bashrc for each shell\n"
       "  phyxel completion fish > ~/.config/fish/completions/phyxel.fish");
   command->callback([&program, shell] {
     fmt::print("{}", *shell == "bash"  ? bash_script(program)

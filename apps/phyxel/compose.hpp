@@ -1,5 +1,5 @@
-/// From a frame of a trajectory to a picture: a shaded surface with the phyxels inside it as dots,
-/// as in Figure 1 of Farias et al. 2008.
+/// Pictures of frames: a shaded surface with the phyxels inside it as dots, as in Figure 1 of
+/// Farias et al. 2008.
 #pragma once
 
 #include "phyxel/recorder.hpp"
@@ -7,20 +7,20 @@
 
 namespace phyxel::app {
 
-/// What all pictures of one trajectory share.
+/// Settings that the pictures of a trajectory share.
 struct Setting {
   Camera camera;
   Vec3d up{0, 0, 1};
   double spacing = 0;     ///< Typical distance between phyxels [m].
-  double extent = 0;      ///< Of everything that is seen [m].
-  int time_decimals = 2;  ///< Of the time label; negative: no label.
+  double extent = 0;      ///< Extent of the visible points [m].
+  int time_decimals = 2;  ///< Decimals of the time label; negative for no label.
 };
 
-/// Median distance [m] from a few points, spread over the list, to their nearest other point; 0
-/// for fewer than two points.
+/// Median distance to the nearest point [m], of a few points distributed over the list; 0 for fewer
+/// than two points.
 double typical_spacing(const std::vector<Vec3d>& point);
 
-/// @param surface,phyxels of one moment; null: not drawn.
+/// Draws a frame. @param surface,phyxels frames of the same time; null if not drawn
 Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Setting& setting);
 
 }  // namespace phyxel::app

@@ -80,7 +80,7 @@ double CsvTable::number(std::size_t row, const std::string& column) const {
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
   if (error != std::errc() || end != value.data() + value.size()) {
     throw InputError(
-        fmt::format("column \"{}\", row {}: \"{}\" is no number", column, row + 1, value));
+        fmt::format("column \"{}\", row {}: \"{}\" is not a number", column, row + 1, value));
   }
   return number;
 }

@@ -1,4 +1,4 @@
-/// Measurements as CSV files that say where they come from.
+/// Tables of measurements as CSV files, with facts about their origin.
 #pragma once
 
 #include <filesystem>
@@ -8,16 +8,16 @@
 
 namespace phyxel::app {
 
-/// Names and values.
+/// Pairs of names and values.
 using Facts = std::vector<std::pair<std::string, std::string>>;
-/// What every measurement is labelled with, in order: program, hardware, compiler, date.
-/// @param cores 0: those that this process may use
+/// The facts of each measurement, in order: program, hardware, compiler, date.
+/// @param cores number of cores; 0 for those that this process may use
 Facts machine_facts(int cores = 0);
 
-/// "model name" of /proc/cpuinfo.
+/// The "model name" of /proc/cpuinfo.
 std::string processor_name();
 
-/// Column and value, all of which a row must have.
+/// Pairs of column and value that a row must have.
 using Match = std::vector<std::pair<std::string, std::string>>;
 
 /// A table of text cells under named columns, with facts on top.
@@ -27,32 +27,31 @@ struct CsvTable {
   std::vector<std::vector<std::string>> rows;
 
   bool has(const std::string& column) const;
-  /// @throws InputError for a column that is not there.
+  /// The text of a cell. @throws InputError for an unknown column
   const std::string& text(std::size_t row, const std::string& column) const;
-  /// @throws InputError if the cell is no number.
+  /// The number in a cell. @throws InputError if it is not a number
   double number(std::size_t row, const std::string& column) const;
   bool matches(std::size_t row, const Match& match) const;
-  /// The first row that matches.
+  /// The first matching row.
   std::optional<std::size_t> find(const Match& match) const;
-  /// Distinct values of a column among the rows that match, in order of appearance.
+  /// Distinct values of a column in matching rows, in order of appearance.
   std::vector<std::string> values(const std::string& column, const Match& match = {}) const;
-  /// "" if there is no such fact.
+  /// The value of a fact; "" if it is missing.
   std::string fact(const std::string& name) const;
 };
 
-/// Facts as "# name: value", then the header, then the rows. Cells must hold no comma and no line
-/// break; those in `rows` that do are written with a semicolon or a space instead.
-/// @throws OutputError
+/// Writes facts as "# name: value", then the header, then the rows. Commas and line breaks in cells
+/// become semicolons and spaces. @throws OutputError
 void write_csv(const std::filesystem::path& file, const CsvTable& table);
 std::string csv_text(const CsvTable& table);
-/// One row as it stands in the file, without the line's end.
+/// The line of a row, without the line's end.
 std::string csv_row(const std::vector<std::string>& cells);
 
-/// @throws InputError if the file cannot be read, or a row has another number of cells than the
-///   header.
+/// Reads a table. @throws InputError if the file cannot be read, or a row and the header differ in
+///   the number of cells
 CsvTable read_csv(const std::filesystem::path& file);
 
-/// The median and the spread, (largest - smallest) / median. @param values at least one
+/// A median and the relative spread, (largest - smallest) / median.
 struct Median {
   double value = 0, spread = 0;
 };

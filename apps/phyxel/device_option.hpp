@@ -1,4 +1,4 @@
-/// The device that a command runs on: what --device says, or what there is.
+/// The option --device.
 #pragma once
 
 #include <string>
@@ -11,11 +11,11 @@ namespace phyxel::app {
 
 inline constexpr const char* device_help = "auto, cpu, cuda or cuda:<number>";
 
-/// The library's, of this program's ranks; says on stderr if there are GPUs that "auto" cannot use.
-/// Collective.
+/// Chooses the device of this program's ranks; warns on stderr if "auto" finds a GPU that it cannot
+/// use. Collective. @throws as `phyxel::choose_device`
 ChosenDevice choose_device(const std::string& name, const std::string& where = "--device");
 
-/// What measurements on it are labelled with; nothing for the CPU.
+/// Facts about the device for tables of measurements; empty for the CPU.
 Facts device_facts(const ChosenDevice& device);
 
 }  // namespace phyxel::app

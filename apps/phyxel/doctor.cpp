@@ -1,4 +1,4 @@
-/// phyxel doctor: what this program finds on this machine, and what a run would choose.
+/// phyxel doctor: the machine as the program sees it, and the choices of a run.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <omp.h>
@@ -29,7 +29,7 @@ std::string host_name() {
   return name;
 }
 
-/// One string of each rank, on every rank.
+/// The strings of all ranks, on each rank.
 std::vector<std::string> of_all_ranks(const std::string& own) {
   std::vector<std::vector<char>> send(static_cast<std::size_t>(ranks().size()),
                                       std::vector<char>(own.begin(), own.end()));
@@ -66,7 +66,7 @@ Findings gpu_facts(const std::vector<Device>& devices) {
   return gpus;
 }
 
-/// How ranks' GPUs would exchange. Collective.
+/// The transport between the ranks' GPUs, in words. Collective.
 std::string transport_of_ranks(const ChosenDevice& device) {
   bool direct = true;
   const int own = device.gpu ? device.gpu->index : -1;
@@ -82,7 +82,7 @@ std::string transport_of_ranks(const ChosenDevice& device) {
   const bool nccl = ranks().smallest(std::int64_t{cuda::has_nccl()}) == 1;
   const std::string by_mpi =
       mpi_takes_device_memory() ? "mpi: CUDA-aware MPI" : "host: host memory and MPI";
-  return nccl ? "nccl, where every rank has a GPU of its own; else " + by_mpi : by_mpi;
+  return nccl ? "nccl, if each rank has its own GPU; else " + by_mpi : by_mpi;
 }
 
 Findings facts() {
@@ -164,7 +164,7 @@ std::string table(const Findings& f) {
 
 void add_doctor(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "doctor", "What there is here: GPUs, MPI, HDF5, memory; and what a run would choose");
+      "doctor", "Show GPUs, MPI, HDF5 and memory of this machine, and what a run would choose");
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "As JSON");
   command->footer(

@@ -1,4 +1,4 @@
-/// phyxel export: a trajectory in other forms.
+/// phyxel export: a trajectory in one file.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -10,7 +10,7 @@
 
 namespace phyxel::app {
 
-/// The values of all ranks, as the writer's thread sees them.
+/// The values of all ranks, as the writer's thread reads them.
 class FileWriter::Asking : public ChunkedSource {
  public:
   Asking(FileWriter& writer, const Moment& moment)
@@ -24,7 +24,7 @@ class FileWriter::Asking : public ChunkedSource {
     return values_ = writer_.asked(quantity, {begin, end});
   }
   std::span<const Triangle> triangles() const override { return writer_.shared_.triangles(); }
-  /// Where they are more than the first rank can be brought at once.
+  /// True for arrays longer than one chunk, if HDF5 is parallel.
   bool writes_collectively(Index count) const override {
     return can_write_collectively() && count > length();
   }
@@ -39,7 +39,7 @@ class FileWriter::Asking : public ChunkedSource {
 };
 
 FileWriter::FileWriter(const SharedModel& shared, Index length) : shared_(shared), length_(length) {
-  can_write_collectively();  // HDF5 starts on this thread, as MPI wants it
+  can_write_collectively();  // initialises HDF5, which calls MPI, on this thread
 }
 
 FileWriter::~FileWriter() {
@@ -101,11 +101,11 @@ void FileWriter::serve(bool wait) {
   if (call.ask == Call::Ask::nothing) return;
   std::vector<double> values;
   if (call.ask == Call::Ask::stretch) {
-    const Phase phase("bringing values together");
+    const Phase phase("gathering values");
     values = shared_.gathered(call.quantity, own_values(call.quantity), call.stretch.begin,
                               call.stretch.end);
   } else {
-    const Phase phase("writing together");
+    const Phase phase("writing collectively");
     write_array();
   }
   if (!leads()) return;
@@ -132,7 +132,7 @@ void FileWriter::write_array() const {
     bool as_float;
     Index count;
   };
-  const FileArray& asked = array_.array;  // on the first rank
+  const FileArray& asked = array_.array;  // valid on the first rank
   const std::string file = text(told(array_.file));
   const Numbers numbers =
       ranks().broadcast(std::vector{Numbers{asked.as_float, asked.count}}).front();

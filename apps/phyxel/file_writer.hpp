@@ -1,4 +1,4 @@
-/// Files written beside the stepping, of values that no rank has all of.
+/// Asynchronous output of values that are distributed over ranks.
 #pragma once
 
 #include <condition_variable>
@@ -19,53 +19,52 @@
 
 namespace phyxel::app {
 
-/// This rank's values of one moment, of which files are written.
+/// This rank's values at one time, from which files are written.
 struct Moment {
   std::shared_ptr<const State> state;
   SurfelState surfels;
-  Frame frame;                     ///< Points into the two.
-  std::vector<Quantity> optional;  ///< Which of those that a frame may lack it has, on any rank.
+  Frame frame;                     ///< Refers to the other members.
+  std::vector<Quantity> optional;  ///< The optional quantities that any rank has.
 };
 
-/// Has files written on the first rank, on a thread of its own, one after the other, while all go
-/// on. On several ranks that thread asks for a stretch at a time, and ranks bring it when they
-/// `serve`: they keep their own values of a moment until its file is there, and the first rank a
-/// stretch more. With parallel HDF5, long arrays are written by all of them at once. MPI is used by
-/// the thread that steps alone, and HDF5 by the writer's alone. At most two files are open, the one
-/// being written and one that waits. Every function is collective, and throws on all ranks what a
-/// job threw.
+/// Writer of files on a thread of the first rank, one file after the other, while all ranks step.
+/// On several ranks that thread requests a chunk at a time, which ranks send when they call
+/// `serve`. Ranks keep their values of a time until its file is written, and the first rank one
+/// chunk more. With parallel HDF5, long arrays are written collectively. Only the stepping thread
+/// calls MPI, and only the writer's thread HDF5. At most two files are pending: one being written
+/// and one queued. Functions are collective, and throw the exception of a job on all ranks.
 class FileWriter {
  public:
-  /// Called on the first rank's thread, with values that its thread alone may ask for.
+  /// A job, called on the first rank's writer thread; only that thread may read the source.
   using Job = std::function<void(ChunkedSource&)>;
 
-  /// @param shared whose values are written; must outlive this
-  /// @param length of a stretch
+  /// @param shared model whose values are written; must outlive the writer
+  /// @param length number of rows of a chunk
   FileWriter(const SharedModel& shared, Index length);
-  /// On one rank, does what still waits; on several, drops it.
+  /// Completes queued jobs on one rank; drops them on several.
   ~FileWriter();
   FileWriter(const FileWriter&) = delete;
   FileWriter& operator=(const FileWriter&) = delete;
 
   void submit(std::shared_ptr<const Moment> moment, Job job);
-  /// Brings what is asked for at the moment. Costs nothing while no file is written.
+  /// Sends the values that the writer has requested, if any.
   void serve();
-  /// Returns when no file waits, so that what the next one is to hold need not be there before.
+  /// Waits until no file is queued, so that the values of the next one can be made late.
   void wait_for_room();
-  /// Returns when all files are written.
+  /// Waits until all files are written.
   void finish();
 
  private:
   class Asking;
-  /// What the first rank tells the others.
+  /// A request of the first rank to all ranks.
   struct Call {
-    std::int64_t done = 0;  // files, since the start
+    std::int64_t done = 0;  // number of files written
     bool failed = false;
     enum class Ask { nothing, stretch, array } ask = Ask::nothing;  // of the file that is open
     Quantity quantity{};
     RowRange stretch;
   };
-  /// What is to be written together.
+  /// An array to be written collectively.
   struct Array {
     std::string file;
     FileArray array;
@@ -85,17 +84,17 @@ class FileWriter {
   const SharedModel& shared_;
   Index length_;
   std::deque<std::shared_ptr<const Moment>> open_;
-  std::int64_t done_ = 0;  // as all ranks know
+  std::int64_t done_ = 0;  // number of files written that all ranks know of
 
-  // Between the two threads of the first rank.
+  // Shared between the two threads of the first rank.
   std::mutex mutex_;
   std::condition_variable changed_;
   Call call_;
-  Array array_;  // if it asks for one
+  Array array_;  // the requested array, if any
   std::optional<std::vector<double>> answer_;
   bool leaving_ = false;
 
-  BackgroundWriter writer_;  // last: its jobs use all the others
+  BackgroundWriter writer_;  // last, since its jobs use the other members
 };
 
 }  // namespace phyxel::app

@@ -1,11 +1,11 @@
-/// The program's arrays, all that are large, in huge pages. Of the program alone: a library leaves
-/// the operator to who links it.
+/// Operator new with huge pages for large arrays. It belongs to the program: a library must leave
+/// the operator to its users.
 #include <cstdlib>
 #include <new>
 
 #include "huge_pages.hpp"
 
-// Sanitizers have their own; clang tells of them by features.
+// Sanitizers replace the operator; clang reports them as features.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define PHYXEL_OWN_NEW 0
 #elif defined(__has_feature)

@@ -1,4 +1,4 @@
-/// phyxel info: what any file of ours holds.
+/// phyxel info: the content of a file.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -154,7 +154,7 @@ Facts scene_facts(const fs::path& file) {
           {"precision", precision_name(scene.solver.precision)},
           {"output", scene.output.directory.string()},
           {"bodies", bodies},
-          {"more", fmt::format("phyxel check {}", file.string())}};
+          {"more", fmt::format("phyxel run {} --dry-run", file.string())}};
 }
 
 Facts mesh_facts(const fs::path& file) {
@@ -182,7 +182,7 @@ Facts folder_facts(const fs::path& folder) {
   }
   if (!warning.empty()) facts["warning"] = warning;
   if (facts.size() == 2)
-    throw InputError(fmt::format("{}: holds no run of phyxel", folder.string()));
+    throw InputError(fmt::format("{}: does not contain a run of phyxel", folder.string()));
   return facts;
 }
 
@@ -203,7 +203,7 @@ Facts facts_of(const fs::path& file) {
   }
 }
 
-/// Texts as they are, numbers to nine digits, short lists on one line.
+/// A value as text: numbers with nine digits, short lists on one line.
 std::string shown(const Facts& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return fmt::format("{:.9g}", value.get<double>());
@@ -251,12 +251,12 @@ void add_info(CLI::App& program) {
   CLI::Option* partition =
       command
           ->add_option("--partition", options->parts,
-                       "Cut a scene into so many parts in every way there is, and show what they "
+                       "Cut a scene into this number of parts by each method, and show what they "
                        "would exchange")
           ->check(CLI::Range(1, 100'000));
   command
       ->add_option("--partitioner", options->partitioner,
-                   "Whose plan is shown: metis, curve, bisection, or auto, the best of them")
+                   "Method whose parts are listed: metis, curve, bisection, or auto, the best")
       ->needs(partition)
       ->capture_default_str();
   command->footer(

@@ -70,7 +70,7 @@ Facts partition_facts(const std::filesystem::path& file, int parts, const std::s
     try {
       const std::vector<int> part_of = make_partition(phyxels, parts, by);
       cuts.push_back(quality_facts(phyxels, "phyxels", by, part_of, parts, seconds_since(start)));
-    } catch (const InputError& error) {  // too many for it: tiles are fewer
+    } catch (const InputError& error) {  // METIS cannot take so many phyxels; there are fewer tiles
       notes.push_back(error.what());
     }
     start = Clock::now();
@@ -123,7 +123,7 @@ std::string partition_tables(const Facts& facts) {
   }
   for (const Facts& note : facts["notes"]) text += "  " + note.get<std::string>() + "\n";
   text += fmt::format(
-      "\n  slowest: what the part with most to do has to do, ghosts counted, over the mean\n"
+      "\n  slowest: largest cost of a part, including ghosts, over the mean\n"
       "\n  Tiles by {}:\n"
       "  part      phyxels     boundary       ghosts  peers (ghosts of each)\n",
       facts["partitioner"].get<std::string>());
@@ -140,14 +140,14 @@ std::string partition_tables(const Facts& facts) {
   const auto kilobytes = [&](const char* way) {
     return 1e-3 * sizeof(float) * facts["numbers sent a step"][way].get<double>();
   };
-  return text + fmt::format(
-                    "\n  Sent a step by all parts in float, displacements of ghosts and\n"
-                    "    their pair stresses, as phyxel does {:>12.1f} kB\n"
-                    "    the force of each pair              {:>12.1f} kB, to the same bits\n"
-                    "    forces summed over each part        {:>12.1f} kB, to bits that depend on "
-                    "the cut\n",
-                    kilobytes("pair stresses"), kilobytes("pair forces"),
-                    kilobytes("summed forces"));
+  return text +
+         fmt::format(
+             "\n  Sent in a step by all parts in float: displacements of ghosts and\n"
+             "    their pair stresses (phyxel's way)  {:>12.1f} kB\n"
+             "    the force of each pair              {:>12.1f} kB, with the same bits\n"
+             "    forces summed over each part        {:>12.1f} kB, with bits that depend on "
+             "the partition\n",
+             kilobytes("pair stresses"), kilobytes("pair forces"), kilobytes("summed forces"));
 }
 
 }  // namespace phyxel::app

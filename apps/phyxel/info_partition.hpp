@@ -1,4 +1,4 @@
-/// phyxel info --partition: how a scene would be cut into parts, and what they would exchange.
+/// phyxel info --partition: partitions of a scene and their communication.
 #pragma once
 
 #include <cstdio>
@@ -8,14 +8,14 @@
 
 namespace phyxel::app {
 
-/// Every partitioner's quality, on phyxels and on the tiles that a GPU keeps whole, and the halo
-/// plan of each part by `partitioner` on tiles.
-/// @param progress stream for the stages of set-up; null: none is shown
-/// @throws InputError if the file is no scene, or the partitioner unknown
+/// The quality of each partitioner on phyxels and on the tiles of a GPU, and the halo of each part
+/// by `partitioner` on tiles.
+/// @param progress stream for the stages of set-up; null for none
+/// @throws InputError if the file is not a scene, or for an unknown partitioner
 nlohmann::ordered_json partition_facts(const std::filesystem::path& scene, int parts,
                                        const std::string& partitioner, std::FILE* progress);
 
-/// The same as two tables.
+/// The facts as two tables.
 std::string partition_tables(const nlohmann::ordered_json& facts);
 
 }  // namespace phyxel::app

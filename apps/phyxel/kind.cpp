@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// True for HDF5 files, and for ours, which have a seal before HDF5's own signature.
+/// True for HDF5 files and sealed files, which have a seal before HDF5's signature.
 bool is_hdf5(const fs::path& file) {
   constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8), seal("phyxel s");
   char bytes[8] = {};
@@ -26,7 +26,7 @@ bool is_hdf5(const fs::path& file) {
   return in && (head == signature || head == seal);
 }
 
-/// The kind in words, and the command for it.
+/// The kind in words, and the command that takes it.
 std::string advice(const fs::path& file, Kind kind) {
   const std::string name = file.string();
   switch (kind) {
@@ -50,7 +50,7 @@ std::string advice(const fs::path& file, Kind kind) {
           "SCENE --resume {0}\"",
           name);
     case Kind::table:
-      return fmt::format("is a table; \"phyxel report {}\" shows it", name);
+      return "is a table";
     default:
       return "is of an unknown kind";
   }
@@ -60,12 +60,12 @@ struct Extension {
   std::string_view end;
   Kind kind;
 };
-/// The only list of extensions of the program.
+/// The program's one list of file extensions.
 constexpr Extension extensions[] = {{".toml", Kind::scene},    {".obj", Kind::mesh},
                                     {".ply", Kind::mesh},      {".stl", Kind::mesh},
                                     {".series", Kind::series}, {".csv", Kind::table}};
 
-/// " (.obj, .ply, .stl)"
+/// The extensions of a kind, e.g. " (.obj, .ply, .stl)".
 std::string extensions_of(Kind kind) {
   std::vector<std::string_view> ends;
   for (const Extension& e : extensions) {
@@ -85,7 +85,7 @@ const char* noun_of(Kind kind) {
     case Kind::series:
       return "a series";
     case Kind::hdf5:
-      return "an HDF5 file of phyxel's";
+      return "an HDF5 file of phyxel";
     case Kind::table:
       return "a table";
     default:
@@ -93,7 +93,7 @@ const char* noun_of(Kind kind) {
   }
 }
 
-/// "a run's folder, a series (.series), an HDF5 file of phyxel's"
+/// A list of kinds, e.g. "a run's folder, a series (.series), an HDF5 file of phyxel".
 std::string in_words(std::initializer_list<Kind> wanted) {
   std::vector<std::string> words;
   for (const Kind kind : wanted) words.push_back(noun_of(kind) + extensions_of(kind));

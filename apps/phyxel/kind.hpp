@@ -1,4 +1,4 @@
-/// What kind of file a command was given, so that the wrong one is answered with what to do.
+/// Kinds of input files, so that a command can name the right command for a wrong kind.
 #pragma once
 
 #include <filesystem>
@@ -8,14 +8,15 @@ namespace phyxel::app {
 
 enum class Kind { missing, folder, scene, mesh, series, hdf5, table, unknown };
 
-/// The kind of a file or folder by its name and, for HDF5, its first bytes. Pipes and devices are
-/// not opened.
+/// The kind of a file or folder, from its name and, for HDF5, its first bytes. Pipes and devices
+/// are not opened.
 Kind kind_of(const std::filesystem::path& file);
 
-/// The kind of a command's input file, checked.
-/// @throws InputError if the file is plainly of none of the kinds `wanted`, naming the kind it has,
-/// the command that takes it, and what is allowed. A missing file or an unknown kind is left to the
-/// reader.
+/// Checks and returns the kind of a command's input file. Missing files and unknown kinds pass, and
+/// are left to the reader.
+/// @throws InputError if the kind is known and not among `wanted`, naming the kind, the command
+/// that
+///   takes it, and the allowed kinds
 Kind expect_kind(const std::filesystem::path& file, std::initializer_list<Kind> wanted);
 
 }  // namespace phyxel::app

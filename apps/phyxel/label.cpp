@@ -36,8 +36,8 @@ const Glyph* find_glyph(char character) {
   return glyph == std::end(font) ? nullptr : glyph;
 }
 
-/// Squared distance of (x, y), in dots, to the nearest stroke: a stroke joins the centres of two
-/// dots that touch, so that the font has round ends instead of steps.
+/// Squared distance of (x, y) to the nearest stroke, in dots. A stroke joins the centres of two
+/// adjacent dots, which gives the font round ends instead of steps.
 double stroke_distance(const Glyph& glyph, double x, double y) {
   double nearest = 1e9;
   const auto on = [&](int c, int r) {
@@ -52,7 +52,7 @@ double stroke_distance(const Glyph& glyph, double x, double y) {
       for (const auto& [dc, dr] : {std::pair{1, 0}, {0, 1}, {1, 1}, {-1, 1}}) {
         if (!on(c + dc, r + dr)) continue;
         if (dc != 0 && dr != 0 && (on(c + dc, r) || on(c, r + dr)))
-          continue;  // a corner, not a slope
+          continue;  // the two dots belong to a corner, not to a slope
         const double along = std::clamp((px * dc + py * dr) / (dc * dc + dr * dr), 0.0, 1.0);
         const double ex = px - along * dc, ey = py - along * dr;
         nearest = std::min(nearest, ex * ex + ey * ey);

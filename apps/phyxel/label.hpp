@@ -1,4 +1,4 @@
-/// Short labels on pictures, in a built-in font.
+/// Labels on pictures, in a built-in font.
 #pragma once
 
 #include <string_view>
@@ -7,11 +7,11 @@
 
 namespace phyxel::app {
 
-/// Draws `text` with its top left corner at pixel (x, y). Known characters: digits and
-/// " .=ts"; others leave a gap. @param scale pixels per dot of the 5 x 7 font.
+/// Draws `text` with its top left corner at pixel (x, y). Known characters are digits and " .=ts";
+/// others leave a gap. @param scale pixels per dot of the 5 x 7 font
 void draw_text(Image& image, int x, int y, double scale, std::string_view text);
 
-/// Pixels per font dot that suit the image.
+/// A scale that suits the image [pixels per font dot].
 double text_scale(const Image& image);
 
 }  // namespace phyxel::app

@@ -1,4 +1,4 @@
-/// Tables of pages made from measurements.
+/// Tables of measurements on Markdown pages.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,8 +11,8 @@
 
 namespace phyxel::app {
 
-/// A table whose cells and facts are `markdown_text`, which leaves numbers and plain words as they
-/// are. @throws InputError as `read_csv`
+/// Reads a table and escapes its cells and facts by `markdown_text`, which leaves numbers and plain
+/// words unchanged. @throws InputError as `read_csv`
 inline CsvTable read_page_table(const std::filesystem::path& file) {
   CsvTable table = read_csv(file);
   for (auto& [name, value] : table.facts) value = markdown_text(value);
@@ -31,7 +31,7 @@ inline std::string table_text(const std::vector<std::string>& head,
   return text + "\n";
 }
 
-/// The cell of the row that matches, or a dash.
+/// The cell of the matching row; a dash if there is none.
 inline std::string cell(const CsvTable& table, const std::string& column, const Match& match) {
   const auto row = table.find(match);
   return row && !table.text(*row, column).empty() ? table.text(*row, column) : "–";

@@ -7,7 +7,7 @@
 namespace phyxel::app {
 namespace {
 
-/// The text in UTF-8, with a space for each control character.
+/// The text in UTF-8, with control characters replaced by spaces.
 std::string on_one_line(const std::string& text) {
   std::string line = valid_utf8(text);
   for (char& c : line) {
@@ -43,7 +43,8 @@ std::string gnuplot_string(const std::string& text) {
   std::string quoted = "'";
   for (const char c : on_one_line(text)) {
     if (c == '\'') {
-      quoted += "\u2019";  // gnuplot 5.4 takes two quotes for one, but not where a string begins
+      quoted +=
+          "\u2019";  // gnuplot 5.4 does not accept a doubled quote at the beginning of a string
     } else {
       quoted += c;
     }

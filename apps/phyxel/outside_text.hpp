@@ -1,5 +1,5 @@
-/// Text that comes from outside (cells of tables, names of files and folders, titles of scenes) on
-/// its way into JSON, Markdown and gnuplot's scripts.
+/// Escapes of external text (cells of tables, names of files and folders, titles of scenes) in
+/// JSON, Markdown and gnuplot scripts.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,19 +8,19 @@
 
 namespace phyxel::app {
 
-/// The text with U+FFFD for every byte that is no UTF-8, as a file's name may have.
+/// The text with each byte that is not UTF-8 replaced by U+FFFD; names of files may have such
+/// bytes.
 std::string valid_utf8(const std::string& text);
 
-/// JSON as a text. Bytes that are no UTF-8 become U+FFFD: no name ends a command whose work is
-/// done.
-/// @param indent spaces of a level; -1: all on one line
+/// JSON as text. Bytes that are not UTF-8 become U+FFFD, so that no name makes a command fail after
+/// its work is done. @param indent spaces of a level; -1 for one line
 std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
-/// A text on one line in which Markdown finds no markup and HTML no element.
+/// The text on one line, with markup of Markdown and HTML escaped.
 std::string markdown_text(const std::string& text);
 
-/// A string of gnuplot, in single quotes: between those it expands no backquotes, macros or
-/// escapes. Line ends and other control characters become spaces.
+/// The text as a string of gnuplot in single quotes, in which backquotes, macros and escapes are
+/// not expanded. Control characters become spaces.
 std::string gnuplot_string(const std::string& text);
 
 }  // namespace phyxel::app

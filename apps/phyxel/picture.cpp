@@ -14,31 +14,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What the scene in a frame says of pictures; the defaults if it cannot be read.
+/// The picture settings of the scene in a frame; the defaults if it cannot be parsed.
 RenderRequest pictures_of(const fs::path& file) {
   try {
     return parse_render(read_frame(file, true).scene, file);
   } catch (const InputError&) {
-    return {};  // frames of programs that have no scene text, or of another version's scene
+    return {};  // the frame has no scene text, or one of another version
   }
 }
 
-/// Looks at every frame, so that the camera holds for the whole motion.
+/// Fits the camera to all frames, so that it sees the whole motion.
 Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request) {
   Setting setting;
   setting.time_decimals = time_decimals(shots);
   const Shot& first = shots.front();
   const RenderRequest said = pictures_of(first.surface.empty() ? first.phyxels : first.surface);
   setting.up = request.up.value_or(said.up);
-  // A direction of the scene that is up, and another one asked for, may be parallel: CameraFit
-  // knows.
+  // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
   CameraFit fit(request.width, request.height, request.view.value_or(said.view), setting.up);
   for (const Shot& shot : shots) {
     for (const fs::path& file : {shot.surface, shot.phyxels}) {
       if (const auto frame = read_if_any(file)) fit.include(frame->point);
     }
   }
-  if (fit.empty()) throw InputError("the frames hold no point with finite coordinates");
+  if (fit.empty()) throw InputError("the frames have no point with finite coordinates");
   const auto phyxels = read_if_any(shots.front().phyxels);
   if (phyxels) setting.spacing = typical_spacing(phyxels->point);
   setting.camera = fit.camera();

@@ -26,7 +26,7 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.9g}", value) : "?";
 }
 
-/// @param place of the curve in its chart, from 1
+/// The line style of a curve. @param place number of the curve in its chart, from 1
 std::string style_of(const Curve& curve, int place) {
   if (curve.level) return "lines lt 1 lc rgb '#808080' dt 4";
   return fmt::format("linespoints lt {}{}", curve.colour ? curve.colour : place,
@@ -56,13 +56,13 @@ fs::path gnuplot() {
   return {};
 }
 
-/// A folder that only this user can look into, removed at the end.
+/// A temporary folder that only this user can access.
 class PrivateFolder {
  public:
   PrivateFolder() {
     std::string name = (fs::temp_directory_path() / "phyxel_plot_XXXXXX").string();
     if (!mkdtemp(name.data())) {
-      throw OutputError(fmt::format("{}: cannot be made: {}", name, std::strerror(errno)));
+      throw OutputError(fmt::format("{}: cannot be created: {}", name, std::strerror(errno)));
     }
     path_ = name;
   }
@@ -78,7 +78,7 @@ class PrivateFolder {
   fs::path path_;
 };
 
-/// Has gnuplot execute a file, without a shell. @returns whether it did
+/// Runs gnuplot on a script, without a shell. @returns true on success
 bool plot(const fs::path& program, const fs::path& script, const fs::path& drawing,
           const fs::path& words) {
   posix_spawn_file_actions_t actions;
@@ -129,7 +129,7 @@ std::string script_of(const BarChart& chart) {
   script +=
       "set style data histogram\nset style histogram clustered gap 1\n"
       "set style fill solid noborder\nset boxwidth 0.9\nset xtics noenhanced font ',12'\n";
-  // Groups stand at 0, 1, 2 …; gnuplot's own range leaves room for two more.
+  // Groups are at 0, 1, 2 …; gnuplot's default range would leave room for two more.
   script +=
       fmt::format("set xrange [-0.6:{}]\n", number(static_cast<double>(chart.groups.size()) - 0.4));
   if (chart.log_y) {
@@ -139,7 +139,7 @@ std::string script_of(const BarChart& chart) {
         if (value > 0) lowest = std::min(lowest, value);
       }
     }
-    // Bars of a logarithmic axis stand on a power of ten below them all.
+    // Bars on a logarithmic axis start at a power of ten below all values.
     const double floor = std::pow(10, std::floor(std::log10(lowest) - 0.3));
     script +=
         fmt::format("set logscale y\nset yrange [{}:*]\nset format y '10^{{%T}}'\n", number(floor));
@@ -164,7 +164,7 @@ std::string script_of(const BarChart& chart) {
 void draw_svg(const std::string& script, const fs::path& file) {
   const fs::path program = gnuplot();
   if (program.empty()) throw OutputError("gnuplot was not found (Debian: gnuplot-nox)");
-  // Names of ours alone: those of folders and files that a user chose stay out of scripts.
+  // Fixed names: names that a user chose do not enter the script.
   const PrivateFolder folder;
   const fs::path source = folder.file("chart.gp"), drawing = folder.file("chart.svg"),
                  words = folder.file("words.txt");

@@ -9,11 +9,11 @@ namespace phyxel::app {
 
 struct Curve {
   std::string label;
-  std::vector<double> x, y;  ///< Of one length.
-  int colour = 0;            ///< 1 to 6; 0: by its place in the chart.
+  std::vector<double> x, y;  ///< Points; equal lengths.
+  int colour = 0;            ///< 1 to 6; 0 for the colour of its number in the chart.
   bool dashed = false;
   bool dotted = false;
-  bool level = false;  ///< A grey line without points: something that the others are held against.
+  bool level = false;  ///< True for a grey reference line without points.
 };
 
 struct LineChart {
@@ -22,26 +22,26 @@ struct LineChart {
   std::vector<Curve> curves;
 };
 
-/// Groups of bars side by side, a bar of every group for each series.
+/// A chart of groups of bars, in which each group has a bar of each series.
 struct BarChart {
   std::string title, y_label;
   bool log_y = true;
   std::vector<std::string> groups;
   struct Series {
     std::string label;
-    std::vector<double> values;  ///< One a group; NaN: no bar.
+    std::vector<double> values;  ///< A value for each group; NaN for no bar.
   };
   std::vector<Series> series;
 };
 
-/// Whether gnuplot is on the path.
+/// True if gnuplot is on the path.
 bool can_plot();
 
-/// What a chart is drawn from: a gnuplot script with its data inside, the same for the same chart.
+/// The gnuplot script of a chart, including its data; equal charts give equal scripts.
 std::string script_of(const LineChart& chart);
 std::string script_of(const BarChart& chart);
 
-/// Draws the script into an SVG file. @throws OutputError with gnuplot's words.
+/// Draws the script into an SVG file. @throws OutputError with gnuplot's message
 void draw_svg(const std::string& script, const std::filesystem::path& file);
 
 }  // namespace phyxel::app

@@ -7,8 +7,7 @@
 
 namespace phyxel::app {
 
-/// Writes an 8-bit sRGB PNG to a temporary name beside `file`, then renames it: a file of that name
-/// is whole or as it was. @throws OutputError
+/// Writes an 8-bit sRGB PNG atomically, by a temporary file that is renamed. @throws OutputError
 void write_png(const std::filesystem::path& file, const Image& image);
 
 }  // namespace phyxel::app

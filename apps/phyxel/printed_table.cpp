@@ -68,7 +68,7 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
 void PrintedTable::write() {
   if (options_.csv.empty()) return;
   if (!stream_.is_open()) return write_csv(options_.csv, table_);
-  // A table only grows at its end.
+  // Rows are only appended.
   const std::string text = csv_text(table_);
   stream_ << std::string_view(text).substr(streamed_) << std::flush;
   streamed_ = text.size();

@@ -1,4 +1,4 @@
-/// Tables of measurements, as the commands that measure show and keep them.
+/// Output of tables of measurements.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,23 +7,22 @@
 
 namespace phyxel::app {
 
-/// Where a table goes.
+/// Destinations of a table.
 struct TableOptions {
-  std::string csv;     ///< A file; "": none.
-  bool force = false;  ///< Whether the file may be replaced.
-  bool json = false;   ///< On the terminal: JSON instead of CSV.
+  std::string csv;     ///< CSV file; "" for none.
+  bool force = false;  ///< True if the file may be replaced.
+  bool json = false;   ///< True for JSON on stdout instead of CSV.
 };
 void add_table_options(CLI::App& command, TableOptions& options);
 
-/// A table whose rows go to the terminal as they come; the CSV file, if there is to be one, is
-/// written whole after each; a FIFO or character device gets the rows one after another. As JSON it
-/// is one object, {"facts": {...}, "rows": [{...}, ...]}, whose cells are numbers where they can be
-/// and null where they are empty.
+/// A table whose rows are printed as they are added. The CSV file, if any, is rewritten atomically
+/// after each row; a FIFO or a character device receives row after row. JSON output is one object,
+/// {"facts": {...}, "rows": [{...}, ...]}, whose cells are numbers if possible and null if empty.
 class PrintedTable {
  public:
-  /// @param more facts after those of the machine
-  /// @param cores of the machine, as in `machine_facts`
-  /// @throws InputError if the file is there and must not be replaced
+  /// @param more facts that follow those of the machine
+  /// @param cores number of cores, as in `machine_facts`
+  /// @throws InputError if the file exists and must not be replaced
   PrintedTable(TableOptions options, const std::vector<std::string>& columns, Facts more = {},
                int cores = 0);
   ~PrintedTable();  ///< Closes the JSON, also after an error.
@@ -35,8 +34,8 @@ class PrintedTable {
   void write();
 
   TableOptions options_;
-  std::ofstream stream_;      ///< Where the CSV is a FIFO or character device, which takes rows.
-  std::size_t streamed_ = 0;  ///< Bytes it has.
+  std::ofstream stream_;      ///< Open if the CSV is a FIFO or a character device.
+  std::size_t streamed_ = 0;  ///< Number of bytes written to it.
   CsvTable table_;
 };
 

@@ -14,7 +14,7 @@
 namespace phyxel::app {
 namespace {
 
-/// One rank's events, after each of which comes a comma.
+/// The events of this rank, each followed by a comma.
 std::string events_of_rank() {
   const int rank = ranks().rank();
   std::string text = fmt::format(
@@ -67,7 +67,7 @@ void write_profile(const std::string& file) {
     if (ranks().rank() > 0) return;
     std::string text = "{\"traceEvents\":[\n";
     for (const std::vector<char>& of_rank : events) text.append(of_rank.begin(), of_rank.end());
-    text.erase(text.size() - 2);  // the last comma
+    text.erase(text.size() - 2);  // removes the last comma
     text += fmt::format("\n],\"otherData\":{{\"spans left out\":{}}}}}\n", left_out);
     write_whole_file(file, text, Durable::no);
   });

@@ -15,7 +15,7 @@
 namespace phyxel::app {
 namespace {
 
-/// Refuses a standard output that lost data: a full disk or a closed pipe.
+/// Throws the OutputError for a standard output that lost data, by a full disk or a closed pipe.
 [[noreturn]] void refuse_standard_output(int error) {
   throw OutputError(fmt::format("standard output: cannot be written: {}",
                                 std::generic_category().message(error)));
@@ -35,7 +35,7 @@ int run_program(CLI::App& program, int argc, char** argv,
     } catch (const std::system_error& error) {
       if (!std::ferror(stdout)) throw;
       refuse_standard_output(error.code().value());
-    } catch (const CLI::Success& help) {  // --help, --version
+    } catch (const CLI::Success& help) {  // --help or --version
       return all.leads() ? program.exit(help) : 0;
     } catch (const CLI::ParseError& error) {
       if (all.leads()) {

@@ -21,7 +21,7 @@ void require_alike(std::uint64_t value, const char* what) {
   if (ranks().smallest(signed_value) == ranks().largest(signed_value)) return;
   throw AgreedError(ExitCode::bad_input,
                     std::string("the ranks have different ") + what +
-                        ": allowed are the same files for all, on a file system that all see");
+                        "; allowed: the same files for all ranks, on a shared file system");
 }
 
 Traffic most_traffic(const Backend& backend) {

@@ -1,4 +1,4 @@
-/// The ranks of this program, which all commands see.
+/// The ranks of this program.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,16 @@
 
 namespace phyxel::app {
 
-/// For main(): who they are. Until then there is one.
+/// Sets the ranks, called by main(). Before, there is one rank.
 void set_ranks(const Ranks& ranks);
 const Ranks& all_ranks();
-/// What they talk through.
+/// The communicator of the ranks.
 const MpiCommunicator& ranks();
 
-/// @throws AgreedError if it is not the same number on all ranks. Collective.
+/// Checks that a number is equal on all ranks. Collective. @throws AgreedError naming `what`
 void require_alike(std::uint64_t value, const char* what);
 
-/// What exchanges have cost the rank that had most. Collective.
+/// The traffic of the rank that had most. Collective.
 Traffic most_traffic(const Backend& backend);
 
 }  // namespace phyxel::app

@@ -15,7 +15,7 @@ namespace phyxel::app {
 namespace {
 
 constexpr double redraw_interval = 0.1;  // [s]
-constexpr std::size_t bar_length = 16;   // leaves an 80-column terminal room for the speed
+constexpr std::size_t bar_length = 16;   // [columns]; leaves room for the speed on 80 columns
 
 int terminal_columns(std::FILE* stream) {
   winsize size = {};
@@ -32,7 +32,7 @@ double usual_line_interval() {
   return said ? std::atof(said) : 5;
 }
 
-/// "0:07", "12:34", "5:06:07", or "-:--" if unknown.
+/// A duration as "0:07", "12:34" or "5:06:07"; "-:--" if unknown.
 std::string clock_text(double seconds) {
   if (!(seconds >= 0 && seconds < 1e9)) return "-:--";
   const auto s = static_cast<std::int64_t>(std::ceil(seconds));
@@ -52,7 +52,7 @@ Progress::Progress(double end_time, std::FILE* stream, const ProgressStyle& styl
   if (stream_ == nullptr) return;
   terminal_ = style.terminal.value_or(is_terminal(stream_));
   if (terminal_) columns_ = style.columns.value_or(terminal_columns(stream_));
-  // On a terminal the first update shows at once; elsewhere short runs get only their last line.
+  // A terminal shows the first update at once; elsewhere a short run has its last line only.
   last_shown_ = clock_() - (terminal_ ? redraw_interval : 0);
 }
 
@@ -81,7 +81,7 @@ void Progress::stage(std::string_view name, double share) {
     stage_ = name;
     stage_start_ = now;
   }
-  given_ = share_parts(share < 1 ? std::min(share, 0.999) : 1);  // 100% is the end
+  given_ = share_parts(share < 1 ? std::min(share, 0.999) : 1);  // 100% only at the end
   given_.push_back(stage_);
   if (share > 0.01 && share < 1) {
     given_.push_back(
@@ -90,7 +90,7 @@ void Progress::stage(std::string_view name, double share) {
   if (terminal_ && share >= 1) return take_away();
   if (terminal_ && share <= 0) last_shown_ = now - redraw_interval;
   show_if_due();
-  pending_ = false;  // the end of set-up shows nothing more of it
+  pending_ = false;  // nothing remains to be shown at the end of set-up
 }
 
 void Progress::take_away() {
@@ -131,19 +131,19 @@ std::vector<std::string> Progress::share_parts(double share) const {
   return parts;
 }
 
-// The parts of a line, the most wanted first: a narrow terminal drops the last ones.
+// The parts of a line, in the order of importance: a narrow terminal drops the last ones.
 std::vector<std::string> Progress::parts() const {
   if (!given_.empty()) return given_;
-  // The last step ends at end_time up to rounding.
+  // The last step ends at end_time except for rounding.
   const bool done = time_ >= end_time_ * (1 - 1e-9);
-  const double fraction = done ? 1 : std::clamp(time_ / end_time_, 0.0, 0.999);  // 100% is the end
-  // Time left from the steps still to go; the step size is time / step.
+  const double fraction = done ? 1 : std::clamp(time_ / end_time_, 0.0, 0.999);  // 100% at the end
+  // Remaining time from the remaining steps; the step size is time / step.
   const double dt = step_ > 0 ? time_ / static_cast<double>(step_) : 0;
   const double left = done ? 0 : (end_time_ - time_) / (dt * steps_per_second_);
   std::vector<std::string> parts = share_parts(fraction);
   parts.push_back(fmt::format("{} left", clock_text(left)));
   parts.push_back(fmt::format("{:.3f}/{:g} s", time_, end_time_));
-  // The run's own threads are in the load, too, and fill the cores at most.
+  // The load includes this run's threads, which occupy at most all cores.
   if (const auto host = load_(); host && host->exceeds()) {
     parts.push_back(fmt::format("load {:.1f} on {} cores", host->load, host->cores));
   }
@@ -161,12 +161,12 @@ void Progress::show() {
   pending_ = false;
   std::string line;
   for (const std::string& part : parts()) {
-    // One column stays free, so that no terminal wraps the line.
+    // One column stays free, so that the terminal does not wrap the line.
     if (terminal_ && static_cast<int>(line.size() + 2 + part.size()) >= columns_) break;
     if (!line.empty()) line += "  ";
     line += part;
   }
-  // Not fmt::print, which throws: a closed stderr must not end a run.
+  // Not fmt::print, which would throw: a closed stderr must not end a run.
   std::fputs((terminal_ ? '\r' + line + "\x1b[K" : line + '\n').c_str(), stream_);
   std::fflush(stream_);
   drawn_ = terminal_;

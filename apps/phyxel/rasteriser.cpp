@@ -9,24 +9,24 @@ using Vec3f = Vec3<float>;
 
 // Directions in the camera's axes: x right, y up, z towards the viewer.
 constexpr Vec3f key_light{-0.44f, 0.66f, 0.61f}, fill_light{0.80f, 0.05f, 0.60f};
-constexpr Vec3f key_halfway{-0.245f, 0.368f, 0.897f};  // between the key light and the viewer
+constexpr Vec3f key_halfway{-0.245f, 0.368f, 0.897f};  // halfway between key light and viewer
 constexpr Colour key_colour{0.80f, 0.77f, 0.72f}, fill_colour{0.13f, 0.15f, 0.19f};
 constexpr Colour sky_colour{0.40f, 0.42f, 0.45f}, ground_colour{0.17f, 0.15f, 0.14f};
 
 // Vertices are rounded to 1/256 of a sample, so that edge functions are exact integers and
 // neighbouring triangles leave no gap.
 constexpr std::int64_t subsample = 256;
-constexpr double farthest_sample = 1 << 20;  // beyond: the products of edge functions overflow
+constexpr double farthest_sample = 1 << 20;  // limit against overflow of edge functions
 
 Colour times(Colour a, Colour b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
 Vec3f unit(Vec3f v) {
   const float length = std::sqrt(dot(v, v));
-  // Of no direction, or of none that is finite: towards the viewer.
+  // A zero or non-finite vector is replaced by the direction towards the viewer.
   return length > 0 && std::isfinite(length) ? v / length : Vec3f{0, 0, 1};
 }
 
-/// Samples a pixel and axis: 3, or as many as keep the buffers within a gigabyte or so.
+/// Number of samples per pixel and axis: 3, or fewer to keep the buffers within about a gigabyte.
 int choose_samples(const Camera& camera) {
   const double pixels = static_cast<double>(camera.width) * camera.height;
   return pixels * 9 <= 5e7 ? 3 : pixels * 4 <= 8e7 ? 2 : 1;
@@ -35,15 +35,15 @@ int choose_samples(const Camera& camera) {
 }  // namespace
 
 struct Rasteriser::Vertex {
-  std::int64_t x, y;  // 1/256 samples
-  float nearness;     // 1 / depth; 0: not drawable
+  std::int64_t x, y;  // [samples / 256]
+  float nearness;     // 1 / depth; 0 if not drawable
   Vec3f normal;       // in the camera's axes, times nearness
   Colour colour;      // times nearness
 };
 
 struct Rasteriser::Disc {
-  float x, y, radius;  // samples
-  float depth, bulge;  // [m]: of the centre, and how much nearer the middle of the sphere is
+  float x, y, radius;  // [samples]
+  float depth, bulge;  // depth of the centre, and how much nearer the front of the sphere is [m]
 };
 
 Rasteriser::Rasteriser(const Camera& camera, Vec3d up, Colour top, Colour bottom)
@@ -71,7 +71,7 @@ Rasteriser::Vertex Rasteriser::vertex(Vec3d point, Vec3d normal, Colour colour) 
   Vertex v{};
   const Camera::Place place = camera_.project(point);
   const double x = place.x * samples_, y = place.y * samples_;
-  // Written so that NaN fails it.
+  // The negated comparison also rejects NaN.
   if (!(place.depth > 0 && std::abs(x) < farthest_sample && std::abs(y) < farthest_sample))
     return v;
   v.x = std::llround(x * subsample);
@@ -88,14 +88,14 @@ Colour Rasteriser::shade(Colour colour, Vec3f n, float x, float y) const {
   const Vec3f viewer = unit({(centre_x_ - x) * per_focal_, (y - centre_y_) * per_focal_, 1.0f});
   const float up = 0.5f + 0.5f * dot(n, sky_);
   Colour light = (1 - up) * ground_colour + up * sky_colour;
-  // Lambert, wrapped by a tenth: the edge of the shadow is soft, as in soft material.
+  // Lambert shading wrapped by a tenth, for the soft shadow edge of soft material.
   const auto lambert = [&](Vec3f direction) {
     return std::max(0.0f, (dot(n, direction) + 0.1f) / 1.1f);
   };
   light += lambert(key_light) * key_colour;
   light += lambert(fill_light) * fill_colour;
   const float facing = std::clamp(dot(n, viewer), 0.0f, 1.0f);
-  // Contours darken, as drawn ones do.
+  // Contours are darkened.
   const float rim = 1 - facing;
   const float contour = 1 - 0.55f * rim * rim * rim * rim;
   float gloss = std::max(0.0f, dot(n, key_halfway));
@@ -107,7 +107,7 @@ void Rasteriser::draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c
   if (a.nearness == 0 || b.nearness == 0 || c.nearness == 0) return;
   const std::int64_t area = (b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y);
   if (area == 0) return;
-  // y points down, so a triangle that is counter-clockwise to the viewer has a negative area.
+  // y points down, so a triangle that is counter-clockwise for the viewer has a negative area.
   const float side = area < 0 ? 1.0f : -1.0f;
   const Vertex& p = a;
   const Vertex& q = area < 0 ? c : b;
@@ -124,7 +124,7 @@ void Rasteriser::draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c
   if (x0 > x1 || y0 > y1) return;
 
   const std::int64_t cx = x0 * subsample + subsample / 2, cy = y0 * subsample + subsample / 2;
-  // Edge functions: twice the area that the sample spans with the opposite edge.
+  // Edge functions: twice the area of the triangle of the sample and the opposite edge.
   std::int64_t row_p = (r.x - q.x) * (cy - q.y) - (r.y - q.y) * (cx - q.x);
   std::int64_t row_q = (p.x - r.x) * (cy - r.y) - (p.y - r.y) * (cx - r.x);
   std::int64_t row_r = (q.x - p.x) * (cy - p.y) - (q.y - p.y) * (cx - p.x);
@@ -136,7 +136,7 @@ void Rasteriser::draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c
         const float wp = static_cast<float>(edge_p) * per_area;
         const float wq = static_cast<float>(edge_q) * per_area;
         const float wr = static_cast<float>(edge_r) * per_area;
-        // Values over depth are linear on the image.
+        // Values divided by depth are linear on the image.
         const float nearness = wp * p.nearness + wq * q.nearness + wr * r.nearness;
         const std::size_t s = at(x, y);
         if (nearness > nearness_[s]) {
@@ -170,8 +170,8 @@ void Rasteriser::draw_surface(std::span<const Vec3d> point, std::span<const Vec3
 }
 
 // 1 / depth is linear over the image of a plane, so the mean of two opposite samples minus the one
-// between them tells a hollow (positive) from a plane (zero) or a bulge (negative), without
-// normals. Source of the idea: Luft et al. 2006, "Image enhancement by unsharp masking the depth
+// between them is positive in a hollow, zero on a plane and negative on a bulge; normals are not
+// needed. Source of the idea: Luft et al. 2006, "Image enhancement by unsharp masking the depth
 // buffer".
 void Rasteriser::shade_hollows(double reach) {
   constexpr int directions = 6, rings = 4;
@@ -188,7 +188,8 @@ void Rasteriser::shade_hollows(double reach) {
       const float here = nearness_[at(x, y)];
       if (here == 0) continue;
       const float per_size = 1 / (here * here * size);  // d(depth) = d(nearness) / nearness^2
-      // Height of a neighbour over this sample, in reaches; one far in front is another object.
+      // Height of a neighbour above this sample in units of the reach; one far in front belongs to
+      // another object.
       const auto rise = [&](int u, int v) {
         const int nx = std::clamp(u, 0, width_ - 1), ny = std::clamp(v, 0, height_ - 1);
         const float height = (nearness_[at(nx, ny)] - here) * per_size;
@@ -196,7 +197,7 @@ void Rasteriser::shade_hollows(double reach) {
       };
       float sum = 0;
       for (int ring = 0; ring < rings; ++ring) {
-        // Written so that NaN is bounded, too.
+        // The order of the arguments also bounds NaN.
         const float wanted = reach_in_samples * here * static_cast<float>(ring + 1) / rings;
         const float radius = wanted < farthest ? wanted : farthest;
         for (int k = 0; k < directions; ++k) {
@@ -241,7 +242,7 @@ Rasteriser::Disc Rasteriser::disc(Vec3d centre, const DotStyle& style) const {
   return d;
 }
 
-/// Calls plot(sample, unit normal of the sphere there) for each sample of the disc.
+/// Calls plot(sample, unit normal of the sphere) for each sample of the sphere's disc.
 template <class Plot>
 void Rasteriser::for_each_sample(const Disc& d, const Plot& plot) const {
   if (d.depth == 0) return;

@@ -1,4 +1,4 @@
-/// phyxel render: pictures of a trajectory, without display or GPU.
+/// phyxel render: pictures of a trajectory.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -75,28 +75,27 @@ void add_render(CLI::App& program) {
                      ->allow_extra_args(false);
   auto* count = command
                     ->add_option("--count", request.choice.count,
-                                 "So many frames, evenly spread, first and last included")
+                                 "Number of frames, evenly spaced, first and last included")
                     ->check(CLI::Range(std::int64_t{1}, most_frames))
                     ->excludes(frames);
-  command->add_option("--every", request.choice.every, "Every so many frames")
+  command->add_option("--every", request.choice.every, "Interval of frames: 10 draws every tenth")
       ->check(CLI::Range(std::int64_t{1}, most_frames))
       ->excludes(frames)
       ->excludes(count);
-  command->add_option("--width", request.width, "Pixels across")->capture_default_str();
-  command->add_option("--height", request.height, "Pixels down")->capture_default_str();
+  command->add_option("--width", request.width, "Width [px]")->capture_default_str();
+  command->add_option("--height", request.height, "Height [px]")->capture_default_str();
   command
-      ->add_option("--view", options->view,
-                   "Direction the camera looks along: x,y,z (default: the scene's)")
+      ->add_option("--view", options->view, "Direction of the camera: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
   command
       ->add_option("--up", options->up,
-                   "Direction that is up on the picture: x,y,z (default: the scene's)")
+                   "Vertical direction of the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_flag("--no-phyxels", options->no_phyxels, "The surface only");
-  command->add_flag("--no-surface", options->no_surface, "The phyxels only, as balls");
-  command->add_flag("--force", options->force, "Replace pictures that exist");
+  command->add_flag("--no-phyxels", options->no_phyxels, "Draw the surface only");
+  command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
+  command->add_flag("--force", options->force, "Replace existing pictures");
   command->add_flag("--json", options->json, "The pictures' names as JSON, nothing else on stdout");
   command->footer(
       "Examples:\n"

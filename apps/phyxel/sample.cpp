@@ -1,4 +1,4 @@
-/// phyxel sample: a mesh filled with phyxels, written as body.h5.
+/// phyxel sample: a body file from a mesh filled with phyxels.
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -30,9 +30,8 @@ struct SampleOptions {
 SampleRequest request_of(const SampleOptions& options) {
   constexpr std::int64_t most = std::numeric_limits<Index>::max(), most_relaxations = 10000;
   if (options.phyxels < 1 || options.phyxels > most) {
-    throw InputError(
-        fmt::format("--phyxels {}: out of range: allowed 1 to {}, as far as memory goes",
-                    options.phyxels, most));
+    throw InputError(fmt::format("--phyxels {}: out of range: allowed 1 to {}, within the memory",
+                                 options.phyxels, most));
   }
   if (options.relaxations < 0 || options.relaxations > most_relaxations) {
     throw InputError(fmt::format("--relaxations {}: out of range: allowed 0 to {}",
@@ -48,7 +47,7 @@ SampleRequest request_of(const SampleOptions& options) {
           .on_surface = options.on_surface};
 }
 
-/// Refuses an output that could not be written in the end, before any time is spent.
+/// Checks in advance that the output can be written. @throws InputError
 void check_output(const SampleOptions& options) {
   namespace fs = std::filesystem;
   const fs::path& out = options.out;
@@ -139,8 +138,7 @@ void add_sample(CLI::App& program) {
       "sample", "Fill a closed surface with phyxels; its vertices become the surfels");
   auto options = std::make_shared<SampleOptions>();
   command->add_option("mesh", options->mesh, "Surface in metres: OBJ, PLY or STL")->required();
-  command->add_option("--phyxels", options->phyxels, "How many: exactly so many are made")
-      ->required();
+  command->add_option("--phyxels", options->phyxels, "Exact number of phyxels")->required();
   command->add_option("--out", options->out, "File to write (body.h5)")->required();
   command
       ->add_option("--seed", options->seed,
@@ -148,15 +146,15 @@ void add_sample(CLI::App& program) {
       ->capture_default_str();
   command
       ->add_option("--relaxations", options->relaxations,
-                   "Sweeps that even out the distances; 0: none")
+                   "Sweeps of Lloyd's relaxation; 0 for none")
       ->capture_default_str();
   CLI::Option* const on_surface = command->add_flag_callback(
       "--on-surface", [options] { options->on_surface = true; },
-      "Phyxels on the surface, too, on its corners and along its sharp edges: far more accurate in "
+      "Also place phyxels on the surface, its corners and its sharp edges: far more accurate in "
       "bending. Default: if the mesh allows it");
   command
       ->add_flag_callback(
-          "--inside", [options] { options->on_surface = false; }, "All phyxels inside")
+          "--inside", [options] { options->on_surface = false; }, "Place all phyxels inside")
       ->excludes(on_surface);
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");

@@ -14,7 +14,7 @@
 namespace phyxel::app {
 namespace {
 
-/// "E = 1e+06 Pa, nu = 0.3, ", of laws that have them.
+/// The moduli of a material, e.g. "E = 1e+06 Pa, nu = 0.3, "; "" for laws without them.
 std::string moduli_of(const Material& m) {
   std::string text;
   if (m.custom_law || has_parameter(m.law, "young")) text += fmt::format("E = {:g} Pa, ", m.young);
@@ -58,9 +58,10 @@ void add_overrides(CLI::App& command, Overrides& o) {
   command.add_option("--out", o.out, "Output folder, instead of the scene's");
   command.add_option("--device", o.device, device_help);
   command.add_option("--precision", o.precision, "float, double or mixed");
-  command.add_option("--method", o.method,
-                     "verlet, implicit (needs --step or the scene's time.step) or equilibrium, "
-                     "which finds where the scene comes to rest; the last two in double");
+  command.add_option(
+      "--method", o.method,
+      "verlet, implicit (needs --step or the scene's time.step) or equilibrium (finds "
+      "the state at rest); the last two in double");
   command.add_option("--threads", o.threads, "CPU threads (default: all)");
   command.add_option("--until", o.until, "Simulated time to stop at [s]");
   command.add_option("--step", o.step, "Time step [s], instead of the scene's");

@@ -1,4 +1,4 @@
-/// What `run` and `check` share: a scene with the command line's overrides, and the plan it gives.
+/// A scene with the overrides of the command line, and its description.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,7 +11,7 @@
 
 namespace phyxel::app {
 
-/// Options that replace what the scene says.
+/// Options that override keys of the scene.
 struct Overrides {
   std::string scene;
   std::string out, device, precision, method;
@@ -24,16 +24,16 @@ void add_overrides(CLI::App& command, Overrides& overrides);
 /// Reads the scene and applies the overrides. @throws InputError
 Scene scene_with(const Overrides& overrides);
 
-/// Phyxels that follow a path, and that loads pull.
+/// Number of phyxels with prescribed displacements, and with loads.
 struct BoundarySize {
   std::int64_t moved = 0, loaded = 0;
 };
-/// Of those that are no ghosts.
+/// Counts the boundary phyxels of a model, without ghosts.
 BoundarySize boundary_size(const Model& model);
 
-/// Bodies, materials, terms, neighbours and warnings, one per line.
+/// Description of bodies, materials, terms, neighbours and warnings, line by line.
 /// @param model may be a rank's share
-/// @param boundary of the whole
+/// @param boundary counts of the whole model
 std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary);
 
 /// The value of `--precision`. @throws InputError

@@ -13,21 +13,21 @@
 namespace phyxel::app {
 namespace {
 
-// Atomic, because a signal may come to any thread of the program.
+// Atomic, since any thread may receive a signal.
 std::atomic<int> stop = 0;
 std::atomic<bool> checkpoint = false;
-std::atomic<bool> at_work = false;  // whether a stop is for the loop over steps to see
+std::atomic<bool> at_work = false;  // true while the loop over steps handles requests to stop
 std::atomic<bool> says = true;
 std::atomic<bool> on_terminal = false;
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
 constexpr auto to_stop = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGXCPU, SIGPIPE};
 
-/// Ends the program during set-up, when no file has been touched.
+/// Ends the program during set-up, before any file has been changed.
 [[noreturn]] void leave() {
   constexpr const char* words =
       "phyxel: error: stopped by a signal during set-up: nothing was written or changed\n";
-  constexpr const char* clear = "\r\x1b[K";  // of the stage that is drawn there
+  constexpr const char* clear = "\r\x1b[K";  // clears the line of the present stage
   if (says) {
     [[maybe_unused]] ssize_t written = 0;
     if (on_terminal) written = ::write(STDERR_FILENO, clear, std::strlen(clear));
@@ -38,7 +38,7 @@ constexpr auto to_stop = {SIGINT, SIGTERM, SIGUSR2, SIGHUP, SIGXCPU, SIGPIPE};
 
 void ask_to_stop(int signal) {
   if (!at_work) leave();
-  if (stop != 0 && signal != SIGPIPE) {  // asked twice: do not wait for the end of the step
+  if (stop != 0 && signal != SIGPIPE) {  // a second signal does not wait for the end of the step
     std::signal(signal, SIG_DFL);
     std::raise(signal);
   }
@@ -51,11 +51,11 @@ void handle(int signal, void (*handler)(int)) {
   struct sigaction action = {};
   action.sa_handler = handler;
   sigemptyset(&action.sa_mask);
-  action.sa_flags = SA_RESTART;  // a write under way is not to fail for it
+  action.sa_flags = SA_RESTART;  // writes in progress must not fail
   sigaction(signal, &action, nullptr);
 }
 
-/// Whether whoever started the program wants it to ignore a signal, as nohup does.
+/// True if the parent process has set a signal to be ignored, as nohup does.
 bool is_ignored(int signal) {
   struct sigaction action = {};
   return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
@@ -73,7 +73,7 @@ StopSignal::StopSignal(bool speaks) {
     if (!is_ignored(signal)) handle(signal, ask_to_stop);
   }
   handle(SIGUSR1, ask_for_checkpoint);
-  handle(SIGXFSZ, SIG_IGN);  // the write that hits the limit fails, which is told
+  handle(SIGXFSZ, SIG_IGN);  // the write that hits the limit fails with an error
 }
 
 StopSignal::~StopSignal() {

@@ -11,9 +11,9 @@
 namespace phyxel::app {
 namespace {
 
-// Turns of libgomp's loop before a waiting thread sleeps: tens of microseconds, a fraction of a
-// step that is worth several threads. By default it spins 300,000 turns, milliseconds in which a
-// thread of another program, or the one that is waited for, could have had the core.
+// Iterations of libgomp's loop before a waiting thread sleeps: tens of microseconds, a fraction of
+// a step that is worth several threads. By default it spins for 300,000 iterations, milliseconds in
+// which a thread of another program, or the awaited one, could have had the core.
 constexpr const char* turns = "1000";
 
 bool starts_with(std::string_view text, std::string_view head) {
@@ -26,22 +26,22 @@ void settle_thread_policy(char** argv) {
   if (std::getenv("OMP_WAIT_POLICY") != nullptr || std::getenv("GOMP_SPINCOUNT") != nullptr) return;
   std::error_code failed;
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", failed);
-  // Started through the dynamic loader, "self" is the loader, whose arguments are others.
+  // A program started through the dynamic loader cannot be restarted: "self" is the loader.
   if (failed || starts_with(self.filename().string(), "ld")) return;
-  // The variable is also what keeps the program from starting itself a second time.
+  // The variable also prevents a second restart.
   if (setenv("GOMP_SPINCOUNT", turns, 1) != 0) return;
   execv("/proc/self/exe", argv);
-  unsetenv("GOMP_SPINCOUNT");  // not started: the runtime has not seen it
+  unsetenv("GOMP_SPINCOUNT");  // the restart failed, and the runtime has not read the variable
 }
 
 std::string thread_policy() {
-  // The environment that the process began with; what is set later comes too late for the runtime.
+  // The initial environment: the runtime does not see variables that are set later.
   std::ifstream file("/proc/self/environ", std::ios::binary);
   const std::string all((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   std::string found;
   for (std::size_t at = 0; at < all.size();) {
     const std::string_view entry(all.c_str() + at);
-    // libgomp lets the count overrule the policy.
+    // In libgomp the count overrides the policy.
     if (starts_with(entry, "GOMP_SPINCOUNT=") ||
         (found.empty() && starts_with(entry, "OMP_WAIT_POLICY="))) {
       found = entry;

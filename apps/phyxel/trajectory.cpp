@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 bool is_series(const fs::path& file) { return kind_of(file) == Kind::series; }
 
-/// Surface and phyxel frames of equal time, one shot each.
+/// Pairs of surface and phyxel frames of equal time.
 std::vector<Shot> pair_by_time(const std::vector<SeriesEntry>& surface,
                                const std::vector<SeriesEntry>& phyxels) {
   std::vector<Shot> shots;
@@ -35,7 +35,7 @@ std::vector<Shot> pair_by_time(const std::vector<SeriesEntry>& surface,
   return shots;
 }
 
-/// A series or a frame of its own is a surface if it has triangles.
+/// Shots of a single series or frame, which is a surface if it has triangles.
 std::vector<Shot> only_family(const std::vector<SeriesEntry>& entries, Families wanted,
                               const fs::path& input) {
   if (entries.empty()) return {};
@@ -60,7 +60,7 @@ Trajectory find_trajectory(const fs::path& input, Families wanted) {
     const bool has_surface = fs::exists(surface), has_phyxels = fs::exists(phyxels);
     if (!has_surface && !has_phyxels) {
       throw InputError(fmt::format(
-          "{}: holds no trajectory: neither surface.hdf.series nor phyxels.hdf.series is there",
+          "{}: has no trajectory: neither surface.hdf.series nor phyxels.hdf.series exists",
           input.string()));
     }
     if (!(has_surface && wanted.surface) && !(has_phyxels && wanted.phyxels)) {
@@ -77,7 +77,7 @@ Trajectory find_trajectory(const fs::path& input, Families wanted) {
     trajectory.series = false;
     trajectory.shots = only_family({{input, read_frame(input).time}}, wanted, input);
   }
-  if (trajectory.shots.empty()) throw InputError(fmt::format("{}: holds no frame", input.string()));
+  if (trajectory.shots.empty()) throw InputError(fmt::format("{}: has no frame", input.string()));
   return trajectory;
 }
 
@@ -98,8 +98,8 @@ int time_decimals(const std::vector<Shot>& shots) {
 std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t available) {
   const auto n = static_cast<std::int64_t>(available);
   if (choice.count < 0 || choice.every < 0) {
-    throw InputError(fmt::format("{} frames, every {}: allowed are positive numbers", choice.count,
-                                 choice.every));
+    throw InputError(
+        fmt::format("{} frames, every {}; allowed: positive numbers", choice.count, choice.every));
   }
   std::vector<std::size_t> chosen;
   if (!choice.frames.empty()) {
@@ -112,11 +112,11 @@ std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t av
     }
     sort_unique(chosen);
   } else if (choice.count == 1) {
-    if (n > 0) chosen.push_back(available - 1);  // the end of a motion tells the most
+    if (n > 0) chosen.push_back(available - 1);  // a single frame is the last one
   } else if (choice.count > 0) {
     const std::int64_t count = std::min(choice.count, n);
     for (std::int64_t k = 0; k < count; ++k) {
-      // k (n - 1) / (count - 1), rounded; count is 1 only if there is a single frame.
+      // k (n - 1) / (count - 1), rounded; count is 1 only with a single frame.
       const std::int64_t gaps = std::max<std::int64_t>(1, count - 1);
       chosen.push_back(static_cast<std::size_t>((2 * k * (n - 1) + gaps) / (2 * gaps)));
     }

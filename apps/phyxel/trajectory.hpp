@@ -1,4 +1,4 @@
-/// The frames of a run on disk, surface and phyxels of one time together.
+/// The frames of a run on disk, with surface and phyxels of equal time paired.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace phyxel::app {
 
-/// Where one moment of the trajectory is on disk; either path may be empty.
+/// The files of one time of a trajectory; either path may be empty.
 struct Shot {
   std::filesystem::path surface, phyxels;
   double time = 0;
@@ -17,33 +17,33 @@ struct Shot {
 
 struct Trajectory {
   std::vector<Shot> shots;
-  bool series = true;  // else a single frame file
+  bool series = true;  // false for a single frame file
 };
 
-/// Which of a trajectory's families are wanted.
+/// The families of a trajectory that are requested.
 struct Families {
   bool surface = true, phyxels = true;
 };
 
-/// The frames of a run's folder, of one series file, or one frame file.
-/// @throws InputError if there are none of those wanted
+/// Finds the frames of a run's folder, a series file or a frame file.
+/// @throws InputError if there are no frames of the requested families
 Trajectory find_trajectory(const std::filesystem::path& input, Families wanted);
 
-/// The frame of that file; nothing if its name is empty.
+/// The frame in a file; unset if the name is empty.
 std::optional<FrameData> read_if_any(const std::filesystem::path& file);
 
-/// Enough decimals to tell two frames apart, at least 2.
+/// Number of decimals that distinguishes the frames' times, at least 2.
 int time_decimals(const std::vector<Shot>& shots);
 
-/// Which frames of a series; at most one member is set, none means all of them.
+/// A choice of frames of a series. At most one member is set; none chooses all frames.
 struct FrameChoice {
-  std::vector<std::int64_t> frames;  ///< Numbers from 0; negative ones count from the end.
-  std::int64_t count = 0;            ///< This many, evenly spread, first and last included.
-  std::int64_t every = 0;            ///< Every so many, from the first.
+  std::vector<std::int64_t> frames;  ///< Numbers from 0; negative numbers count from the end.
+  std::int64_t count = 0;            ///< Number of evenly spaced frames, first and last included.
+  std::int64_t every = 0;            ///< Interval of frames, from the first.
 };
 
-/// Frame numbers in rising order, each once.
-/// @throws InputError for a number outside [-available, available), or a negative count or step.
+/// The chosen frame numbers, ascending and unique.
+/// @throws InputError for a number outside [-available, available), or a negative count or interval
 std::vector<std::size_t> choose_frames(const FrameChoice& choice, std::size_t available);
 
 }  // namespace phyxel::app

@@ -1,4 +1,4 @@
-/// The paper's body structure (section 5.1), and what its text needs beside it.
+/// The paper's body structure (section 5.1) and the arrays that its text implies.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -9,49 +9,49 @@ namespace phyxel::paper {
 /// paper's float, or double in the proofs. All pointers are device memory.
 template <class Real>
 struct CuBody {
-  Real* d_positions_masses;      ///< x, y, z [m] and mass [kg], shape [n, 4]; mass 0: held.
+  Real* d_positions_masses;      ///< x, y, z [m] and mass [kg], shape [n, 4]; a mass of 0 is fixed.
   Real* d_displacements_volume;  ///< u [m] and volume [m³], shape [n, 4].
-  Real* d_forces;                ///< [N], shape [n, n, 3]: row i holds the forces that i applies,
-                                 ///< on itself at (i, i), where calcStrainStressB leaves the sum.
+  Real* d_forces;                ///< [N], shape [n, n, 3]: row i holds the forces that i exerts;
+                                 ///< calcStrainStressB stores the total force on i at (i, i).
   Real* d_momentMatrices;        ///< A⁻¹ [m], shape [n, 3, 3].
   int numPhyxels;
   int maxNeighbors;
   unsigned short* d_neighbors;  ///< Shape [maxNeighbors, n]: slot k of phyxel i at k·n + i.
   Real* d_omega;                ///< ω_ij [1/m³], same shape.
-  Real* d_gradui;               ///< ∇u, ∇v, ∇w one after the other, shape [n, 3, 3].
+  Real* d_gradui;               ///< Rows ∇u, ∇v, ∇w, shape [n, 3, 3].
   Real* d_lastDisplacements;    ///< u(t - Δt) [m], shape [n, 3].
 };
 
-/// Marks an unused neighbour slot.
+/// Value of an unused neighbour slot.
 inline constexpr unsigned short no_neighbor = 0xFFFF;
 
 /// Inverse neighbourhood: "all phyxels that have a certain phyxel P as a neighbor".
 struct CuInverse {
   int* d_offsets;             ///< Shape [n + 1].
-  unsigned short* d_phyxels;  ///< Who, ascending.
-  unsigned short* d_slots;    ///< In which of their slots (for the CSR gather).
+  unsigned short* d_phyxels;  ///< Phyxels that have P as a neighbour, ascending.
+  unsigned short* d_slots;    ///< Slot of P in each of their lists (for the CSR gather).
 };
 
-/// What replaces d_forces' n×n matrix in the CSR gather.
+/// Arrays of the CSR gather, which replace the n×n matrix of `d_forces`.
 template <class Real>
 struct CuGather {
   Real* d_pairStress;  ///< -v P A⁻¹, shape [n, 3, 3].
-  Real* d_ownForces;   ///< Shape [n, 3]; calcStrainStressB leaves the sum here.
+  Real* d_ownForces;   ///< Total forces [N], shape [n, 3]; calcStrainStressB stores them.
 };
 
-/// The mesh. Weights and carriers in slots like those of the neighbours.
+/// The surfels. Weights and carriers are in slots, as the neighbours of phyxels.
 template <class Real>
 struct CuSurfels {
-  Real* d_positions;  ///< At rest [m], shape [n_surfels, 3].
-  Real* d_normals;    ///< At rest, shape [n_surfels, 3].
+  Real* d_positions;  ///< Rest positions [m], shape [n_surfels, 3].
+  Real* d_normals;    ///< Rest normals, shape [n_surfels, 3].
   int numSurfels;
   int maxNeighbors;
   unsigned short* d_neighbors;  ///< Shape [maxNeighbors, n_surfels].
-  Real* d_omega;                ///< Same shape.
-  Real* d_vertexBuffer;         ///< Normal and position, interleaved (OpenGL's GL_N3F_V3F).
+  Real* d_omega;                ///< Weights, same shape.
+  Real* d_vertexBuffer;         ///< Interleaved normals and positions (OpenGL's GL_N3F_V3F).
 };
 
-/// Read-only data through the texture cache.
+/// Textures of read-only arrays.
 struct CuTextures {
   cudaTextureObject_t positions_masses, displacements_volume, omega, surfel_omega;
 };
@@ -66,7 +66,7 @@ struct Vector4<float> {
   static __device__ float4 fetch(cudaTextureObject_t t, int i) { return tex1Dfetch<float4>(t, i); }
   static __device__ float fetch1(cudaTextureObject_t t, int i) { return tex1Dfetch<float>(t, i); }
 };
-/// Textures have no texels of double: one is fetched as two integers, four as two texels.
+/// Double has no texels: one number is fetched as two integers, four numbers as two texels.
 template <>
 struct Vector4<double> {
   struct alignas(16) type {

@@ -1,9 +1,8 @@
-/// The kernels of Farias et al. 2008, section 5.1, by their names and roles. An exhibit: the
-/// production kernels owe nothing to them. docs/paper.md lists what the text leaves open and how
-/// each gap was filled.
+/// The kernels of Farias et al. 2008, section 5.1, by their names, independent of the production
+/// kernels. docs/paper.md lists what the paper leaves open and how each gap was filled.
 ///
-/// One thread a phyxel (or a surfel), one body a launch. Products of indices are 24-bit
-/// multiplications, as on a GPU of 2008, where 32-bit ones took four times as long.
+/// Each phyxel (or surfel) has a thread, and each launch steps one body. Indices are multiplied by
+/// 24-bit products, since 32-bit products took four times as long on a GPU of 2008.
 #pragma once
 
 #include "cu_body.cuh"
@@ -59,13 +58,13 @@ __device__ void store9(Real* array, int i, const Mat3<Real>& m) {
   for (int e = 0; e < 9; ++e) to[e] = m(e / 3, e % 3);
 }
 
-/// Entry (i, j) of the n×n matrix. The product of two 16-bit numbers fits 32 bits; three times it
-/// does not.
+/// Entry (i, j) of the n×n matrix. The product of two 16-bit numbers fits 32 bits, but three times
+/// the product does not.
 __device__ inline std::size_t matrix_entry(int i, int j, int n) {
   return __umul24(static_cast<unsigned>(i), static_cast<unsigned>(n)) + static_cast<unsigned>(j);
 }
 
-/// Weights, inverse moment matrix and volume of each phyxel. Runs once.
+/// Computes weights, inverse moment matrix and volume of each phyxel, once.
 template <class Real>
 __global__ void precalcImutableValues(CuBody<Real> body, CuTextures textures,
                                       const Real* d_supports) {
@@ -77,7 +76,7 @@ __global__ void precalcImutableValues(CuBody<Real> body, CuTextures textures,
   const Real inverse_h_squared = Real(1) / (h * h);
   const Real at_centre = Real(315.0 / (64.0 * 3.14159265358979323846)) / (h * h * h);
   Sym3<Real> moment;
-  Real density = x_m.w * at_centre;  // [M] sums over the phyxel itself too
+  Real density = x_m.w * at_centre;  // [M] includes the phyxel itself in the sum
   for (int k = 0; k < body.maxNeighbors; ++k) {
     const int slot = __mul24(k, n) + i;
     const int j = body.d_neighbors[slot];
@@ -93,7 +92,7 @@ __global__ void precalcImutableValues(CuBody<Real> body, CuTextures textures,
   body.d_displacements_volume[__mul24(i, 4) + 3] = x_m.w / density;
 }
 
-/// Equation (4): six stresses from six strains through the whole tensor, zeros included.
+/// Equation (4): six stresses from six strains by the full tensor, zeros included.
 template <class Real>
 __device__ Sym3<Real> hooke(const Sym3<Real>& strain) {
   const Real e[6] = {strain.xx, strain.yy, strain.zz, strain.xy, strain.yz, strain.xz};
@@ -106,8 +105,8 @@ __device__ Sym3<Real> hooke(const Sym3<Real>& strain) {
   return {s[0], s[3], s[5], s[1], s[4], s[2]};
 }
 
-/// Force of phyxel i on the neighbour at x_ij [N], q = -v P A⁻¹. The fused products are spelled
-/// out, so that whoever evaluates it gets the same bits.
+/// Force of phyxel i on the neighbour at x_ij [N], with q = -v P A⁻¹. Fused products are explicit,
+/// so that each caller gets the same bits.
 template <class Real>
 __device__ Vec3<Real> force_on_neighbor(const Mat3<Real>& q, Vec3<Real> x_ij, Real w) {
   const Vec3<Real> wx = w * x_ij;
@@ -116,8 +115,8 @@ __device__ Vec3<Real> force_on_neighbor(const Mat3<Real>& q, Vec3<Real> x_ij, Re
           fma(q(2, 2), wx.z, fma(q(2, 1), wx.y, q(2, 0) * wx.x))};
 }
 
-/// Strain and stress at each phyxel; the forces that it applies to its neighbours go into the
-/// matrix (`dense`), or what they follow from is kept (the CSR gather).
+/// Computes strain and stress of each phyxel, and stores the forces that it exerts on its
+/// neighbours in the matrix (`dense`), or its pair stress (CSR gather).
 template <class Real, bool green, bool dense>
 __global__ void calcStrainStressA(CuBody<Real> body, CuGather<Real> gather, CuTextures textures) {
   const int i = thread_index(), n = body.numPhyxels;
@@ -167,7 +166,7 @@ __global__ void calcStrainStressA(CuBody<Real> body, CuGather<Real> gather, CuTe
   }
 }
 
-/// Each phyxel sums what its inverse neighbourhood stored for it: column i of the matrix.
+/// Sums the forces on each phyxel over its inverse neighbourhood: column i of the matrix.
 template <class Real>
 __global__ void calcStrainStressB(CuBody<Real> body, CuInverse inverse) {
   const int i = thread_index(), n = body.numPhyxels;
@@ -179,7 +178,7 @@ __global__ void calcStrainStressB(CuBody<Real> body, CuInverse inverse) {
   store3(body.d_forces, matrix_entry(i, i, n), sum);
 }
 
-/// The same sum, in the same order, without the matrix: each force is evaluated where it is needed.
+/// Sums the forces on each phyxel in the same order without the matrix, evaluating each force.
 template <class Real>
 __global__ void calcStrainStressB_csr(CuBody<Real> body, CuInverse inverse, CuGather<Real> gather,
                                       CuTextures textures) {
@@ -197,7 +196,8 @@ __global__ void calcStrainStressB_csr(CuBody<Real> body, CuInverse inverse, CuGa
   store3(gather.d_ownForces, i, sum);
 }
 
-/// Verlet in displacements (reference 29 of the paper). A phyxel of mass 0 is held.
+/// A step of Verlet's method in displacements (reference 29 of the paper). A phyxel of mass 0 is
+/// fixed.
 template <class Real, bool dense>
 __global__ void integrate(CuBody<Real> body, CuGather<Real> gather, CuTextures textures,
                           Vec3<Real> gravity, Real dt_squared) {
@@ -217,8 +217,8 @@ __global__ void integrate(CuBody<Real> body, CuGather<Real> gather, CuTextures t
   reinterpret_cast<Four*>(body.d_displacements_volume)[i] = {next.x, next.y, next.z, u_v.w};
 }
 
-/// Equation (6), "added with the original positions to fill the OpenGL vertex buffer"; normals by
-/// the cofactor of the same blend of gradients.
+/// Equation (6), "added with the original positions to fill the OpenGL vertex buffer"; normals
+/// follow the cofactor of the same weighted gradient.
 template <class Real>
 __global__ void updateSurfels(CuBody<Real> body, CuSurfels<Real> surfels, CuTextures textures) {
   const int s = thread_index();

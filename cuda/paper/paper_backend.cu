@@ -1,10 +1,12 @@
-/// Owns the arrays of one body, launches the kernels of 2008 on it.
+/// The backend of the 2008 program on a GPU: the arrays of one body and the launches of its
+/// kernels.
 #include <algorithm>
 #include <string>
 #include <type_traits>
 
 #include "check.hpp"
 #include "device.hpp"
+#include "device_values.cuh"
 #include "kernels.cuh"
 #include "paper_backend.hpp"
 #include "paper_model.hpp"
@@ -13,42 +15,11 @@
 namespace phyxel::paper {
 namespace {
 
-// The surfel kernel's own launch configuration: surfels are many, and use few registers each.
+// Threads a block of the surfel kernel, which has many threads of few registers.
 constexpr unsigned surfel_block = 256;
 
-/// A texture over linear device memory.
-class Texture {
- public:
-  Texture() = default;
-  template <class Texel, class T>
-  static Texture over(const DeviceArray<T>& array) {
-    Texture texture;
-    if (array.size() == 0) return texture;
-    cudaResourceDesc resource{};
-    resource.resType = cudaResourceTypeLinear;
-    resource.res.linear.devPtr = array.data();
-    resource.res.linear.desc = cudaCreateChannelDesc<Texel>();
-    resource.res.linear.sizeInBytes = array.bytes();
-    cudaTextureDesc how{};
-    how.readMode = cudaReadModeElementType;
-    PHYXEL_CUDA(cudaCreateTextureObject(&texture.object_, &resource, &how, nullptr));
-    return texture;
-  }
-  Texture(Texture&& other) noexcept { std::swap(object_, other.object_); }
-  Texture& operator=(Texture&& other) noexcept {
-    std::swap(object_, other.object_);
-    return *this;
-  }
-  ~Texture() {
-    if (object_) cudaDestroyTextureObject(object_);
-  }
-  cudaTextureObject_t object() const { return object_; }
-
- private:
-  cudaTextureObject_t object_ = 0;
-};
-
-/// Out of the matrix, into slots like those of the neighbours; zero where there is none.
+/// Copies pair forces from the matrix into slots, as those of the neighbours; unused slots are
+/// zero.
 template <class Real>
 __global__ void copy_pair_forces(CuBody<Real> body, Real* copies) {
   const int i = thread_index(), n = body.numPhyxels;
@@ -285,25 +256,6 @@ class GpuBackend final : public PaperBackend {
     displacements_texture_ = Texture::over<typename Texels::texel>(displacements_volume_);
   }
 
-  /// Rows of a CSR as slots: entry k of row r at k·rows + r, unused ones marked.
-  static std::vector<unsigned short> slots_of(const Csr& csr, int most) {
-    const auto rows = static_cast<std::size_t>(csr.rows());
-    std::vector<unsigned short> slots(rows * static_cast<std::size_t>(most), no_neighbor);
-    for (std::size_t r = 0; r < rows; ++r) {
-      const auto row = csr.row(static_cast<Index>(r));
-      for (std::size_t k = 0; k < row.size(); ++k) {
-        slots[k * rows + r] = static_cast<unsigned short>(row[k]);
-      }
-    }
-    return slots;
-  }
-
-  static int longest_row(const Csr& csr) {
-    Index longest = 0;
-    for (Index r = 0; r < csr.rows(); ++r) longest = std::max(longest, csr.length(r));
-    return longest;
-  }
-
   void make_neighbours() {
     const Csr& csr = model_.neighbourhood.neighbours;
     body_.maxNeighbors = longest_row(csr);
@@ -316,7 +268,7 @@ class GpuBackend final : public PaperBackend {
     body_.d_omega = omega_.data();
     omega_texture_ = Texture::over<typename Vector4<Real>::texel1>(omega_);
 
-    // Walking the rows in order leaves each inverse row ascending.
+    // Inverse rows are ascending, since rows are visited in order.
     std::vector<std::vector<std::pair<Index, Index>>> inverse(static_cast<std::size_t>(n_));
     for (Index i = 0; i < n_; ++i) {
       const auto row = csr.row(i);
@@ -396,7 +348,7 @@ class GpuBackend final : public PaperBackend {
     surfel_omega_texture_ = Texture::over<typename Vector4<Real>::texel1>(surfel_omega_);
   }
 
-  /// Once its mass has gone into the volumes, a held phyxel is marked by mass 0.
+  /// Computes the immutable values, and then marks fixed phyxels by mass 0.
   void precalculate() {
     const auto n = static_cast<std::size_t>(n_);
     std::vector<Real> supports;
@@ -426,8 +378,8 @@ class GpuBackend final : public PaperBackend {
     check_launch(last_launch_);
   }
 
-  /// There is one material in constant memory; it is exchanged, in order with the launches, when a
-  /// body of another material has its turn. One thread drives this program, as in 2008.
+  /// Puts the body's material into constant memory, in stream order, if that holds another one. Not
+  /// thread-safe: one thread drives this program, as in 2008.
   void use_material() {
     static std::vector<Real> present;
     static int present_device = -1;
@@ -453,26 +405,6 @@ class GpuBackend final : public PaperBackend {
 
   // --- values -----------------------------------------------------------------------------------
 
-  static std::vector<Real> copy_of(const Array<Real>& array) {
-    std::vector<Real> values(array.size());
-    array.download(values.data());
-    return values;
-  }
-  static void set3(std::vector<Real>& to, std::size_t at, Vec3d v) {
-    to[at] = static_cast<Real>(v.x);
-    to[at + 1] = static_cast<Real>(v.y);
-    to[at + 2] = static_cast<Real>(v.z);
-  }
-  static Vec3d at3(const std::vector<Real>& from, std::size_t at) {
-    return {from[at], from[at + 1], from[at + 2]};
-  }
-  static std::vector<Mat3d> matrices(const std::vector<Real>& values) {
-    std::vector<Mat3d> list(values.size() / 9);
-    for (std::size_t k = 0; k < values.size(); ++k) {
-      list[k / 9](static_cast<int>(k % 9) / 3, static_cast<int>(k % 3)) = values[k];
-    }
-    return list;
-  }
   /// The displacement array with zero displacements.
   std::vector<Real> volumes_only() const {
     std::vector<Real> now = copy_of(displacements_volume_);

@@ -1,8 +1,8 @@
-/// The program of Farias et al. 2008, as an artefact: its kernels on the GPU, and the sequential
-/// C++ program that they were compared with. See docs/paper.md for every choice.
+/// The program of Farias et al. 2008: its kernels on a GPU, and the sequential C++ program that
+/// they were compared with. docs/paper.md explains each choice.
 ///
-/// Kept apart from the production solver on purpose. Both take a `Model` of one body made by
-/// `paper_model` (or one that `check_paper_model` lets pass).
+/// The two are independent of the production solver. Both take a `Model` of one body made by
+/// `paper_model`, or one that `check_paper_model` accepts.
 #pragma once
 
 #include <memory>
@@ -12,25 +12,25 @@
 
 namespace phyxel::paper {
 
-/// A backend that also shows what its kernels made, for proofs.
+/// A backend that exposes intermediate results of its kernels for verification.
 class PaperBackend : public Backend {
  public:
-  /// What precalcImutableValues computes, once.
+  /// The results of precalcImutableValues.
   struct ImmutableValues {
-    std::vector<double> omega;  ///< Full weights ω_ij [1/m³] in the order of the neighbour lists.
+    std::vector<double> omega;  ///< Weights ω_ij [1/m³] in the order of the neighbour lists.
     std::vector<Mat3d> inverse_moment;  ///< A⁻¹ with those weights [m], shape [n].
     std::vector<double> volume;         ///< v [m³], shape [n].
   };
   virtual ImmutableValues immutable_values() const = 0;
 
-  /// What calcStrainStressA stored in the n×n matrix by the last `stress()`: the force of each
-  /// phyxel on each of its neighbours [N], in the order of the neighbour lists. Empty for the CSR
-  /// gather, which stores none.
+  /// The force of each phyxel on each of its neighbours [N] in the order of the neighbour lists, as
+  /// calcStrainStressA stored them in the n×n matrix in the last `stress()`. Empty for the CSR
+  /// gather, which does not store them.
   virtual std::vector<Vec3d> pair_forces() const = 0;
 
-  /// calcStrainStressA: displacements -> gradients -> stresses -> forces on each neighbour.
+  /// Runs calcStrainStressA: gradients, stresses and forces on neighbours from displacements.
   virtual void stress() = 0;
-  /// calcStrainStressB and updatePositions: sums forces, and takes a step of `dt` [s].
+  /// Runs calcStrainStressB and integrate: sums forces and takes a step of `dt` [s].
   virtual void advance(double time, double dt) = 0;
   void step(std::int64_t first, double dt, int count, bool move_surfels) override {
     for (int s = 0; s < count; ++s) {
@@ -40,19 +40,20 @@ class PaperBackend : public Backend {
     }
   }
 
-  /// updateSurfels: fills the vertex buffer from the present displacements and the gradients of
-  /// the last `stress()`. `advect_surfels` does both and copies the buffer to the host.
+  /// Runs updateSurfels, which fills the vertex buffer from the present displacements and the
+  /// gradients of the last `stress()`. `advect_surfels` calls both and copies the buffer to the
+  /// host.
   void update_surfels() override = 0;
 };
 
-/// Most phyxels that `unsigned short` neighbour indices can name; 65,535 marks an empty slot.
+/// Largest number of phyxels for `unsigned short` neighbour indices; 65,535 marks an empty slot.
 inline constexpr Index most_phyxels = 65535;
 
-/// How calcStrainStressA hands forces to calcStrainStressB.
+/// How calcStrainStressA passes forces to calcStrainStressB.
 enum class ForceStore {
-  dense,  ///< The paper's n×n matrix, three numbers a pair.
-  csr,    ///< One matrix a phyxel, gathered over compressed rows of the inverse neighbourhood; sums
-          ///< in the same order and so gives the same bits.
+  dense,  ///< By the paper's n×n matrix of forces.
+  csr,    ///< By a pair stress for each phyxel, gathered over the compressed inverse neighbourhood;
+          ///< sums have the same order, and results the same bits.
 };
 
 struct GpuOptions {
@@ -62,13 +63,13 @@ struct GpuOptions {
   unsigned block = 64;  ///< Threads a block of the phyxel kernels.
 };
 
-/// The kernels of section 5 on a GPU.
-/// @throws InputError for a model that the 2008 program could not have run; DeviceError.
+/// Makes the backend of section 5 on a GPU.
+/// @throws InputError for a model that the 2008 program could not run; DeviceError
 std::unique_ptr<PaperBackend> make_gpu_backend(const Model& model, const GpuOptions& options = {});
 
-/// The sequential program of section 5: one phyxel after the other, each pushing its neighbours.
-/// `Real` is float, double or long double; in long double it is the reference for rounding.
-/// @throws InputError as above.
+/// Makes the sequential program of section 5, which visits one phyxel after the other and adds its
+/// forces to its neighbours. `Real` is float, double or long double; long double is the reference
+/// for rounding. @throws InputError for a model that the 2008 program could not run
 template <class Real>
 std::unique_ptr<PaperBackend> make_sequential_backend(const Model& model);
 

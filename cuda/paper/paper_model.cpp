@@ -12,7 +12,7 @@
 namespace phyxel::paper {
 namespace {
 
-/// Where a body hangs and how stiff it is: section 6.1 gives the range 1e4 to 1e6 Pa.
+/// The support and the stiffness of a body. Section 6.1 gives the range 1e4 to 1e6 Pa.
 struct Hanging {
   const char* name;
   const char* region;
@@ -111,8 +111,8 @@ void check_paper_model(const Model& model) {
   const Part& part = model.with_lists().parts[0];
   if (model.size() > most_phyxels) {
     refuse(
-        fmt::format("body \"{}\" has {} phyxels, but its neighbours are named by 16-bit numbers "
-                    "(unsigned short): allowed at most {}",
+        fmt::format("body \"{}\" has {} phyxels, but neighbour indices have 16 bits "
+                    "(unsigned short); allowed: at most {}",
                     part.name, model.size(), most_phyxels));
   }
   if (!part.kernel_volumes) {
@@ -137,9 +137,9 @@ void check_paper_model(const Model& model) {
   }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {
-    if (!motion.stands_still()) refuse("phyxels that are moved; allowed: phyxels that are held");
+    if (!motion.stands_still()) refuse("prescribed motion; allowed: fixed phyxels");
     if (!motion.axes.all()) {
-      refuse("phyxels that are held along some axes; allowed: phyxels that are held along all");
+      refuse("phyxels that are fixed along some axes only; allowed: along all axes");
     }
   }
 }

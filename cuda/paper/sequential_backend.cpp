@@ -1,6 +1,6 @@
-/// The program that Farias et al. 2008 compared with: one core, one phyxel after the other.
-/// Weights, moments and neighbours are prepared (section 5); each phyxel pushes its neighbours, so
-/// neither the n×n matrix nor the inverse neighbourhood is needed.
+/// The sequential program that Farias et al. 2008 compared with, on one core. Weights, moments and
+/// neighbours are computed in advance (section 5). Each phyxel adds its forces to its neighbours,
+/// so neither the n×n matrix nor the inverse neighbourhood is needed.
 #include <fmt/format.h>
 
 #include <type_traits>
@@ -157,7 +157,7 @@ class SequentialBackend final : public PaperBackend {
     }
     return values;
   }
-  /// Evaluated for the occasion: pushing needs no matrix.
+  /// Evaluates the pair forces, which this program does not store.
   std::vector<Vec3d> pair_forces() const override {
     std::vector<Vec3d> forces;
     for_law([&](const auto& law) {
@@ -184,7 +184,7 @@ class SequentialBackend final : public PaperBackend {
  private:
   const Csr& neighbours() const { return model_.neighbourhood.neighbours; }
 
-  /// The work of precalcImutableValues.
+  /// Does the work of precalcImutableValues.
   void prepare() {
     omega_.reserve(static_cast<std::size_t>(neighbours().entries()));
     for (Index i = 0; i < size(); ++i) mass_.push_back(static_cast<Real>(model_.mass[i]));
@@ -223,7 +223,8 @@ class SequentialBackend final : public PaperBackend {
     return displacement_gradient(sum, inverse_moment_[i]);
   }
 
-  /// push(j, force of phyxel i on its neighbour j), from the present gradient of i.
+  /// Calls push(j, force) for each neighbour j with the force of phyxel i on it [N], from the
+  /// present gradient of i.
   template <class Law, class Push>
   void for_each_push(const Law& law, Index i, Push&& push) const {
     const Csr& csr = neighbours();

@@ -1,5 +1,5 @@
-/// The spatial hash on the device. Points stand in their buckets by index, so that a visit meets
-/// them in one order; bodies share the table, each with cells of its own size.
+/// A spatial hash on the device. The points of a bucket are in the order of their indices, so that
+/// visits are deterministic. Bodies share the table; each has its own cell size.
 #pragma once
 
 #include "model/cell_grid.hpp"
@@ -7,7 +7,7 @@
 
 namespace phyxel::cuda {
 
-/// What kernels see of it.
+/// The hash as kernels see it.
 struct HashView {
   struct alignas(16) Entry {
     Vec3d position;
@@ -17,7 +17,7 @@ struct HashView {
     CellGrid grid;
     double cell_size;
     Vec3d high;
-    Index begin, end;  ///< Its points.
+    Index begin, end;  ///< Range of the body's points.
   };
 
   const Body* bodies;
@@ -25,7 +25,7 @@ struct HashView {
   std::uint64_t mask;
   const std::uint32_t* bucket_start;
   const Entry* entries;
-  const Index* index;  ///< Of each entry.
+  const Index* index;  ///< Point of each entry.
   Index points;
 
   __device__ int body_of(Index point) const {
@@ -45,8 +45,8 @@ struct HashView {
     return static_cast<std::uint32_t>((h ^ static_cast<std::uint32_t>(body) * 2654435761U) & mask);
   }
 
-  /// Calls visit(k, position) for every entry k of the body in a cell; where another body's cell
-  /// has the same name and bucket, for its entries too.
+  /// Calls visit(k, position) for each entry k of the body in a cell, and for entries of another
+  /// body whose cell has the same key and bucket.
   template <class Visit>
   __device__ void visit_cell(int body, CellGrid::Cell c, Visit&& visit) const {
     const std::uint64_t cell = CellGrid::name(c);
@@ -65,7 +65,8 @@ struct HashView {
       }
     }
   }
-  /// Calls visit(k, position) once for every entry k nearer to `place` than `reach`, and others.
+  /// Calls visit(k, position) once for each entry k nearer to `place` than `reach`, and for some
+  /// farther ones.
   template <class Visit>
   __device__ void visit_near(int body, Vec3d place, double reach, Visit&& visit) const {
     const int rings = rings_within(reach, bodies[body].cell_size);
@@ -88,37 +89,38 @@ struct HashView {
   }
 };
 
-/// Calls visit(j) with every index that each(offer) offers, by ascending number: the order in which
-/// the host sums, so that both get the same bits.
-/// @param number of each index in the whole model; null: the index itself
+/// Calls visit(j) for each index that each(offer) offers, in ascending order of global ids. The
+/// host sums in the same order, so that both results are equal bit by bit.
+/// @param global_id of each index; null if it is the index itself
 template <class Each, class Visit>
-__device__ void in_ascending_order(const Index* number, Each&& each, Visit&& visit) {
-  constexpr int most = 64;  // at once; where there are more, they are sought again
+__device__ void in_ascending_order(const Index* global_id, Each&& each, Visit&& visit) {
+  constexpr int most = 64;  // indices sorted in one pass; more take several passes
   Index found[most], after = -1;
-  const auto number_of = [&](Index j) { return number ? number[j] : j; };
+  const auto id_of = [&](Index j) { return global_id ? global_id[j] : j; };
   for (;;) {
     int count = 0;
     each([&](Index j) {
-      const Index n = number_of(j);
-      if (n <= after || (count == most && n > number_of(found[most - 1]))) return;
+      const Index n = id_of(j);
+      if (n <= after || (count == most && n > id_of(found[most - 1]))) return;
       int k = count < most ? count++ : most - 1;
-      for (; k > 0 && number_of(found[k - 1]) > n; --k) found[k] = found[k - 1];
+      for (; k > 0 && id_of(found[k - 1]) > n; --k) found[k] = found[k - 1];
       found[k] = j;
     });
     for (int k = 0; k < count; ++k) visit(found[k]);
     if (count < most) return;
-    after = number_of(found[most - 1]);
+    after = id_of(found[most - 1]);
   }
 }
 
+/// Owner of a spatial hash in device memory.
 class DeviceHash {
  public:
   struct Body {
     Index begin, end;
-    double cell_size;  ///< Wanted; a cell may not be smaller than a millionth of the body.
+    double cell_size;  ///< Requested size [m]; a cell is at least a millionth of the body.
   };
 
-  /// @param position on the device
+  /// Builds the hash. @param position positions on the device [m]
   DeviceHash(const DeviceArray<Vec3d>& position, const std::vector<Body>& bodies) {
     fill(position, bodies);
   }
@@ -127,7 +129,7 @@ class DeviceHash {
     return {bodies_.data(), static_cast<int>(bodies_.size()), mask_, start_.data(), entries_.data(),
             index_.data(),  static_cast<Index>(index_.size())};
   }
-  /// Mean number of points in a cell that holds any, or a little less.
+  /// Mean number of points in a non-empty cell; an underestimate if cells share a bucket.
   double mean_occupancy() const;
 
   void fill(const DeviceArray<Vec3d>& position, const std::vector<Body>& bodies);
@@ -140,7 +142,7 @@ class DeviceHash {
   DeviceArray<Index> index_;
 };
 
-/// The box around points [begin, end).
+/// The bounding box of points [begin, end).
 Box box_around(const DeviceArray<Vec3d>& position, Index begin, Index end);
 
 }  // namespace phyxel::cuda

@@ -1,17 +1,15 @@
-// Compiled without fused multiplications: whoever is a neighbour on the CPU shall be one here.
+// Compiled without fused multiplications, so that neighbours are those of the CPU.
 #include <algorithm>
 
 #include "model/space_filling_curve.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
-#include "setup/device_hash.cuh"
-#include "setup/device_tiling.hpp"
-#include "setup/wait_free.hpp"
+#include "setup/device_lists.cuh"
 
 namespace phyxel::cuda {
 namespace {
 
-// --- lists that the host has ---------------------------------------------------------------
+// --- lists copied from the host --------------------------------------------------------------
 
 DeviceTileLists send(const TileLists& lists, const std::string& what) {
   return {sent(lists.halo, what), lists.halo_stride, sent(lists.rows, what),
@@ -41,14 +39,14 @@ DeviceTiling send_tiling(const Model& model) {
   return out;
 }
 
-// --- lists found here ----------------------------------------------------------------------
+// --- lists found on the device ---------------------------------------------------------------
 
-/// What the search needs of a model.
+/// Input of the neighbour search.
 struct SearchCloud {
-  DeviceArray<Vec3d> position;
-  DeviceArray<double> support;
+  DeviceArray<Vec3d> position;  ///< Rest positions [m], shape [n].
+  DeviceArray<double> support;  ///< [m], shape [n].
   std::vector<DeviceHash::Body> bodies;
-  std::vector<double> largest_support;  ///< Of each body.
+  std::vector<double> largest_support;  ///< Largest support of each body [m].
 };
 
 SearchCloud send_cloud(const Model& model) {
@@ -71,24 +69,7 @@ SearchCloud send_cloud(const Model& model) {
   return cloud;
 }
 
-/// Calls visit(j, x_j - x_i) for every neighbour j of the phyxel, or, with the largest support of
-/// each body as `inverse_reach`, for every phyxel whose neighbour it is.
-template <class Visit>
-__device__ void visit_neighbours(const HashView& hash, int body, Index phyxel, Vec3d here,
-                                 const double* support, const double* inverse_reach,
-                                 Visit&& visit) {
-  const double h = support[phyxel];
-  hash.visit_near(body, here, inverse_reach ? inverse_reach[body] : h,
-                  [&](std::uint32_t k, Vec3d p) {
-                    const Vec3d x = p - here;
-                    const Index j = hash.index[k];
-                    const double reach = inverse_reach ? support[j] : h;
-                    if (j != phyxel && dot(x, x) < reach * reach && hash.is_of(body, k)) {
-                      visit(j, x);
-                    }
-                  });
-}
-
+/// Builder of a model's tiles by a neighbour search on the device.
 class Finder {
  public:
   explicit Finder(const Model& model)
@@ -111,7 +92,7 @@ class Finder {
     return std::move(out_);
   }
 
-  /// Lengths of the lists, by phyxel.
+  /// Length of each phyxel's list, shape [n].
   DeviceArray<Index> count(const double* inverse_reach) {
     const auto n = static_cast<std::size_t>(model_.size());
     DeviceArray<Index> length(n, "list lengths");
@@ -128,14 +109,14 @@ class Finder {
     return length;
   }
 
-  /// Bodies one after the other along the curve, each from the start of a tile; within a tile long
-  /// lists first. As `make_tiling` does.
+  /// Assigns places as `make_tiling` does: bodies one after the other along the curve, each from
+  /// the start of a tile; within a tile, phyxels with long lists first.
   void place_phyxels() {
     const Index n = model_.size();
     const DeviceArray<Index> length = count(nullptr);
     most_neighbours_ = largest(length);
     const DeviceArray<Index> order = curve_order();
-    std::vector<Index> tile_begin;  // in the order, and where the last tile ends
+    std::vector<Index> tile_begin;  // first phyxel of each tile in the order, and the end
     for (std::size_t p = 0; p < model_.parts.size(); ++p) {
       const Part& part = model_.parts[p];
       for (Index begin = part.begin; begin < part.end; begin += tile_size) {
@@ -157,7 +138,7 @@ class Finder {
     tile_begin_ = sent(first_place, "tiles");
   }
 
-  /// Own tiles are those of the whole, in which lists are named by places in the whole.
+  /// Assigns the places of a share: its own tiles are tiles of the whole model.
   void place_share() {
     const auto n = static_cast<std::size_t>(model_.size());
     const Share& share = *model_.share;
@@ -200,7 +181,7 @@ class Finder {
     out_.boundary_tiles = tiling.boundary_tiles;
     out_.phyxel_at = sent(out_.phyxel, "places");
     place_of_ = sent(share.place, "places");
-    number_ = sent(share.global_id, "places");
+    global_id_ = sent(share.global_id, "places");
     std::vector<Index> first_place;
     for (Index tile = 0; tile < out_.own_tiles; ++tile) {
       Index any = -1;
@@ -208,7 +189,7 @@ class Finder {
       first_place.push_back(share.place[any] / tile_size * tile_size);
     }
     tile_begin_ = sent(first_place, "tiles");
-    // From places in the whole to places here.
+    // The map from places in the whole model to places in the share.
     whole_place_ = sent(share.place, "places");
     place_here_ = sent(out_.place, "places");
     sort_pairs(whole_place_, place_here_);
@@ -222,7 +203,7 @@ class Finder {
     out_.moment_offset.clear();
     const HashView hash = table_.view();
     for_each("moments", static_cast<std::int64_t>(out_.own_tiles) * tile_size,
-             [hash, number = number_.data(), phyxel_at = out_.phyxel_at.data(),
+             [hash, global_id = global_id_.data(), phyxel_at = out_.phyxel_at.data(),
               position = cloud_.position.data(), support = cloud_.support.data(),
               inverse_moment = out_.inverse_moment.data(),
               moment_offset = out_.moment_offset.data()] __device__(std::int64_t place) {
@@ -235,7 +216,7 @@ class Finder {
                    visit_neighbours(hash, hash.body_of(i), i, position[i], support, nullptr,
                                     [&](Index j, Vec3d) { offer(j); });
                  };
-                 in_ascending_order(number, each, [&](Index j) {
+                 in_ascending_order(global_id, each, [&](Index j) {
                    const Vec3d x = position[j] - position[i];
                    const double w = weight_shape(dot(x, x), inverse_h_squared);
                    moment += moment_term(x, w);
@@ -278,10 +259,23 @@ class Finder {
 
   void sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& order,
                   const DeviceArray<Index>& length);
-  DeviceTileLists make_lists(const double* inverse_reach, Index longest);
 
-  static Index largest(const DeviceArray<Index>& values) {
-    return reduce(values.data(), static_cast<std::int64_t>(values.size()), Index{0}, Larger{});
+  /// Finds the lists of one pass.
+  /// @param inverse_reach null for lists of neighbours
+  DeviceTileLists make_lists(const double* inverse_reach, Index longest) const {
+    return find_lists({.hash = table_.view(),
+                       .position = cloud_.position.data(),
+                       .support = cloud_.support.data(),
+                       .inverse_reach = inverse_reach,
+                       .phyxel_at = out_.phyxel_at.data(),
+                       .place_of = place_of_.data(),
+                       .tile_begin = tile_begin_.data(),
+                       .whole_place = whole_place_.data(),
+                       .place_here = place_here_.data(),
+                       .here = static_cast<Index>(whole_place_.size()),
+                       .tiles = out_.own_tiles,
+                       .what = "neighbour lists of " + std::to_string(model_.size()) + " phyxels"},
+                      longest);
   }
 
  private:
@@ -290,14 +284,15 @@ class Finder {
   DeviceHash table_;
   DeviceArray<double> largest_support_;
   Index most_neighbours_ = 0;
-  // Of each phyxel in the whole model's tiles; where own tiles begin there.
-  DeviceArray<Index> place_of_, tile_begin_;
-  // Of a share: numbers in the whole; places in the whole, ascending, and where those are here.
-  DeviceArray<Index> number_, whole_place_, place_here_;
+  DeviceArray<Index> place_of_;    ///< Place of each phyxel in the whole model's tiles.
+  DeviceArray<Index> tile_begin_;  ///< First place of each own tile in the whole model's tiles.
+  DeviceArray<Index> global_id_;   ///< Global ids of a share; empty for a whole model.
+  /// Places of a share in the whole model's tiles, ascending, and the same phyxels' places here.
+  DeviceArray<Index> whole_place_, place_here_;
   DeviceTiling out_;
 };
 
-/// One block a tile.
+/// Sorts the phyxels of a tile by the length of their lists, longest first. One block a tile.
 __global__ void sort_tile(const Index* begins, const Index* order, const Index* length,
                           Index* phyxel_at, Index* place_of) {
   __shared__ Index lengths[tile_size];
@@ -329,256 +324,6 @@ void Finder::sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Inde
   sort_tile<<<tiles, tile_size>>>(begins.data(), order.data(), length.data(), out_.phyxel_at.data(),
                                   place_of_.data());
   check_launch({"sort_tile", tiles, tile_size, "tiles"});
-}
-
-// Of the halo's hash table: at most half full, and with all else within 48 KiB.
-constexpr int table_size = 2 * most_halo;
-
-/// One block a tile: the places outside that its lists name, ascending.
-/// @param tile_begin first place of each tile of the batch
-/// @param found [tiles * tile_size, longest]
-/// @param halo [tiles, most_halo]
-/// @param points of each tile's halo; more than fit: the number that were seen until then
-__global__ void collect_halo(const Index* tile_begin, const Index* found, const Index* length,
-                             Index longest, Index* halo, Index* points) {
-  __shared__ Index table[table_size];
-  __shared__ Index sorted[most_slots];
-  __shared__ int count;
-  const int thread = static_cast<int>(threadIdx.x);
-  for (int k = thread; k < table_size; k += tile_size) table[k] = -1;
-  if (thread == 0) count = 0;
-  __syncthreads();
-  const Index begin = tile_begin[blockIdx.x];
-  const std::size_t row = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
-  for (Index e = 0; e < length[row]; ++e) {
-    const Index place = found[row * longest + e];
-    if (place >= begin && place < begin + tile_size) continue;
-    unsigned at = static_cast<unsigned>(place) * 2654435761U >> 16;
-    for (;; ++at) {
-      Index& cell = table[at % table_size];
-      const Index there = atomicCAS(&cell, -1, place);
-      if (there == place) break;
-      if (there == -1) {
-        const int number = atomicAdd(&count, 1);
-        if (number < most_slots) sorted[number] = place;
-        break;
-      }
-      if (*const_cast<volatile int*>(&count) > most_halo) break;  // refused anyway
-    }
-  }
-  __syncthreads();
-  const int all = count;
-  if (thread == 0) points[blockIdx.x] = all;
-  if (all > most_halo) return;
-  int size = 2;
-  while (size < all) size *= 2;
-  for (int k = all + thread; k < size; k += tile_size) sorted[k] = INT32_MAX;
-  __syncthreads();
-  for (int width = 2; width <= size; width *= 2) {  // bitonic
-    for (int apart = width / 2; apart > 0; apart /= 2) {
-      for (int k = thread; k < size; k += tile_size) {
-        const int other = k ^ apart;
-        if (other > k && (sorted[k] > sorted[other]) == ((k & width) == 0)) {
-          const Index swap = sorted[k];
-          sorted[k] = sorted[other];
-          sorted[other] = swap;
-        }
-      }
-      __syncthreads();
-    }
-  }
-  Index* out = halo + static_cast<std::size_t>(blockIdx.x) * most_halo;
-  for (int k = thread; k < all; k += tile_size) out[k] = sorted[k];
-}
-
-/// The rows of a batch of tiles on their way: as places, as slots, in order.
-struct Batch {
-  Index first_tile, tiles;
-  DeviceArray<Index> found, length, halo, points;
-  DeviceArray<std::uint16_t> slots, ordered;
-  DeviceArray<Index> steps;  ///< Of each team.
-};
-
-DeviceTileLists Finder::make_lists(const double* inverse_reach, Index longest_found) {
-  const Index longest = std::max<Index>(longest_found, 1), tiles = out_.own_tiles;
-  const std::string what = "neighbour lists of " + std::to_string(model_.size()) + " phyxels";
-  const HashView hash = table_.view();
-
-  // Twice the longest list is far more than teams take, except for the oddest clouds.
-  int capacity = std::min(team * longest, 2 * longest + 64);
-  const std::size_t place_bytes = 6 * static_cast<std::size_t>(longest) + 2 * capacity + 16;
-  const Index most_tiles = static_cast<Index>(std::clamp<std::size_t>(
-      (std::size_t{3} << 29) / (tile_size * place_bytes + 4 * most_halo), 1, 16384));
-
-  DeviceTileLists lists;
-  lists.rows = {static_cast<std::size_t>(tiles) * (tile_size / warp_size), what};
-  struct Piece {
-    DeviceArray<std::uint16_t> entries;
-    DeviceArray<Index> halo;  ///< [tiles, stride]
-    Index stride, tiles;
-  };
-  std::vector<Piece> pieces;
-  std::int64_t chunks = 0;
-  for (Index first = 0; first < tiles; first += most_tiles) {
-    Batch b;
-    b.first_tile = first;
-    b.tiles = std::min(most_tiles, tiles - first);
-    const auto places = static_cast<std::size_t>(b.tiles) * tile_size;
-    const auto places_64 = static_cast<std::int64_t>(places);
-    const std::size_t first_place = static_cast<std::size_t>(first) * tile_size;
-    b.found = {places * longest, what};
-    b.length = {places, what};
-    for_each(
-        "find_neighbours", places_64,
-        [hash, phyxel_at = out_.phyxel_at.data() + first_place, position = cloud_.position.data(),
-         support = cloud_.support.data(), inverse_reach, place_of = place_of_.data(),
-         found = b.found.data(), length = b.length.data(), longest] __device__(std::int64_t row) {
-          const Index i = phyxel_at[row];
-          Index count = 0;
-          if (i >= 0) {
-            visit_neighbours(hash, hash.body_of(i), i, position[i], support, inverse_reach,
-                             [&](Index j, Vec3d) { found[row * longest + count++] = place_of[j]; });
-          }
-          length[row] = count;
-        });
-    b.halo = {static_cast<std::size_t>(b.tiles) * most_halo, what};
-    b.points = {static_cast<std::size_t>(b.tiles), what};
-    collect_halo<<<b.tiles, tile_size>>>(tile_begin_.data() + first, b.found.data(),
-                                         b.length.data(), longest, b.halo.data(), b.points.data());
-    check_launch({"collect_halo", static_cast<unsigned>(b.tiles), tile_size, what});
-    const Index stride = largest(b.points);
-    if (stride > most_halo) refuse_halo(stride);
-
-    b.slots = {places * longest, what};
-    b.slots.clear();  // lists end before their room does, and all of it is copied
-    for_each("name_slots", places_64,
-             [tile_begin = tile_begin_.data() + first, longest, found = b.found.data(),
-              length = b.length.data(), halo = b.halo.data(), points = b.points.data(),
-              slots = b.slots.data()] __device__(std::int64_t row) {
-               const Index tile = static_cast<Index>(row / tile_size);
-               const Index begin = tile_begin[tile];
-               const Index* of_tile = halo + static_cast<std::size_t>(tile) * most_halo;
-               std::uint16_t* list = slots + row * longest;
-               for (Index e = 0; e < length[row]; ++e) {
-                 const Index place = found[row * longest + e];
-                 int slot = place - begin;
-                 if (slot < 0 || slot >= tile_size) {
-                   int low = 0, high = points[tile];  // the first that is not less
-                   while (low < high) {
-                     const int middle = (low + high) / 2;
-                     if (of_tile[middle] < place) {
-                       low = middle + 1;
-                     } else {
-                       high = middle;
-                     }
-                   }
-                   slot = tile_size + far_slots + low;
-                 }
-                 const auto s = static_cast<std::uint16_t>(slot);
-                 Index k = e;
-                 for (; k > 0 && earlier_slot(s, list[k - 1]); --k) list[k] = list[k - 1];
-                 list[k] = s;
-               }
-             });
-    const std::size_t teams = places / team;
-    DeviceArray<std::uint16_t> spent(b.slots.size(), what);
-    for (;; capacity = team * longest) {
-      b.ordered = {places * capacity, what};
-      b.steps = {teams, what};
-      PHYXEL_CUDA(
-          cudaMemcpyAsync(spent.data(), b.slots.data(), b.slots.bytes(), cudaMemcpyDeviceToDevice));
-      for_each("order_wait_free", static_cast<std::int64_t>(teams),
-               [longest, capacity, length = b.length.data(), slots = spent.data(),
-                ordered = b.ordered.data(), steps = b.steps.data()] __device__(std::int64_t t) {
-                 steps[t] = order_wait_free(slots + t * team * longest, longest, length + t * team,
-                                            tile_size, ordered + t * team * capacity, capacity);
-               });
-      const Index fewest =
-          reduce(b.steps.data(), static_cast<std::int64_t>(teams), Index{0}, Smaller{});
-      if (fewest >= 0) break;
-    }
-
-    // Rows of a warp are as long as its longest team's.
-    constexpr int teams_a_warp = warp_size / team;
-    const std::size_t warps = places / warp_size;
-    DeviceArray<std::int64_t> warp_chunks(warps, what);
-    TileLists::Row* rows = lists.rows.data() + first_place / warp_size;
-    for_each("row_lengths", static_cast<std::int64_t>(warps),
-             [steps = b.steps.data(), warp_chunks = warp_chunks.data(),
-              rows] __device__(std::int64_t w) {
-               Index length = 0;
-               for (int t = 0; t < teams_a_warp; ++t) {
-                 length = max(length, steps[w * teams_a_warp + t]);
-               }
-               rows[w].length = length;
-               warp_chunks[w] = (length + chunk - 1) / chunk;
-             });
-    const DeviceArray<std::int64_t> begins = running_sums(warp_chunks);
-    const std::int64_t piece_chunks = last_of(begins);
-    Piece piece{{static_cast<std::size_t>(piece_chunks) * warp_size * chunk, what},
-                {static_cast<std::size_t>(b.tiles) * stride, what},
-                stride,
-                b.tiles};
-    for_each(
-        "pack_entries", places_64,
-        [rows, chunks, begins = begins.data(), steps = b.steps.data(), ordered = b.ordered.data(),
-         capacity, entries = piece.entries.data()] __device__(std::int64_t row) {
-          const std::int64_t w = row / warp_size;
-          const int lane = static_cast<int>(row % warp_size);
-          const Index length = rows[w].length, ready = steps[row / team];
-          const auto idle = static_cast<std::uint16_t>(tile_size + lane % columns);
-          if (lane == 0) rows[w].chunk = static_cast<std::int32_t>(chunks + begins[w]);
-          for (Index e = 0; e < (length + chunk - 1) / chunk * chunk; ++e) {
-            const std::uint16_t slot = e < ready ? ordered[row * capacity + e] : idle;
-            entries[((begins[w] + e / chunk) * warp_size + lane) * chunk + e % chunk] =
-                e < length ? static_cast<std::uint16_t>(16 * slot) : std::uint16_t{0};
-          }
-        });
-    for_each("pack_halo", static_cast<std::int64_t>(piece.halo.size()),
-             [stride, halo = b.halo.data(), points = b.points.data(), out = piece.halo.data(),
-              whole = whole_place_.data(), here = place_here_.data(),
-              n = static_cast<Index>(whole_place_.size())] __device__(std::int64_t k) {
-               const auto tile = k / stride, h = k % stride;
-               Index place = h < points[tile] ? halo[tile * most_halo + h] : -1;
-               if (whole && place >= 0) {
-                 Index low = 0, high = n - 1;
-                 while (low < high) {
-                   const Index middle = low + (high - low) / 2;
-                   if (whole[middle] < place) {
-                     low = middle + 1;
-                   } else {
-                     high = middle;
-                   }
-                 }
-                 place = here[low];
-               }
-               out[k] = place;
-             });
-    chunks += piece_chunks;
-    lists.halo_stride = std::max(lists.halo_stride, stride);
-    pieces.push_back(std::move(piece));
-  }
-
-  lists.entries = {static_cast<std::size_t>(chunks) * warp_size * chunk, what};
-  lists.halo = {static_cast<std::size_t>(tiles) * lists.halo_stride, what};
-  std::uint16_t* entries = lists.entries.data();
-  Index* halo = lists.halo.data();
-  for (Piece& piece : pieces) {
-    PHYXEL_CUDA(cudaMemcpyAsync(entries, piece.entries.data(), piece.entries.bytes(),
-                                cudaMemcpyDeviceToDevice));
-    entries += piece.entries.size();
-    const auto count = static_cast<std::int64_t>(piece.tiles) * lists.halo_stride;
-    for_each("join_halo", count,
-             [halo, from = piece.halo.data(), stride = piece.stride,
-              all = lists.halo_stride] __device__(std::int64_t k) {
-               const auto tile = k / all, h = k % all;
-               halo[k] = h < stride ? from[tile * stride + h] : -1;
-             });
-    halo += count;
-    PHYXEL_CUDA(cudaDeviceSynchronize());
-    piece = {};
-  }
-  return lists;
 }
 
 }  // namespace

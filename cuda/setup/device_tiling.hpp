@@ -1,4 +1,4 @@
-/// A model's tiles in device memory: found there, or brought there where the host has the lists.
+/// A model's tiles in device memory, found there or copied from the host.
 #pragma once
 
 #include <optional>
@@ -19,26 +19,28 @@ struct DeviceTileLists {
   std::size_t bytes() const { return halo.bytes() + rows.bytes() + entries.bytes(); }
 };
 
+/// `Tiling` in device memory, with the moments.
 struct DeviceTiling {
   std::vector<Index> phyxel, place, part;  ///< As in `Tiling`, on the host.
   Index own_tiles = 0, boundary_tiles = 0;
-  DeviceArray<Index> phyxel_at;  ///< The same as `phyxel`, on the device.
+  DeviceArray<Index> phyxel_at;  ///< Copy of `phyxel` on the device.
   DeviceTileLists neighbours;
-  std::optional<DeviceTileLists> inverse;  ///< Where the neighbours do not serve both passes.
-  DeviceArray<Sym3d> inverse_moment;       ///< Shape [places]; zero where nobody is.
-  DeviceArray<Vec3d> moment_offset;        ///< Shape [places].
+  std::optional<DeviceTileLists>
+      inverse;                        ///< For the second pass; unset if the lists are symmetric.
+  DeviceArray<Sym3d> inverse_moment;  ///< [1/m²], shape [places]; zero at empty places.
+  DeviceArray<Vec3d> moment_offset;   ///< [m], shape [places].
 
   Index places() const { return static_cast<Index>(phyxel.size()); }
   Index tiles() const { return static_cast<Index>(part.size()); }
   const DeviceTileLists& second() const { return inverse ? *inverse : neighbours; }
 };
 
-/// On the current device. Lists that the model has are taken over; others are found, the same to
-/// the last entry.
-/// @throws DeviceError; InputError if a tile reaches more points than 16-bit slots can name.
+/// Makes the tiling on the current device. Lists that the model has are copied; otherwise they are
+/// found on the device, and are equal to the host's.
+/// @throws DeviceError; InputError if a tile reaches more points than 16-bit slots can address
 DeviceTiling make_device_tiling(const Model& model);
 
-/// The tiles and lists on the host, for plans made there.
+/// Copies the tiles and lists to the host.
 Tiling fetched_tiling(const DeviceTiling& on_device);
 
 }  // namespace phyxel::cuda

@@ -1,4 +1,4 @@
-/// Sorting, scanning and adding up on the device, with memory that runs out in our own words.
+/// Sorting, scans and reductions on the device, with phyxel's messages where memory runs out.
 #pragma once
 
 #include <thrust/iterator/counting_iterator.h>
@@ -16,7 +16,7 @@ namespace phyxel::cuda {
 
 inline constexpr int setup_threads = 256;
 
-/// Calls body(i) for i in [0, count), a thread each.
+/// Calls body(i) for i in [0, count), one thread each.
 template <class Body>
 __global__ void for_each_kernel(std::int64_t count, Body body) {
   const std::int64_t i = static_cast<std::int64_t>(blockIdx.x) * setup_threads +
@@ -31,7 +31,7 @@ void for_each(const char* kernel, std::int64_t count, const Body& body) {
   check_launch({kernel, blocks, setup_threads, std::to_string(count) + " at once"});
 }
 
-/// Runs a CUB algorithm: once to learn how much memory it needs, once for real.
+/// Runs a CUB algorithm with temporary memory: the first call returns its size.
 template <class Algorithm>
 void with_temporary(Algorithm&& algorithm) {
   std::size_t bytes = 0;
@@ -40,7 +40,7 @@ void with_temporary(Algorithm&& algorithm) {
   PHYXEL_CUDA(algorithm(static_cast<void*>(temporary.data()), bytes));
 }
 
-/// Sorts by key, equal keys staying in order; the sorted pairs replace the arrays.
+/// Stable sort of pairs by key, in place.
 template <class Key, class Value>
 void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values) {
   const auto count = static_cast<std::int64_t>(keys.size());
@@ -64,7 +64,7 @@ void sort_values(DeviceArray<T>& values) {
   values = std::move(sorted);
 }
 
-/// Combines `values` from the left in some order: for operations to which order means nothing.
+/// Reduces `values` in an unspecified order; `combine` must be associative and commutative.
 template <class In, class T, class Combine>
 T reduce(In values, std::int64_t count, T start, Combine combine) {
   const DeviceArray<T> result(1, "set-up");
@@ -95,7 +95,8 @@ struct Smaller {
   }
 };
 
-/// sums[k] = values[0] + ... + values[k-1], one more than there are values.
+/// Exclusive prefix sums with the total at the end: sums[k] = values[0] + ... + values[k-1], shape
+/// [values + 1].
 template <class T>
 DeviceArray<T> running_sums(const DeviceArray<T>& values) {
   DeviceArray<T> sums(values.size() + 1, "set-up");

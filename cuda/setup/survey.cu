@@ -1,4 +1,4 @@
-// Compiled without fused multiplications: whoever is a neighbour on the CPU shall be one here.
+// Compiled without fused multiplications, so that neighbours are those of the CPU.
 #include <bit>
 
 #include "device.hpp"
@@ -15,9 +15,9 @@ using namespace cuda;
 
 constexpr int most_nearest = 256;
 
-/// `mean_spacing` of the CPU, entry by entry of the hash so that neighbours in space are
-/// neighbours in a warp.
-/// @param farthest of the nearest, of each; null: not wanted
+/// `mean_spacing` of the CPU. Threads follow the entries of the hash, so that those of a warp
+/// search the same cells.
+/// @param farthest receives the distance to the farthest of the nearest phyxels [m]; may be null
 template <int capacity>
 void find_spacing(const DeviceHash& table, int nearest, DeviceArray<double>& spacing,
                   double* farthest) {
@@ -74,7 +74,7 @@ DeviceArray<double> mean_spacing_of(const DeviceArray<Vec3d>& position, int near
   }
 }
 
-/// h of every phyxel. `middle` becomes the median.
+/// The support of each phyxel [m]. @param middle receives the median [m]
 DeviceArray<double> supports(const DeviceArray<double>& spacing, std::size_t n,
                              const NeighbourhoodRule& rule, double* middle) {
   const auto median = [](const DeviceArray<double>& values) {
@@ -97,59 +97,60 @@ DeviceArray<double> supports(const DeviceArray<double>& spacing, std::size_t n,
   return support;
 }
 
-/// What one phyxel's neighbours amount to. Here and below without padding, which nobody would write
-/// and copies read.
-struct Finding {
+/// Summary of one phyxel's neighbours. This struct and the next have no padding, which copies would
+/// read uninitialised.
+struct NeighbourSummary {
   Index length;
   std::int16_t rank, coincident;
 };
-struct Lengths {
+struct ListTotals {
   Offset pairs;
   Index fewest, most;
   Offset degenerate;
 };
-static_assert(std::has_unique_object_representations_v<Finding> &&
-              std::has_unique_object_representations_v<Lengths>);
-struct AsLengths {
-  __device__ Lengths operator()(const Finding& f) const {
+static_assert(std::has_unique_object_representations_v<NeighbourSummary> &&
+              std::has_unique_object_representations_v<ListTotals>);
+struct AsTotals {
+  __device__ ListTotals operator()(const NeighbourSummary& f) const {
     return {f.length, f.length, f.length, f.rank < 3 || f.coincident};
   }
 };
-struct AddLengths {
-  __device__ Lengths operator()(const Lengths& a, const Lengths& b) const {
+struct AddTotals {
+  __device__ ListTotals operator()(const ListTotals& a, const ListTotals& b) const {
     return {a.pairs + b.pairs, a.fewest < b.fewest ? a.fewest : b.fewest,
             a.most > b.most ? a.most : b.most, a.degenerate + b.degenerate};
   }
 };
 
-/// What is asked of the neighbourhoods of one body's points.
-struct Question {
-  const Vec3d* position;
-  const double* support;
-  const double* spacing;  ///< Null: no kernel sums are wanted.
-  const char* own;        ///< Whether a point is asked about; null: all are.
-  double inverse_reach;   ///< The largest support, where lists are one-sided; else 0.
+/// Input of a neighbour summary: the points of one body.
+struct SummaryInput {
+  const Vec3d* position;  ///< [m], shape [n].
+  const double* support;  ///< [m], shape [n].
+  const double* spacing;  ///< [m], shape [n]; null if no kernel sums are wanted.
+  const char* own;        ///< Nonzero for points to be summarised; null for all.
+  double inverse_reach;   ///< Largest support [m] if lists are one-sided; else 0.
 };
 
-/// @param kernel_sum of each point, if wanted
-/// @param needed set for points that own ones have in their lists, or that have own ones in theirs;
-///   null: not wanted
-void look_around(const DeviceHash& table, const Question& q, Finding* findings, double* kernel_sum,
-                 char* needed) {
+/// Summarises the neighbours of each own point.
+/// @param kernel_sum receives the kernel sum of each point; may be null
+/// @param needed receives 1 for each point in the list of an own point, or with an own point in its
+///   list; may be null
+void summarise_neighbours(const DeviceHash& table, const SummaryInput& q,
+                          NeighbourSummary* summaries, double* kernel_sum, char* needed) {
   const HashView hash = table.view();
-  for_each("survey", hash.points,
-           [hash, q, findings, kernel_sum, needed] __device__(std::int64_t at) {
+  for_each("summarise_neighbours", hash.points,
+           [hash, q, summaries, kernel_sum, needed] __device__(std::int64_t at) {
              const auto self = static_cast<std::uint32_t>(at);
              const Index i = hash.index[self];
              if (q.own && !q.own[i]) {
-               findings[i] = {0, 3, 0};
+               summaries[i] = {0, 3, 0};
                return;
              }
              const Vec3d here = hash.entries[self].position;
              const double h = q.support[i], inverse_h_squared = 1 / (h * h);
              const auto cube = [&](Index j) { return q.spacing[j] * q.spacing[j] * q.spacing[j]; };
              Sym3d moment;
-             Finding f{};
+             NeighbourSummary f{};
              hash.visit_near(0, here, h, [&](std::uint32_t k, Vec3d p) {
                const Vec3d x = p - here;
                const double d2 = dot(x, x);
@@ -167,7 +168,7 @@ void look_around(const DeviceHash& table, const Question& q, Finding* findings, 
                });
              }
              f.rank = static_cast<std::int16_t>(pseudo_inverse(moment).rank);
-             findings[i] = f;
+             summaries[i] = f;
              if (!kernel_sum) return;
              double sum = h > 0 ? cube(i) * weight(0, h) : 0;
              const auto each = [&](auto&& offer) {
@@ -183,10 +184,10 @@ void look_around(const DeviceHash& table, const Question& q, Finding* findings, 
            });
 }
 
-Degenerate degenerate_of(const std::vector<Finding>& findings) {
+Degenerate degenerate_of(const std::vector<NeighbourSummary>& summaries) {
   Degenerate d;
-  for (std::size_t k = 0; k < findings.size(); ++k) {
-    const Finding& f = findings[k];
+  for (std::size_t k = 0; k < summaries.size(); ++k) {
+    const NeighbourSummary& f = summaries[k];
     const auto i = static_cast<Index>(k);
     if (f.coincident) d.coincident.push_back(i);
     if (f.rank == 0) d.isolated.push_back(i);
@@ -209,20 +210,20 @@ Survey survey_on_device(std::span<const Vec3d> host_position, const Neighbourhoo
   double middle = 0;
   const DeviceArray<double> support = supports(spacing, n, rule, &middle);
   if (kernel_volumes) kernel_sum = {n, "kernel sums" + of};
-  DeviceArray<Finding> findings(n, "survey" + of);
-  look_around(DeviceHash(position, {{0, static_cast<Index>(n), middle}}),
-              {position.data(), support.data(), spacing.data(), nullptr, 0}, findings.data(),
-              kernel_sum.data(), nullptr);
-  const thrust::transform_iterator lengths(findings.data(), AsLengths{});
-  const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),
-                             Lengths{0, static_cast<Index>(n), 0, 0}, AddLengths{});
+  DeviceArray<NeighbourSummary> summaries(n, "neighbour summaries" + of);
+  summarise_neighbours(DeviceHash(position, {{0, static_cast<Index>(n), middle}}),
+                       {position.data(), support.data(), spacing.data(), nullptr, 0},
+                       summaries.data(), kernel_sum.data(), nullptr);
+  const thrust::transform_iterator lengths(summaries.data(), AsTotals{});
+  const ListTotals all = reduce(lengths, static_cast<std::int64_t>(n),
+                                ListTotals{0, static_cast<Index>(n), 0, 0}, AddTotals{});
   survey.lists = {all.pairs, all.fewest, all.most};
   survey.support = fetched(support);
   if (kernel_volumes) {
     survey.spacing = fetched(spacing);
     survey.kernel_sum = fetched(kernel_sum);
   }
-  if (all.degenerate > 0) survey.degenerate = degenerate_of(fetched(findings));
+  if (all.degenerate > 0) survey.degenerate = degenerate_of(fetched(summaries));
   return survey;
 }
 
@@ -252,7 +253,7 @@ class CudaShareSurveyor final : public ShareSurveyor {
     Around around;
     const std::size_t n = host_position.size();
     if (n == 0) return around;
-    const std::string what = "what is around " + std::to_string(n) + " phyxels";
+    const std::string what = "neighbour summaries of " + std::to_string(n) + " phyxels";
     const auto sent_span = [&](auto values) {
       DeviceArray<std::remove_const_t<typename decltype(values)::element_type>> array(values.size(),
                                                                                       what);
@@ -267,7 +268,7 @@ class CudaShareSurveyor final : public ShareSurveyor {
       kernel_sum = {n, what};
       kernel_sum.clear();
     }
-    DeviceArray<Finding> findings(n, what);
+    DeviceArray<NeighbourSummary> summaries(n, what);
     DeviceArray<char> needed(n, what);
     needed.clear();
     double sum = 0, largest = 0;
@@ -275,19 +276,19 @@ class CudaShareSurveyor final : public ShareSurveyor {
       sum += h;
       largest = std::max(largest, h);
     }
-    look_around(
+    summarise_neighbours(
         DeviceHash(position, {{0, static_cast<Index>(n), sum / static_cast<double>(n)}}),
         {position.data(), support.data(), spacing.data(), own.data(), one_sided ? largest : 0},
-        findings.data(), kernel_sum.data(), needed.data());
+        summaries.data(), kernel_sum.data(), needed.data());
     around.needed = fetched(needed);
-    const thrust::transform_iterator lengths(findings.data(), AsLengths{});
-    const Lengths all = reduce(lengths, static_cast<std::int64_t>(n),
-                               Lengths{0, static_cast<Index>(n), 0, 0}, AddLengths{});
-    if (all.degenerate > 0) around.degenerate = degenerate_of(fetched(findings));
+    const thrust::transform_iterator lengths(summaries.data(), AsTotals{});
+    const ListTotals all = reduce(lengths, static_cast<std::int64_t>(n),
+                                  ListTotals{0, static_cast<Index>(n), 0, 0}, AddTotals{});
+    if (all.degenerate > 0) around.degenerate = degenerate_of(fetched(summaries));
     const DeviceArray<Index> length(n, what);
     for_each("list_lengths", static_cast<std::int64_t>(n),
-             [findings = findings.data(), length = length.data()] __device__(std::int64_t i) {
-               length[i] = findings[i].length;
+             [summaries = summaries.data(), length = length.data()] __device__(std::int64_t i) {
+               length[i] = summaries[i].length;
              });
     around.length = fetched(length);
     if (!host_spacing.empty()) around.kernel_sum = fetched(kernel_sum);
@@ -315,7 +316,7 @@ Surveyor cuda_surveyor(int device) {
 
 bool can_survey_on_cuda(const Scene& scene) {
   return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
-    // The host finds closing vectors, from its lists, and sorts by material.
+    // The host finds closing vectors from its lists, and sorts phyxels by material.
     return body.closure > 0 || !body.inclusions.empty() || body.neighbourhood.max_neighbours ||
            body.neighbourhood.nearest > most_nearest;
   });

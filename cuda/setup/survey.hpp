@@ -1,4 +1,4 @@
-/// Supports, list lengths and degenerate phyxels, found on a GPU.
+/// Neighbour search on a GPU: supports, list lengths and degenerate phyxels, without lists.
 #pragma once
 
 #include <memory>
@@ -8,15 +8,17 @@
 
 namespace phyxel {
 
-/// For `build_model`, whose lists are then found by `make_cuda_backend`: the same supports as on
-/// the CPU to the last bit, kernel sums to rounding. The function throws DeviceError.
+/// The neighbour search of `build_model` on a GPU; `make_cuda_backend` then finds the lists.
+/// Supports are equal to the CPU's bit by bit, kernel sums up to rounding. The function that is
+/// returned throws DeviceError.
 Surveyor cuda_surveyor(int device = 0);
 
-/// For `build_share`, on ranks whose GPUs find their lists themselves. @throws DeviceError
+/// The neighbour search of `build_share`, for ranks whose GPUs find their lists. @throws
+/// DeviceError
 std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device);
 
-/// Whether those surveyors know what all bodies ask for: not `max_neighbours`, nor `closure`, and
-/// `nearest` up to 256.
+/// True if the search on a GPU supports all bodies of a scene: no `max_neighbours`, no `closure`,
+/// no inclusions, and `nearest` up to 256.
 bool can_survey_on_cuda(const Scene& scene);
 
 }  // namespace phyxel

@@ -25,7 +25,7 @@ void find_places(Tiling& tiling) {
   }
 }
 
-/// Bodies one after the other, each from the start of a tile.
+/// Assigns places to bodies one after the other, each from the start of a tile.
 void place_phyxels(const Model& model, Tiling& tiling) {
   const Csr& lists = model.neighbourhood.neighbours;
   tiling.place.resize(static_cast<std::size_t>(model.size()));
@@ -46,8 +46,8 @@ void place_phyxels(const Model& model, Tiling& tiling) {
   find_places(tiling);
 }
 
-/// Whether each phyxel needs a ghost in either pass.
-std::vector<char> who_reaches_ghosts(const Model& model) {
+/// For each phyxel 1 if it needs a ghost in either pass, else 0.
+std::vector<char> reach_ghosts(const Model& model) {
   std::vector<char> reaches(static_cast<std::size_t>(model.size()), 0);
   const auto is_ghost = [&](Index j) { return !model.owns(j); };
   for (Index i = 0; i < model.size(); ++i) {
@@ -73,9 +73,9 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
     parallel_sort(pairs);
     return in_bulk(pairs.size(), [&](std::size_t k) { return pairs[k].second; });
   };
-  // Own phyxels, tile by tile of the whole.
+  // Own phyxels, by tiles of the whole model.
   Bulk<Index> own;
-  std::vector<Index> begin, part_of;  // of each tile
+  std::vector<Index> begin, part_of;  // first own phyxel and part of each tile
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
     const Bulk<Index> of_part = sorted(model.parts[p].begin, model.parts[p].owned_end());
     const auto before = static_cast<Index>(own.size());
@@ -107,7 +107,7 @@ void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Ti
   }
   tiling.own_tiles = tiles;
   for (std::size_t p = 0; p < model.parts.size(); ++p) {
-    std::size_t next = 0;  // in the last tile
+    std::size_t next = 0;  // number of ghosts placed
     for (const Index i : sorted(model.parts[p].owned_end(), model.parts[p].end)) {
       if (next % tile_size == 0) {
         tiling.part.push_back(static_cast<Index>(p));
@@ -127,7 +127,7 @@ std::vector<Index> numbers_at(const Model& model, const std::vector<Index>& phyx
 
 namespace {
 
-/// What tells the order of halos: of each place, that in the whole model.
+/// The place in the whole model's tiles of the phyxel at each place, by which halos are ordered.
 std::vector<Index> orders_of(const Model& model, const Tiling& tiling) {
   std::vector<Index> order(tiling.phyxel.size());
   std::iota(order.begin(), order.end(), 0);
@@ -138,14 +138,15 @@ std::vector<Index> orders_of(const Model& model, const Tiling& tiling) {
   return order;
 }
 
-/// One tile's halo and lists.
+/// The halo and the lists of a tile.
 struct TileRows {
   std::vector<Index> halo;
-  std::array<std::vector<std::uint16_t>, tile_size> slots;  ///< Of each place, in order, equally
-                                                            ///< long within a warp.
+  /// Ordered slots of each place; lists of a warp have the same length.
+  std::array<std::vector<std::uint16_t>, tile_size> slots;
 };
 
-/// @param order of each place, in which halos are
+/// Builds the halo and the lists of a tile.
+/// @param order place in the whole model's tiles of each place, by which the halo is sorted
 TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, const std::vector<Index>& order,
                       Index tile) {
   const Index begin = tile * tile_size, end = begin + tile_size;
@@ -203,7 +204,7 @@ TileRows rows_of_tile(const Csr& lists, const Tiling& tiling, const std::vector<
 
 TileLists make_lists(const Csr& lists, const Tiling& tiling, const std::vector<Index>& order) {
   constexpr int warps = tile_size / warp_size;
-  constexpr Index batch = 4096;  // tiles; their rows take some 40 kB each before they are packed
+  constexpr Index batch = 4096;  // tiles, whose rows take about 40 kB each before they are packed
   const Index tiles = tiling.own_tiles;
   TileLists out;
   std::vector<std::vector<Index>> halos(static_cast<std::size_t>(tiles));
@@ -216,7 +217,7 @@ TileLists make_lists(const Csr& lists, const Tiling& tiling, const std::vector<I
     for (Index tile = first; tile < last; ++tile) {
       try {
         rows[tile - first] = rows_of_tile(lists, tiling, order, tile);
-        halos[tile] = rows[tile - first].halo;  // a copy has no room to spare
+        halos[tile] = rows[tile - first].halo;  // a copy, without spare capacity
       } catch (...) {
 #pragma omp critical
         failure = std::current_exception();
@@ -262,15 +263,15 @@ TileLists make_lists(const Csr& lists, const Tiling& tiling, const std::vector<I
 
 void refuse_halo(int points) {
   throw InputError(
-      fmt::format("{} phyxels side by side have {} others as neighbours; a GPU tile holds at most "
-                  "{}: allowed are a smaller support or the CPU",
+      fmt::format("the halo of a tile of {} phyxels has {} points; a GPU's tile has room for {}; "
+                  "allowed: a smaller support, or the CPU",
                   tile_size, points, most_halo));
 }
 
 Tiling make_tiling(const Model& model) {
   Tiling tiling;
   if (model.share) {
-    place_share(model, who_reaches_ghosts(model), tiling);
+    place_share(model, reach_ghosts(model), tiling);
   } else {
     place_phyxels(model, tiling);
   }

@@ -1,16 +1,19 @@
-/// How a model is laid out for a GPU: phyxels in the order of a space-filling curve, cut into tiles
-/// whose points fit shared memory, and neighbour lists in 16-bit slots of that memory.
+/// Layout of a model for a GPU: phyxels in the order of a space-filling curve, cut into tiles whose
+/// points fit shared memory, and neighbour lists of 16-bit slots in that memory.
 ///
-/// A warp takes 32 neighbouring phyxels and walks their lists in step, one lane a phyxel. Shared
-/// memory answers eight lanes at a time, 16 bytes each, at once if their slots differ modulo 8 or
-/// are the same; so the entries of a list are put into an order in which they do (see
-/// wait_free.hpp). That order is also the one in which sums run, whatever kernel walks the list:
-/// results do not depend on the way of launching.
+/// A place is an index into the tiles: tile * tile_size + tile slot. A slot is an index into the
+/// shared memory of a tile's block.
 ///
-/// A lane with nothing to do takes a far point, which costs a comparison in every weight. Its own
-/// phyxel, with a share of exactly zero, would do without, but too often meets others in a column.
+/// A warp takes 32 neighbouring phyxels and traverses their lists in lockstep, one lane for each
+/// phyxel. Shared memory serves eight lanes at a time, 16 bytes each, without a bank conflict if
+/// their slots differ modulo 8 or are equal; the entries of lists are ordered accordingly (see
+/// wait_free.hpp). Sums run in the same order in every kernel, so that results do not depend on how
+/// a step is launched.
 ///
-/// Plain host code without CUDA.
+/// An idle lane reads a null point: one beyond every support, at the price of a comparison in each
+/// weight. Its own phyxel, whose weight is zero, would cause bank conflicts.
+///
+/// Host code without CUDA.
 #pragma once
 
 #include <cstdint>
@@ -20,24 +23,24 @@
 
 namespace phyxel::cuda {
 
-inline constexpr int tile_size = 256;  ///< Places a tile.
+inline constexpr int tile_size = 256;  ///< Number of tile slots.
 inline constexpr int warp_size = 32;
-inline constexpr int far_slots = 8;  ///< Slots of points beyond every support, for filling up.
-inline constexpr int chunk = 8;      ///< Entries that a lane loads at once.
-/// A slot's number times its 16 bytes must fit 16 bits.
+inline constexpr int far_slots = 8;  ///< Number of null points: one for each bank of 16 bytes.
+inline constexpr int chunk = 8;      ///< Number of entries that a lane loads at once.
+/// Largest number of slots: a slot's offset in bytes, 16 × slot, must fit 16 bits.
 inline constexpr int most_slots = 4096;
 inline constexpr int most_halo = most_slots - tile_size - far_slots;
-/// @throws InputError: a tile has that many neighbours outside.
+/// Throws the InputError for a tile whose halo has too many points.
 [[noreturn]] void refuse_halo(int points);
 
-/// Lists of neighbours, tile by tile. Slots of a tile: its own places in order, `far_slots`
-/// far points, then its halo.
+/// Neighbour lists, tile by tile. The slots of a tile are its own phyxels, `far_slots` null points
+/// and its halo, in this order.
 struct TileLists {
-  /// Places of other tiles that a tile needs, ascending, filled up with -1, shape [tiles,
+  /// Places of other tiles that a tile needs, ascending, padded with -1, shape [tiles,
   /// halo_stride].
   std::vector<Index> halo;
   int halo_stride = 0;
-  /// Of each warp: where its entries begin, in chunks, and how many entries a lane has.
+  /// The lists of a warp: their first chunk, and the number of entries of a lane.
   struct Row {
     std::int32_t chunk = 0, length = 0;
   };
@@ -47,16 +50,16 @@ struct TileLists {
   std::vector<std::uint16_t> entries;
 
   int slots() const { return tile_size + far_slots + halo_stride; }
-  /// Entries of the list of a place, far ones included.
+  /// Number of entries in the list of a place, including null points.
   int length_of(Index place) const { return rows[place / warp_size].length; }
-  /// The slot that entry e of a place names.
+  /// The slot of entry e of a place.
   int slot_of(Index of, int e) const {
     const std::size_t lane =
         static_cast<std::size_t>(rows[of / warp_size].chunk + e / chunk) * warp_size +
         of % warp_size;
     return entries[lane * chunk + e % chunk] / 16;
   }
-  /// The place in a slot of a tile; -1: a far point.
+  /// The place in a slot of a tile; -1 for a null point.
   Index place_in(Index tile, int slot) const {
     if (slot < tile_size) return tile * tile_size + slot;
     if (slot < tile_size + far_slots) return -1;
@@ -69,11 +72,11 @@ struct TileLists {
 };
 
 struct Tiling {
-  std::vector<Index> phyxel;  ///< Which phyxel is at a place; -1: none, shape [tiles · tile_size].
-  std::vector<Index> place;   ///< Where a phyxel is, shape [n].
-  std::vector<Index> part;    ///< Body of a tile, shape [tiles].
-  /// The first tiles have lists; the rest are a share's ghosts. Of those with lists, the first ones
-  /// name ghosts, or are ghosts elsewhere.
+  std::vector<Index> phyxel;  ///< Phyxel at each place, or -1, shape [tiles · tile_size].
+  std::vector<Index> place;   ///< Place of each phyxel, shape [n].
+  std::vector<Index> part;    ///< Part of each tile, shape [tiles].
+  /// Number of tiles with lists, which come first, before tiles of ghosts; and the number of those
+  /// that exchange values with other ranks, which come first among them.
   Index own_tiles = 0, boundary_tiles = 0;
   TileLists neighbours;  ///< For the first pass.
   TileLists inverse;     ///< For the second pass; empty if the neighbours serve both.
@@ -83,18 +86,19 @@ struct Tiling {
   const TileLists& second() const { return inverse.rows.empty() ? neighbours : inverse; }
 };
 
-/// Of a share, own tiles are those of the whole model, phyxel by phyxel and entry by entry, so that
-/// sums run alike; they must be whole (see `curve_groups`). Ghosts follow, in tiles of their own.
-/// @throws InputError if a tile reaches more points than 16-bit slots can name.
+/// Makes the tiles and lists of a model. The own tiles of a share are tiles of the whole model,
+/// with the same entries in the same order, so that sums round alike; a partition must not cut them
+/// (see `curve_groups`). Ghosts follow, in tiles of their own.
+/// @throws InputError if a tile reaches more points than 16-bit slots can address
 Tiling make_tiling(const Model& model);
 
-/// Places of a share: the tiles of the whole, as far as they are here, those first that reach
-/// ghosts or are ghosts elsewhere; then ghosts, body by body. Sets all of a tiling but its lists.
-/// @param reaches_ghosts whether each phyxel needs a ghost in either pass, shape [n]
+/// Assigns the places of a share: its tiles of the whole model, boundary tiles first, then ghosts,
+/// body by body. Sets all members of the tiling except its lists.
+/// @param reaches_ghosts nonzero for phyxels that need a ghost in either pass, shape [n]
 void place_share(const Model& model, const std::vector<char>& reaches_ghosts, Tiling& tiling);
 
-/// Of each place, the number of its phyxel in the whole model; -1: nobody. @param phyxel of each
-///   place
+/// The global id of the phyxel at each place; -1 at empty places.
+/// @param phyxel the phyxel at each place, or -1
 std::vector<Index> numbers_at(const Model& model, const std::vector<Index>& phyxel);
 
 }  // namespace phyxel::cuda

@@ -1,5 +1,5 @@
-/// The order of entries in which eight lanes never wait for shared memory. Shared by the set-up on
-/// the host and on the device.
+/// The order of list entries in which eight lanes have no bank conflicts in shared memory. Host and
+/// device share this code.
 #pragma once
 
 #include <cstdint>
@@ -8,28 +8,29 @@
 
 namespace phyxel::cuda {
 
-/// Lanes that shared memory answers together, and the 16-byte columns it has for them.
+/// Number of lanes that shared memory serves together, and of its 16-byte columns.
 inline constexpr int team = 8, columns = 8;
 
-/// The order in which `order_wait_free` takes a lane's slots: column by column, ascending.
+/// The order of a lane's slots that `order_wait_free` expects: by column, then ascending.
 PHYXEL_HD bool earlier_slot(std::uint16_t a, std::uint16_t b) {
   return a % columns != b % columns ? a % columns < b % columns : a < b;
 }
 
-/// Puts the slots of eight lanes into an order in which each step's slots are the same or in
-/// different columns; a lane for which there is none takes a far slot. Lanes end up equally long.
+/// Orders the slots of eight lanes so that the slots of a step are equal or in different columns; a
+/// lane without such a slot takes a null point. All lanes get the same number of steps.
 ///
-/// Step by step, the lane with the most left to do chooses first: a slot that another lane has just
-/// chosen if it has that too, otherwise one from the column with the most left.
-/// @param slots of lane l: slots[l * stride + k], k < length[l], by `earlier_slot`; used up
-/// @param first_far the far point of column c is slot `first_far` + c
-/// @param ordered of lane l: ordered[l * capacity + step]
-/// @returns the number of steps, or -1 if they are more than `capacity`; eight times the longest
-///   list always is enough.
+/// In each step, lanes choose in the order of their remaining slots, most first: a slot that
+/// another lane has chosen in this step if they share it, otherwise one from the fullest column.
+/// @param slots lists of the lanes, slots[l * stride + k] with k < length[l], sorted by
+///   `earlier_slot`; overwritten
+/// @param first_far slot of the null point of column 0; that of column c is `first_far` + c
+/// @param ordered receives the slots, ordered[l * capacity + step]
+/// @returns the number of steps, or -1 if `capacity` is too small; eight times the longest list is
+///   always enough
 PHYXEL_HD int order_wait_free(std::uint16_t* slots, int stride, const int* length,
                               std::uint16_t first_far, std::uint16_t* ordered, int capacity) {
-  std::uint16_t begin[team][columns], end[team][columns];  // of each lane's entries in each column
-  int waiting[columns] = {};                               // entries left in each column
+  std::uint16_t begin[team][columns], end[team][columns];  // each lane's entries in each column
+  int waiting[columns] = {};                               // remaining entries of each column
   int left_of[team], left = 0;
   for (int lane = 0; lane < team; ++lane) {
     int k = 0;
@@ -47,7 +48,7 @@ PHYXEL_HD int order_wait_free(std::uint16_t* slots, int stride, const int* lengt
     if (steps == capacity) return -1;
     int chosen[columns];
     for (int c = 0; c < columns; ++c) chosen[c] = -1;
-    unsigned taken = 0, idle = 0;  // lanes
+    unsigned taken = 0, idle = 0;  // bit masks of lanes
     for (int turn = 0; turn < team; ++turn) {
       int lane = -1;
       for (int l = 0; l < team; ++l) {

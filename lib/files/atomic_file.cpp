@@ -24,32 +24,31 @@ std::string reason(int error) { return std::error_code(error, std::generic_categ
   throw OutputError(fmt::format("{}: {}: {}", file.string(), what, reason(error)));
 }
 
-/// What a file is that is not a regular one, or null.
+/// The kind of a file that is not regular, for messages; null for a regular file.
 const char* irregular(mode_t mode) {
   if (S_ISDIR(mode)) return "a folder";
   if (S_ISCHR(mode)) return "a character device";
   if (S_ISBLK(mode)) return "a block device";
   if (S_ISFIFO(mode)) return "a FIFO";
   if (S_ISSOCK(mode)) return "a socket";
-  return S_ISREG(mode) ? nullptr : "no regular file";
+  return S_ISREG(mode) ? nullptr : "not a regular file";
 }
 
-/// Whether bytes can be written to a file one after another, but not kept in it.
+/// True for a FIFO or a character device, which can be written to but not replaced.
 bool is_stream(mode_t mode) { return S_ISCHR(mode) || S_ISFIFO(mode); }
 
-/// The status of what a path leads to through links; false if nothing is there.
-/// @throws InputError for a link that leads nowhere
+/// Gets the status of a path, following links. @returns false if it does not exist.
+/// @throws InputError for a dangling link
 bool found(const fs::path& file, struct stat* status) {
   if (::stat(file.c_str(), status) == 0) return true;
   const int error = errno;
   if (::lstat(file.c_str(), status) != 0) return false;
-  throw InputError(
-      fmt::format("{}: is a link that leads nowhere ({}); allowed: a file or a new name",
-                  file.string(), reason(error)));
+  throw InputError(fmt::format("{}: is a dangling link ({}); allowed: a file or a new name",
+                               file.string(), reason(error)));
 }
 
-/// The regular file, there or not, that writing to `file` shall replace: behind any links, so that
-/// these stay. @throws InputError if something else is there
+/// The regular file, existing or not, that writing to `file` replaces: the target of any links, so
+/// that these stay. @throws InputError if it exists and is not a regular file
 fs::path replaced_file(const fs::path& file) {
   struct stat status {};
   if (!found(file, &status)) return file;
@@ -64,7 +63,7 @@ fs::path replaced_file(const fs::path& file) {
   return error ? file : target;
 }
 
-/// A file descriptor that closes itself.
+/// A file descriptor with RAII.
 class Descriptor {
  public:
   Descriptor(const fs::path& file, int flags)
@@ -75,7 +74,7 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int get() const { return fd_; }
-  /// Closing can report what writing did not (NFS, quotas).
+  /// Closes the descriptor, which may report an error that writing did not (NFS, quotas).
   int close() {
     const int result = ::close(fd_);
     fd_ = -1;
@@ -86,7 +85,7 @@ class Descriptor {
   int fd_;
 };
 
-/// 0, or the error number of the write that failed.
+/// Writes bytes at an offset. @returns 0, or the error number of the write that failed
 int write_all(int fd, std::span<const std::byte> bytes, off_t at) {
   while (!bytes.empty()) {
     const ssize_t written = ::pwrite(fd, bytes.data(), bytes.size(), at);
@@ -100,7 +99,7 @@ int write_all(int fd, std::span<const std::byte> bytes, off_t at) {
   return 0;
 }
 
-/// Writes behind what was written before. @returns 0, or the error number
+/// Writes bytes at the current position. @returns 0, or the error number
 int write_on(int fd, std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd, bytes.data(), bytes.size());
@@ -120,7 +119,7 @@ std::span<const std::byte> bytes_of(std::string_view text) {
 void sync_folder(const fs::path& file) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const Descriptor descriptor(folder, O_RDONLY | O_DIRECTORY);
-  // Some file systems cannot sync a folder; the rename is then as durable as it gets.
+  // Some file systems cannot sync a folder, and the error is ignored.
   if (descriptor.get() >= 0) ::fsync(descriptor.get());
 }
 
@@ -128,7 +127,7 @@ void sync_folder(const fs::path& file) {
 
 NewFile::NewFile(const fs::path& file, std::uint64_t size)
     : file_(replaced_file(file)), temporary_(file_.string() + ".tmp"), size_(size) {
-  // What a killed program has left is removed first, so that a link of that name is not followed.
+  // The .tmp of a killed program is removed first, so that a link of that name is not followed.
   constexpr int flags = O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
   fd_ = ::open(temporary_.c_str(), flags, 0666);
   if (fd_ < 0 && errno == EEXIST && ::unlink(temporary_.c_str()) == 0) {
@@ -141,8 +140,8 @@ NewFile::NewFile(const fs::path& file, std::uint64_t size)
     failed = ::fallocate(fd_, 0, 0, static_cast<off_t>(size));
   } while (failed != 0 && errno == EINTR);
   if (failed == 0) return;
-  // Some file systems know no such thing: there, writing tells. (posix_fallocate would write a byte
-  // into every block of theirs.)
+  // Where the file system does not support fallocate, a full disk shows when writing.
+  // (posix_fallocate would write a byte into every block there.)
   for (const int error : {ENOSPC, EDQUOT, EFBIG, EIO}) {
     if (errno == error) fail(error);
   }
@@ -171,7 +170,7 @@ void NewFile::sync() {
 
 void NewFile::read(std::uint64_t at, std::uint64_t count,
                    const std::function<void(std::span<const std::byte>)>& take) {
-  // Opened anew, as network file systems then ask what others have written.
+  // Opened again: network file systems then revalidate what other hosts have written.
   const Descriptor others(temporary_, O_RDONLY);
   if (others.get() < 0) fail(errno);
   std::vector<std::byte> some(std::min<std::uint64_t>(count, std::uint64_t{16} << 20));
@@ -188,7 +187,7 @@ void NewFile::read(std::uint64_t at, std::uint64_t count,
 
 void NewFile::finish(Durable durable) {
   if (durable == Durable::yes && ::fsync(fd_) != 0) fail(errno);
-  // Closing can report what writing did not (NFS, quotas).
+  // Closing may report an error that writing did not (NFS, quotas).
   if (::close(std::exchange(fd_, -1)) != 0) fail(errno);
   if (::rename(temporary_.c_str(), file_.c_str()) != 0) {
     const int error = errno;
@@ -231,7 +230,7 @@ void sync_file(const fs::path& file) {
   if (descriptor.get() < 0 || ::fsync(descriptor.get()) != 0) {
     // Some file systems cannot sync a folder.
     if (descriptor.get() >= 0 && errno == EINVAL) return;
-    fail(file, "cannot be brought to the disk", errno);
+    fail(file, "cannot be flushed to the disk", errno);
   }
 }
 
@@ -258,7 +257,7 @@ void replace_tail(const fs::path& file, std::size_t keep, std::string_view text)
     error = errno;
   }
   if (error != 0) {
-    // The old tail lies in blocks the file already owns, so that this works on a full disk.
+    // The old tail fits the blocks that the file has already, so this works on a full disk.
     write_all(descriptor.get(), bytes_of(tail), static_cast<off_t>(keep));
     [[maybe_unused]] const int cut = ::ftruncate(descriptor.get(), static_cast<off_t>(size));
     fail(file, "cannot be written", error);
@@ -304,13 +303,13 @@ void make_writable_folder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (!fs::is_directory(folder)) {
-    throw InputError(fmt::format("{}: the output folder cannot be made: {}", folder.string(),
+    throw InputError(fmt::format("{}: the output folder cannot be created: {}", folder.string(),
                                  error ? error.message() : "a file of that name exists"));
   }
   const fs::path probe = folder / fmt::format(".phyxel_probe_{}", ::getpid());
   const Descriptor descriptor(probe, O_WRONLY | O_CREAT | O_EXCL);
   if (descriptor.get() < 0) {
-    throw InputError(fmt::format("{}: no file can be made in the output folder: {}",
+    throw InputError(fmt::format("{}: no file can be created in the output folder: {}",
                                  folder.string(), reason(errno)));
   }
   ::unlink(probe.c_str());

@@ -18,7 +18,7 @@ namespace {
 constexpr const char* kind = "body";
 constexpr std::int64_t version = 1;
 
-/// Points must be finite and fit an Index.
+/// Checks that points are finite and that an Index can count them. @throws InputError
 void check_points(const Hdf5Reader& in, const std::string& path, const std::vector<Vec3d>& points) {
   if (points.size() > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
     in.refuse(fmt::format("{} has {} rows; allowed at most {}", path, points.size(),

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint8_t vtk_poly_vertex = 2, vtk_triangle = 5;
 constexpr std::int64_t version = 1;
 
-/// The run's own metadata, beside the VTKHDF group.
+/// Writes the run's metadata, in the group /phyxel beside the VTKHDF group.
 void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diagnostics,
                     bool floats_do) {
   out.group("/phyxel");
@@ -35,7 +35,7 @@ void write_metadata(Hdf5Writer& out, const Scene& scene, const Diagnostics& diag
   out.text("/phyxel/scene", scene.text);
 }
 
-/// Where each body's phyxels, or surfels, end in the whole model.
+/// The end of each body's phyxels, or surfels, in global ids.
 struct Ends {
   std::vector<std::int64_t> phyxels, surfels;
 };
@@ -66,7 +66,7 @@ void write_counts(Hdf5Writer& out, std::int64_t points, std::int64_t cells,
   count("/VTKHDF/NumberOfConnectivityIds", connectivity);
 }
 
-/// Rows of an array, in the type they are stored as.
+/// Rows of an array, in the type in which the file stores them.
 template <class T>
 Hdf5Writer::Fill<T> rows_of(const FileArray& array, ChunkedSource& values) {
   return [array, &values](std::size_t first, std::span<T> rows) {
@@ -94,15 +94,15 @@ void write_rows(Hdf5Writer& out, const FileArray& array, ChunkedSource& values) 
   }
 }
 
-/// Typical distance between two points of a part [m], from its volume v: that of n phyxels is
-/// (v/n)^(1/3), that of n surfels at least that on a sphere, the smallest surface around v.
+/// Typical distance between two points of a part [m], from its volume v: (v/n)^(1/3) for n phyxels;
+/// for n surfels that on a sphere of volume v, which has the smallest surface.
 double spacing_of(const Part& part, Points points) {
   if (points == Points::phyxels) return std::cbrt(part.volume / std::max(1, part.size));
   const double area = std::cbrt(36 * std::numbers::pi * part.volume * part.volume);
   return std::sqrt(area / std::max(1, part.surfels));
 }
 
-/// 0, 1, 2, ... times `step`.
+/// The sequence 0, `step`, 2 `step`, ...
 Hdf5Writer::Fill<std::int64_t> counting(std::int64_t step) {
   return [step](std::size_t first, std::span<std::int64_t> rows) {
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -111,7 +111,7 @@ Hdf5Writer::Fill<std::int64_t> counting(std::int64_t step) {
   };
 }
 
-/// Which body each phyxel, or surfel, is of.
+/// The index of the body of each phyxel, or surfel.
 Hdf5Writer::Fill<Index> bodies(std::vector<std::int64_t> ends) {
   return [ends = std::move(ends)](std::size_t first, std::span<Index> rows) {
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -260,7 +260,7 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
   }
   FrameData frame;
   frame.time = in.number_attribute("/phyxel", "time");
-  if (!std::isfinite(frame.time)) in.refuse(fmt::format("is of t = {} s", frame.time));
+  if (!std::isfinite(frame.time)) in.refuse(fmt::format("has the time {} s", frame.time));
   const std::size_t points = in.shape("/VTKHDF/Points").rows;
   if (points > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
     in.refuse(fmt::format("/VTKHDF/Points has {} rows; allowed at most {}", points,

@@ -1,4 +1,4 @@
-/// One instant of a run as a VTKHDF file.
+/// Frames: the state of a run at one time, as VTKHDF files.
 #pragma once
 
 #include <filesystem>
@@ -14,19 +14,19 @@ namespace phyxel {
 inline constexpr const char* phyxel_frame_kind = "point frame";
 inline constexpr const char* surface_frame_kind = "surface frame";
 
-/// Attribute of the group /phyxel of frames whose positions a float would hold too coarsely.
+/// Attribute of the group /phyxel in frames for whose positions float is too coarse.
 inline constexpr const char* far_attribute = "positions_need_double";
 
-/// Whose positions a frame holds.
+/// The points of a frame.
 enum class Points : std::uint8_t { phyxels, surfels };
-/// Whether floats hold the positions of a model's points: in every body the distance between two
-/// neighbouring floats, at the largest coordinate that the body may have, is at most a thousandth
-/// of the distance between two of its points. The answer follows from figures of the whole bodies
-/// and of the whole model, so that it is the same on any number of ranks and after a restart.
-/// @param displacement the largest of any phyxel [m]
+/// True if float is precise enough for the positions of a model's points: in each body the spacing
+/// of floats at the body's largest coordinate is at most a thousandth of the distance between two
+/// of its points. Only quantities of whole bodies and of the whole model enter, so that the result
+/// does not depend on the number of ranks, nor on a restart.
+/// @param displacement largest displacement of any phyxel [m]
 bool floats_hold_positions(const Model& model, double displacement, Points points);
 
-/// A number of `Diagnostics`, as a column of the energy log and an attribute of every frame.
+/// A quantity of `Diagnostics`: a column of the energy log and an attribute of each frame.
 struct DiagnosticColumn {
   const char* name;
   const char* unit;
@@ -34,21 +34,22 @@ struct DiagnosticColumn {
 };
 std::span<const DiagnosticColumn> diagnostic_columns();
 
-/// VTKHDF UnstructuredGrid 1.0, what every ParaView since 5.10 opens: one poly-vertex cell a body.
-/// Positions in the precision of the run's state, and in double where floats do not hold them.
-/// `model` may be a rank's share.
+/// Writes the phyxels as VTKHDF UnstructuredGrid 1.0 (ParaView 5.10 and later), one poly-vertex
+/// cell for each body. Positions have the precision of the run's state, or double if float is too
+/// coarse. `model` may be a rank's share.
 void write_phyxel_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
                         const Diagnostics& diagnostics, ChunkedSource& values);
 
-/// The same for the deformed surface: triangles, with normals.
+/// Writes the deformed surface in the same format: triangles, with normals.
 void write_surface_frame(const std::filesystem::path& file, const Model& model, const Scene& scene,
                          const Diagnostics& diagnostics, ChunkedSource& values);
 
-/// Values of an array's rows. @param values_of those of one of its terms
+/// Values of an array's rows: the sum of its terms.
+/// @param values_of function that returns the values of one term
 template <class ValuesOf>
 std::vector<double> sum_of_terms(const FileArray& array, ValuesOf&& values_of) {
   const auto first = values_of(array.terms[0]);
-  // Not added to zero, which would lose the sign of another.
+  // The sum starts with the first term: adding to +0 would lose the sign of -0.
   std::vector<double> sum(first.begin(), first.end());
   for (std::size_t t = 1; t < array.terms.size(); ++t) {
     const auto more = values_of(array.terms[t]);
@@ -58,7 +59,7 @@ std::vector<double> sum_of_terms(const FileArray& array, ValuesOf&& values_of) {
 }
 
 class Hdf5Writer;
-/// An array that comes when the file is written.
+/// Adds an array whose values are read from `values` when the file is written.
 void write_later(Hdf5Writer& out, const FileArray& array, ChunkedSource& values);
 
 }  // namespace phyxel

@@ -13,7 +13,7 @@
 namespace phyxel {
 namespace {
 
-/// An HDF5 identifier that closes itself.
+/// An HDF5 identifier with RAII.
 class Handle {
  public:
   using Close = herr_t (*)(hid_t);
@@ -45,10 +45,10 @@ hid_t type_of() {
   if constexpr (std::is_same_v<T, std::uint8_t>) return H5T_NATIVE_UINT8;
 }
 
-/// HDF5 prints its error stack to stderr unless told not to; our messages replace it.
+/// Turns off HDF5's printing of its error stack; phyxel's messages replace it.
 void quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
-/// Property list for objects without time stamps, with the groups on the way made.
+/// Property list for objects without time stamps, with creation of intermediate groups.
 hid_t link_list() {
   const hid_t list = H5Pcreate(H5P_LINK_CREATE);
   H5Pset_create_intermediate_group(list, 1);
@@ -92,12 +92,12 @@ void put_attribute(hid_t file, const std::string& path, const std::string& attri
   demand(handle.good() && H5Awrite(handle, type, value) >= 0, name, path + "@" + attribute);
 }
 
-/// What every ParaView reads.
+/// Selects the version of the file format that ParaView 5.10 reads.
 void set_versions(hid_t access) {
   H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18);
 }
 
-/// Hands over a stretch of the layout.
+/// Producer of a range of the layout.
 std::function<void(const Content::Sink&)> from_memory(std::shared_ptr<const SparseBytes> memory,
                                                       std::uint64_t begin, std::uint64_t end) {
   return [=, memory = std::move(memory)](const Content::Sink& sink) {

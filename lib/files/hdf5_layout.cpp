@@ -20,14 +20,14 @@
 namespace phyxel {
 namespace {
 
-// Numbers of our files are little-endian, and so are those of the machines that phyxel runs on.
+// Sealed files are little-endian, and are read without conversion.
 static_assert(std::endian::native == std::endian::little);
 
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint64_t undefined = ~std::uint64_t{0};
-// Far above what a file of ours has: the headers of a frame take some kilobytes, and the names of a
-// body's regions lie in one block.
+// Largest block of the structure, far above what phyxel writes: the headers of a frame take some
+// kilobytes, and the names of a body's regions are in one block.
 constexpr std::uint64_t largest_block = std::uint64_t{64} << 20;
 constexpr int deepest_group = 8, highest_tree = 8;
 
@@ -45,7 +45,7 @@ enum Message : std::uint16_t {
   modification_time = 0x12,
 };
 
-/// The types of numbers that are allowed, as a datatype message encodes them.
+/// A number type that is allowed, as a datatype message encodes it.
 struct NumberType {
   Hdf5Value::Kind kind;
   std::uint64_t width;
@@ -63,14 +63,14 @@ constexpr std::uint8_t text_class = 0x13;
 
 std::uint64_t rounded_up(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 
-/// Reads numbers of a block of the file in their order.
+/// Sequential reader of the numbers of a block.
 class Cursor {
  public:
   Cursor(const FileBytes& file, std::span<const std::uint8_t> bytes) : file_(file), bytes_(bytes) {}
 
   std::uint64_t left() const { return bytes_.size(); }
   std::span<const std::uint8_t> take(std::uint64_t count) {
-    if (count > bytes_.size()) file_.refuse("its HDF5 structure is cut short");
+    if (count > bytes_.size()) file_.refuse("its HDF5 structure is truncated");
     const auto taken = bytes_.first(count);
     bytes_ = bytes_.subspan(count);
     return taken;
@@ -102,7 +102,7 @@ class LayoutReader {
     at.expect(
         "\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0"sv);  // versions 0; offsets, lengths of 8 bytes
     at.take(8);                                      // sizes of nodes, flags
-    // Files written in memory say 0, those written behind a seal 512: HDF5 goes by where it is.
+    // The base address is 0 in files written in memory, and 512 in files written behind a seal.
     if (const std::uint64_t base = at.number(8); base != 0 && base != seal_size) {
       file_.refuse(fmt::format("its HDF5 structure begins at {}; allowed: {}", base, seal_size));
     }
@@ -112,8 +112,8 @@ class LayoutReader {
   }
 
  private:
-  /// The place in the file of an address. @throws InputError unless so many bytes lie there, of
-  /// which none has been claimed before
+  /// Offset in the file of a block at an address. @throws InputError if the block exceeds the file,
+  /// or overlaps one claimed before
   std::uint64_t claim(std::uint64_t address, std::uint64_t bytes) {
     const std::uint64_t most = file_.size() - std::min<std::uint64_t>(seal_size, file_.size());
     if (address > most || bytes > most - address || bytes > unclaimed_) {
@@ -135,14 +135,14 @@ class LayoutReader {
     return found;
   }
 
-  /// A message of an object, or of an attribute.
+  /// A message of an object header or an attribute.
   struct Part {
     std::uint16_t type;
     Bytes bytes;
-    std::uint64_t at;  // in the file
+    std::uint64_t at;  // offset in the file
   };
 
-  /// Messages of an object header of version 1, with the blocks that continue it.
+  /// Messages of an object header of version 1 and of its continuation blocks.
   std::vector<Part> messages_of(std::uint64_t address, const std::string& path) {
     const Bytes head = block(address, 16);
     Cursor at(file_, head);
@@ -240,7 +240,7 @@ class LayoutReader {
     value.at = bytes == 0 ? 0 : claim(value.at, bytes);
   }
 
-  /// Bytes of a value. @throws InputError if they are more than the file's
+  /// Size of a value [bytes]. @throws InputError if it exceeds the file's size
   std::uint64_t bytes_of(const std::string& path, const Hdf5Value& value) const {
     std::uint64_t bytes = value.width;
     for (const std::uint64_t extent : value.extent) {
@@ -299,7 +299,7 @@ class LayoutReader {
     read_type(type, called, value);
     read_space(space, called, value);
     value.at = part.at + part.bytes.size() - in.left();
-    if (bytes_of(called, value) > in.left()) file_.refuse(called + " is cut short");
+    if (bytes_of(called, value) > in.left()) file_.refuse(called + " is truncated");
     if (!object.attributes.emplace(text, std::move(value)).second) {
       file_.refuse(called + " is there twice");
     }
@@ -307,7 +307,7 @@ class LayoutReader {
 
   void read_group(const std::string& path, std::uint64_t tree, std::uint64_t heap, int depth) {
     if (depth >= deepest_group) {
-      file_.refuse(fmt::format("{} lies deeper than {} groups", path, deepest_group));
+      file_.refuse(fmt::format("{} is nested deeper than {} groups", path, deepest_group));
     }
     const Bytes head = block(heap, 32);
     Cursor at(file_, head);
@@ -318,7 +318,8 @@ class LayoutReader {
     read_tree(path, tree, names, depth, -1);
   }
 
-  /// A node of a tree of members. @param level the one that it must have; -1: it is the root
+  /// Reads a node of the tree of a group's members.
+  /// @param level the node's expected level; -1 for the root
   void read_tree(const std::string& path, std::uint64_t node, const Bytes& names, int depth,
                  int level) {
     const Bytes head = block(node, 24);

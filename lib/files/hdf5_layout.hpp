@@ -1,10 +1,10 @@
-/// The structure of an HDF5 file as Hdf5Writer makes it, read without HDF5.
+/// Parser, without HDF5, of the structure of HDF5 files that Hdf5Writer makes.
 ///
-/// Anybody can compute a digest, so a seal is no shield, and the parser of HDF5 1.10 reads beyond
-/// its buffers on crafted files. Files of ours use a small part of the format: superblock 0, groups
-/// with symbol tables, object headers 1, contiguous arrays of five types of numbers and texts of
-/// fixed length, attributes in headers. That part is read here, and everything else is refused by
-/// name: chunks, filters, other types, soft and external links, shared messages.
+/// Anybody can compute a digest, so a seal does not protect against crafted files, on which the
+/// parser of HDF5 1.10 reads beyond its buffers. phyxel's files use a small part of the format:
+/// superblock 0, groups with symbol tables, object headers 1, contiguous arrays of five number
+/// types and texts of fixed length, attributes in headers. This parser reads that part, and refuses
+/// everything else by name: chunks, filters, other types, soft and external links, shared messages.
 ///
 /// Format: The HDF Group, *HDF5 File Format Specification Version 3.0*.
 #pragma once
@@ -16,10 +16,10 @@
 
 namespace phyxel {
 
-/// Bytes of an open file, read at their places.
+/// An open file, read at given offsets.
 class FileBytes {
  public:
-  /// @throws InputError if the file cannot be opened or is no regular file.
+  /// Opens a file. @throws InputError if it cannot be opened or is not a regular file
   explicit FileBytes(std::string name);
   ~FileBytes();
   FileBytes(const FileBytes&) = delete;
@@ -27,9 +27,9 @@ class FileBytes {
 
   std::uint64_t size() const { return size_; }
   const std::string& name() const { return name_; }
-  /// @throws InputError if the file ends before.
+  /// Reads `count` bytes at the offset `at`. @throws InputError if the file ends before
   void read(std::uint64_t at, std::uint64_t count, void* to) const;
-  /// An InputError that names the file.
+  /// Throws an InputError that names the file.
   [[noreturn]] void refuse(const std::string& why) const;
 
  private:
@@ -38,27 +38,26 @@ class FileBytes {
   std::uint64_t size_ = 0;
 };
 
-/// The value of an array or of an attribute: its type, its shape and where its bytes lie.
+/// The value of an array or an attribute: its type, its shape and the offset of its bytes.
 struct Hdf5Value {
   enum class Kind : std::uint8_t { real, integer, text };
   Kind kind = Kind::real;
-  std::uint64_t width = 0;            ///< Bytes of one number, or of the text.
-  std::vector<std::uint64_t> extent;  ///< At most two; empty for a single value.
-  std::uint64_t at = 0;               ///< From the beginning of the file; all bytes lie in it.
-  std::uint64_t count() const;        ///< Of numbers.
+  std::uint64_t width = 0;            ///< Size of one number, or of the text [bytes].
+  std::vector<std::uint64_t> extent;  ///< Up to two dimensions; empty for a single value.
+  std::uint64_t at = 0;         ///< Offset from the beginning of the file, which holds all bytes.
+  std::uint64_t count() const;  ///< Number of numbers.
 };
 
 /// A group or an array.
 struct Hdf5Object {
   bool is_group = false;
-  Hdf5Value value;  ///< Of an array.
+  Hdf5Value value;  ///< The value of an array; unused for a group.
   std::map<std::string, Hdf5Value> attributes;
 };
 
-/// All objects of the file by their absolute paths ("/VTKHDF/Points"); the root is "". All sizes
-/// are checked against the file's, and no byte of the file is claimed twice, so that memory and
-/// time are bounded by the size of the file. @throws InputError for a file that Hdf5Writer does not
-/// make.
+/// The objects of a file by absolute path ("/VTKHDF/Points"); the root is "". Sizes are checked
+/// against the file's, and no byte of the file is claimed twice, so that memory and time are
+/// bounded by the size of the file. @throws InputError if Hdf5Writer would not make such a file
 std::map<std::string, Hdf5Object> read_hdf5_layout(const FileBytes& file);
 
 }  // namespace phyxel

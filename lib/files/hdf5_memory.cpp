@@ -25,19 +25,19 @@ void by_page(std::uint64_t at, std::size_t count, Piece&& piece) {
   }
 }
 
-// --- HDF5's view of it: a file driver -----------------------------------------------------------
+// --- A file driver of HDF5 ----------------------------------------------------------------------
 struct Access {
   SparseBytes* bytes;
 };
 struct OpenFile {
-  H5FD_t common;  // first: HDF5 knows no more of it
+  H5FD_t common;  // must be first: HDF5 accesses the object through it
   SparseBytes* bytes;
   haddr_t end_of_allocation;
 };
 OpenFile& opened(H5FD_t* file) { return *reinterpret_cast<OpenFile*>(file); }
 const OpenFile& opened(const H5FD_t* file) { return *reinterpret_cast<const OpenFile*>(file); }
 
-/// No exception may pass through HDF5.
+/// Runs `work` and turns its exceptions into an HDF5 error: none may pass through HDF5's C code.
 template <class Work>
 herr_t succeeds(Work&& work) {
   try {
@@ -58,7 +58,7 @@ herr_t close_file(H5FD_t* file) {
   delete &opened(file);
   return 0;
 }
-/// Those of HDF5's own driver for memory, so that both lay files out alike.
+/// The feature flags of HDF5's core driver, so that both give files the same layout.
 herr_t features_of(const H5FD_t*, unsigned long* flags) {
   *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
            H5FD_FEAT_AGGREGATE_SMALLDATA;

@@ -14,10 +14,10 @@ namespace {
 
 using Kind = Hdf5Value::Kind;
 
-/// Numbers that are converted at a time.
+/// Number of values converted at a time.
 constexpr std::uint64_t some_numbers = 1 << 16;
 
-/// Converts numbers as they are stored to T. @returns false if one is out of T's range.
+/// Converts stored numbers to T. @returns false if one is out of T's range
 template <class Stored, class T>
 bool convert(const std::vector<std::byte>& bytes, std::span<T> values) {
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -31,7 +31,7 @@ bool convert(const std::vector<std::byte>& bytes, std::span<T> values) {
   return true;
 }
 
-/// The same, of the type that the file says.
+/// Converts numbers of the file's type to T. @returns false if one is out of T's range
 template <class T>
 bool convert_stored(const Hdf5Value& value, const std::vector<std::byte>& bytes,
                     std::span<T> values) {

@@ -115,9 +115,9 @@ void Recorder::remove_unfinished() const {
 void Recorder::check_space(std::int64_t frames_before) const {
   const double scalar = scene_.solver.precision == Precision::single ? 4 : 8;
   const auto count = [](std::size_t n) { return static_cast<double>(n); };
-  double frame = 20e3;  // seal, HDF5's own structure, metadata
+  double frame = 20e3;  // seal, HDF5 structure, metadata
   const double phyxels = model_.global_count();
-  const auto position = [&](Points points) {  // at rest; a motion may carry bodies farther
+  const auto position = [&](Points points) {  // at rest; motion may need doubles later
     return floats_hold_positions(model_, 0, points) ? scalar : 8;
   };
   if (writes_phyxels_) {
@@ -125,13 +125,13 @@ void Recorder::check_space(std::int64_t frames_before) const {
              (3 * position(Points::phyxels) + 3 * scalar * count(scene_.output.fields.size()) + 8);
   }
   if (writes_surface_) {
-    // A closed surface has twice as many triangles as corners.
+    // A closed surface has twice as many triangles as vertices.
     frame += model_.global_surfel_count() * (3 * (position(Points::surfels) + 4) + 2 * 33);
   }
   const double frames = scene_.output.frames_per_second > 0
                             ? std::floor(scene_.time.end * scene_.output.frames_per_second) + 1
                             : 1;
-  const double checkpoints = 3 * phyxels * 6 * scalar;  // two, and a third while it is written
+  const double checkpoints = 3 * phyxels * 6 * scalar;  // two, and one more being written
   const double needed =
       std::max(0.0, frames - count(static_cast<std::size_t>(frames_before))) * frame + checkpoints;
   std::error_code error;
@@ -139,7 +139,7 @@ void Recorder::check_space(std::int64_t frames_before) const {
   if (error) return;
   for (const fs::path& file : trajectory_files(directory_)) {
     const auto size = fs::file_size(file, error);
-    if (!error && frames_before == 0) available += static_cast<double>(size);  // will be replaced
+    if (!error && frames_before == 0) available += static_cast<double>(size);  // to be replaced
   }
   if (needed > available) {
     throw InputError(
@@ -170,8 +170,7 @@ void Recorder::create_files() {
 void Recorder::continue_after(const Continuation& point, bool overwrite) {
   frames_ = point.frames;
   if (!is_in_folder(point.checkpoint, directory_)) {
-    // The folder has no trajectory, or one that may be replaced: `check_continuation` has seen to
-    // it.
+    // `check_continuation` has made sure that the folder has no trajectory, or one to be replaced.
     return overwrite ? begin_anew() : create_files();
   }
   if (!has_frames(directory_)) return create_files();
@@ -186,9 +185,9 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   };
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
-  // Nothing is refused from here on, so that the folder is cut back as a whole or not at all.
+  // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
-  fs::remove(directory_ / summary_name, ignored);  // of what is no longer the end
+  fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run
   for (const fs::path& file : later) fs::remove(file, ignored);
   for (auto& [series, entries] : kept) {
     series->create(directory_ / series_name(series == &phyxels_ ? "phyxels" : "surface"), entries);

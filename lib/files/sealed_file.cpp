@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* first_line = "phyxel sealed file 1\n";
 
-/// Digest of a file from a byte onwards, in bounded memory.
+/// Incremental XXH3 digest.
 class Digest {
  public:
   Digest() : state_(XXH3_createState()) { XXH3_128bits_reset(state_.get()); }
@@ -51,7 +51,7 @@ std::array<char, seal_size> seal_of(const std::string& kind, std::uint64_t bytes
   return seal;
 }
 
-/// Value of the line that begins with `key`, or "" if there is none, or none of printable letters.
+/// Value of the seal's line that begins with `key`; "" if it is missing or not printable.
 std::string line_of(const std::string& seal, const std::string& key) {
   const std::size_t at = seal.find('\n' + key + ' ');
   if (at == std::string::npos) return "";
@@ -63,7 +63,7 @@ std::string line_of(const std::string& seal, const std::string& key) {
   return printable ? value : "";
 }
 
-/// Digest and count of all bytes behind the seal.
+/// Digest of the bytes behind the seal; `bytes` receives their number.
 std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
   std::vector<char> buffer(1 << 16);
   Digest digest;
@@ -75,7 +75,7 @@ std::string digest_rest(std::istream& in, std::uint64_t* bytes) {
   return digest.hex();
 }
 
-/// The layout first, by which those who write the rest find their way.
+/// Writes the layout and then the other pieces, which collective writers find through the layout.
 void write_collectively(NewFile& out, const Content& content) {
   std::uint64_t at = seal_size;
   for (const Content::Piece& piece : content.pieces) {
@@ -88,11 +88,11 @@ void write_collectively(NewFile& out, const Content& content) {
     }
     at += piece.bytes;
   }
-  out.sync();  // for those on other hosts
+  out.sync();  // makes the layout visible on other hosts
   content.write_collectively(out.temporary());
 }
 
-/// The seal of a file, whose stream then stands behind it.
+/// Reads the seal of a file; the stream is then positioned behind it.
 std::string read_seal(const fs::path& file, std::ifstream& in) {
   require_regular_file(file);
   in.open(file, std::ios::binary);
@@ -108,7 +108,7 @@ std::string read_seal(const fs::path& file, std::ifstream& in) {
                       file.string(), std::string(first_line).substr(0, 20)));
     }
     throw InputError(
-        fmt::format("{}: not a file written by phyxel (or cut short within its first {} bytes)",
+        fmt::format("{}: not a file written by phyxel (or truncated within its first {} bytes)",
                     file.string(), seal_size));
   }
   return seal;
@@ -117,7 +117,7 @@ std::string read_seal(const fs::path& file, std::ifstream& in) {
 void check_bytes(const fs::path& file, const std::string& seal, std::uint64_t bytes) {
   const std::string stated = line_of(seal, "bytes");
   if (stated == std::to_string(bytes)) return;
-  throw InputError(fmt::format("{}: cut short or altered: {} bytes behind the seal, which says {}",
+  throw InputError(fmt::format("{}: truncated or altered: {} bytes behind the seal, which says {}",
                                file.string(), bytes, stated.empty() ? "nothing" : stated));
 }
 

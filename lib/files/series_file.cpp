@@ -1,4 +1,4 @@
-/// Series files: the times of a trajectory's frames, as ParaView reads them.
+/// Series files: the names and times of a trajectory's frames, in ParaView's format.
 #include <fmt/format.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-/// A whole trajectory in one temporal VTKHDF file.
+/// Export of a trajectory to one temporal VTKHDF file.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,14 +20,14 @@ namespace fs = std::filesystem;
 const std::string grid = "/VTKHDF/";
 const std::string point_data = "/VTKHDF/PointData/";
 
-/// An array of a frame with the type and the width it has there.
+/// An array of a frame, with its type and its number of columns.
 struct Field {
   std::string name;
   bool integer = false;
   std::size_t columns = 0;
 };
 
-/// Adds an array that has one frame's rows behind another's. Each is read when it is written.
+/// Adds an array that concatenates the rows of the frames. Each frame is read when it is written.
 template <class T>
 void gather(Hdf5Writer& out, const std::string& path, const std::vector<SeriesEntry>& entries,
             std::size_t points, std::size_t columns) {
@@ -48,6 +48,68 @@ void put(Hdf5Writer& out, const std::string& path, const std::vector<std::int64_
   out.array<std::int64_t>(path, values, columns);
 }
 
+/// The properties that the frames of a series share, and their times [s].
+struct CommonFrame {
+  std::string kind;
+  std::size_t points = 0;
+  std::vector<std::int64_t> connectivity, offsets;
+  std::vector<Field> fields;
+  bool floats_do = true;  ///< True if float is precise enough for the positions of all frames.
+  std::vector<double> times;
+};
+
+/// Reads the layout of the first frame and checks that the others have the same.
+/// @throws InputError for frames that are damaged, of another kind or of other points or cells
+CommonFrame read_common(const std::vector<SeriesEntry>& entries) {
+  CommonFrame common;
+  common.kind = check_seal(entries.front().file);
+  if (common.kind != phyxel_frame_kind && common.kind != surface_frame_kind) {
+    throw InputError(fmt::format("{}: is a phyxel {}; expected a frame",
+                                 entries.front().file.string(), common.kind));
+  }
+  const Hdf5Reader first(entries.front().file);
+  common.points = first.shape(grid + "Points").rows;
+  common.connectivity = first.array<std::int64_t>(grid + "Connectivity");
+  common.offsets = first.array<std::int64_t>(grid + "Offsets");
+  for (const std::string& name : first.names("/VTKHDF/PointData")) {
+    common.fields.push_back(
+        {name, first.is_integer(point_data + name), first.shape(point_data + name).columns});
+  }
+  for (const SeriesEntry& entry : entries) {
+    check_seal(entry.file, common.kind);
+    const Hdf5Reader in(entry.file);
+    if (in.shape(grid + "Points").rows != common.points ||
+        in.array<std::int64_t>(grid + "Connectivity") != common.connectivity) {
+      in.refuse("has other points or cells than the first frame of its series");
+    }
+    common.floats_do = common.floats_do && !in.has_attribute("/phyxel", far_attribute);
+    common.times.push_back(entry.time);
+  }
+  return common;
+}
+
+/// Writes the group of steps. Parts, cells and connectivity are the same in each, and stored once.
+void put_steps(Hdf5Writer& out, const CommonFrame& common) {
+  const std::size_t steps = common.times.size();
+  const std::vector<std::int64_t> zeros(steps, 0), ones(steps, 1);
+  std::vector<std::int64_t> point_offsets;
+  for (std::size_t k = 0; k < steps; ++k) {
+    point_offsets.push_back(static_cast<std::int64_t>(k * common.points));
+  }
+  out.group("/VTKHDF/Steps");
+  out.attribute("/VTKHDF/Steps", "NSteps", static_cast<std::int64_t>(steps));
+  out.array<double>(grid + "Steps/Values", common.times);
+  put(out, grid + "Steps/PartOffsets", zeros, 0);
+  put(out, grid + "Steps/NumberOfParts", ones, 0);
+  put(out, grid + "Steps/PointOffsets", point_offsets, 0);
+  put(out, grid + "Steps/CellOffsets", zeros, 1);
+  put(out, grid + "Steps/ConnectivityIdOffsets", zeros, 1);
+  out.group("/VTKHDF/Steps/PointDataOffsets");
+  for (const Field& field : common.fields) {
+    put(out, grid + "Steps/PointDataOffsets/" + field.name, point_offsets, 0);
+  }
+}
+
 }  // namespace
 
 void export_single(const fs::path& series, const fs::path& out_file, bool overwrite) {
@@ -56,59 +118,32 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   check_output_file(out_file, overwrite, Output::file);
   make_writable_folder(out_file.has_parent_path() ? out_file.parent_path() : ".");
 
-  const std::string kind = check_seal(entries.front().file);
-  if (kind != phyxel_frame_kind && kind != surface_frame_kind) {
-    throw InputError(
-        fmt::format("{}: is a phyxel {}; expected a frame", entries.front().file.string(), kind));
-  }
+  const CommonFrame common = read_common(entries);
   const Hdf5Reader first(entries.front().file);
-  const std::size_t steps = entries.size();
-  const std::size_t points = first.shape(grid + "Points").rows;
-  const auto connectivity = first.array<std::int64_t>(grid + "Connectivity");
-  const auto offsets = first.array<std::int64_t>(grid + "Offsets");
-  std::vector<Field> fields;
-  for (const std::string& name : first.names("/VTKHDF/PointData")) {
-    fields.push_back(
-        {name, first.is_integer(point_data + name), first.shape(point_data + name).columns});
-  }
 
-  bool floats_do = true;
-  std::vector<double> times;
-  std::vector<std::int64_t> point_offsets;
-  for (const SeriesEntry& entry : entries) {
-    check_seal(entry.file, kind);
-    const Hdf5Reader in(entry.file);
-    if (in.shape(grid + "Points").rows != points ||
-        in.array<std::int64_t>(grid + "Connectivity") != connectivity) {
-      in.refuse("has other points or cells than the first frame of its series");
-    }
-    floats_do = floats_do && !in.has_attribute("/phyxel", far_attribute);
-    point_offsets.push_back(static_cast<std::int64_t>(times.size() * points));
-    times.push_back(entry.time);
-  }
-
-  // In memory but for the arrays of all frames, so that a full disk never meets HDF5.
+  // In memory except for the concatenated arrays, so that HDF5 never writes to a full disk.
   Hdf5Writer out;
   out.group("/VTKHDF");
   const std::int64_t version[] = {2, 0};
   out.attribute("/VTKHDF", "Version", std::span<const std::int64_t>(version));
   out.attribute("/VTKHDF", "Type", std::string("UnstructuredGrid"));
-  put(out, grid + "NumberOfPoints", {static_cast<std::int64_t>(points)}, 0);
-  put(out, grid + "NumberOfCells", {static_cast<std::int64_t>(offsets.size()) - 1}, 0);
-  put(out, grid + "NumberOfConnectivityIds", {static_cast<std::int64_t>(connectivity.size())}, 0);
+  put(out, grid + "NumberOfPoints", {static_cast<std::int64_t>(common.points)}, 0);
+  put(out, grid + "NumberOfCells", {static_cast<std::int64_t>(common.offsets.size()) - 1}, 0);
+  put(out, grid + "NumberOfConnectivityIds",
+      {static_cast<std::int64_t>(common.connectivity.size())}, 0);
   out.array<std::uint8_t>(grid + "Types", first.array<std::uint8_t>(grid + "Types"));
-  put(out, grid + "Connectivity", connectivity, 0);
-  put(out, grid + "Offsets", offsets, 0);
+  put(out, grid + "Connectivity", common.connectivity, 0);
+  put(out, grid + "Offsets", common.offsets, 0);
   const auto gather_reals = [&](const std::string& path, std::size_t columns, bool as_float) {
-    (as_float ? gather<float> : gather<double>)(out, path, entries, points, columns);
+    (as_float ? gather<float> : gather<double>)(out, path, entries, common.points, columns);
   };
-  gather_reals(grid + "Points", 3, floats_do);
-  for (const Field& field : fields) {
+  gather_reals(grid + "Points", 3, common.floats_do);
+  for (const Field& field : common.fields) {
     if (field.integer) {
-      gather<Index>(out, point_data + field.name, entries, points, field.columns);
+      gather<Index>(out, point_data + field.name, entries, common.points, field.columns);
     } else {
       gather_reals(point_data + field.name, field.columns,
-                   floats_do || field.name != "displacement");
+                   common.floats_do || field.name != "displacement");
     }
   }
   out.group("/phyxel");
@@ -117,19 +152,7 @@ void export_single(const fs::path& series, const fs::path& out_file, bool overwr
   out.attribute("/phyxel", "title", first.text_attribute("/phyxel", "title"));
   out.text("/phyxel/scene", first.text("/phyxel/scene"));
 
-  // Parts, cells and connectivity stay where they are in every step: stored once.
-  const std::vector<std::int64_t> zeros(steps, 0), ones(steps, 1);
-  out.group("/VTKHDF/Steps");
-  out.attribute("/VTKHDF/Steps", "NSteps", static_cast<std::int64_t>(steps));
-  out.array<double>(grid + "Steps/Values", times);
-  put(out, grid + "Steps/PartOffsets", zeros, 0);
-  put(out, grid + "Steps/NumberOfParts", ones, 0);
-  put(out, grid + "Steps/PointOffsets", point_offsets, 0);
-  put(out, grid + "Steps/CellOffsets", zeros, 1);
-  put(out, grid + "Steps/ConnectivityIdOffsets", zeros, 1);
-  out.group("/VTKHDF/Steps/PointDataOffsets");
-  for (const Field& field : fields)
-    put(out, grid + "Steps/PointDataOffsets/" + field.name, point_offsets, 0);
+  put_steps(out, common);
   write_sealed(out_file, "trajectory", out.content(), Durable::yes);
 }
 

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t largest_log = std::size_t{1} << 30;
 
-/// Whether a name is one of ours, finished or temporary.
+/// True for the name of a file of a trajectory, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
   for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, summary_name}) {
@@ -35,7 +35,7 @@ bool is_trajectory_name(std::string_view name) {
          numbered("checkpoint_", ".h5");
 }
 
-/// The number in the name of a frame, or -1.
+/// The number in the name of a frame; -1 if there is none.
 std::int64_t number_of(const fs::path& file) {
   const std::string name = file.stem().string();
   const std::size_t at = name.rfind('_') + 1;
@@ -44,7 +44,7 @@ std::int64_t number_of(const fs::path& file) {
   return error == std::errc() && end == name.data() + name.size() ? number : -1;
 }
 
-/// A column of a line of the log, or "" if there is none.
+/// A column of a line of the log; "" if there is none.
 std::string_view cell(std::string_view line, std::size_t column) {
   for (; column > 0; --column) {
     const std::size_t comma = line.find(',');
@@ -54,7 +54,7 @@ std::string_view cell(std::string_view line, std::size_t column) {
   return line.substr(0, line.find(','));
 }
 
-/// A number in a text, or NaN.
+/// The number in a text; NaN if there is none.
 double number_in(std::string_view text) {
   double value = std::nan("");
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -111,7 +111,7 @@ void check_continuation(const fs::path& directory, const Continuation& point, bo
     const auto found = trajectory_files(directory);
     if (!found.empty() && !overwrite) {
       throw InputError(fmt::format(
-          "{}: holds a trajectory ({}) that {} is no part of; it is kept; allowed: "
+          "{}: holds a trajectory ({}) to which {} does not belong; it is kept; allowed: "
           "another folder (--out), the checkpoint's own, or --force to replace it",
           directory.string(), found.front().filename().string(), point.checkpoint.string()));
     }
@@ -133,7 +133,7 @@ bool holds_only_a_start(const fs::path& directory, const Scene& scene) {
     try {
       if (read_frame(file, true).scene != scene.text) return false;
     } catch (const InputError&) {
-      return false;  // whose it is nobody knows
+      return false;  // the file belongs to no known run
     }
   }
   const fs::path log = directory / log_name;
@@ -145,21 +145,20 @@ bool holds_only_a_start(const fs::path& directory, const Scene& scene) {
 KeptLog kept_log(const fs::path& file, const Continuation& point) {
   const std::string text = read_text_file(file, largest_log);
   const auto refuse = [&](const std::string& why) {
-    throw InputError(
-        fmt::format("{}: {}: it is another run's, or was changed; nothing is; allowed: another "
-                    "folder (--resume "
-                    "CHECKPOINT --out FOLDER), or an earlier checkpoint",
-                    file.string(), why));
+    throw InputError(fmt::format(
+        "{}: {}: it belongs to another run, or was changed; it is kept; allowed: another "
+        "folder (--resume CHECKPOINT --out FOLDER), or an earlier checkpoint",
+        file.string(), why));
   };
   std::vector<std::string_view> lines;
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = text.find('\n', begin);
-    if (end == std::string::npos) break;  // a line that was being written
+    if (end == std::string::npos) break;  // an incomplete last line
     lines.emplace_back(text.data() + begin, end - begin);
     begin = end + 1;
   }
   if (lines.empty()) refuse("has no header");
-  // A run that was continued in a folder of its own has the frames since then only.
+  // A run that was continued in another folder has the frames since then only.
   std::int64_t kept = 0;
   for (std::size_t l = 1; l < lines.size(); ++l) {
     const double step = number_in(cell(lines[l], 0));
@@ -193,7 +192,7 @@ KeptSeries kept_series(const fs::path& directory, const char* family, std::int64
   for (const SeriesEntry& entry : read_series(file)) {
     const std::int64_t number = number_of(entry.file);
     if (number < 0) {
-      throw InputError(fmt::format("{}: lists {}, which is no frame of a run", file.string(),
+      throw InputError(fmt::format("{}: lists {}, which is not a frame of a run", file.string(),
                                    entry.file.filename().string()));
     }
     if (number >= frames) {

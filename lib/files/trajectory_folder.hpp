@@ -1,4 +1,4 @@
-/// The folder of a trajectory: which files are a run's, and where a run may go on.
+/// The folder of a trajectory: its files, and checks before a run continues in it.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,19 @@ std::filesystem::path frame_file(const std::filesystem::path& directory, const c
                                  std::int64_t number);
 std::string series_name(const char* family);
 
-/// Everything in the folder that belongs to a trajectory, sorted.
+/// The files of the folder that belong to a trajectory, sorted.
 std::vector<std::filesystem::path> trajectory_files(const std::filesystem::path& directory);
 
-/// True if the folder holds more of a trajectory than checkpoints.
+/// True if the folder holds files of a trajectory other than checkpoints.
 bool has_frames(const std::filesystem::path& directory);
 
-/// True if the folder holds the file. An empty path counts as held.
+/// True if the file is in the folder, or if its path is empty.
 bool is_in_folder(const std::filesystem::path& file, const std::filesystem::path& directory);
 
-/// Checks that a run may go on in a folder. @throws InputError if the folder holds the trajectory
-/// of another run and `overwrite` is false, or lacks what belongs to the run that is continued
+/// Checks that a run may continue in a folder.
+/// @throws InputError if the folder holds the trajectory of another run and `overwrite` is false,
+/// or
+///   lacks files of the run that is continued
 void check_continuation(const std::filesystem::path& directory, const Continuation& point,
                         bool overwrite);
 
@@ -36,7 +38,8 @@ struct KeptLog {
   std::string text;
   std::int64_t frames = 0;  ///< Lines below the header.
 };
-/// @throws InputError if the log has fewer lines, or is another run's
+/// Reads the energy log up to a checkpoint.
+/// @throws InputError if the log has too few lines, or belongs to another run
 KeptLog kept_log(const std::filesystem::path& file, const Continuation& point);
 
 /// The part of a series up to a checkpoint, and the files of later frames.
@@ -44,10 +47,10 @@ struct KeptSeries {
   std::vector<SeriesEntry> entries;
   std::vector<std::filesystem::path> later;
 };
-/// @param frames that the checkpoint counts; @param logged those of them that the log has, which
-/// the
-///   series must have as whole files
-/// @throws InputError if it has not
+/// Reads a series up to a checkpoint.
+/// @param frames number of frames at the checkpoint
+/// @param logged number of frames in the energy log, for each of which the series must have a file
+/// @throws InputError if a file is missing or incomplete
 KeptSeries kept_series(const std::filesystem::path& directory, const char* family,
                        std::int64_t frames, std::int64_t logged);
 

@@ -11,7 +11,7 @@
 namespace phyxel {
 namespace {
 
-/// From so many samples on, their number tells the volume to 20%.
+/// Number of samples from which the volume is known to 20%.
 constexpr Offset telling_samples = 30;
 
 class Search {
@@ -32,7 +32,7 @@ class Search {
     double expected = 0;  // samples of the next sweep
     for (int sweep = 0;; ++sweep) {
       refuse_if_too_fine();
-      // Rough sweeps are not worth telling of.
+      // Coarse sweeps are not reported as progress.
       collect(expected > 0.5 * wanted ? &stage : nullptr);
       const double found = static_cast<double>(filling_.tally.samples);
       if ((found >= 0.9 * wanted && found <= 1.3 * wanted) ||
@@ -48,7 +48,7 @@ class Search {
   }
 
  private:
-  /// One sweep, within what is left of the work.
+  /// Makes one sweep, limited to the remaining work.
   void collect(Stage* stage) {
     const Offset most =
         hopeless() ? most_filling_work(request_) / 100 : most_filling_work(request_);
@@ -66,7 +66,7 @@ class Search {
   }
 
   void refuse_if_too_fine() const {
-    // Among so many voxels, some would lie inside a plate of even 1e-7 of its width.
+    // With 3e5 voxels, some would lie inside a plate as thin as 1e-7 of its width.
     const bool nothing = (filling_.sweeps > 0 && filling_.tally.samples == 0) || hopeless();
     const double most = nothing ? 3e5 : most_voxels_;
     const double voxels = sampler_.surface_voxels(filling_.voxel);
@@ -79,8 +79,8 @@ class Search {
                        voxels, most_voxels_);
   }
 
-  /// The volume inside as far as it is known: by the surface if it is closed and by samples, which
-  /// also see what runs through itself inside out.
+  /// Best estimate of the enclosed volume [m^3]: from the surface if it is closed, and from the
+  /// samples, which also count regions enclosed inside out; unset if neither is known.
   std::optional<double> volume() const {
     std::optional<double> known = request_.volume;
     if (filling_.tally.samples >= telling_samples) {
@@ -89,18 +89,18 @@ class Search {
     }
     return known;
   }
-  /// Side of the voxels of which as many as wanted make up a volume [m].
+  /// Side of the voxels of which the requested number make up `volume` [m].
   double voxel_for(double volume) const {
     return std::cbrt(std::max(volume, 0.0) / request_.samples);
   }
-  /// True if the volume says that the voxels wanted are too many for the surface. Twice the number
-  /// allowed leaves room for the tolerances of `run` and of the volume.
+  /// True if the volume shows that the surface would need too many voxels. The factor of two leaves
+  /// room for the tolerances of `run` and of the volume.
   bool hopeless() const {
     const auto known = volume();
     return known && !(sampler_.surface_voxels(voxel_for(*known)) <= 2 * most_voxels_);
   }
 
-  /// @param why if the volume does not say it
+  /// @param why the reason, used if the volume does not give one
   [[noreturn]] void refuse(std::string why) const {
     const double unit = std::ldexp(1.0, -request_.exponent);
     const auto known = volume();
@@ -120,7 +120,7 @@ class Search {
   const InsideSampler& sampler_;
   const FillingRequest& request_;
   InsideFilling& filling_;
-  double most_voxels_;  ///< Along the surface.
+  double most_voxels_;  ///< Largest number of voxels along the surface.
   double swept_ = 0;    ///< Side of the voxels of the last sweep [m].
 };
 

@@ -9,35 +9,36 @@
 
 namespace phyxel {
 
-/// What the search must find, and what it knows of the surface.
+/// The number of sample points to find, and the known properties of the surface.
 struct FillingRequest {
-  Index phyxels = 0;          ///< For messages.
-  double samples = 0;         ///< Number of sample points, within -10% and +30%.
+  Index phyxels = 0;          ///< Number of phyxels, named in error messages.
+  double samples = 0;         ///< Number of sample points wanted; -10% to +30% are accepted.
   std::uint64_t seed = 1;     ///< Seed of the sample points.
   std::size_t triangles = 0;  ///< Number of triangles of the surface.
-  /// Signed volume of a closed surface [m^3]; unset for an open one. Where a surface runs through
-  /// itself inside out, parts of it count negative.
+  /// Signed volume of a closed surface [m^3]; unset for an open one. Regions that a
+  /// self-intersecting surface encloses inside out count negative.
   std::optional<double> volume;
-  int exponent = 0;     ///< Lengths of the surface are 2^exponent times those of the user's.
-  std::string defects;  ///< The surface in words, for messages.
+  int exponent = 0;     ///< The surface is scaled by 2^exponent relative to the user's.
+  std::string defects;  ///< Description of the surface's defects, for error messages.
 };
 
-/// Sample points that fill the inside, and how they were found.
+/// Sample points that fill the inside of a surface, and the cost of the search.
 struct InsideFilling {
   std::vector<SampleBlock> blocks;
-  SampleTally tally;  ///< Of the last sweep.
-  double voxel = 0;   ///< Side of its voxels [m].
+  SampleTally tally;  ///< Counts of the last sweep.
+  double voxel = 0;   ///< Side of the voxels of the last sweep [m].
   int sweeps = 0;     ///< Sweeps over the whole surface.
   Offset work = 0;    ///< Work of all sweeps, in units of `SampleTally::work`.
 };
 
-/// The most work that the search does for a surface: about 100 times that of a compact body.
+/// Upper limit of the search's work for a surface: about 100 times the work for a compact body.
 Offset most_filling_work(const FillingRequest& request);
 
-/// Fills the inside with about as many sample points as asked for. Ends after `most_filling_work`
-/// at the latest; after a hundredth of it if the surface's volume says that it cannot succeed.
-/// @param filling is also set where the surface is refused
-/// @throws InputError for a surface without volume, or with too little for its area or its size
+/// Fills the inside with about the requested number of sample points. The search ends after
+/// `most_filling_work` at the latest, and after a hundredth of it if the surface's volume shows
+/// that it cannot succeed.
+/// @param filling is set even if the surface is refused
+/// @throws InputError if the surface has no volume, or too little for its area or its size
 void fill_inside(const InsideSampler& sampler, const FillingRequest& request,
                  InsideFilling& filling);
 

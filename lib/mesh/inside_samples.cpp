@@ -9,18 +9,18 @@
 namespace phyxel {
 namespace {
 
-constexpr int block_level = 2;             ///< Blocks have 2^2 voxels a side.
-constexpr std::size_t enough_tasks = 400;  ///< For an even load on any number of threads.
+constexpr int block_level = 2;             ///< A block has 2^2 voxels a side.
+constexpr std::size_t enough_tasks = 400;  ///< Number of tasks that balances the load of threads.
 
-/// Up to here, walking from a known point beats the winding number of a compact surface, which
-/// looks at few of its triangles.
+/// Number of triangles up to which walking from a known point is faster than the winding number
+/// of a compact surface, which visits few of its triangles.
 constexpr std::size_t few_triangles = 48;
 
 double component(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
-/// True if a direction square to an edge of the triangle and one of the cube separates the two; the
-/// cube lies about the origin. Without this test a long thin triangle across the axes touches its
-/// whole plane within its bounding box, of which it fills little.
+/// True if an axis perpendicular to an edge of the triangle and an edge of the cube separates the
+/// two; the cube is centred at the origin. Without this test a long thin triangle oblique to the
+/// axes would seem to touch each cell of its plane within its bounding box.
 /// Source: Akenine-Moeller 2001, the nine axes of class 3.
 bool parted_by_an_edge(Vec3d a, Vec3d b, Vec3d c, double half) {
   const Vec3d corner[3] = {a, b, c};
@@ -30,7 +30,7 @@ bool parted_by_an_edge(Vec3d a, Vec3d b, Vec3d c, double half) {
       const Vec3d axis = cross(edge, side);
       const double on_edge = dot(axis, corner[k]), beyond = dot(axis, corner[(k + 2) % 3]);
       const double reach = half * (std::abs(axis.x) + std::abs(axis.y) + std::abs(axis.z));
-      // The products of coordinates that cancel in `on_edge` round it.
+      // Products of coordinates that cancel in `on_edge` leave this rounding error.
       const double rounding =
           1e-15 * (std::abs(axis.x * corner[k].x) + std::abs(axis.y * corner[k].y) +
                    std::abs(axis.z * corner[k].z));
@@ -73,8 +73,9 @@ InsideSampler::InsideSampler(const Surface& surface, bool closed)
   few_ = few_for_walking();
 }
 
-/// Long thin triangles that reach across each other's groups leave the winding number nothing to
-/// sum up: near them it looks at all, and walking past hundreds costs less.
+/// Number of triangles up to which walking is faster, from measured winding numbers. Long thin
+/// triangles have large overlapping groups, so that a winding number near them visits most
+/// triangles; walking past hundreds then costs less.
 std::size_t InsideSampler::few_for_walking() const {
   constexpr std::size_t probes = 32;
   const std::size_t step = surface_.triangle.size() / probes + 1;
@@ -89,9 +90,9 @@ std::size_t InsideSampler::few_for_walking() const {
   return std::max(few_triangles, static_cast<std::size_t>(work / std::max<Offset>(probed, 1) / 8));
 }
 
-/// False if the triangle surely misses the cube: one of their separating axes lies between them.
-/// On an open surface only the axes of the cube and the plane are tried, and a triangle may yet
-/// miss the cube: `agrees_throughout` is evidence, not proof, and finds less to do so.
+/// False if a separating axis shows that the triangle misses the cube. For an open surface only
+/// the axes of the cube and the triangle's normal are tried, and a triangle may still miss the
+/// cube: `agrees_throughout` is evidence, not proof, and such cells do not rely on it.
 bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
   const Triangle& t = surface_.triangle[triangle];
   const Vec3d a = surface_.position[t[0]] - middle, b = surface_.position[t[1]] - middle,
@@ -106,13 +107,13 @@ bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
   return !closed_ || !parted_by_an_edge(a, b, c, half);
 }
 
-/// The winding number, which counts as work.
+/// The winding number at `point`; its cost is added to the tally's work.
 double InsideSampler::winding_at(Vec3d point, SampleTally& tally) const {
   return winding_number_(point, &tally.work);
 }
 
-/// The change of the winding number on the straight way between two points of a cell of a closed
-/// surface: one at each triangle that the way goes through. Nothing if rounding might decide.
+/// The change of the winding number along the segment between two points of a cell of a closed
+/// surface: one for each triangle that the segment crosses. Unset if rounding might decide.
 std::optional<double> InsideSampler::change_between(const Cell& cell, Vec3d start, Vec3d point,
                                                     SampleTally& tally) const {
   tally.work += static_cast<Offset>(cell.triangles.size());
@@ -125,7 +126,7 @@ std::optional<double> InsideSampler::change_between(const Cell& cell, Vec3d star
                 c = surface_.position[t[2]] - start;
     const Vec3d normal = cross(b - a, c - a);
     const double size = std::max({norm(a), norm(b), norm(c)});
-    // Six times the volumes of start, point and triangle.
+    // Six times the volumes of the tetrahedra of the triangle and either end.
     const double rounding = 1e-12 * size * size * size,
                  edge_rounding = 1e-12 * size * size * length;
     const double before = dot(a, normal), after = before - dot(way, normal);
@@ -142,9 +143,9 @@ std::optional<double> InsideSampler::change_between(const Cell& cell, Vec3d star
   return change;
 }
 
-/// The winding number at a point in a cell of a closed surface, from that in the cell's middle. A
-/// straight way that meets an edge, as many do on surfaces with a plane of symmetry, is tried once
-/// more with a bend, halfway and inside the cell.
+/// The winding number at a point in a cell of a closed surface, from the one in the cell's middle.
+/// If the segment meets an edge, as many do on surfaces with a plane of symmetry, a path with a
+/// bend inside the cell is tried next.
 double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d point,
                                    SampleTally& tally) const {
   const Vec3d start = grid.middle(cell);
@@ -156,9 +157,9 @@ double InsideSampler::winding_from(const Grid& grid, const Cell& cell, Vec3d poi
   return second ? cell.winding + *first + *second : winding_at(point, tally);
 }
 
-/// Whether an open surface, none of whose triangles touch the cell, has the same side everywhere in
-/// it. There its winding number is harmonic: it has no extremes inside the cell, so agreement in
-/// the middle and at the corners is good evidence.
+/// True if a cell that no triangle of an open surface touches lies on one side of it. The winding
+/// number is harmonic there and has no extremes inside the cell, so agreement of the middle and
+/// the corners is good evidence.
 bool InsideSampler::agrees_throughout(const Grid& grid, const Cell& cell,
                                       SampleTally& tally) const {
   const auto clear = [&](double w) {
@@ -179,7 +180,7 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
                                                       SampleTally& tally) const {
   std::vector<Cell> children(8);
   const std::int64_t side = std::int64_t{1} << (cell.level - 1);
-  // A little larger than it is, for the rounding of sample points to float.
+  // Slightly enlarged, since sample points are rounded to float.
   const double half = 0.5 * grid.voxel * (static_cast<double>(side) + 1e-3);
   const bool few = closed_ && cell.triangles.size() <= few_;
   if (few && !cell.measured) {
@@ -313,7 +314,7 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
 SampleTally InsideSampler::collect(double voxel, std::uint64_t seed,
                                    std::vector<SampleBlock>& blocks, Stage* stage,
                                    Offset most_work) const {
-  // Eight children at most of fewer than enough_tasks cells.
+  // Each of fewer than enough_tasks cells has at most eight children.
   std::vector<std::vector<SampleBlock>> by_task(8 * enough_tasks);
   const SampleTally tally = visit(
       voxel, seed,

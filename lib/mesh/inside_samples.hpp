@@ -15,7 +15,7 @@ namespace phyxel {
 
 class Stage;
 
-/// Neighbouring sample points, at `centre` + offset.
+/// A block of neighbouring sample points, at `centre` + `offset`.
 struct SampleBlock {
   Vec3d centre;                     ///< [m]
   std::vector<Vec3<float>> offset;  ///< [m], shape [n].
@@ -25,59 +25,60 @@ struct SampleBlock {
   }
 };
 
-/// What sampling found, beside the points.
+/// Counts made while sampling.
 struct SampleTally {
-  Offset samples = 0;
-  Offset doubtful = 0;  ///< Those with a winding number more than 0.1 from a whole number.
-  Offset repeated = 0;  ///< Those the surface winds around more than once.
-  /// Work done: one unit for each sample, each triangle held against a cell or a line, and each
+  Offset samples = 0;   ///< Number of sample points inside.
+  Offset doubtful = 0;  ///< Samples whose winding number is more than 0.1 from an integer.
+  Offset repeated = 0;  ///< Samples with a winding number above one.
+  /// Work done: one unit for each sample, each triangle tested against a cell or a line, and each
   /// group of triangles in a winding number; `WindingNumber::angle_work` for each solid angle.
   Offset work = 0;
   void add(const SampleTally& other);
 };
 
-/// The inside of a surface, cut into voxels with one sample point at a random place in each. Space
-/// is halved down to the voxels only near triangles, so that the empty part of a large box costs
-/// nothing. A point is inside where the winding number is above one half.
+/// Sampler of the inside of a surface: voxels, each with one sample point at a random position.
+/// An octree is refined down to the voxels near triangles only, so that the empty part of a large
+/// box costs nothing. A point is inside if its winding number is above one half.
 class InsideSampler {
  public:
-  /// The surface must outlive the sampler. `closed`: see SurfaceTopology.
+  /// @param surface must outlive the sampler
+  /// @param closed see `SurfaceTopology`
   InsideSampler(const Surface& surface, bool closed);
 
   using Visit = std::function<void(std::size_t task, const SampleBlock&)>;
 
   static constexpr Offset no_limit = std::numeric_limits<Offset>::max();
 
-  /// Calls visit(task, block) for blocks of up to 4 x 4 x 4 voxels with the side `voxel` [m]. The
-  /// tasks run on many threads in any order, the blocks of one task in order; the blocks depend
+  /// Calls visit_block(task, block) for blocks of up to 4 x 4 x 4 voxels with the side `voxel` [m].
+  /// Tasks run on many threads in any order, the blocks of one task in order; the blocks depend
   /// on `voxel` and `seed` only. A sweep that takes more than `most_work` ends early: the tally's
-  /// work is then above it, and the blocks are incomplete.
-  /// @param stage that this is all of; may be null
+  /// work is then above the limit, and the blocks are incomplete.
+  /// @param stage reports the progress of the sweep; may be null
   SampleTally visit(double voxel, std::uint64_t seed, const Visit& visit_block,
                     Stage* stage = nullptr, Offset most_work = no_limit) const;
 
-  /// All blocks, by task.
+  /// Collects the blocks of a sweep in the order of their tasks.
   SampleTally collect(double voxel, std::uint64_t seed, std::vector<SampleBlock>& blocks,
                       Stage* stage = nullptr, Offset most_work = no_limit) const;
 
   bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
-  /// About how many voxels the surface passes through, all of which are looked at.
+  /// Approximate number of voxels that the surface passes through; the sampler visits each.
   double surface_voxels(double voxel) const { return (area_ / voxel + length_) / voxel; }
   double area() const { return area_; }      ///< Area of the surface [m^2].
-  double extent() const { return extent_; }  ///< Longest side of its bounding box [m].
-  Vec3d middle() const { return middle_; }   ///< Of its bounding box [m].
+  double extent() const { return extent_; }  ///< Longest side of the surface's bounding box [m].
+  Vec3d middle() const { return middle_; }   ///< Centre of the surface's bounding box [m].
 
  private:
   /// A cube of 2^level voxels a side.
   struct Cell {
     std::int64_t x = 0, y = 0, z = 0;  ///< Lower corner in units of voxels.
     int level = 0;
-    std::vector<Index> triangles;  ///< Those that may touch it.
-    bool known = false;            ///< Whether all of it has the same `winding`.
-    bool measured = false;         ///< Whether `winding` is known in the middle at least.
-    double winding = 0;
+    std::vector<Index> triangles;  ///< Triangles that may touch the cell.
+    bool known = false;            ///< True if the whole cell has the same `winding`.
+    bool measured = false;         ///< True if `winding` is known at least in the middle.
+    double winding = 0;            ///< Winding number.
   };
-  /// The work of all tasks of a sweep, and how much they may do.
+  /// The work that the tasks of a sweep have done, and its upper limit.
   struct WorkLimit {
     std::atomic<Offset> done = 0;
     Offset most = no_limit;
@@ -113,9 +114,10 @@ class InsideSampler {
   bool closed_;
   WindingNumber winding_number_;
   Vec3d middle_;
-  std::size_t few_ = 0;  ///< Triangles up to which walking from a known point is faster.
+  std::size_t few_ = 0;  ///< Number of triangles up to which walking from a known point is faster.
   double extent_ = 0;
-  double area_ = 0, length_ = 0;  ///< Of all triangles, and of their longest sides [m^2, m].
+  double area_ = 0;    ///< Sum of the triangles' areas [m^2].
+  double length_ = 0;  ///< Sum of the triangles' longest sides [m].
 };
 
 }  // namespace phyxel

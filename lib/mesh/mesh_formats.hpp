@@ -1,4 +1,4 @@
-/// The readers behind read_mesh(), on content already in memory: what the fuzzer feeds.
+/// The parsers behind read_mesh(), for content in memory; the fuzzer calls them too.
 #pragma once
 
 #include <span>
@@ -12,7 +12,7 @@ namespace phyxel {
 
 enum class MeshFormat { obj, ply, stl };
 
-/// Reads `content` as a mesh; `name` stands for the file in messages.
+/// Parses `content` as a mesh; error messages call the file `name`.
 /// @throws InputError as read_mesh() does.
 Surface parse_mesh(std::string_view content, MeshFormat format, const std::string& name);
 
@@ -20,18 +20,18 @@ Surface parse_obj(std::string_view content, const std::string& name);
 Surface parse_ply(std::string_view content, const std::string& name);
 Surface parse_stl(std::string_view content, const std::string& name);
 
-/// [bytes]; a triangle takes more than one, so their number fits an `Index`.
+/// Largest mesh file [bytes]. A triangle takes more than one byte, so an `Index` can count them.
 inline constexpr std::size_t largest_file = std::size_t{1} << 31;
 
-/// Coordinates beyond this would overflow in areas and volumes [m].
+/// Largest coordinate [m]: larger ones would overflow in areas and volumes.
 inline constexpr double largest_coordinate = 1e30;
 
-/// Polygons with more corners are refused: cutting them up takes quadratic time and more.
+/// Largest number of corners of a polygon: triangulation takes at least quadratic time.
 inline constexpr std::size_t largest_polygon = 2000;
 
-/// Cuts a simple polygon, not necessarily flat or convex, into triangles by ear clipping, and
-/// appends them. Whatever its shape, the triangles together have the polygon's boundary, so that
-/// a closed mesh stays closed.
+/// Triangulates a simple polygon, not necessarily flat or convex, by ear clipping and appends the
+/// triangles. They have the polygon's boundary whatever its shape, so that a closed mesh stays
+/// closed.
 void append_polygon(std::span<const Index> corners, const std::vector<Vec3d>& position,
                     std::vector<Triangle>& triangle);
 

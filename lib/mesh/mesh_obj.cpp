@@ -13,7 +13,7 @@
 namespace phyxel {
 namespace {
 
-/// Keywords of the OBJ format. A line that starts otherwise is damage, not geometry of some kind.
+/// Keywords of the OBJ format. A line that starts with another word is an error.
 constexpr std::string_view keywords[] = {
     "v",      "vt",     "vn",       "vp",       "vw",         "f",         "fo",
     "l",      "p",      "o",        "g",        "s",          "t",         "mg",
@@ -22,10 +22,9 @@ constexpr std::string_view keywords[] = {
     "scrv",   "sp",     "end",      "con",      "bevel",      "lod",       "ctech",
     "stech",  "call",   "c_interp", "d_interp", "shadow_obj", "trace_obj", "csh"};
 
-/// What tinyobjloader is given. It takes damaged numbers and indices without complaint and knows no
-/// line numbers in what it returns, so every line is checked first, and only vertices and faces,
-/// with absolute indices, are passed on. Coordinates are kept as they were read here: its own are
-/// off in their last digit.
+/// Validated input for tinyobjloader, which accepts malformed numbers and indices and returns no
+/// line numbers. Each line is checked first, and only vertices and faces with absolute indices are
+/// passed on. Coordinates are kept as parsed here: tinyobjloader rounds the last digit wrongly.
 struct CheckedText {
   std::string text;
   std::vector<Vec3d> position;
@@ -50,7 +49,7 @@ class LineCheck {
       }
       check(text);
     }
-    // Faces may name vertices that come later, so this can be told only now.
+    // A face may name a vertex of a later line, so the largest index is checked at the end.
     if (greatest_ > checked_.position.size()) {
       line_ = greatest_line_;
       fail(fmt::format("a corner names vertex {}, but there are {}", greatest_,

@@ -18,7 +18,7 @@ enum class Kind { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 struct Property {
   std::string name;
   bool is_list = false;
-  Kind count = Kind::uint8;  ///< Of a list's length.
+  Kind count = Kind::uint8;  ///< Type of a list's length.
   Kind value = Kind::float32;
 };
 
@@ -78,7 +78,7 @@ class PlyReader {
       }
     }
     check_end();
-    // Faces may come before the vertices, so polygons are cut up at the end.
+    // Faces may come before the vertices, so polygons are triangulated at the end.
     for (std::size_t f = 0; f + 1 < face_start_.size(); ++f) {
       append_polygon({corner_.data() + face_start_[f], face_start_[f + 1] - face_start_[f]},
                      surface_.position, surface_.triangle);
@@ -168,11 +168,11 @@ class PlyReader {
     elements_.back().properties.push_back(std::move(property));
   }
 
-  /// Refuses a count that the rest of the file cannot hold, before memory is asked for.
+  /// Refuses a count that the rest of the file cannot hold, before memory is allocated for it.
   void check_room(const Element& element) const {
-    std::size_t least = 0;  // bytes of one element, lists empty
+    std::size_t least = 0;  // bytes of one element whose lists are empty
     for (const Property& p : element.properties) {
-      // In text, a digit and a space.
+      // A value in text takes at least a digit and a space.
       least += encoding_ == Encoding::ascii ? 2 : bytes_of(p.is_list ? p.count : p.value);
     }
     if (least == 0) return;
@@ -184,7 +184,7 @@ class PlyReader {
     }
   }
 
-  /// What is left over was promised by no element: then the counts in the header are wrong.
+  /// Refuses a file with content after its last element: the counts in its header are wrong.
   void check_end() {
     if (encoding_ != Encoding::ascii) cursor_ = TextCursor(content_.substr(at_));
     if (cursor_.word().empty()) return;
@@ -322,8 +322,8 @@ class PlyReader {
 
   std::string_view content_;
   const std::string& name_;
-  TextCursor cursor_;   ///< In the header and in text.
-  std::size_t at_ = 0;  ///< In binary data.
+  TextCursor cursor_;   ///< Position in the header and in text data.
+  std::size_t at_ = 0;  ///< Position in binary data [bytes].
   bool in_header_ = true;
   Encoding encoding_ = Encoding::none;
   std::vector<Element> elements_;

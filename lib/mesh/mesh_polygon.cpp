@@ -26,7 +26,7 @@ void append_polygon(std::span<const Index> corners, const std::vector<Vec3d>& po
     triangle.push_back({corners[0], corners[1], corners[2]});
     return;
   }
-  // Newell's normal; the polygon is seen along its largest component.
+  // Newell's normal; the polygon is projected along its largest component.
   Vec3d normal;
   for (std::size_t k = 0; k < corners.size(); ++k) {
     const Vec3d origin = position[corners[0]];
@@ -46,8 +46,8 @@ void append_polygon(std::span<const Index> corners, const std::vector<Vec3d>& po
 
   while (ring.size() > 3) {
     const std::size_t n = ring.size();
-    // The convex corner that holds no other one and makes the roundest triangle with its
-    // neighbours; if rounding leaves none, the first will do.
+    // The ear is the convex corner whose triangle contains no other corner and is the roundest; if
+    // rounding leaves none, it is the first corner.
     std::size_t ear = 0;
     double best = -1;
     for (std::size_t k = 0; k < n; ++k) {
@@ -65,7 +65,8 @@ void append_polygon(std::span<const Index> corners, const std::vector<Vec3d>& po
       if (!empty) continue;
       ear = k;
       best = area / edges;
-      if (n > 64) break;  // roundness is worth a quadratic search only in small polygons
+      if (n > 64)
+        break;  // a quadratic search for the roundest triangle pays in small polygons only
     }
     triangle.push_back({ring[(ear + n - 1) % n], ring[ear], ring[(ear + 1) % n]});
     ring.erase(ring.begin() + static_cast<std::ptrdiff_t>(ear));

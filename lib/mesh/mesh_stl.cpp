@@ -13,7 +13,8 @@
 namespace phyxel {
 namespace {
 
-/// Gives corners with exactly the same coordinates the same vertex: STL has no indices.
+/// Map from coordinates to vertices: STL has no indices, so corners with equal coordinates become
+/// one vertex.
 class CornerMerger {
  public:
   explicit CornerMerger(std::vector<Vec3d>& position) : position_(position) {}
@@ -131,7 +132,7 @@ class AsciiStl {
 
   void read_facet(CornerMerger& merger) {
     expect("normal");
-    for (int k = 0; k < 3; ++k) words_.word();  // recomputed from the corners
+    for (int k = 0; k < 3; ++k) words_.word();  // the normal is not used
     expect("outer");
     expect("loop");
     Triangle triangle;
@@ -159,7 +160,7 @@ class AsciiStl {
 }  // namespace
 
 Surface parse_stl(std::string_view content, const std::string& name) {
-  // Binary files may start with "solid" too: the size decides.
+  // A binary file may start with "solid", too: the file size decides.
   std::size_t promised = 0;
   if (content.size() >= header_bytes) {
     promised = little_endian(content.data() + 80);

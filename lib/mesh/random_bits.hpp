@@ -1,11 +1,11 @@
-/// Random numbers that depend on a place and a seed, not on what was drawn before.
+/// Counter-based random numbers: functions of an index and a seed, without a state.
 #pragma once
 
 #include <cstdint>
 
 namespace phyxel {
 
-/// A well-mixed function of `v`. Source: Steele, Lea, Flood 2014 (SplitMix64).
+/// A 64-bit hash of `v`. Source: Steele, Lea, Flood 2014 (SplitMix64).
 inline std::uint64_t mix_bits(std::uint64_t v) {
   v += 0x9e3779b97f4a7c15u;
   v = (v ^ (v >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -13,7 +13,7 @@ inline std::uint64_t mix_bits(std::uint64_t v) {
   return v ^ (v >> 31);
 }
 
-/// Uniform in (0, 1) from the low 21 bits.
+/// A number uniform in (0, 1), made of the low 21 bits.
 inline double unit_fraction(std::uint64_t bits) {
   return (static_cast<double>(bits & 0x1fffff) + 0.5) / 2097152.0;
 }

@@ -11,7 +11,7 @@
 namespace phyxel {
 namespace {
 
-/// Points in the buckets of a hash table, added one by one.
+/// A spatial hash table to which points are added one by one.
 class GrowingHash {
  public:
   GrowingHash(double cell_size, std::size_t expected)
@@ -27,8 +27,8 @@ class GrowingHash {
     point_.push_back(p);
   }
 
-  /// Square of the distance to the nearest point, or `limit` if none is nearer. Exact for limits
-  /// up to the square of the cell size.
+  /// Square of the distance to the nearest point [m^2], or `limit` if none is nearer. Exact for
+  /// limits up to the square of the cell size.
   double nearest2(Vec3d p, double limit) const {
     const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
     for (std::int64_t k = z - 1; k <= z + 1; ++k) {
@@ -59,13 +59,13 @@ class GrowingHash {
   std::vector<Vec3d> point_;
 };
 
-/// Sample points in a random order, some of which are taken.
+/// Candidate sample points in random order, some of which have been accepted.
 class Darts {
  public:
-  /// @param share of the sample points that are darts
-  /// @param radius the largest that is asked for [m]
-  /// @param before points taken already
-  /// @param expected how many will be taken, roughly
+  /// @param share fraction of the sample points that are candidates
+  /// @param radius largest radius that `take` will be called with [m]
+  /// @param before points accepted in advance
+  /// @param expected approximate number of points that will be accepted
   Darts(const std::vector<SampleBlock>& blocks, double share, std::uint64_t seed, double radius,
         std::span<const Vec3d> before, std::size_t expected)
       : origin_(blocks.front().centre),
@@ -84,7 +84,7 @@ class Darts {
     for (const Vec3d& p : before) taken_.add(p - origin_);
   }
 
-  /// Takes darts that are so far from all that were taken, until there are `most`.
+  /// Accepts candidates at least `radius` [m] from each accepted point, until there are `most`.
   void take(double radius, std::size_t most) {
     for (Dart& dart : dart_) {
       if (count() == most) return;
@@ -108,7 +108,7 @@ class Darts {
   struct Dart {
     std::uint64_t rank;
     Vec3d place;
-    double clearance2;  ///< Square of the distance to the nearest point taken, when last looked.
+    double clearance2;  ///< Squared distance to the nearest accepted point, when last computed.
   };
   Vec3d origin_;
   std::size_t before_;
@@ -126,8 +126,8 @@ std::size_t samples_in(const std::vector<SampleBlock>& blocks) {
 
 std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
                                std::uint64_t seed, std::span<const Vec3d> before) {
-  // Twelve darts a point are enough to choose from; the hundred are for a few points, which must
-  // not by chance get fewer darts than points.
+  // Twelve candidates a point suffice; a hundred more keep a small n from getting, by chance,
+  // fewer candidates than points.
   const double share = (12.0 * n + 100) / static_cast<double>(samples_in(blocks));
   // Random packings of spheres jam at a diameter of 0.90 spacings.
   double radius = 0.9 * spacing;
@@ -136,7 +136,7 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
   while (darts.count() < static_cast<std::size_t>(n)) {
     darts.take(radius, static_cast<std::size_t>(n));
     stage.reach(static_cast<double>(darts.count()) / n);
-    // Samples closer together than this are told apart by nothing.
+    // Below this radius, the distance between samples no longer matters.
     radius = radius > 1e-6 * spacing ? 0.96 * radius : 0;
   }
   stage.finish();
@@ -153,12 +153,12 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, doubl
 
 namespace {
 
-/// Cells that are at least 1.2 spacings wide, and wider where sites are sparse: in a sheet or
-/// thread thinner than a spacing they are many spacings apart, and a search would go through empty
+/// A hash with cells at least 1.2 spacings wide, and wider if the sites are sparse: in a sheet or
+/// thread thinner than a spacing, sites are many spacings apart, and a search would visit empty
 /// cells.
 SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
   SpatialHash hash(site, 1.2 * spacing);
-  // Sites that fill space are 1.9 to a cell on average, those on a face more than 1.05.
+  // Occupied cells have 1.9 sites on average if the sites fill space, more than 1.05 on a face.
   while (hash.mean_occupancy() < 1.05 && site.size() > 1) {
     hash = SpatialHash(site, 2 * hash.cell_size());
   }
@@ -195,7 +195,7 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   };
   const int farthest = hash_.farthest_ring(block.centre);
   for (int ring = 0; ring <= farthest; ++ring) {
-    if (ring > 4) {  // hardly ever: far from every site
+    if (ring > 4) {  // rare: the block is far from every site
       hash_.visit_all(compare);
       break;
     }
@@ -274,7 +274,7 @@ void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
     assign(site, spacing);
     std::fill(sum.begin(), sum.end(), Vec3d{});
     std::fill(count.begin(), count.end(), 0);
-    // In one order on one thread: the sums' last bits must not depend on the number of threads.
+    // Serial, so that the rounding of the sums does not depend on the number of threads.
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       for (std::size_t k = 0; k < blocks_[b].offset.size(); ++k) {
         const Index i = owner_[first_[b] + k];
@@ -301,7 +301,7 @@ void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site, const std::vector
                    [&](Index a, Index b) { return count[a] > count[b]; });
   const auto homeless = static_cast<std::size_t>(
       std::count_if(order.begin(), order.end(), [&](Index i) { return count[i] == 0; }));
-  // Each goes to the sample point farthest from the site of one of the largest cells.
+  // Each empty site moves to the sample point farthest from the site of one of the largest cells.
   std::vector<Index> guest(site.size(), -1);
   std::vector<double> farthest(site.size(), -1);
   std::vector<Vec3d> place(site.size());

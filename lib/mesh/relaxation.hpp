@@ -1,4 +1,4 @@
-/// Spreading a given number of points evenly over a set of sample points.
+/// Even distribution of a given number of points over a set of sample points.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,30 @@
 
 namespace phyxel {
 
-/// Picks exactly n of the sample points, far from each other: random points are taken or refused
-/// by their distance to those taken before, and the distance asked for shrinks until n are found.
-/// Source: McCool and Fiume 1992 (dart throwing with a shrinking radius). `spacing`: cube root of
-/// the volume of one point [m]. `before`: points that are there already.
+/// Selects exactly n sample points that are far from each other. Random candidates are accepted if
+/// no point accepted before is within a radius, and the radius shrinks until n are found.
+/// Source: McCool and Fiume 1992 (dart throwing with a shrinking radius).
+/// @param spacing cube root of the volume of one point [m]
+/// @param before points accepted in advance, which are not returned
 std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
                                std::uint64_t seed, std::span<const Vec3d> before = {});
 
-/// As many sample points as fit with `gap` [m] between them, and between them and those `before`.
+/// A maximal set of sample points at least `gap` [m] from each other and from those in `before`.
 std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, double gap,
                                    std::uint64_t seed, std::span<const Vec3d> before);
 
-/// Finds the nearest of a set of sites for all points of a block at once.
+/// Search for the nearest of a set of sites for each point of a block.
 class NearestSite {
  public:
-  /// `spacing`: typical distance between sites [m]. The sites must outlive this.
+  /// @param site must outlive the search
+  /// @param spacing typical distance between sites [m]
   NearestSite(const std::vector<Vec3d>& site, double spacing);
 
-  /// Space that one thread reuses from block to block.
+  /// Work space that one thread reuses from block to block.
   struct Scratch {
     std::vector<float> x, y, z, best;
     std::vector<std::int32_t> slot;
-    std::vector<Index> owner;  ///< The answer, shape [n].
+    std::vector<Index> owner;  ///< Result: the nearest site of each point, shape [n].
     std::vector<Index> candidate;
     std::vector<Vec3<float>> candidate_offset;
   };
@@ -41,19 +43,20 @@ class NearestSite {
   SpatialHash hash_;
 };
 
-/// The sample points with the site that each is nearest to: a Voronoi diagram cut to the inside.
+/// A Voronoi diagram of sites, restricted to the inside of a surface and represented by sample
+/// points, each with its nearest site.
 class SampledVoronoi {
  public:
   explicit SampledVoronoi(std::vector<SampleBlock> blocks);
 
   const std::vector<SampleBlock>& blocks() const { return blocks_; }
 
-  /// Moves every site to the centroid of its cell, `sweeps` times (Lloyd 1982); sites that own no
-  /// sample point are put into the largest cells. The first `fixed` sites stay.
+  /// Moves each site to the centroid of its cell, `sweeps` times (Lloyd 1982). A site that owns no
+  /// sample point is moved into one of the largest cells. The first `fixed` sites stay.
   void relax(std::vector<Vec3d>& site, double spacing, int sweeps, std::size_t fixed = 0);
 
-  /// Moves the sites named to the nearest sample point of their cells; those without any as
-  /// relax() does. The first `fixed` stay.
+  /// Moves each site with a nonzero `which` to the nearest sample point of its cell; a site without
+  /// sample points is moved as in relax(). The first `fixed` sites stay.
   void snap(std::vector<Vec3d>& site, double spacing, const std::vector<std::uint8_t>& which,
             std::size_t fixed = 0);
 

@@ -16,14 +16,13 @@
 namespace phyxel {
 namespace {
 
-/// Sample points for each phyxel during relaxation. The more, the less a centroid is off by chance
-/// (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and the more memory is needed;
-/// for a few phyxels, more cost nothing.
+/// Number of sample points for each phyxel during relaxation. More samples give centroids with
+/// less noise (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and take more memory.
 double samples_per_phyxel(Index phyxels) { return std::max(64.0, 20000.0 / phyxels); }
 
 void check_memory(Index phyxels) {
-  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 darts of 40, and 200 in sums,
-  // hashes and results.
+  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 candidates of 40 bytes, and
+  // 200 bytes in sums, hashes and results.
   const double bytes = phyxels * (24 * samples_per_phyxel(phyxels) + 12 * 40 + 200);
   const double memory =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
@@ -35,8 +34,8 @@ void check_memory(Index phyxels) {
   }
 }
 
-/// Refuses sizes whose squares and cubes would leave the range of the numbers in use, or whose
-/// coordinates hold no shape. @returns the surface's extent [m].
+/// Refuses a surface whose size would overflow or underflow when cubed, or whose coordinates are
+/// too coarse for its shape. @returns the surface's extent [m].
 double check_extent(const Surface& surface) {
   constexpr double smallest = 1e-30, largest = 1e31;  // [m]
   Vec3d low = surface.position[surface.triangle[0][0]], high = low;
@@ -88,7 +87,7 @@ void check_request(const Surface& surface, const SampleRequest& request) {
   }
 }
 
-/// Multiplies all lengths by 2^exponent, which rounds nothing.
+/// Multiplies positions by 2^exponent, without rounding.
 void scale(std::vector<Vec3d>& position, int exponent) {
   for (Vec3d& p : position) {
     p = {std::ldexp(p.x, exponent), std::ldexp(p.y, exponent), std::ldexp(p.z, exponent)};
@@ -117,13 +116,13 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
   const double doubtful = static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
   if (doubtful <= 0.4) return;
   throw InputError(fmt::format(
-      "the surface is too open to tell inside from outside: for {:.0f}% of the points inside, the "
-      "winding number is not near a whole number ({})",
+      "the surface is too open to tell inside from outside: {:.0f}% of the interior points have an "
+      "ambiguous winding number ({})",
       100 * doubtful, defects.describe()));
 }
 
-/// Each phyxel's share of `volume`: of the sample points, on voxels half as large as those of the
-/// relaxation, it gets those nearest to it.
+/// Share of each phyxel in the volume: the number of sample points nearest to it, on voxels half as
+/// large as those of the relaxation.
 std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
                                    double voxel, double spacing, std::uint64_t seed,
                                    double& sampled_volume) {
@@ -143,13 +142,13 @@ std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vect
       &stage);
   sampled_volume = static_cast<double>(tally.samples) * std::pow(0.5 * voxel, 3);
   std::vector<double> share(site.size());
-  // A phyxel too small to be seen still has a place of its own: half a sample's worth.
+  // A phyxel without sample points gets the volume of half a sample.
   for (std::size_t i = 0; i < site.size(); ++i) share[i] = std::max(0.5, double(count[i]));
   stage.finish();
   return share;
 }
 
-/// Mean and smallest distance to the nearest phyxel; zero for a single one.
+/// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
 void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& report) {
   const auto n = static_cast<std::ptrdiff_t>(site.size());
   if (n < 2) return;
@@ -164,7 +163,7 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
       nearest2 = std::min(nearest2, dot(d, d));
     };
     const double cell = hash.cell_size();
-    // With rings 0 to r looked at, nothing nearer than r cells has been missed.
+    // After rings 0 to r, each site nearer than r cells has been visited.
     int ring = 0;
     for (; ring < 4; ++ring) {
       hash.visit_ring(site[i], ring, compare);
@@ -177,7 +176,8 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
 }
 
-/// A few samples inside an overlap, or beside a fold, are no matter.
+/// Refuses phyxels on a surface that is open or overlaps itself. A few samples inside an overlap
+/// or beside a fold are tolerated.
 void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::string& defects) {
   constexpr double allowed = 1e-3;
   const double repeated = static_cast<double>(tally.repeated) / static_cast<double>(tally.samples);
@@ -188,45 +188,88 @@ void refuse_surface_phyxels(const SampleTally& tally, bool closed, const std::st
       closed ? "overlaps itself" : fmt::format("is not closed ({})", defects)));
 }
 
+/// A surface ready for sampling.
+struct PreparedSurface {
+  Surface surface;           ///< Scaled to a size of one to two, with its triangles turned outward.
+  int exponent;              ///< The scale is 2^exponent.
+  SurfaceTopology topology;  ///< Connectivity of the scaled surface.
+  std::string defects;       ///< Description of the original surface's defects.
+};
+
+/// Inspects, scales, cleans and orients a surface, and reports its defects and each change.
+PreparedSurface prepare(const Surface& surface, SampleReport& found) {
+  const Stage inspecting("inspecting the surface");
+  found.defects = inspect_surface(surface);
+  // The surface is scaled to a size of one to two, the range in which float offsets are accurate.
+  PreparedSurface made{.surface = surface,
+                       .exponent = -std::ilogb(check_extent(surface)),
+                       .topology = {},
+                       .defects = found.defects.describe()};
+  scale(made.surface.position, made.exponent);
+  if (found.defects.unused_vertices > 0) {
+    drop_unused_vertices(made.surface);
+    found.warnings.push_back(fmt::format("{} vertices that no triangle uses were left out",
+                                         found.defects.unused_vertices));
+  }
+  for (std::string& done : orient(made.surface)) found.warnings.push_back(std::move(done));
+  made.surface.normal = vertex_normals(made.surface.position, made.surface.triangle);
+  made.topology = connect(made.surface);
+  return made;
+}
+
+/// Adds to `site` the phyxels that lie on the surface, if the request and the surface allow them.
+/// @param spacing cube root of the volume of a phyxel [m], adjusted to the phyxels on the surface
+void place_on_surface(const PreparedSurface& prepared, const SampleTally& tally, double volume,
+                      const SampleRequest& request, std::vector<Vec3d>& site, double& spacing,
+                      SampleReport& found) {
+  if (!request.on_surface.value_or(true)) return;
+  try {
+    refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
+    SurfaceSites sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels,
+                                  request.seed + 3, request.relaxations);
+    site = std::move(sites.position);
+    spacing = sites.spacing;
+  } catch (const InputError& error) {
+    if (request.on_surface) throw;
+    found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
+  }
+}
+
+/// Moves sites that relaxation has left outside to a sample point of their cells: in a thin or
+/// hollow body, the centroid of a cell may lie outside. The first `fixed` sites stay.
+void bring_inside(const InsideSampler& sampler, SampledVoronoi& voronoi, std::vector<Vec3d>& site,
+                  double spacing, std::size_t fixed) {
+  std::vector<std::uint8_t> outside(site.size());
+  const auto n = static_cast<std::ptrdiff_t>(site.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
+    outside[i] = !sampler.inside(site[i]);
+  }
+  if (std::count(outside.begin(), outside.end(), 1) > 0) {
+    voronoi.snap(site, spacing, outside, fixed);
+  }
+}
+
 }  // namespace
 
 Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
   check_request(surface, request);
   SampleReport found;
-  Stage inspecting("inspecting the surface");
-  found.defects = inspect_surface(surface);
-  const std::string defects = found.defects.describe();
+  PreparedSurface prepared = prepare(surface, found);
+  const bool closed = prepared.topology.closed;
+  const InsideSampler sampler(prepared.surface, closed);
 
-  // Worked on at a size of one to two, so that floats hold whatever is derived from it.
-  const int exponent = -std::ilogb(check_extent(surface));
-  Cloud cloud;
-  cloud.surface = surface;
-  scale(cloud.surface.position, exponent);
-  if (found.defects.unused_vertices > 0) {
-    drop_unused_vertices(cloud.surface);
-    found.warnings.push_back(fmt::format("{} vertices that no triangle uses were left out",
-                                         found.defects.unused_vertices));
-  }
-  for (std::string& done : orient(cloud.surface)) found.warnings.push_back(std::move(done));
-  cloud.surface.normal = vertex_normals(cloud.surface.position, cloud.surface.triangle);
-  const SurfaceTopology topology = connect(cloud.surface);
-  const bool closed = topology.closed;
-  const InsideSampler sampler(cloud.surface, closed);
-  inspecting.finish();
-
-  const double wanted = request.phyxels * samples_per_phyxel(request.phyxels);
   const std::uint64_t seed = request.seed;
   InsideFilling filling;
   fill_inside(sampler,
               {.phyxels = request.phyxels,
-               .samples = wanted,
+               .samples = request.phyxels * samples_per_phyxel(request.phyxels),
                .seed = seed,
-               .triangles = cloud.surface.triangle.size(),
-               .volume = closed ? std::optional(enclosed_volume(cloud.surface)) : std::nullopt,
-               .exponent = exponent,
-               .defects = defects},
+               .triangles = prepared.surface.triangle.size(),
+               .volume = closed ? std::optional(enclosed_volume(prepared.surface)) : std::nullopt,
+               .exponent = prepared.exponent,
+               .defects = prepared.defects},
               filling);
-  std::vector<SampleBlock>& blocks = filling.blocks;
   const SampleTally& tally = filling.tally;
   const double voxel = filling.voxel;
   refuse_if_too_open(tally, found.defects, closed);
@@ -234,61 +277,43 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
       static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
   if (!closed) {
     found.warnings.push_back(fmt::format(
-        "the surface is not closed ({}); for {:.2g}% of the points inside that is a matter of "
-        "opinion",
-        defects, 100 * found.doubtful_fraction));
+        "the surface is not closed ({}); {:.2g}% of the interior points have an ambiguous winding "
+        "number",
+        prepared.defects, 100 * found.doubtful_fraction));
   }
 
+  Cloud cloud;
   const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
   double spacing = std::cbrt(rough_volume / request.phyxels);
-  if (request.on_surface.value_or(true)) {
-    try {
-      refuse_surface_phyxels(tally, closed, defects);
-      SurfaceSites sites = sites_on(cloud.surface, topology, rough_volume, request.phyxels,
-                                    seed + 3, request.relaxations);
-      cloud.position = std::move(sites.position);
-      spacing = sites.spacing;
-    } catch (const InputError& error) {
-      if (request.on_surface) throw;
-      found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
-    }
-  }
+  place_on_surface(prepared, tally, rough_volume, request, cloud.position, spacing, found);
   const std::size_t on_surface = cloud.position.size();
   found.on_surface = static_cast<Index>(on_surface);
-  const std::vector<Vec3d> within =
-      throw_darts(blocks, request.phyxels - found.on_surface, spacing, seed + 1, cloud.position);
+  const std::vector<Vec3d> within = throw_darts(filling.blocks, request.phyxels - found.on_surface,
+                                                spacing, seed + 1, cloud.position);
   cloud.position.insert(cloud.position.end(), within.begin(), within.end());
-  SampledVoronoi voronoi(std::move(blocks));
+  SampledVoronoi voronoi(std::move(filling.blocks));
   voronoi.relax(cloud.position, spacing, request.relaxations, on_surface);
-
-  // Where the body is thin or hollow, the centroid of a cell may lie outside.
-  std::vector<std::uint8_t> outside(cloud.position.size());
-  const auto n = static_cast<std::ptrdiff_t>(cloud.position.size());
-#pragma omp parallel for schedule(dynamic, 256)
-  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(on_surface); i < n; ++i) {
-    outside[i] = !sampler.inside(cloud.position[i]);
-  }
-  if (std::count(outside.begin(), outside.end(), 1) > 0) {
-    voronoi.snap(cloud.position, spacing, outside, on_surface);
-  }
+  bring_inside(sampler, voronoi, cloud.position, spacing, on_surface);
 
   double sampled_volume = 0;
   cloud.volume = voronoi_shares(sampler, cloud.position, voxel, spacing, seed + 2, sampled_volume);
-  // The divergence theorem counts space that the surface covers twice, twice.
+  // The divergence theorem counts regions with a winding number of two twice.
   const bool exact = closed && tally.repeated == 0;
-  found.volume = exact ? enclosed_volume(cloud.surface) : sampled_volume;
+  found.volume = exact ? enclosed_volume(prepared.surface) : sampled_volume;
   if (tally.repeated > 0) {
     found.warnings.push_back(fmt::format(
-        "the surface overlaps itself: {:.2g}% of the inside lies in it more than once, and counts "
-        "once",
+        "the surface overlaps itself: {:.2g}% of the inside has a winding number above 1, and "
+        "counts once",
         100 * static_cast<double>(tally.repeated) / static_cast<double>(tally.samples)));
   }
   const double total = std::accumulate(cloud.volume.begin(), cloud.volume.end(), 0.0);
   for (double& v : cloud.volume) v *= found.volume / total;
 
   measure_gaps(cloud.position, spacing, found);
+  cloud.surface = std::move(prepared.surface);
   order_along_curve(cloud);
 
+  const int exponent = prepared.exponent;
   scale(cloud.surface.position, -exponent);
   scale(cloud.position, -exponent);
   for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);

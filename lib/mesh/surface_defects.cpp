@@ -39,7 +39,7 @@ SurfaceDefects inspect_surface(const Surface& surface) {
   for (const Triangle& t : surface.triangle) {
     const Vec3d a = surface.position[t[0]], b = surface.position[t[1]], c = surface.position[t[2]];
     const double longest = std::max({dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c)});
-    // Thinner than the rounding of its corners.
+    // The triangle is thinner than the rounding error of its corners.
     if (!(norm(cross(b - a, c - a)) > 1e-14 * longest)) {
       ++defects.degenerate_triangles;
       example((a + b + c) / 3.0);

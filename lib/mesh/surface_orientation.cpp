@@ -29,8 +29,8 @@ double area(const Surface& surface, const Triangle& t) {
                           surface.position[t[2]] - surface.position[t[0]]));
 }
 
-/// Walks over every edge that joins exactly two triangles, and turns the smaller share (by area)
-/// of each patch so reached to agree with the rest. @returns the number of triangles turned.
+/// Finds patches of triangles connected by edges of exactly two triangles, and turns the smaller
+/// part (by area) of each to agree with the rest. @returns the number of triangles turned.
 Index agree_on_outside(Surface& surface) {
   const SurfaceTopology topology = connect(surface);
   const auto n = static_cast<Index>(surface.triangle.size());
@@ -103,7 +103,8 @@ std::vector<std::string> orient(Surface& surface) {
   }
   std::vector<double> volume(topology.parts, 0);
   for (Index p = 0; p < topology.parts; ++p) {
-    // About its own middle, so that a part with a hole is judged by its shape, not its place.
+    // Taken about its own middle, so that the volume of a part with a hole does not depend on its
+    // position.
     const Vec3d middle = 0.5 * (box[p].low + box[p].high);
     for (const Triangle& t : part[p]) {
       volume[p] += dot(surface.position[t[0]] - middle,
@@ -111,14 +112,14 @@ std::vector<std::string> orient(Surface& surface) {
                    6;
     }
   }
-  // Fewer than four triangles enclose nothing: loose ones are left as they are.
+  // Fewer than four triangles enclose no volume, and are left as they are.
   std::vector<Index> order;
   for (Index p = 0; p < topology.parts; ++p) {
     if (part[p].size() >= 4) order.push_back(p);
   }
   if (std::none_of(order.begin(), order.end(), [&](Index p) { return volume[p] < 0; })) return done;
 
-  // From the largest part to the smallest, so that whatever holds a part comes before it.
+  // From the largest part to the smallest, so that a part comes after those that contain it.
   std::stable_sort(order.begin(), order.end(),
                    [&](Index a, Index b) { return std::abs(volume[a]) > std::abs(volume[b]); });
   std::vector<bool> turn_part(topology.parts, false);

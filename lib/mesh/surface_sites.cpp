@@ -15,32 +15,32 @@
 namespace phyxel {
 namespace {
 
-/// Faces that turn by more than this meet in a sharp edge, which turns no more than this unless in
-/// a corner.
+/// Cosine of the smallest angle between the normals of two faces that makes their edge sharp, and
+/// of the smallest turn of a sharp edge that makes a corner.
 const double sharp = std::cos(40 * std::numbers::pi / 180);
-/// Areas below so many squares of a side are nothing but rounding.
+/// Area, in squares of the longest side, below which a triangle's normal is rounding error.
 constexpr double no_area = 1e-12;
-/// Sample points for each site on a face, and for each on an edge.
+/// Number of sample points for each site on a face or an edge.
 constexpr double samples_per_site = 64;
-/// What a sample point on a face takes while sites are chosen among all.
+/// Memory that a sample point on a face takes while sites are selected [bytes].
 constexpr double bytes_per_sample = 150;
-/// Distances between random sites, in spacings, at which lines, faces and what they enclose get
-/// about one each on a spacing, its square and its cube.
+/// Smallest distances between random sites, in spacings, that give about one site for each spacing
+/// of an edge and for each square spacing of a face.
 constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.82;
 
-/// A point of a vertex, an edge or a triangle, by its number.
+/// A point on a vertex, an edge or a triangle, with the index of that piece.
 struct PointOn {
   std::size_t piece;
   Vec3d point;
 };
 
-/// Ends of a sharp edge.
+/// The ends of a sharp edge [m].
 struct Crease {
   Vec3d from, to;
 };
 
 struct Features {
-  std::vector<PointOn> corners;  ///< By their vertices.
+  std::vector<PointOn> corners;  ///< Corners, with the indices of their vertices.
   std::vector<Crease> creases;
 };
 
@@ -65,7 +65,8 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
     if (!is_sharp) {
       const Vec3d a = area_of(surface, edges[k].triangle),
                   b = area_of(surface, edges[k + 1].triangle);
-      // A triangle without area, as repair leaves them along edges, hides how its neighbours meet.
+      // A degenerate triangle, as mesh repair leaves along edges, hides the angle of its
+      // neighbours.
       const double size = norm(a) * norm(b), least = no_area * length * length;
       is_sharp = norm(a) <= least || norm(b) <= least || dot(a, b) < sharp * size;
     }
@@ -77,7 +78,8 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
   for (std::size_t v = 0; v < leaving.size(); ++v) {
     const std::vector<Vec3d>& at = leaving[v];
     if (at.empty()) continue;
-    // An edge that goes on does so in two directions, each of which several may share.
+    // A sharp edge that continues leaves the vertex in two opposite directions, each of which
+    // several edges may share.
     bool back = false, other = false;
     for (const Vec3d& direction : at) {
       const double along = dot(direction, at[0]);
@@ -89,8 +91,8 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
   return features;
 }
 
-/// Neighbouring points of a piece in one block: the points of a plane across an axis stay exactly
-/// on it.
+/// Groups neighbouring points of a piece into blocks. Points of a plane perpendicular to an axis
+/// stay exactly on it.
 std::vector<SampleBlock> blocks_of(const std::vector<PointOn>& points, double side) {
   struct Placed {
     std::array<std::int64_t, 4> cell;
@@ -116,7 +118,7 @@ std::vector<SampleBlock> blocks_of(const std::vector<PointOn>& points, double si
   return blocks;
 }
 
-/// Says how many samples each piece gets, so that every stretch of pieces gets its share.
+/// Number of samples of each piece in turn, rounded so that any run of pieces gets its share.
 class Shares {
  public:
   explicit Shares(double size_of_one) : one_(size_of_one) {}
@@ -146,7 +148,7 @@ std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, doubl
   return blocks_of(points, spacing);
 }
 
-/// Each triangle's by a sequence that covers it evenly.
+/// Sample points of each triangle, from a low-discrepancy sequence.
 /// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
 std::vector<SampleBlock> samples_over(const Surface& surface, double spacing, std::uint64_t seed) {
   constexpr double step_1 = 0.7548776662466927, step_2 = 0.5698402909980532;
@@ -168,7 +170,7 @@ std::vector<SampleBlock> samples_over(const Surface& surface, double spacing, st
   return blocks_of(points, spacing);
 }
 
-/// Adds sites at random sample points and spreads them, those that are there staying.
+/// Adds sites at random sample points and relaxes them; the sites of the argument stay.
 void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
                double spacing, std::uint64_t seed, int relaxations) {
   const std::size_t fixed = site.size();
@@ -177,23 +179,24 @@ void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double
   site.insert(site.end(), more.begin(), more.end());
   SampledVoronoi voronoi(std::move(blocks));
   voronoi.relax(site, spacing, relaxations, fixed);
-  // Centroids lie beside curves and curved faces.
+  // The centroids of cells of curved edges and faces lie off the surface.
   std::vector<std::uint8_t> which(site.size(), 1);
   std::fill_n(which.begin(), fixed, 0);
   voronoi.snap(site, spacing, which, fixed);
 }
 
-/// Corners that are not too near to each other.
+/// A subset of the corners that are not too near to each other [m].
 std::vector<Vec3d> corners_of(const Features& features, double spacing, std::uint64_t seed) {
   const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing);
   std::vector<Vec3d> site = fill_with_darts(blocks, gap_at_corners * spacing, seed, {});
   if (site.empty()) return site;
-  // Darts are rounded, corners are exact.
+  // Sample offsets are rounded to float; this restores the exact corners.
   SampledVoronoi(blocks).snap(site, spacing, std::vector<std::uint8_t>(site.size(), 1), 0);
   return site;
 }
 
-/// Σ volumes = V/s³ + A/(2 s²): those on faces take half of a phyxel's volume each.
+/// The spacing s [m] that solves phyxels = V/s³ + A/(2 s²): a phyxel on a face takes half the
+/// volume of an interior one.
 double spacing_for(double volume, double area, Index phyxels) {
   double low = std::cbrt(volume / phyxels), high = low;
   const auto needed = [&](double s) { return volume / (s * s * s) + area / (2 * s * s); };
@@ -226,7 +229,7 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
               relaxations);
     add_sites(found.position, samples_over(surface, s, seed + 1), gap_on_faces * s, s, seed + 2,
               relaxations);
-    // Some are for the inside: at least a quarter of those of a lattice without surface.
+    // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     if (inside > 0.25 * volume / (s * s * s)) return found;
     found.spacing *= 1.1;

@@ -1,4 +1,4 @@
-/// How the triangles of a surface hang together.
+/// The connectivity of a surface's triangles.
 #pragma once
 
 #include <string>
@@ -8,31 +8,32 @@
 
 namespace phyxel {
 
-/// One side of a triangle. Ends are named by `SurfaceTopology::corner`, smaller first.
+/// One side of a triangle. Its ends are vertices of `SurfaceTopology::corner`, smaller first.
 struct SurfaceEdge {
   Index low, high;
   Index triangle;
-  bool forward;  ///< The triangle runs from low to high.
+  bool forward;  ///< True if the triangle runs from `low` to `high`.
 };
 
-/// Vertices at exactly the same place count as one here, since many files repeat a vertex where
-/// its colour or texture changes. Triangles that are left with fewer than three vertices have no
-/// edges.
+/// Edges and connected parts of a surface. Vertices at exactly the same position count as one,
+/// since many files repeat a vertex where its colour or texture changes. Triangles that have fewer
+/// than three distinct vertices have no edges.
 struct SurfaceTopology {
-  std::vector<Index> corner;       ///< First vertex at the same place, shape [n_vertices].
+  std::vector<Index> corner;       ///< First vertex at the same position, shape [n_vertices].
   std::vector<SurfaceEdge> edges;  ///< Sorted, so that the sides of one edge are adjacent.
   std::vector<Index> part;         ///< Connected part of each triangle, shape [n_triangles].
-  Index parts = 0;
-  /// Every edge is run through as often forwards as backwards. Then the winding number is a whole
-  /// number everywhere off the surface, and constant wherever no triangle lies in between.
+  Index parts = 0;                 ///< Number of connected parts.
+  /// True if each edge is used as often forwards as backwards. Then the winding number is an
+  /// integer off the surface, and constant between points that no triangle separates.
   bool closed = false;
 };
 
+/// Finds the edges and the connected parts of a surface.
 SurfaceTopology connect(const Surface& surface);
 
-/// Turns triangles over until neighbours agree on the outside, and parts until their outside is
-/// out: a part that encloses negative volume is turned, unless it lies in another part and is its
-/// cavity. @returns what was done, one sentence each.
+/// Makes the orientation of neighbouring triangles consistent, and that of parts outward: a part
+/// that encloses negative volume is turned, unless it is a cavity of another part.
+/// @returns one sentence for each kind of change
 std::vector<std::string> orient(Surface& surface);
 
 }  // namespace phyxel

@@ -1,4 +1,4 @@
-/// Walks through text word by word, counting lines.
+/// A cursor that reads text word by word and counts lines.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@ inline bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\v' || c == '\f';
 }
 
-/// The number that `word` is, all of it; may be infinite or NaN, if written so.
+/// The value of `word`, which may be infinite or NaN; unset if any part of it is not a number.
 inline std::optional<double> parse_number(std::string_view word) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
   double value = 0;
@@ -30,7 +30,7 @@ inline std::optional<long long> parse_integer(std::string_view word) {
   return value;
 }
 
-/// The word as messages may show it: damaged files hold anything.
+/// The first 40 characters of a word for error messages, unprintable ones replaced by "?".
 inline std::string printable(std::string_view word) {
   std::string shown(word.substr(0, 40));
   for (char& c : shown) c = c < ' ' || c > '~' ? '?' : c;
@@ -59,8 +59,8 @@ class TextCursor {
     return rest;
   }
 
-  std::size_t line() const { return line_; }  ///< Of the last word, from 1.
-  std::size_t offset() const { return at_; }  ///< Bytes from the start.
+  std::size_t line() const { return line_; }  ///< Line of the last word, from 1.
+  std::size_t offset() const { return at_; }  ///< Position from the start [bytes].
   std::size_t left() const { return text_.size() - at_; }
 
  private:

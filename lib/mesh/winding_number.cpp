@@ -38,7 +38,7 @@ WindingNumber::WindingNumber(const Surface& surface, double accuracy) : accuracy
   nodes_.reserve(corners_.size() / 2 + 8);
   nodes_.emplace_back();
   nodes_[0].count = static_cast<Index>(corners_.size());
-  // Children are appended behind, so this reaches every node.
+  // Children are appended, so the loop reaches every node.
   for (Index node = 0; node < static_cast<Index>(nodes_.size()); ++node) build(node);
 }
 

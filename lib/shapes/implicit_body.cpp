@@ -6,7 +6,7 @@
 namespace phyxel {
 namespace {
 
-/// Minimum with a rounded seam: a quadratic takes over where |a - b| < blend.
+/// Smooth minimum: a quadratic where |a - b| < blend.
 double smooth_min(double a, double b, double blend) {
   const double near = std::max(blend - std::abs(a - b), 0.0);
   return std::min(a, b) - (blend > 0 ? 0.25 * near * near / blend : 0);
@@ -17,7 +17,7 @@ double smooth_min(double a, double b, double blend) {
 double ImplicitBody::Part::distance(Vec3d p) const {
   const Vec3d d = p - at;
   if (limb) {
-    // The ball of the limb that is nearest: its centre lies where d(distance)/dt = 0.
+    // The nearest ball of the limb has its centre where d(distance)/dt = 0.
     const double x = dot(d, along);
     const double across = norm(d - x * along);
     const double t = std::clamp(x - slope * across / std::sqrt(1 - slope * slope), 0.0, length);
@@ -42,7 +42,7 @@ bool ImplicitBody::Part::farther(Vec3d p, double reach) const {
 }
 
 double ImplicitBody::value(Vec3d p) const {
-  double value = 1e3;  // m; far outside
+  double value = 1e3;  // [m], far outside
   for (const Part& part : parts_) {
     if (part.farther(p, (part.removes ? -value : value) + part.blend)) continue;
     const double d = part.distance(p);
@@ -52,7 +52,7 @@ double ImplicitBody::value(Vec3d p) const {
 }
 
 SurfacePoint ImplicitBody::project(Vec3d p) const {
-  // Differences over the corners of a tetrahedron give value and gradient from four evaluations.
+  // Value and gradient from differences over the four corners of a tetrahedron.
   constexpr double step = 1e-5;  // m; errors of 1e-10 m at curvatures of 1/m
   Vec3d gradient;
   for (int iteration = 0; iteration < 3; ++iteration) {
@@ -86,7 +86,8 @@ void ImplicitBody::append(Part part, bool removes, double blend, Vec3d low, Vec3
   part.blend = blend;
   parts_.push_back(part);
   if (removes) return;
-  const Vec3d seam{blend, blend, blend};  // a seam bulges by a quarter of its width at most
+  const Vec3d seam{blend, blend,
+                   blend};  // more than the bulge, at most a quarter of the seam width
   low = low - seam;
   high = high + seam;
   low_ = {std::min(low_.x, low.x), std::min(low_.y, low.y), std::min(low_.z, low.z)};

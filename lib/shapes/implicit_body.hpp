@@ -7,70 +7,73 @@
 
 namespace phyxel {
 
-/// A place on or near a surface.
+/// A point on or near a surface.
 struct SurfacePoint {
   Vec3d position;  ///< [m]
   Vec3d normal;    ///< Outward unit normal.
 };
 
-/// A union of rounded parts, less some cuts, with smooth seams. `value` is about the signed
+/// A union of rounded parts, minus some cuts, with smooth seams. `value` approximates the signed
 /// distance to the surface [m], negative inside; it is exact for a single limb or ball.
 class ImplicitBody {
  public:
-  /// The hull of two balls: at `from` with radius `from_radius`, at `to` with `to_radius`.
+  /// The convex hull of two balls, at `from` and `to`, with radii `from_radius` and `to_radius`.
   struct Limb {
     Vec3d from;
     double from_radius;
     Vec3d to;
     double to_radius;
   };
-  /// An ellipsoid, turned about the y axis: `pitch` [rad] lifts its +x end towards +z.
+  /// An ellipsoid rotated about the y axis: `pitch` [rad] lifts its +x end towards +z.
   struct Ellipsoid {
     Vec3d centre;
     Vec3d radii;
     double pitch = 0;
   };
 
-  /// Joins a part to the parts added before; `blend` [m] is the width of the seam.
+  /// Joins a part to those added before; `blend` [m] is the width of the seam.
   void add(const Limb& limb, double blend);
   void add(const Ellipsoid& ellipsoid, double blend);
-  /// Takes a part away from those added before.
+  /// Subtracts a part from those added before.
   void cut(const Limb& limb, double blend);
   void cut(const Ellipsoid& ellipsoid, double blend);
-  /// Adds the part and its mirror image in the plane y = 0.
+  /// Adds a part and its mirror image in the plane y = 0.
   template <class Part>
   void add_pair(const Part& part, double blend) {
     add(part, blend);
     add(mirrored(part), blend);
   }
+  /// Subtracts a part and its mirror image in the plane y = 0.
   template <class Part>
   void cut_pair(const Part& part, double blend) {
     cut(part, blend);
     cut(mirrored(part), blend);
   }
 
+  /// The approximate signed distance of `p` [m].
   double value(Vec3d p) const;
-  /// The nearest point of the surface, by Newton steps along the gradient; for places near it.
+  /// The surface point nearest to `p`, by Newton steps along the gradient; `p` must be near it.
   SurfacePoint project(Vec3d p) const;
 
-  /// A box that holds the body [m].
+  /// Lower corner of a bounding box [m].
   Vec3d low() const { return low_; }
-  Vec3d high() const { return high_; }
+  Vec3d high() const { return high_; }  ///< Upper corner of the bounding box [m].
 
  private:
   struct Part {
-    bool limb;  ///< Or an ellipsoid.
-    bool removes;
+    bool limb;     ///< True for a limb, false for an ellipsoid.
+    bool removes;  ///< True if the part is subtracted.
     double blend;  ///< [m]
     Vec3d at;      ///< Start of the limb or centre of the ellipsoid [m].
     Vec3d along;   ///< Limb: unit vector along it. Ellipsoid: (cos pitch, 0, sin pitch).
     double length, radius,
         slope;            ///< Limb: its length and first radius [m], its loss of radius per length.
     Vec3d inverse_radii;  ///< Ellipsoid [1/m].
-    Vec3d ball;           ///< Centre of a ball that holds the part [m],
-    double ball_radius, stretch;  ///< its radius [m], and how far `distance` may fall short.
+    Vec3d ball;           ///< Centre of a ball that contains the part [m].
+    double ball_radius;   ///< Radius of that ball [m].
+    double stretch;       ///< Largest ratio of the true distance to `distance`.
     double distance(Vec3d p) const;
-    /// Whether `distance(p)` is certainly more than `reach` [m].
+    /// True if `distance(p)` is certainly more than `reach` [m].
     bool farther(Vec3d p, double reach) const;
   };
   static Limb mirrored(Limb limb);
@@ -83,8 +86,8 @@ class ImplicitBody {
   Vec3d low_{1e300, 1e300, 1e300}, high_{-1e300, -1e300, -1e300};
 };
 
-/// Triangulates the surface on a lattice of `cell` [m] by marching tetrahedra (Doi and Koide 1991):
-/// closed, manifold and outward whatever the body; triangles may be thin.
+/// Triangulates the surface on a lattice of `cell` [m] by marching tetrahedra (Doi and Koide 1991).
+/// The result is closed, manifold and oriented outward for any body; triangles may be thin.
 /// Source of the six tetrahedra of a cube: Freudenthal 1942.
 Surface polygonise(const ImplicitBody& body, double cell);
 

@@ -8,7 +8,8 @@
 namespace phyxel {
 namespace {
 
-/// Lattice points of the box, and the function's values at one block of them at a time.
+/// Marching tetrahedra over the lattice of the bounding box, with the values of one block of
+/// lattice points in memory at a time.
 class Polygoniser {
  public:
   Polygoniser(const ImplicitBody& body, double cell) : body_(body), cell_(cell) {
@@ -27,7 +28,7 @@ class Polygoniser {
   }
 
  private:
-  static constexpr int side = 8;  // cells of a block
+  static constexpr int side = 8;  // cells along a side of a block
   using Cell = std::array<int, 3>;
 
   int block_count(double extent) const {
@@ -39,8 +40,8 @@ class Polygoniser {
 
   void polygonise_block(const Cell& block) {
     const Cell first{side * block[0], side * block[1], side * block[2]};
-    // The surface is farther than the block's corners if the function is large in the middle; its
-    // slope stays below 1.5 for the parts in use.
+    // A block is empty if the function in its middle exceeds the largest change towards a corner;
+    // the slope stays below 1.5 for the parts in use.
     const Vec3d middle = place(first) + 0.5 * side * cell_ * Vec3d{1, 1, 1};
     if (std::abs(body_.value(middle)) > 1.5 * std::sqrt(3.) * 0.5 * side * cell_) return;
     for (int k = 0, v = 0; k <= side; ++k)
@@ -52,7 +53,7 @@ class Polygoniser {
         for (int i = 0; i < side; ++i) polygonise_cube(first, {i, j, k});
   }
 
-  /// Six tetrahedra about the diagonal, one for each order in which the three axes are walked.
+  /// Polygonises six tetrahedra about the cube's diagonal, one for each order of the three axes.
   void polygonise_cube(const Cell& first, const Cell& local) {
     static constexpr int axes[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                        {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
@@ -65,7 +66,7 @@ class Polygoniser {
         if (step == 3) break;
         ++at[axes[order][step]];
       }
-      if (order >= 3) std::swap(corner[0], corner[1]);  // all six right-handed
+      if (order >= 3) std::swap(corner[0], corner[1]);  // makes the tetrahedron right-handed
       polygonise_tetrahedron(corner);
     }
   }
@@ -112,7 +113,7 @@ class Polygoniser {
   Index vertex_on(const Corner& p, const Corner& q) {
     const Cell low{std::min(p.at[0], q.at[0]), std::min(p.at[1], q.at[1]),
                    std::min(p.at[2], q.at[2])};
-    // The two ends of an edge differ by 0 or 1 on each axis, always in the same sense.
+    // The ends of an edge differ by 0 or 1 on each axis, with the same sign on all axes.
     std::uint64_t key = 0;
     for (int axis = 0; axis < 3; ++axis) {
       key = key << 20 | static_cast<std::uint64_t>(low[axis]);
@@ -120,7 +121,7 @@ class Polygoniser {
     for (int axis = 0; axis < 3; ++axis) key = key << 1 | (p.at[axis] != q.at[axis]);
     const auto [found, fresh] = vertices_.try_emplace(key, static_cast<Index>(vertices_.size()));
     if (fresh) {
-      // Off the lattice points, so that no triangle is without area.
+      // Vertices are kept off the lattice points, so that no triangle is degenerate.
       const double t = std::clamp(p.value / (p.value - q.value), 0.02, 0.98);
       surface_.position.push_back((1 - t) * place(p.at) + t * place(q.at));
     }

@@ -11,8 +11,8 @@ namespace {
 
 using Cell = std::array<std::int64_t, 3>;
 
-/// Calls visit(cell) for the cells of the cube of 2^level cells at `corner` that lie below `end`,
-/// in Morton order (x fastest).
+/// Calls visit(cell) in Morton order (x fastest) for the cells below `end` of a cube at `corner`
+/// with 2^level cells a side.
 template <class Visit>
 void visit_cells(const Cell& corner, int level, const Cell& end, Visit& visit) {
   if (corner[0] >= end[0] || corner[1] >= end[1] || corner[2] >= end[2]) return;
@@ -28,8 +28,8 @@ void visit_cells(const Cell& corner, int level, const Cell& end, Visit& visit) {
   }
 }
 
-/// Fills the lattice in cubes of cells, the cubes in Morton order, so that each knows where its
-/// phyxels go and any number of threads may share the work.
+/// Fills a lattice block by block, the blocks in Morton order. The first phyxel of each block is
+/// known in advance, so that threads fill blocks independently.
 class Filling {
  public:
   Filling(const Lattice& lattice, double jitter, std::uint64_t seed)
@@ -40,7 +40,7 @@ class Filling {
     }
   }
 
-  /// The blocks whose first phyxels are in the piece.
+  /// Fills the blocks whose first phyxels are in the piece.
   CloudPiece run(Piece piece) {
     find_blocks();
     const Offset whole = first_.back();
@@ -113,7 +113,7 @@ class Filling {
     visit_cells(corner, block_level, end_, visit_cell);
   }
 
-  /// Whether a node lies on a face across `axis`. Cells do not.
+  /// True if a node lies on a face perpendicular to `axis`; false for cells.
   bool on_face(const Cell& c, int axis) const {
     return lattice_.nodes && (c[axis] == 0 || c[axis] == end_[axis] - 1);
   }
@@ -126,7 +126,7 @@ class Filling {
     Vec3d move{jitter_ * cell_.x * signed_fraction(bits),
                jitter_ * cell_.y * signed_fraction(bits >> 21),
                jitter_ * cell_.z * signed_fraction(bits >> 42)};
-    if (lattice_.nodes) {  // of others than those on faces, none comes as far as a face
+    if (lattice_.nodes) {  // interior nodes cannot reach a face
       return centre + Vec3d{on_face(c, 0) ? 0 : move.x, on_face(c, 1) ? 0 : move.y,
                             on_face(c, 2) ? 0 : move.z};
     }
@@ -136,7 +136,7 @@ class Filling {
     return centre;
   }
 
-  /// The outermost layer of phyxels on each side that is flat.
+  /// Adds a region for each flat side: the outermost layer of phyxels there.
   void add_regions(Cloud& cloud, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     if (lattice_.solid == Lattice::Solid::sphere) return;
     static constexpr const char* names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
@@ -161,8 +161,8 @@ class Filling {
   double jitter_;
   std::uint64_t salt_;
   Cell end_{}, block_end_{};
-  std::vector<Cell> block_;    ///< Corners, in units of blocks, in Morton order.
-  std::vector<Offset> first_;  ///< Phyxels before each block, shape [n_blocks + 1].
+  std::vector<Cell> block_;    ///< Lower corners of blocks in units of blocks, in Morton order.
+  std::vector<Offset> first_;  ///< Number of phyxels before each block, shape [n_blocks + 1].
 };
 
 }  // namespace
@@ -184,7 +184,7 @@ bool Lattice::contains(Vec3d p) const {
 
 bool Lattice::holds(const std::array<std::int64_t, 3>& cell) const {
   if (solid == Solid::box) return true;
-  // In half cells from the axis, or from the centre, where the radius is the number of cells.
+  // Distances from the axis or the centre in half cells, in which the radius is the cell count.
   const auto n = static_cast<std::int64_t>(cells[0]);
   const std::int64_t x = 2 * cell[0] + 1 - n, y = 2 * cell[1] + 1 - n, z = 2 * cell[2] + 1 - n;
   return x * x + y * y + (solid == Solid::sphere ? z * z : 0) < n * n;
@@ -194,7 +194,8 @@ double Lattice::phyxels() const {
   const double box_cells = places(0) * places(1) * places(2);
   if (solid == Solid::box) return box_cells;
   if (box_cells > 1e11) return box_cells * (volume() / (extent.x * extent.y * extent.z));
-  // Row by row in half cells: a row holds odd numbers if n is even, and even ones if it is odd.
+  // Row by row in half cells: coordinates of cell centres are odd if n is even, and even if n is
+  // odd.
   const double n = cells[0];
   const bool odd = std::fmod(n, 2) == 0;
   const auto numbers_within = [&](double square) {

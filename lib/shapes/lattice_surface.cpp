@@ -7,7 +7,7 @@
 namespace phyxel {
 namespace {
 
-/// The lattice points on the surface of a box of m[0] x m[1] x m[2] cells, numbered layer by layer.
+/// Numbering, layer by layer, of the nodes on the surface of a box of m[0] x m[1] x m[2] cells.
 struct BoxPoints {
   std::array<Index, 3> m;
 
@@ -24,14 +24,14 @@ struct BoxPoints {
   }
 };
 
-/// Puts a point of the cube [-1, 1]^3 on the same place of the solid.
+/// Maps a point of the cube [-1, 1]^3 to the solid.
 Vec3d shaped(Lattice::Solid solid, Vec3d p) {
   const auto even_angle = [](double t) { return std::tan(std::numbers::pi / 4 * t); };
   if (solid == Lattice::Solid::sphere) {
     return normalised(Vec3d{even_angle(p.x), even_angle(p.y), even_angle(p.z)});
   }
   if (solid == Lattice::Solid::cylinder) {
-    // Squares about the axis become circles (Shirley and Chiu 1997).
+    // Concentric squares are mapped to circles (Shirley and Chiu 1997).
     const double r = std::max(std::abs(p.x), std::abs(p.y));
     if (r == 0) return p;
     const Vec3d d = normalised(Vec3d{even_angle(p.x / r), even_angle(p.y / r), 0});
@@ -75,8 +75,8 @@ class SolidSurface {
       for (Index a = 0; a < mu; ++a) {
         const Index p = point(a, b), q = point(a + 1, b), r = point(a + 1, b + 1),
                     s = point(a, b + 1);
-        // Diagonals run from the middle of the face to its corners: the corners of a cylinder's cap
-        // lie on its rim, and a triangle of three points there would have next to no area.
+        // Diagonals run from the middle of the face to its corners. The corners of a cylinder's cap
+        // lie on its rim, where a triangle of three rim points would be nearly degenerate.
         if ((2 * a + 1 < mu) == (2 * b + 1 < mv)) {
           add(p, q, r);
           add(p, r, s);
@@ -104,7 +104,7 @@ class SolidSurface {
 
 Surface lattice_surface(const Lattice& lattice, double spacing) {
   constexpr double most_surfels = 1e6;
-  // A side of the cube becomes a quarter of a circle.
+  // A side of the cube is mapped to a quarter of a circle.
   const double quarter = std::numbers::pi / 4;
   const bool box = lattice.solid == Lattice::Solid::box;
   const bool sphere = lattice.solid == Lattice::Solid::sphere;
@@ -116,7 +116,7 @@ Surface lattice_surface(const Lattice& lattice, double spacing) {
   std::array<Index, 3> cells;
   for (int axis = 0; axis < 3; ++axis) {
     const bool round = !box && (sphere || axis < 2);
-    // A circle has 16 corners at least. A needle's length alone may be many steps.
+    // A circle has at least 16 corners; the length of a needle limits the number of steps.
     cells[axis] = static_cast<Index>(
         std::clamp(std::round(length[axis] / step), round ? 4.0 : 1.0, most_surfels / 16));
   }

@@ -7,9 +7,9 @@
 #include "phyxel/mesh.hpp"
 #include "shapes/surface_remesh.hpp"
 
-// All lengths are in metres; x is forwards, y to the left, z up. With so few phyxels a limb must be
-// at least two spacings thick (0.09 m in the head, 0.055 m in the others), or its phyxels would lie
-// in a row and could not resist bending.
+// Lengths are in metres; x points forwards, y to the left, z up. A limb must be at least two
+// spacings thick (0.09 m for the head, 0.055 m for the other bodies), or its phyxels would lie in a
+// row and could not resist bending.
 namespace phyxel {
 namespace {
 
@@ -17,12 +17,12 @@ PaperBody alien_head() {
   using Limb = ImplicitBody::Limb;
   using Ellipsoid = ImplicitBody::Ellipsoid;
   ImplicitBody form;
-  // A wide cranium that tapers to a small chin; a thin neck on the stump of the shoulders.
+  // Cranium, chin, neck and shoulders.
   form.add(Ellipsoid{{-0.05, 0, 0.21}, {0.34, 0.33, 0.29}}, 0);
   form.add(Limb{{0.07, 0, 0.06}, 0.23, {0.17, 0, -0.24}, 0.075}, 0.12);
   form.add(Limb{{-0.07, 0, -0.05}, 0.16, {-0.08, 0, -0.37}, 0.135}, 0.08);
   form.add(Ellipsoid{{-0.08, 0, -0.43}, {0.17, 0.21, 0.07}}, 0.08);
-  // Almond eyes that rise outwards, each a bulge in a deeper socket; nostrils, a thin mouth.
+  // Eyes (each a bulge in a socket), nostrils and mouth.
   const Vec3d inner{0.315, 0.062, -0.08}, middle{0.30, 0.145, 0.0}, outer{0.22, 0.245, 0.115};
   form.cut_pair(Limb{middle, 0.105, inner, 0.045}, 0.03);
   form.cut_pair(Limb{middle, 0.105, outer, 0.045}, 0.03);
@@ -77,7 +77,7 @@ PaperBody dino() {
   return {"dino", 575, 53504, form, "mouth", {0.66, 0, 0.38}, 12};
 }
 
-/// The `count` phyxels nearest to `place`, sorted.
+/// Indices of the `count` phyxels nearest to `place`, ascending.
 std::vector<Index> nearest_phyxels(const Cloud& cloud, Vec3d place, int count) {
   std::vector<Index> order(cloud.position.size());
   std::iota(order.begin(), order.end(), 0);

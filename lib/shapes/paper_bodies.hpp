@@ -7,19 +7,20 @@
 
 namespace phyxel {
 
-/// What is fixed about one of the paper's bodies.
+/// The definition of one of the paper's bodies.
 struct PaperBody {
   std::string name;
   Index phyxels, surfels;
   ImplicitBody form;
-  std::string region;   ///< The phyxels a scene hangs it by ...
-  Vec3d region_anchor;  ///< ... which are those nearest to this place [m],
-  int region_size;      ///< and this many.
+  std::string region;   ///< Name of the region that scenes fix: the phyxels nearest to an anchor.
+  Vec3d region_anchor;  ///< Position of the anchor [m].
+  int region_size;      ///< Number of phyxels of the region.
 };
 
-/// @returns nullptr for a name that is not one of the paper's.
+/// The body called `name`, or null if the paper has none of that name.
 const PaperBody* find_paper_body(const std::string& name);
 
+/// Samples a body with its number of phyxels; `surface` adds its surfels.
 Cloud make_paper_body(const PaperBody& body, bool surface);
 
 }  // namespace phyxel

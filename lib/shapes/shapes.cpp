@@ -35,21 +35,22 @@ void check_size(const ShapeRequest& request) {
   } else {
     if (request.placement == ShapeRequest::Placement::nodes) {
       throw InputError(fmt::format(
-          "shape \"{}\": lattice \"nodes\", whose outer layer would not lie on a round surface: "
-          "allowed are \"cells\", or the shapes beam and block",
+          "shape \"{}\": lattice \"nodes\": its outer layer would not lie on a round surface; "
+          "allowed: \"cells\", or the shapes beam and block",
           request.name));
     }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
   }
   const double volume = make_lattice(request, 1).volume();
-  if (!(volume > 1e-280 && volume < 1e280)) {  // room for products with counts and densities
-    throw InputError(fmt::format("shape \"{}\": a volume of {} m^3 is beyond what numbers can hold",
+  if (!(volume > 1e-280 &&
+        volume < 1e280)) {  // products with counts and densities must not overflow
+    throw InputError(fmt::format("shape \"{}\": a volume of {} m^3; allowed: 1e-280 to 1e280 m^3",
                                  request.name, volume));
   }
 }
 
-/// What filling a shape takes at any time: positions, volumes, their order, a copy of each.
+/// Checks the memory for positions, volumes, their order and a copy of each.
 void require_memory_for_cloud(const std::string& shape, double phyxels, Piece piece = {}) {
   constexpr double bytes_per_phyxel = 120;
   require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel / piece.of);
@@ -87,7 +88,7 @@ double spacing_for(const ShapeRequest& request, Index phyxels) {
 
 double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
   if (const PaperBody* body = find_paper_body(request.name)) {
-    throw InputError(fmt::format("shape \"{}\" is no lattice: it has {} phyxels and no spacing",
+    throw InputError(fmt::format("shape \"{}\" is not a lattice: it has {} phyxels and no spacing",
                                  body->name, body->phyxels));
   }
   check_size(request);
@@ -101,7 +102,7 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
   const auto count = [&](double spacing) { return make_lattice(request, spacing).phyxels(); };
   const double guess = std::min(std::cbrt(unit.volume() / phyxels), longest);
   if (count(guess) == phyxels) return guess;
-  // Whole numbers of cells make the count jump: of the two sides of the jump the nearer one.
+  // Cell counts are integers, so the number of phyxels jumps: the nearer side of the jump is taken.
   double few = longest, many = guess;
   while (count(many) < phyxels) many *= 0.7;
   if (count(few) >= phyxels) return few;

@@ -10,7 +10,7 @@
 namespace phyxel {
 namespace {
 
-/// A triangle mesh that can lose vertices and flip edges. It stays closed and manifold.
+/// A closed manifold triangle mesh with edge collapse and edge flip, which keep it so.
 class Remesher {
  public:
   Remesher(const ImplicitBody& body, Surface surface) : body_(body), s_(std::move(surface)) {
@@ -32,7 +32,7 @@ class Remesher {
       if (queue_.empty()) throw std::logic_error("no edge of the surface can be collapsed");
       const auto [length2, a, b] = queue_.top();
       queue_.pop();
-      // Entries whose edge has moved or gone are stale.
+      // An entry is stale if its edge was moved or removed.
       if (around_[a].empty() || around_[b].empty() || length2 != squared_length(a, b)) continue;
       if (!collapse(a, b)) continue;
       --left;
@@ -84,7 +84,7 @@ class Remesher {
     for (const Index t : around_[v]) {
       const Triangle& c = s_.triangle[t];
       const int k = c[0] == v ? 0 : c[1] == v ? 1 : 2;
-      ring.push_back(c[(k + 1) % 3]);  // closed and manifold: each neighbour follows v once
+      ring.push_back(c[(k + 1) % 3]);  // each neighbour follows v once, as the mesh is manifold
     }
     return ring;
   }
@@ -96,13 +96,13 @@ class Remesher {
     }
   }
 
-  /// Shape of a triangle seen against the outward direction: 0.87 for an equilateral one, 0 for one
-  /// without area, negative for one turned over.
+  /// Quality of a triangle seen against the outward direction: 0.87 if it is equilateral, 0 if
+  /// degenerate, negative if inverted.
   static double quality(Vec3d a, Vec3d b, Vec3d c, Vec3d outward) {
     const Vec3d ab = b - a, bc = c - b, ca = a - c;
     return dot(cross(ab, -ca), outward) / std::max({dot(ab, ab), dot(bc, bc), dot(ca, ca)});
   }
-  /// The same with one corner put at `p`.
+  /// Quality of a triangle with one corner moved to `p`.
   double quality(const Triangle& t, Index corner, const SurfacePoint& p) const {
     std::array<Vec3d, 3> x;
     for (int k = 0; k < 3; ++k) x[k] = t[k] == corner ? p.position : s_.position[t[k]];
@@ -110,8 +110,9 @@ class Remesher {
   }
   SurfacePoint point(Index v) const { return {s_.position[v], s_.normal[v]}; }
 
-  /// Merges b into a. Refused where the mesh would stop being manifold (the link condition: a and
-  /// b share exactly the two vertices opposite their edge) or a triangle would turn over.
+  /// Merges b into a. @returns false, with the mesh unchanged, if the mesh would not be manifold
+  /// (link condition: a and b share exactly the two vertices opposite their edge) or a triangle
+  /// would be inverted.
   bool collapse(Index a, Index b) {
     std::vector<Index> ring_a = neighbours(a), ring_b = neighbours(b);
     if (std::find(ring_a.begin(), ring_a.end(), b) == ring_a.end()) return false;
@@ -154,8 +155,8 @@ class Remesher {
     }
   }
 
-  /// Flips the edge from corner k of triangle t if that makes the smallest angles larger
-  /// (Delaunay: the angles opposite the edge sum to more than 180 degrees).
+  /// Flips the edge from corner k of triangle t if that increases the smallest angle (Delaunay
+  /// criterion: the angles opposite the edge sum to more than 180 degrees).
   void flip(Index t, int k) {
     const Triangle one = s_.triangle[t];
     const Index a = one[k], b = one[(k + 1) % 3], c = one[(k + 2) % 3];
@@ -195,7 +196,7 @@ class Remesher {
     const Vec3d step = mean / static_cast<double>(ring.size()) - s_.position[v];
     const Vec3d n = s_.normal[v];
     const SurfacePoint p = body_.project(s_.position[v] + 0.7 * (step - dot(step, n) * n));
-    double before = 0.3, after = 1;  // above 0.3 a triangle may get worse for its neighbours' good
+    double before = 0.3, after = 1;  // a triangle may lose quality to its neighbours down to 0.3
     for (const Index t : around_[v]) {
       before = std::min(before, quality(s_.triangle[t], v, point(v)));
       after = std::min(after, quality(s_.triangle[t], v, p));
@@ -205,7 +206,7 @@ class Remesher {
 
   const ImplicitBody& body_;
   Surface s_;
-  std::vector<std::vector<Index>> around_;  ///< Triangles at each vertex; none: the vertex is gone.
+  std::vector<std::vector<Index>> around_;  ///< Triangles at each vertex; none if it was removed.
   std::priority_queue<Edge, std::vector<Edge>, std::greater<>> queue_;
 };
 
@@ -215,7 +216,7 @@ Surface mesh_body(const ImplicitBody& body, Index vertices) {
   const Vec3d extent = body.high() - body.low();
   double cell = std::max({extent.x, extent.y, extent.z}) / 24;
   Surface fine = polygonise(body, cell);
-  // Between 1.6 and 2.4 times as many vertices as wanted: enough to choose from.
+  // The fine surface has 1.6 to 2.4 times the requested number of vertices.
   for (int attempt = 0; attempt < 20; ++attempt) {
     const double ratio = static_cast<double>(fine.position.size()) / vertices;
     if (ratio > 1.6 && ratio < 2.4) break;

@@ -15,7 +15,7 @@
 namespace phyxel {
 namespace {
 
-/// n of "cuda:n".
+/// The number n of "cuda:n", 0 for "cuda"; unset for other names.
 std::optional<int> device_number(const std::string& name) {
   if (name == "cuda") return 0;
   if (name.rfind("cuda:", 0) != 0 || name.size() < 6 || name.size() > 8) return std::nullopt;
@@ -25,7 +25,7 @@ std::optional<int> device_number(const std::string& name) {
   return std::stoi(name.substr(5));
 }
 
-/// The GPU, or why it is none.
+/// The GPU of that number, or the reason why it cannot be used.
 ChosenDevice device_if_usable(int number) {
   ChosenDevice chosen;
   try {
@@ -65,11 +65,11 @@ ChosenDevice choose_device(const Ranks& ranks, const std::string& name, const st
   std::string why;
   const auto found = static_cast<int>(cuda_devices(&why).size());
   const int next = ranks.host_rank() % std::max(1, found);
-  // None is an error that names the reason.
+  // A missing GPU is an error that names the reason.
   if (name == "cuda") return ranks.agreed([&] { return ChosenDevice{use_cuda_device(next), ""}; });
   ChosenDevice chosen = found > 0 ? device_if_usable(next) : ChosenDevice{std::nullopt, why};
   if (ranks.smallest(std::int64_t{chosen.gpu.has_value()}) == 1) return chosen;
-  if (chosen.gpu) chosen.why_no_gpu = "another rank has none";
+  if (chosen.gpu) chosen.why_no_gpu = "another rank has no GPU";
   chosen.gpu.reset();
   return chosen;
 }

@@ -21,7 +21,7 @@ namespace phyxel {
 namespace {
 
 std::unique_ptr<MpiCommunicator> communicator_of(int& argc, char**& argv) {
-  // One rank starts no MPI: it may be there without working outside of mpirun.
+  // A single rank does not start MPI, which may be installed and yet fail outside mpirun.
   if (!launched_as_rank()) return std::make_unique<MpiCommunicator>();
   return std::make_unique<MpiCommunicator>(argc, argv);
 }

@@ -19,7 +19,7 @@ std::vector<Partitioner> candidates_of(const std::string& name) {
   return {Partitioner::bisection, Partitioner::curve, Partitioner::metis};
 }
 
-/// Of all bodies, as the whole model numbers their surfels.
+/// The triangles of all bodies, with global ids of surfels.
 std::vector<Triangle> triangles_of(const std::vector<Surface>& surfaces) {
   std::vector<Triangle> triangles;
   Index shift = 0;
@@ -90,7 +90,7 @@ std::unique_ptr<Backend> SharedModel::make_backend(Precision precision, int thre
     return phyxel::make_backend(here_, precision, device_, threads, transport);
   };
   ranks_.collectively([&] { check_transport_name(transport); });
-  // Ranks' GPUs meet while their backends are made; what fails there fails on one rank.
+  // Construction of GPU backends is collective, and an error there ends one rank.
   return device_.gpu ? make() : ranks_.agreed(make);
 }
 
@@ -111,10 +111,10 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   Header now{};
   ranks_.collectively([&] {
     if (length < 1)
-      throw InputError(fmt::format("{} phyxels at a time: allowed is 1 or more", length));
+      throw InputError(fmt::format("{} phyxels at a time; allowed: 1 or more", length));
     if (!ranks_.leads()) return;
     if (!wrote(checkpoint->info()) || checkpoint->phyxels() != here_.global_count()) {
-      throw InputError("the checkpoint is of another model: allowed is the one that wrote it");
+      throw InputError("the checkpoint belongs to another model; allowed: the model that wrote it");
     }
     const State header = checkpoint->state(0, 0);
     now = {header.step, header.time, header.dt, header.history_interval, header.looks};

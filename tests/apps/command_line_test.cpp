@@ -88,7 +88,7 @@ TEST_F(CommandLine, FilesOfAnotherKindAreToldApart) {
       {"cow.OBJ", "is a mesh; \"phyxel sample cow.OBJ"},
       {"scene.toml", "is a scene; \"phyxel run scene.toml\""},
       {"x.h5", "is an HDF5 file (a body, frame or checkpoint); \"phyxel info x.h5\""},
-      {"x.csv", "is a table; \"phyxel report x.csv\""},
+      {"x.csv", "is a table"},
       {"x.hdf.series", "is a series of frames; \"phyxel render x.hdf.series\""},
       {"out", "is a folder; \"phyxel info out\""}};
   const struct {
@@ -97,7 +97,6 @@ TEST_F(CommandLine, FilesOfAnotherKindAreToldApart) {
     std::string allowed;
   } commands[] = {
       {{"run"}, {}, {"scene.toml"}, "a scene (.toml)"},
-      {{"check"}, {}, {"scene.toml"}, "a scene (.toml)"},
       {{"sample"}, {"--phyxels", "9", "--out", "b.h5"}, {"cow.OBJ"}, "a mesh (.obj, .ply, .stl)"},
       {{"render"},
        {},
@@ -106,8 +105,8 @@ TEST_F(CommandLine, FilesOfAnotherKindAreToldApart) {
       {{"export"}, {"--single", "one.hdf"}, {"x.hdf.series"}, "a series (.series)"},
       {{"report"},
        {"--out", "r.html"},
-       {"x.h5", "x.hdf.series", "out", "x.csv"},
-       "a run's folder, a series (.series), an HDF5 file of phyxel's, a table (.csv)"},
+       {"x.h5", "x.hdf.series", "out"},
+       "a run's folder, a series (.series), an HDF5 file of phyxel"},
       {{"info"},
        {},
        {"x.h5", "x.hdf.series", "out", "scene.toml", "cow.OBJ"},

@@ -34,7 +34,7 @@ class Completion : public test::Program {
     return std::system((std::string("command -v ") + shell + " >/dev/null").c_str()) == 0;
   }
   void expect_what_is_offered() const {
-    EXPECT_THAT(offered({"che"}), ElementsAre("check"));
+    EXPECT_THAT(offered({"doc"}), ElementsAre("doctor"));
     EXPECT_THAT(offered({"bench", "st"}), ElementsAre("step"));
     EXPECT_THAT(offered({"run", "--st"}), ElementsAre("--step"));
     EXPECT_THAT(offered({"accuracy", "hard", "--pre"}), ElementsAre("--precision"));

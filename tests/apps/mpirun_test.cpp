@@ -139,9 +139,9 @@ density = 1000
 )");
   launcher_.clear();
   const std::string warning = "vertices that no triangle uses";
-  ASSERT_THAT(run({"check", "t.toml"}).out, HasSubstr(warning));
+  ASSERT_THAT(run({"run", "t.toml", "--dry-run"}).out, HasSubstr(warning));
   use_ranks(2);
-  const Outcome outcome = run({"check", "t.toml"});
+  const Outcome outcome = run({"run", "t.toml", "--dry-run"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::size_t at = outcome.out.find(warning);
   ASSERT_NE(at, std::string::npos) << outcome.out;
@@ -246,8 +246,8 @@ TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
 /// The plan of two ranks is that of one, and no file is written.
 TEST_F(Mpirun, CheckTellsThePlanOnce) {
   write_scene();
-  const Outcome one = run_on(0, {"check", "scene.toml", "--json"});
-  const Outcome two = run_on(2, {"check", "scene.toml", "--json"});
+  const Outcome one = run_on(0, {"run", "scene.toml", "--dry-run", "--json"});
+  const Outcome two = run_on(2, {"run", "scene.toml", "--dry-run", "--json"});
   ASSERT_EQ(two.code, 0) << two.err;
   const auto alone = nlohmann::json::parse(one.out), shared = nlohmann::json::parse(two.out);
   for (const char* key : {"phyxels", "surfels", "steps", "time_step_s", "neighbours_per_phyxel"}) {
@@ -414,7 +414,7 @@ TEST_F(Mpirun, StuckRankIsNamedAndMayComeOn) {
     const std::vector<pid_t> ranks = children_of(mpirun);
     ASSERT_EQ(ranks.size(), 2u);
     kill(ranks[which], SIGSTOP);
-    const std::string name = "rank " + std::to_string(which) + " of 2 has not come on";
+    const std::string name = "rank " + std::to_string(which) + " of 2 has made no progress";
     std::string said;
     for (int wait = 0; wait < 2000 && count_of(name, said) == 0; ++wait) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -424,7 +424,7 @@ TEST_F(Mpirun, StuckRankIsNamedAndMayComeOn) {
     const Outcome outcome = finish(mpirun);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_EQ(count_of(name, outcome.err), 1) << outcome.err;
-    EXPECT_EQ(count_of("has not come on", outcome.err), 1) << outcome.err;
+    EXPECT_EQ(count_of("has made no progress", outcome.err), 1) << outcome.err;
   }
 }
 

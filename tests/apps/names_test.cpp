@@ -39,7 +39,7 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
 )");
   write(odd + ".obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
   const std::string scene = odd + ".toml", out = odd + "_out";
-  EXPECT_EQ(json_of({"check", scene})["scene"], shown + ".toml");
+  EXPECT_EQ(json_of({"run", scene, "--dry-run"})["scene"], shown + ".toml");
   EXPECT_EQ(json_of({"run", scene, "--out", out})["directory"], shown + "_out");
   EXPECT_TRUE(json_of({"run", scene, "--out", out, "--resume", "auto"}).contains("finished"));
   EXPECT_EQ(json_of({"render", out})["pictures"][0], shown + "_out/pictures/frame_000000.png");

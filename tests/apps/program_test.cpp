@@ -273,7 +273,7 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
       {{"frobnicate"}, "phyxel: error: frobnicate: unknown command; phyxel --help lists them\n"},
       {{"run", "thin.toml"},
        "phyxel: error: thin.toml:3:1: body \"flat\": flat.obj: the surface encloses no volume: "},
-      {{"check", "beam.toml", "--step", "1"},
+      {{"run", "beam.toml", "--dry-run", "--step", "1"},
        "phyxel: error: beam.toml: time.step = 1 s is unstable"},
       {{"run", "missing.toml"}, "missing.toml: no such file"},
       {{"run", "."}, "error: .: is a folder; "},
@@ -289,7 +289,7 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
       {{"run", "beam.toml", "--threads", "0"}, "--threads 0: out of range: allowed 1 to"},
       {{"run", "beam.toml", "--step", "nan"}, "--step nan: out of range: allowed > 0"},
       {{"run", "beam.toml", "--out", "/proc/phyxel"}, "/proc/phyxel: the output folder cannot"},
-      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5: the output folder cannot be made"},
+      {{"run", "beam.toml", "--out", "kept.h5"}, "kept.h5: the output folder cannot be created"},
       {{"sample", "missing.obj", "--phyxels", "10", "--out", "a.h5"}, "missing.obj: no such file"},
       {{"sample", "empty.obj", "--phyxels", "10", "--out", "a.h5"}, "empty.obj: the file is empty"},
       {{"sample", "nan.obj", "--phyxels", "10", "--out", "a.h5"},
@@ -360,16 +360,16 @@ TEST_F(Program, WaitingThreadsSleepSoonUnlessTheUserSaysOtherwise) {
 
 /// On a terminal, where stderr is shown beside stdout.
 TEST_F(Program, ColoursAreForTerminalsOnly) {
-  EXPECT_THAT(run({"check", "none.toml"}).err, Not(HasSubstr("\033[")));
+  EXPECT_THAT(run({"run", "none.toml", "--dry-run"}).err, Not(HasSubstr("\033[")));
   write("on_terminal.sh", "exec script -qec \"$*\" /dev/null\n");
   launcher_ = {"/bin/sh", "on_terminal.sh"};
   environment_ = {{"TERM", "xterm"}, {"NO_COLOR", ""}};
-  EXPECT_THAT(run({"check", "none.toml"}).out, HasSubstr("\033[31merror: \033[0m"));
+  EXPECT_THAT(run({"run", "none.toml", "--dry-run"}).out, HasSubstr("\033[31merror: \033[0m"));
   environment_ = {{"TERM", "xterm"}, {"NO_COLOR", "1"}};
-  EXPECT_THAT(run({"check", "none.toml"}).out,
+  EXPECT_THAT(run({"run", "none.toml", "--dry-run"}).out,
               AllOf(HasSubstr("error: none.toml"), Not(HasSubstr("\033["))));
   environment_ = {{"TERM", "dumb"}, {"NO_COLOR", ""}};
-  EXPECT_THAT(run({"check", "none.toml"}).out,
+  EXPECT_THAT(run({"run", "none.toml", "--dry-run"}).out,
               AllOf(HasSubstr("error: none.toml"), Not(HasSubstr("\033["))));
 }
 
@@ -432,7 +432,7 @@ TEST_F(Program, DryRunTellsThePlanOfTheRunAndWritesNothing) {
   }
   EXPECT_GT(plan["bytes"], 0);
   EXPECT_GT(plan["forecast_seconds"], 0.0);
-  EXPECT_THAT(run({"check", "beam.toml"}).out, HasSubstr("forecast"));
+  EXPECT_THAT(run({"run", "beam.toml", "--dry-run"}).out, HasSubstr("forecast"));
   // Beside an earlier trajectory, too, which stays.
   EXPECT_EQ(run({"run", "beam.toml", "--dry-run"}).code, 0);
   EXPECT_EQ(run({"run", "beam.toml"}).code, 2);
@@ -450,7 +450,8 @@ TEST_F(Program, SamplesAMeshAndRunsIt) {
   write("few.toml",
         "[time]\nend = 1\n[[body]]\nmesh = \"gem.obj\"\nphyxels = 9\n[body.material]\n"
         "young = 1e5\npoisson = 0.34\ndensity = 1000\n");
-  EXPECT_THAT(run({"check", "few.toml"}).out, HasSubstr("gem.obj: all phyxels lie inside: 9"));
+  EXPECT_THAT(run({"run", "few.toml", "--dry-run"}).out,
+              HasSubstr("gem.obj: all phyxels lie inside: 9"));
   write("gem.toml", R"(
 [time]
 end = 0.02

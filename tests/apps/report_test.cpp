@@ -311,19 +311,6 @@ TEST_F(Reports, OneFamilyAloneIsShown) {
   EXPECT_EQ(one["frames"].size(), 1u);
 }
 
-TEST_F(Reports, MeasurementsBecomeTables) {
-  write("a.csv", "# program: phyxel\nn,error,seconds\n1,0.1,2\n2,inf,3\n");
-  write("b.csv", "way\n<b>\n");
-  const Outcome done = run({"report", "a.csv", "b.csv", "-o", "both.html", "--json"});
-  ASSERT_EQ(done.code, 0) << done.err;
-  EXPECT_EQ(json::parse(done.out)["tables"], 2);
-  const json data = data_of(text_of(folder_ / "both.html"));
-  EXPECT_EQ(data["tables"][0]["rows"][1][1], "inf");
-  EXPECT_EQ(data["tables"][1]["rows"][0][0], "<b>");
-  ASSERT_EQ(run({"report", folder_.string(), "-o", "folder.html"}).code, 0);  // all of it
-  EXPECT_EQ(data_of(text_of(folder_ / "folder.html"))["tables"].size(), 2u);
-}
-
 TEST_F(Reports, WrongRequestsAreRefused) {
   run_beam();
   write("a.csv", "n\n1\n");
@@ -334,13 +321,13 @@ TEST_F(Reports, WrongRequestsAreRefused) {
     EXPECT_THAT(outcome.err, HasSubstr(why));
   };
   refused({"report", "nowhere"}, "nowhere: no such file or folder");
-  refused({"report", "out", "a.csv"}, "one run, or any number of tables");
+  refused({"report", "a.csv"}, "a.csv: is a table; allowed here: a run's folder");
   refused({"report", "out", "-o", "kept.html"}, "kept.html: exists already and is kept");
   refused({"report", "kept.html"}, "kept.html");
   EXPECT_EQ(text_of(folder_ / "kept.html"), "mine");
 }
 
-TEST_F(Reports, ABrowserDrawsThem) {
+TEST_F(Reports, ABrowserDrawsAReplay) {
   PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
   run_beam();
   page_of();
@@ -352,11 +339,6 @@ TEST_F(Reports, ABrowserDrawsThem) {
   EXPECT_GT(drawn, 0.02);
   EXPECT_LT(drawn, 0.7);
   EXPECT_THAT(text_of(folder_ / "dom.html"), HasSubstr("kinetic"));
-  write("t.csv", "n,error,seconds\n1,0.1,2\n2,0.05,3\n3,0.2,4\n");
-  ASSERT_EQ(run({"report", "t.csv"}).code, 0);
-  const std::string results = seen_by_browser(folder_ / "t.html");
-  EXPECT_THAT(results, HasSubstr("data-state=\"drawn\""));
-  EXPECT_THAT(results, HasSubstr("data-circles=\"3\""));
 }
 
 }  // namespace

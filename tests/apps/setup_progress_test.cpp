@@ -57,7 +57,7 @@ const std::vector<std::string> of_meshes{"reading the mesh",      "inspecting th
 
 TEST_F(SetupLines, EachStageOfCheckAndSampleIsShownToItsEnd) {
   show_all();
-  const Outcome check = run({"check", "scene.toml"});
+  const Outcome check = run({"run", "scene.toml", "--dry-run"});
   ASSERT_EQ(check.code, 0) << check.err;
   EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of(of_meshes)));
   EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of({"distances between phyxels", "neighbours",
@@ -70,9 +70,9 @@ TEST_F(SetupLines, EachStageOfCheckAndSampleIsShownToItsEnd) {
 
 TEST_F(SetupLines, ShortStagesAndSilentCommandsLeaveNothing) {
   environment_ = {{"PHYXEL_PROGRESS_SECONDS", "60"}};  // however slow this machine is
-  EXPECT_THAT(run({"check", "scene.toml"}).err, IsEmpty());
+  EXPECT_THAT(run({"run", "scene.toml", "--dry-run"}).err, IsEmpty());
   show_all();
-  EXPECT_THAT(run({"check", "scene.toml", "--json"}).err, IsEmpty());
+  EXPECT_THAT(run({"run", "scene.toml", "--dry-run", "--json"}).err, IsEmpty());
   EXPECT_THAT(run({"info", "scene.toml", "--partition", "2", "--json"}).err, IsEmpty());
   EXPECT_THAT(run({"info", "scene.toml", "--partition", "2"}).err, Not(IsEmpty()));
   EXPECT_THAT(run({"run", "scene.toml", "--until", "0.001", "--quiet"}).err, IsEmpty());
@@ -86,7 +86,7 @@ TEST_F(SetupLines, OneRankShowsThemForAll) {
   show_all();
   environment_.emplace_back("ASAN_OPTIONS", "detect_leaks=0");  // Open MPI's own
   launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", "2"};
-  const Outcome check = run({"check", "scene.toml"});
+  const Outcome check = run({"run", "scene.toml", "--dry-run"});
   ASSERT_EQ(check.code, 0) << check.err;
   const std::vector<std::string> lines = lines_of(check.err);
   for (const std::string& end : ends_of({"reading the mesh", "volumes of phyxels", "making phyxels",

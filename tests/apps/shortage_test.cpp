@@ -186,9 +186,10 @@ TEST_F(Shortage, ACheckpointThatCannotBeWrittenEndsTheRunBetweenFrames) {
   write("out", "a file where the folder was");
   const Outcome outcome = finish(child);
   EXPECT_EQ(outcome.code, 74) << outcome.out << outcome.err;
-  // The series, the log and the folder are brought to the disk first; it may go between any two.
+  // The series, the log and the folder are flushed first; the folder may vanish between any two.
+  // any two.
   EXPECT_THAT(outcome.err,
-              ContainsRegex("error: out(/[a-z_0-9.]+)?: (cannot be brought to the disk|cannot be "
+              ContainsRegex("error: out(/[a-z_0-9.]+)?: (cannot be flushed to the disk|cannot be "
                             "written|[0-9]+ bytes could not be written)"));
   EXPECT_TRUE(latest_checkpoint(folder_ / "kept").has_value());
 }

@@ -14,7 +14,7 @@ std::string Run::with_last_good_state(const char* error, Progress& progress) {
     write_state();
     writer_.finish();
   } catch (const Error& writing) {
-    // What this rank alone knows of must end all.
+    // An error of this rank alone must end all ranks.
     if (ranks().size() > 1 && !dynamic_cast<const AgreedError*>(&writing)) throw;
     return fmt::format("{}; the last good state could not be written: {}", error, writing.what());
   }
@@ -28,14 +28,14 @@ std::shared_ptr<const GoodState> Run::good_state(const Diagnostics& now) const {
 
 bool Run::core_is_left() const {
   if (device_.gpu) return true;
-  const int threads = backend_->threads();  // of each rank alike
+  const int threads = backend_->threads();  // equal on all ranks
   return threads < omp_get_num_procs() &&
          threads * ranks().host_size() < sysconf(_SC_NPROCESSORS_ONLN);
 }
 
 void Run::hand_over(std::shared_ptr<const Moment> moment, FileWriter::Job job) {
   writer_.submit(std::move(moment), std::move(job));
-  // The first rank's, which writes.
+  // The first rank decides, since it writes.
   if (ranks().broadcast(std::vector<char>{core_is_left()}).front() == 0) writer_.finish();
 }
 

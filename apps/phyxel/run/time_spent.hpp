@@ -1,4 +1,4 @@
-/// Seconds of a run, by what they were spent on.
+/// Time of a run, by stage.
 #pragma once
 
 #include <string_view>
@@ -10,7 +10,8 @@
 
 namespace phyxel::app {
 
-/// Where a run's seconds go, in the order of their first ones; spans of its profile, too.
+/// Accumulated time of stages, in the order of their first occurrence. Stages also are spans of the
+/// profile.
 class TimeSpent {
  public:
   template <class Work>

@@ -43,7 +43,7 @@ struct Heard {
 
 class Stages : public test::Folder {
  protected:
-  /// All that `phyxel check` sets up.
+  /// Sets up what `phyxel run --dry-run` does.
   static void set_up(const Scene& scene) {
     const Model model = build_model(scene);
     step_limit(model, 1);

@@ -1,5 +1,5 @@
-/// Wrong scenes of every kind, made from the table of keys and taken as far as `phyxel check` takes
-/// them: whatever refuses one names its file, the key or body, and the value.
+/// Wrong scenes of every kind, made from the table of keys and taken as far as `phyxel run
+/// --dry-run` takes them: the error names the file, the key or body, and the value.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

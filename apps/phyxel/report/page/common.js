@@ -1,10 +1,10 @@
 'use strict';
-// What both pages share: the data, elements, numbers, plots.
+// The data, elements, numbers and plots of the page.
 const data = JSON.parse(document.getElementById('data').textContent);
 const colours = ['#1f6fb2', '#d1495b', '#2f9e6e', '#e09f1f', '#7b5cc4', '#11a0b5', '#8a6b4d', '#c4559f', '#6b7a8f', '#9aa812'];
 
 function element(name, attributes = {}, ...children) {
-  const svg = ['svg', 'path', 'line', 'text', 'circle', 'g', 'rect', 'title'].includes(name);
+  const svg = ['svg', 'path', 'line', 'text'].includes(name);
   const made = svg ? document.createElementNS('http://www.w3.org/2000/svg', name) : document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
     if (key.startsWith('on')) made.addEventListener(key.slice(2), value);
@@ -14,7 +14,7 @@ function element(name, attributes = {}, ...children) {
   return made;
 }
 
-/// Few digits, as a reader wants them.
+/// A number with four digits.
 function short(value) {
   if (!Number.isFinite(value)) return String(value);
   const size = Math.abs(value);
@@ -23,16 +23,8 @@ function short(value) {
   return String(+value.toPrecision(4));
 }
 
-/// Round numbers between two, about `count` of them.
-function ticks(low, high, count, log) {
-  if (log) {
-    const from = Math.ceil(Math.log10(low) - 1e-9), to = Math.floor(Math.log10(high) + 1e-9);
-    const step = Math.max(1, Math.ceil((to - from + 1) / count));
-    const all = [];
-    for (let k = from; k <= to; k += step) all.push(10 ** k);
-    if (all.length >= 2) return all;
-    log = false;
-  }
+/// About `count` round numbers between two numbers.
+function ticks(low, high, count) {
   const raw = (high - low) / count, unit = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map(m => m * unit).find(s => s >= raw) || raw;
   const all = [];
@@ -40,34 +32,31 @@ function ticks(low, high, count, log) {
   return all;
 }
 
-/// Curves or points over axes. chart: {x, y, logX, logY, series: [{label, x, y, titles, dashed, points, colour}],
-/// seek}. Returns the element, with `now(x)` to move a line to x.
+/// Curves over axes. chart: {x, y, series: [{label, x, y, dashed, colour}], seek}. Returns the element, whose `now(x)`
+/// moves a line to x.
 function plot(chart) {
   const width = 640, height = 300, left = 76, right = 12, top = 12, bottom = 42;
-  const usable = (v, log) => Number.isFinite(v) && (!log || v > 0);
-  const range = (axis, log) => {
+  const range = axis => {
     let low = Infinity, high = -Infinity;
     for (const s of chart.series) {
       s[axis].forEach((v, k) => {
-        if (!usable(s.x[k], chart.logX) || !usable(s.y[k], chart.logY)) return;
+        if (!Number.isFinite(s.x[k]) || !Number.isFinite(s.y[k])) return;
         low = Math.min(low, v); high = Math.max(high, v);
       });
     }
-    if (low > high) return log ? [0.1, 10] : [0, 1];
-    if (log) return low === high ? [low / 2, high * 2] : [low / 1.15, high * 1.15];
+    if (low > high) return [0, 1];
     const pad = low === high ? Math.abs(low) * 0.1 || 1 : (axis === 'y' ? 0.05 * (high - low) : 0);
     return [low - pad, high + pad];
   };
-  const [x0, x1] = range('x', chart.logX), [y0, y1] = range('y', chart.logY);
-  const part = (v, low, high, log) => log ? Math.log(v / low) / Math.log(high / low) : (v - low) / (high - low);
-  const px = v => left + part(v, x0, x1, chart.logX) * (width - left - right);
-  const py = v => height - bottom - part(v, y0, y1, chart.logY) * (height - top - bottom);
+  const [x0, x1] = range('x'), [y0, y1] = range('y');
+  const px = v => left + (v - x0) / (x1 - x0) * (width - left - right);
+  const py = v => height - bottom - (v - y0) / (y1 - y0) * (height - top - bottom);
   const svg = element('svg', {class: 'plot', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `${chart.y} over ${chart.x}`});
-  for (const v of ticks(x0, x1, 6, chart.logX)) {
+  for (const v of ticks(x0, x1, 6)) {
     svg.append(element('line', {class: 'grid', x1: px(v), x2: px(v), y1: top, y2: height - bottom}),
                element('text', {x: px(v), y: height - bottom + 16, 'text-anchor': 'middle'}, short(v)));
   }
-  for (const v of ticks(y0, y1, 5, chart.logY)) {
+  for (const v of ticks(y0, y1, 5)) {
     svg.append(element('line', {class: 'grid', x1: left, x2: width - right, y1: py(v), y2: py(v)}),
                element('text', {x: left - 6, y: py(v) + 4, 'text-anchor': 'end'}, short(v)));
   }
@@ -77,17 +66,11 @@ function plot(chart) {
     const colour = s.colour || colours[n % colours.length];
     let path = '', drawing = false;
     s.x.forEach((v, k) => {
-      const fine = usable(v, chart.logX) && usable(s.y[k], chart.logY);
+      const fine = Number.isFinite(v) && Number.isFinite(s.y[k]);
       if (fine) path += `${drawing ? 'L' : 'M'}${px(v).toFixed(1)} ${py(s.y[k]).toFixed(1)}`;
       drawing = fine;
     });
-    if (!s.points) svg.append(element('path', {d: path, fill: 'none', stroke: colour, 'stroke-width': 1.8, ...(s.dashed ? {'stroke-dasharray': '5 4'} : {})}));
-    if (s.points) {
-      s.x.forEach((v, k) => {
-        if (!usable(v, chart.logX) || !usable(s.y[k], chart.logY)) return;
-        svg.append(element('circle', {cx: px(v), cy: py(s.y[k]), r: 4, fill: colour, 'fill-opacity': 0.8}, element('title', {}, s.titles ? s.titles[k] : '')));
-      });
-    }
+    svg.append(element('path', {d: path, fill: 'none', stroke: colour, 'stroke-width': 1.8, ...(s.dashed ? {'stroke-dasharray': '5 4'} : {})}));
   });
   const line = element('line', {class: 'now', y1: top, y2: height - bottom, visibility: 'hidden'});
   svg.append(line);
@@ -106,9 +89,4 @@ function plot(chart) {
     line.setAttribute('x1', px(x)); line.setAttribute('x2', px(x));
   };
   return whole;
-}
-
-/// Rows of (name, value).
-function facts(rows) {
-  return element('table', {}, ...rows.map(([name, value]) => element('tr', {}, element('td', {}, name), element('td', {}, value))));
 }
