@@ -24,7 +24,8 @@ struct Material {
   std::map<std::string, double> parameters = {};
   /// Stiffness k_v [Pa] of volume conservation (Mueller et al. 2004); 0: no such term.
   double volume_stiffness = 0;
-  double damping = 0;  ///< Mass-proportional damping [1/s]; 0: none.
+  double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
+  double viscosity = 0;  ///< Relaxation time τ of Kelvin–Voigt damping [s]; 0: none.
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
   /// support for the body. Unset: `default_hourglass`, in scene files and in code alike; the parts
   /// of a model have it set.
