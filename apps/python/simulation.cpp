@@ -13,7 +13,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
-#include "phyxel/solver.hpp"
+#include "phyxel/step_control.hpp"
 #include "scene/scene_error.hpp"
 #include "stages.hpp"
 
@@ -125,7 +125,7 @@ class Simulation {
           (solver_->steps() / plan_.steps_per_frame + 1) * plan_.steps_per_frame;
       const int halvings = plan_.halvings;
       take(std::min(last, frame) - solver_->steps());
-      last <<= plan_.halvings - halvings;
+      last = in_present_steps(last, plan_.halvings - halvings);
       if (recorder_) write_one();
       told_.reach_time(solver_->time());
     }
@@ -279,7 +279,7 @@ class Simulation {
 
   void start(const State& state) {
     solver_ = std::make_unique<Solver>(model_, *backend_, state, scene_.solver.method);
-    shortener_.emplace(model_, *backend_, plan_);
+    control_.emplace(model_, *backend_, plan_);
     solver_->observe(
         [this, last = std::chrono::steady_clock::now()](const NewtonProgress& newton) mutable {
           if (std::chrono::steady_clock::now() - last < std::chrono::milliseconds(100)) return true;
@@ -299,16 +299,23 @@ class Simulation {
     if (backend_->external_forces().empty()) watch_.emplace(model_, now);
   }
 
+  /// A number of steps, counted anew after the step was halved so many times, or doubled where that
+  /// is negative. A step of twice the size may go beyond: half of one is not taken.
+  static std::int64_t in_present_steps(std::int64_t steps, int halvings) {
+    return halvings >= 0 ? steps << halvings : -((-steps) >> -halvings);
+  }
+
   /// So many steps of the present size: of twice as many, once they are halved.
   void take(std::int64_t count) {
     for (std::int64_t k = 0, taken = 1; k < count; k += taken) {
-      const int made = shortener_->look(*solver_, plan_.halvings);
+      const int made = control_->look(*solver_, plan_.halvings);
       plan_.halve(made);
-      count = k + ((count - k) << made);
+      count = k + in_present_steps(count - k, made);
+      looked_ = in_present_steps(looked_, made);
       try {
         const std::int64_t end = solver_->steps() + (count - k);
         taken = solver_->steps_to(
-            std::min({end, looked_ + watch_interval, shortener_->next_look(*solver_)}));
+            std::min({end, looked_ + watch_interval, control_->next_look(*solver_)}));
         naming(scene_, [&] { solver_->step(static_cast<int>(taken)); });
       } catch (const InterruptedError&) {
         const py::gil_scoped_acquire here;
@@ -330,8 +337,8 @@ class Simulation {
     const Diagnostics now = diagnose(model_, *backend_, solver_->now());
     looked_ = solver_->steps();
     if (watch_) {
-      watch_->check(now, &*shortener_);
-      shortener_->see(*solver_);
+      watch_->check(now, &*control_);
+      control_->see(*solver_);
     } else if (now.bad_phyxel >= 0) {
       throw DivergedError(fmt::format("step {}, t = {:g} s: the state of phyxel {} is not finite",
                                       now.step, now.time, now.bad_phyxel));
@@ -345,7 +352,7 @@ class Simulation {
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
   std::unique_ptr<Solver> solver_;
-  std::optional<StepShortener> shortener_;
+  std::optional<StepControl> control_;
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::int64_t looked_ = 0;

@@ -146,10 +146,11 @@ std::vector<SceneKey> run_keys() {
   return {
       {.section = "time", .name = "end", .unit = "s", .required = true, .range = {0, 1e9, true},
        .meaning = "Simulated time."},
-      {.section = "time", .name = "step", .type = KeyType::number_or_auto, .unit = "s",
-       .fallback = "\"auto\"", .range = time_span(),
-       .meaning = "Time step. \"auto\": `safety` times the largest stable step, which is found "
-           "from the stiffness of the bodies; three digits of it. A given step above the largest "
+      {.section = "time", .name = "step", .type = KeyType::number_or_adaptive, .unit = "s",
+       .fallback = "\"adaptive\"", .range = time_span(),
+       .meaning = "Time step. \"adaptive\" (or \"auto\"): `safety` times the largest stable step, which "
+           "is found from the stiffness of the bodies; three digits of it. It is halved where a law "
+           "stiffens, and doubled again later. A given step is only halved; one above the largest "
            "is refused. The method \"implicit\" needs one, of any size."},
       {.section = "time", .name = "safety", .fallback = "0.8", .range = strictly_between(0, 1),
        .meaning = "Fraction of the largest stable step; not with a given `step`."},

@@ -14,8 +14,8 @@ enum class KeyType {
   text,
   path,  ///< Text, resolved from the scene file's folder.
   integer,
-  number,          ///< An integer or a float; never NaN or infinite.
-  number_or_auto,  ///< A number or "auto".
+  number,              ///< An integer or a float; never NaN or infinite.
+  number_or_adaptive,  ///< A number or "adaptive", for which "auto" stands, too.
   boolean,
   choice,   ///< One of `words`.
   choices,  ///< A list of `words`, each at most once.

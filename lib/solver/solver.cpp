@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "phyxel/equilibrium.hpp"
-#include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
@@ -141,48 +140,6 @@ void Solver::step_by_newton() {
       break;
     }
   }
-}
-
-void Looks::halve_step() {
-  next *= 2;
-  if (last >= 0) last *= 2;
-  if (measured >= 0) measured *= 2;
-  measured_share /= 4;
-  change /= 2;
-}
-
-void Solver::halve_step() {
-  if (!model_ || method_ != Method::verlet) {
-    throw InputError("only Verlet's steps of a solver that knows its model can be halved");
-  }
-  const Model& model = *model_;
-  State state = this->state();
-  std::vector<Vec3d> force;
-  backend_.internal_forces(force);
-  const std::span<const Vec3d> external = backend_.external_forces();
-  for (std::size_t i = 0; i < external.size(); ++i) force[i] += external[i];
-  add_loads(model, time(), force);
-  const std::vector<Vec3d> free = free_axes(model);
-  // A quarter of a step on, under constant force: v' = a - c v.
-  const double ahead = dt_ / 4;
-  for (const Part& part : model.parts) {
-    const double c = part.material.damping;
-    const double gain = damped_flow(c, ahead).gain;
-    for (Index i = part.begin; i < part.owned_end(); ++i) {
-      const Vec3d acceleration =
-          (1 / model.mass[i]) * force[i] + model.gravity - c * state.velocity[i];
-      const Vec3d change = gain * acceleration;
-      state.velocity[i] += free.empty() ? change : by_components(free[i], change);
-    }
-  }
-  OwnedVectors(model, std::max(1, backend_.threads())).refresh_ghosts(state.displacement);
-  first_step_ += steps_;  // as many have been taken as before
-  steps_ *= 2;
-  dt_ /= 2;
-  looks_.halve_step();
-  state.step = steps_;
-  state.dt = dt_;
-  backend_.upload(state);
 }
 
 Instant Solver::now() const { return {steps_, time(), method_ == Method::verlet ? dt_ / 2 : 0}; }

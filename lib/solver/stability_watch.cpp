@@ -7,7 +7,7 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/solver.hpp"
+#include "phyxel/step_control.hpp"
 
 namespace phyxel {
 namespace {
@@ -85,10 +85,10 @@ double StabilityWatch::speed_limit(double time) const {
   return std::max(3 * wave_speed_, whip * driving_speed_) + acceleration_ * time;
 }
 
-void StabilityWatch::check(const Diagnostics& now, const StepShortener* shortener) {
+void StabilityWatch::check(const Diagnostics& now, const StepControl* control) {
   const std::string when = fmt::format("at t = {:g} s (step {})", now.time, now.step);
   const auto began = [&] {
-    if (shortener) return shortener->where_it_began();
+    if (control) return control->where_it_began();
     if (!good_ || good_->fastest_phyxel < 0) return std::string("nothing moved before");
     return fmt::format("fastest at t = {:g} s, the last good state, was {}, at {:g} m/s",
                        good_->time, describe_phyxel(model_, good_->fastest_phyxel),

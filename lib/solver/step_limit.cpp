@@ -177,12 +177,27 @@ StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
     if (model.share) throw AgreedError(ExitCode::bad_input, why);
     throw InputError(why);
   }
-  limit.largest_step = 2 / limit.omega_max;
+  limit.largest_step = stable_step(limit.omega_max, largest_viscosity(model));
   stage.finish();
   return limit;
 }
 
 }  // namespace
+
+double viscous_step_share(double relaxation_time, double omega) {
+  const double ratio = relaxation_time * omega / 2;  // of critical damping
+  return 1 / (std::hypot(1, ratio) + ratio);         // √(1 + ξ²) - ξ without its cancellation
+}
+
+double stable_step(double omega, double relaxation_time) {
+  return 2 / omega * (relaxation_time > 0 ? viscous_step_share(relaxation_time, omega) : 1);
+}
+
+double largest_viscosity(const Model& model) {
+  double largest = 0;
+  for (const Part& part : model.parts) largest = std::max(largest, part.material.viscosity);
+  return model.share ? model.share->communicator->largest(largest) : largest;
+}
 
 StepLimit step_limit(const Model& model, int threads) {
   Stage stage(stage_name);
@@ -217,7 +232,7 @@ StepLimit present_step_limit(const Model& model, Backend& backend) {
   }
   StepLimit limit;
   limit.omega_max = found.omega;
-  limit.largest_step = 2 / found.omega;
+  limit.largest_step = stable_step(found.omega, largest_viscosity(model));
   limit.iterations = found.iterations;
   return limit;
 }

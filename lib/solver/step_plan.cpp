@@ -137,7 +137,8 @@ void check_damped(const Scene& scene, double damping) {
   throw InputError(fmt::format(
       "time.step = {:g} s is too long for body.material.damping = {:g} 1/s: distances would be "
       "more "
-      "than 4% off; allowed at most {:g} s (1 / damping), or \"auto\", or --unsafe-step to try it "
+      "than 4% off; allowed at most {:g} s (1 / damping), or \"adaptive\", or --unsafe-step to try "
+      "it "
       "all the same",
       *scene.time.step, damping, 1 / damping));
 }
@@ -147,11 +148,12 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
   StepPlan plan;
   plan.limit = step_limit(model, backend);
   plan.shortens = !unsafe_step;
+  plan.lengthens = plan.shortens && !scene.time.step;
   const double largest = plan.limit.largest_step;
   if (scene.time.step && *scene.time.step >= largest && !unsafe_step) {
     throw InputError(fmt::format(
         "time.step = {:g} s is unstable: the largest stable step is {:g} s (2 / omega_max, "
-        "omega_max = {:g} rad/s); allowed below that, or \"auto\", or --unsafe-step to try it "
+        "omega_max = {:g} rad/s); allowed below that, or \"adaptive\", or --unsafe-step to try it "
         "all the same",
         *scene.time.step, largest, plan.limit.omega_max));
   }
@@ -190,6 +192,11 @@ void StepPlan::halve(int times) {
     steps *= 2;
     steps_per_frame *= 2;
   }
+  for (; times < 0 && halvings > 0; ++times, --halvings) {
+    dt *= 2;
+    steps /= 2;
+    steps_per_frame /= 2;
+  }
 }
 
 namespace {
@@ -208,7 +215,7 @@ StepPlan plan_of(const Scene& scene, const Model& model, Backend& backend, bool 
   }
   if (!scene.time.step) {
     throw InputError(
-        "time.step = \"auto\": implicit steps are stable at any size: needed is one [s], short "
+        "time.step = \"adaptive\": implicit steps are stable at any size: needed is one [s], short "
         "against the motions to be seen");
   }
   check_resolves(scene, finest_resolution(scene));

@@ -67,8 +67,11 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const PrincipalStretches<double> s = principal_stretches(gradient[i]);
-        own.look_at(stiffening_of(law, volume, gradient[i], s, at_rest), s.largest,
-                    model.global_id(i));
+        // Viscosity acts on the rate of Green's strain: that of a wave grows as the stretch
+        // squared.
+        const double viscous = part.material.viscosity > 0 ? s.largest * s.largest : 0;
+        own.look_at(std::max(stiffening_of(law, volume, gradient[i], s, at_rest), viscous),
+                    s.largest, model.global_id(i));
       }
     }
 #pragma omp critical
@@ -80,7 +83,7 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
 }  // namespace
 
 bool stiffens(const Material& material) {
-  return material.custom_law || material.volume_stiffness > 0 ||
+  return material.custom_law || material.volume_stiffness > 0 || material.viscosity > 0 ||
          !law_table()[chosen_law(material).index].is_linear;
 }
 

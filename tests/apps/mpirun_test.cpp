@@ -53,6 +53,57 @@ TEST_F(Mpirun, WaitingThreadsOfEachRankSleepSoon) {
   EXPECT_EQ(said("GOMP_SPINCOUNT = '1000'"), 2) << outcome.err;
 }
 
+/// A beam is stretched by two thirds and comes back: its steps are halved and doubled again
+/// at the same ones on any number of ranks, and after a stop among the halved ones.
+TEST_F(Mpirun, HalvesAndDoublesStepsAlikeOnAllRanks) {
+  write("swing.toml", R"([time]
+end = 10.6
+step = "adaptive"
+[solver]
+threads = 1
+device = "cpu"
+[output]
+frames_per_second = 1
+[[body]]
+name = "beam"
+shape = "beam"
+size = [0.6, 0.2, 0.2]
+jitter = 0.1
+spacing = 0.05
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+law = "neo-hookean"
+[[body.fixed]]
+region = "x-"
+[[body.motion]]
+region = "x+"
+amplitude = [0.4, 0, 0]
+frequency = 0.05
+)");
+  const Outcome alone = run_on(0, {"run", "swing.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(alone.out, HasSubstr("because a body stiffened, doubled once"));
+  for (const int ranks : {2, 3}) {
+    const std::string name = std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "swing.toml", "--out", name});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", name);
+  }
+  ASSERT_EQ(run_on(3, {"run", "swing.toml", "--out", "parts", "--until", "6"}).code, 0);
+  const State middle = read_checkpoint(latest_checkpoint(folder_ / "parts").value()).state;
+  const auto end = [&](const char* folder) {
+    return read_checkpoint(latest_checkpoint(folder_ / folder).value()).state;
+  };
+  EXPECT_EQ(middle.dt, end("alone").dt / 2);
+  ASSERT_EQ(run_on(2, {"run", "swing.toml", "--out", "parts", "--resume", "auto"}).code, 0);
+  EXPECT_EQ(end("parts").step, end("alone").step);
+  EXPECT_TRUE(end("parts").looks == end("alone").looks);
+  EXPECT_TRUE(end("parts").displacement == end("alone").displacement);
+  EXPECT_TRUE(end("parts").velocity == end("alone").velocity);
+}
+
 /// A body that stiffens has its steps halved at the same ones on any number of ranks, and a search
 /// for rest comes to the same bits, also when all ranks were stopped by a signal that one has
 /// heard.

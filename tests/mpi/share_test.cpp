@@ -294,18 +294,22 @@ TEST(AgainstTheOracle, SharesFeelAndMoveAsThePapersSay) {
   world().barrier();
 }
 
-/// The stiffest phyxel of all ranks is that of one, a step is halved to the same bits, and the
-/// limit of the deformed body is the same.
+/// The stiffest phyxel of all ranks is that of one, a step is halved and doubled to the same bits,
+/// and the limit of the deformed body is the same.
 TEST_P(Shares, StiffenAndHalveTheirStepsAsTheWhole) {
   const State start_of_whole = start(whole_), start_of_share = start(model_);
   const auto alone = backend(whole_, Precision::double_),
              here = backend(model_, Precision::double_);
   Solver whole(whole_, *alone, start_of_whole, Method::verlet),
       share(model_, *here, start_of_share, Method::verlet);
-  for (int s = 0; s < 10; ++s) {
+  for (int s = 0; s < 11; ++s) {
     if (s == 5) {
       whole.halve_step();
       share.halve_step();
+    }
+    if (s == 9) {
+      whole.double_step();
+      share.double_step();
     }
     whole.step();
     share.step();

@@ -14,7 +14,7 @@ namespace {
 
 /// How often a run that planned one step had halved it to the other; nothing if it never does.
 std::optional<int> halvings_between(double planned, double step) {
-  for (int k = 0; k <= StepShortener::most_halvings; ++k) {
+  for (int k = 0; k <= StepControl::most_halvings; ++k) {
     if (std::ldexp(planned, -k) == step) return k;
   }
   return std::nullopt;

@@ -34,7 +34,7 @@ Run::Run(const RunOptions& options)
         });
       })),
       solver_(model(), *backend_, first_state(), scene_.solver.method),
-      shortener_(model(), *backend_, plan_),
+      control_(model(), *backend_, plan_),
       first_step_(solver_.steps()),
       start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
   StopSignal::work_begins();
@@ -164,8 +164,8 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     if (frame) writer_.wait_for_room();
     const auto look_start = Clock::now();
     now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
-    watch.check(now_, &shortener_);
-    shortener_.see(solver_);
+    watch.check(now_, &control_);
+    control_.see(solver_);
     show_progress(progress, now_);
     peak_energy_ = watch.watched().peak_energy;
     if (frame)

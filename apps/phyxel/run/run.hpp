@@ -98,7 +98,7 @@ class Run {
   /// How long a rank may stay where it is before it is named.
   static double watchdog_seconds();
 
-  /// One step, after a look at whether it has to be shorter.
+  /// One step, after a look at whether it has to be shorter or may be longer.
   void take_step(Progress& progress);
   /// Has Newton's method show how far it has come, serve files, and hear signals.
   void watch_newton(Progress& progress);
@@ -182,8 +182,9 @@ class Run {
   StepPlan plan_;
   BoundarySize boundary_;  // of the whole
   Solver solver_;
-  StepShortener shortener_;
+  StepControl control_;
   std::int64_t first_step_ = 0;
+  int halvings_told_ = plan_.halvings;  // of the planned step, the most so far
   Diagnostics start_diagnostics_, now_;
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // between ranks

@@ -1,4 +1,4 @@
-/// A run's steps: shortened where a law stiffens, and watched while Newton's method is at work.
+/// A run's steps: as long as the limit allows, and watched while Newton's method is at work.
 #include <fmt/format.h>
 
 #include "run/run.hpp"
@@ -10,12 +10,16 @@ namespace phyxel::app {
 void Run::take_step(Progress& progress) {
   const double before = solver_.dt();
   const std::int64_t steps = solver_.steps();
-  const int halvings = shortener_.look(solver_, plan_.halvings);
-  if (halvings > 0) {
+  const int halvings = control_.look(solver_, plan_.halvings);
+  if (halvings != 0) {
     plan_.halve(halvings);
     first_step_ += solver_.steps() - steps;  // as many have been taken as before
+  }
+  // A body that swings halves its steps again and again: that is told once.
+  if (plan_.halvings > halvings_told_) {
+    halvings_told_ = plan_.halvings;
     if (!options_.json && !options_.quiet) {
-      const std::string where = shortener_.where_it_began();
+      const std::string where = control_.where_it_began();
       progress.say(
           fmt::format("the time step is halved from {:.4g} to {:.4g} s at t = {:g} s: a body "
                       "stiffens; {}",
@@ -24,7 +28,7 @@ void Run::take_step(Progress& progress) {
   }
   const auto next = [&](std::int64_t every) { return (solver_.steps() / every + 1) * every; };
   const std::int64_t limit = std::min({plan_.steps, next(plan_.steps_per_frame),
-                                       next(watch_interval), shortener_.next_look(solver_)});
+                                       next(watch_interval), control_.next_look(solver_)});
   naming(scene_, [&] { solver_.step(solver_.steps_to(limit)); });  // a search may be refused
 }
 

@@ -134,7 +134,8 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
   j.update({{"time_s", now.time},
             {"steps", solver_.steps()},
             {"time_step_s", plan_.dt},
-            {"time_step_halvings", plan_.halvings},
+            {"time_step_halvings", plan_.halvings + solver_.looks().doublings},
+            {"time_step_doublings", solver_.looks().doublings},
             {"largest_stable_step_s", plan_.limit.largest_step},
             {"omega_max_rad_s", plan_.limit.omega_max},
             {"force_evaluations", solver_.work().evaluations},
@@ -181,9 +182,14 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
         1e-3 * static_cast<double>(traffic.bytes_sent) / std::max(steps, 1.0),
         100 * traffic.seconds / std::max(loop_seconds_, 1e-9));
   }
-  if (plan_.halvings > 0) {
-    fmt::print("  time step   halved {} times, to {:.4g} s, because a body stiffened\n",
-               plan_.halvings, plan_.dt);
+  const std::int64_t doublings = solver_.looks().doublings;
+  if (plan_.halvings + doublings > 0) {
+    const auto times = [](std::int64_t count) {
+      return count == 1 ? std::string("once") : fmt::format("{} times", count);
+    };
+    fmt::print(
+        "  time step   halved {} because a body stiffened, doubled {}; {:.4g} s at the end\n",
+        times(plan_.halvings + doublings), doublings > 0 ? times(doublings) : "never", plan_.dt);
   }
   if (!steps_explicitly()) {
     const SolverWork work = solver_.work();

@@ -36,7 +36,7 @@ void stress_fields(const Model& model, Backend& backend, std::vector<double>* vo
 /// The speed of pressure waves at rest [m/s]: sqrt((λ + 2μ + k_v) / ρ) of Hooke's law.
 double pressure_wave_speed(const Material& material);
 
-class StepShortener;
+class StepControl;
 
 /// Detects unstable runs and stops them.
 class StabilityWatch {
@@ -47,12 +47,12 @@ class StabilityWatch {
   StabilityWatch(const Model& model, const Diagnostics& start,
                  const std::optional<Watched>& before = std::nullopt);
 
-  /// @param shortener whose looks tell where it began; null: the fastest phyxel of the last good
+  /// @param control whose looks tell where it began; null: the fastest phyxel of the last good
   ///   state is named. Of a share: collective.
   /// @throws DivergedError, saying which phyxel and when, if the state is not finite, if a phyxel
   ///   moves faster by far than waves, gravity, loads and motions can make it, or if a conservative
   ///   scene has gained more energy than it has exchanged so far.
-  void check(const Diagnostics& now, const StepShortener* shortener = nullptr);
+  void check(const Diagnostics& now, const StepControl* control = nullptr);
 
   /// The reference values; every state that `check` finds good updates the peak energy.
   const Watched& watched() const { return watched_; }

@@ -24,4 +24,5 @@
 #include "phyxel/shared_model.hpp"
 #include "phyxel/solver.hpp"
 #include "phyxel/state.hpp"
+#include "phyxel/step_control.hpp"
 #include "phyxel/types.hpp"

@@ -17,14 +17,28 @@ namespace phyxel {
 /// How the largest stable step was found.
 struct StepLimit {
   double omega_max = 0;     ///< Largest eigenfrequency of the model at rest [rad/s].
-  double largest_step = 0;  ///< 2 / omega_max [s]: Verlet is stable below it.
+  double largest_step = 0;  ///< `stable_step` of omega_max [s]: Verlet is stable below it.
   double sound_step = 0;    ///< Smallest h / c over the phyxels [s], for comparison.
   int iterations = 0;       ///< Lanczos iterations taken.
 };
 
+/// The share of 2/ω that Verlet's steps may have under Kelvin–Voigt damping, √(1 + ξ²) - ξ, where
+/// the mode is damped by ξ = τω/2 of critical damping: viscous forces follow from half-step
+/// velocities.
+/// @param relaxation_time τ [s], at least 0. @param omega ω [rad/s]
+double viscous_step_share(double relaxation_time, double omega);
+
+/// The largest stable step [s] of Verlet's method for a mode of angular frequency ω [rad/s], 2/ω,
+/// or `viscous_step_share` of that if a relaxation time τ [s] damps it.
+double stable_step(double omega, double relaxation_time);
+
+/// The longest relaxation time τ of all materials [s]. Of a share: collective.
+double largest_viscosity(const Model& model);
+
 /// Largest eigenvalue of M⁻¹K at the reference state, by Lanczos iteration on the force function
 /// itself, so that every term in use counts. Fixed phyxels are taken as free, which can only lower
-/// the limit, and damping is left out, which raises it (`verlet_velocity_damped`). On the CPU, in
+/// the limit, and damping in proportion to mass is left out, which raises it
+/// (`verlet_velocity_damped`). The longest relaxation time of all bodies lowers it. On the CPU, in
 /// double.
 /// @throws InputError if nothing in the model resists deformation.
 StepLimit step_limit(const Model& model, int threads = 0);
@@ -34,8 +48,9 @@ StepLimit step_limit(const Model& model, int threads = 0);
 StepLimit step_limit(const Model& model, Backend& backend);
 
 /// The limit at the displacements that the backend holds, and holds again after, within 2%: by
-/// Lanczos iteration on differences of the forces there. `sound_step`, which is of the model at
-/// rest, is not found. Of a share: collective, and the same on any number of ranks.
+/// Lanczos iteration on differences of the elastic forces there; relaxation times are those at
+/// rest. `sound_step`, which is of the model at rest, is not found. Of a share: collective, and the
+/// same on any number of ranks.
 /// @returns a largest step that is infinite where nothing resists, NaN where a force is not finite
 StepLimit present_step_limit(const Model& model, Backend& backend);
 
@@ -46,10 +61,12 @@ struct StepPlan {
   std::int64_t steps = 0;            ///< To the end of the run.
   std::int64_t steps_per_frame = 0;  ///< Frames fall on multiples of it.
   std::string why;                   ///< One line for the summary.
-  bool shortens = false;  ///< Whether steps are halved where a law stiffens (`StepShortener`).
-  int halvings = 0;       ///< Of the step, so far.
+  bool shortens = false;   ///< True if steps are halved where a law stiffens (`StepControl`).
+  bool lengthens = false;  ///< True if halved steps are doubled again where the limit allows it.
+  int halvings = 0;        ///< The present step is the planned one, halved so many times.
 
-  /// Halves the step so many times; frames and the end stay where they are.
+  /// Halves the step `times` times, or doubles it -`times` times; frames and the end stay where
+  /// they are. No step is longer than the planned one.
   void halve(int times);
 };
 
@@ -78,7 +95,8 @@ struct SolverWork {
 class ImplicitStep;
 
 /// Advances a state through a backend by steps of fixed size. Time is always step × dt, so that a
-/// restarted run sees the same times to the bit; `halve_step` doubles the number of steps taken.
+/// restarted run sees the same times to the bit; `halve_step` doubles the number of steps taken,
+/// and `double_step` halves it.
 class Solver {
  public:
   /// By Verlet's steps. Uploads `start`, whose `dt` is the step size.
@@ -102,16 +120,22 @@ class Solver {
   /// `limit`; at least 1.
   int steps_to(std::int64_t limit) const;
   /// Halves the step of Verlet's method: the present time stays, step and dt change by a factor of
-  /// two, and velocities move from t - dt/2 to t - dt/4 by the present forces. Exact in powers of
-  /// two, so that times after a restart are the same bits. Of a share: collective.
+  /// two, exactly, so that times after a restart are the same bits. Velocities move from t - dt/2
+  /// to t - dt/4 by the present forces, and the state by what keeps the action of each mode
+  /// (`StepChange`). Of a share: collective.
   /// @throws InputError from a solver that was made without a model, or for another method
   void halve_step();
+  /// Doubles the step of Verlet's method, the inverse of `halve_step` but for higher orders of dt.
+  /// Of a share: collective.
+  /// @throws InputError after an odd number of steps, and as `halve_step`
+  void double_step();
   double time() const { return static_cast<double>(steps_) * dt_; }  ///< [s]
   /// Taken since t = 0.
   std::int64_t steps() const { return steps_; }
   double dt() const { return dt_; }  ///< [s]
-  /// What a `StepShortener` has found.
+  /// The record of a `StepControl`.
   Looks& looks() { return looks_; }
+  const Looks& looks() const { return looks_; }
   /// When the present state is, for `diagnose`.
   Instant now() const;
   State state() const;  ///< Downloaded copy.
@@ -120,6 +144,8 @@ class Solver {
 
  private:
   void step_by_newton();
+  /// Goes on by steps of dt [s], of which the time so far is `steps`.
+  void change_step(std::int64_t steps, double dt);
 
   const Model* model_ = nullptr;  ///< Of a method that needs it.
   Backend& backend_;
@@ -132,67 +158,6 @@ class Solver {
   NewtonObserver observer_;
   bool begun_ = false;  ///< The start is that of an interrupted search for rest.
   SolverWork rest_;     ///< Of the search for rest.
-};
-
-/// Halves Verlet's steps where laws have become so stiff that they would soon be unstable. It looks
-/// at a bound that costs little, a wave in the stiffest phyxel; only beyond that bound it finds the
-/// limit itself, as far fewer bodies outgrow their step than have a phyxel that would. When it
-/// looks follows from what it has seen: often where a body stiffens, seldom where nothing changes.
-/// All of that is part of the state, so that runs, restarts and any number of threads and ranks
-/// halve at the same steps. Laws that cannot stiffen cost nothing.
-class StepShortener {
- public:
-  static constexpr int most_halvings = 10;  ///< Of one run.
-  /// Of (dt / limit)²: bodies that stiffen fast come to half as much again between two looks.
-  static constexpr double largest_share = 0.75;
-
-  /// All must outlive this.
-  StepShortener(const Model& model, Backend& backend, const StepPlan& plan);
-
-  /// Before a step: if a look is due, looks, and halves the solver's step as often as needed.
-  /// Collective.
-  /// @param halvings made before
-  /// @returns those made now
-  /// @throws DivergedError, saying which phyxel, its stretch and when, if `most_halvings` are not
-  ///   enough or a displacement is not finite
-  int look(Solver& solver, int halvings);
-  /// The step before which `look` has to be called next.
-  std::int64_t next_look(Solver& solver) const {
-    return active_ ? solver.looks().next : std::numeric_limits<std::int64_t>::max();
-  }
-  /// Whether any law can stiffen.
-  bool active() const { return active_; }
-  /// The fewest steps between two looks: half the number of steps in which a wave crosses the
-  /// smallest body, from 1 to 16.
-  std::int64_t fewest() const { return fewest_; }
-  /// The most steps between two looks.
-  std::int64_t most() const { return std::min<std::int64_t>(32 * fewest_, 128); }
-  /// Looks without halving, so that messages know of models that cannot stiffen, too. Collective.
-  void see(const Solver& solver);
-  /// The first phyxel for which steps were halved, or else the stiffest of the last look: which,
-  /// its stretch, and when. Collective.
-  std::string where_it_began() const;
-
- private:
-  /// (dt / limit)² at the present displacements.
-  double share_of_limit(const Solver& solver) const;
-  /// The largest share that is allowed: `largest_share`, or a tenth more than at rest where a scene
-  /// asks for longer steps.
-  double allowed_share(double dt) const;
-  /// When to look again, after a look that found `ratio`.
-  void look_again(const Solver& solver, Looks& looks, double ratio) const;
-
-  static constexpr std::int64_t most_of_fewest = 16;
-  struct Seen {
-    Stiffening what;
-    double time = 0;  ///< [s]
-  };
-  const Model& model_;
-  Backend& backend_;
-  double limit_;
-  bool active_ = false;
-  std::int64_t fewest_ = most_of_fewest;
-  std::optional<Seen> seen_, first_;
 };
 
 }  // namespace phyxel

@@ -8,7 +8,7 @@
 
 namespace phyxel {
 
-/// Record of the looks that `StepShortener` takes at bodies that stiffen. A state carries the
+/// Record of the looks that `StepControl` takes at bodies that stiffen. A state carries the
 /// record, so that a resumed run looks at the same steps as the unbroken one, and finds the same.
 struct Looks {
   std::int64_t next = 0;       ///< Step of the next look.
@@ -19,9 +19,14 @@ struct Looks {
   double measured_ratio = 1;   ///< Stiffening at that step.
   double measured_share = 0;   ///< (dt / limit)² at that step.
   std::int64_t apart = 0;      ///< Number of steps after which the limit is found again.
+  /// Last step at which a step of twice the size was found too long; -1: never.
+  std::int64_t too_long = -1;
+  std::int64_t doublings = 0;  ///< Number of times that the step was doubled since t = 0.
 
   /// Rewrites all step counts for a step of half the size: the same times have twice the numbers.
   void halve_step();
+  /// Rewrites all step counts for a step of twice the size, and counts it.
+  void double_step();
   bool operator==(const Looks&) const = default;
 };
 
@@ -76,8 +81,8 @@ struct SurfelState {
 
 /// The phyxel that is stiffest against its own state at rest.
 struct Stiffening {
-  /// Upper bound of the stiffness of plane waves over that at rest (physics/laws.hpp);
-  /// infinite if a displacement is not finite.
+  /// Upper bound of the stiffness of plane waves over that at rest (physics/laws.hpp), or of their
+  /// viscosity if that has grown more; infinite if a displacement is not finite.
   double ratio = 1;
   double stretch = 1;  ///< Its largest principal stretch.
   Index phyxel = -1;   ///< Its global id; -1: there is no phyxel.

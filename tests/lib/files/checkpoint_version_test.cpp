@@ -18,7 +18,8 @@ class CheckpointVersions : public test::Folder {
  protected:
   /// A checkpoint as version 2 wrote it, one phyxel; or with another number, or with parameters.
   std::filesystem::path written(std::int64_t version, const std::string& parameters = "",
-                                const Looks& looks = {}, double peak_energy = 4.5) const {
+                                const Looks& looks = {}, double peak_energy = 4.5,
+                                bool doubles = true) const {
     Hdf5Writer out;
     out.group("/phyxel");
     out.attribute("/phyxel", "version", version);
@@ -38,7 +39,11 @@ class CheckpointVersions : public test::Folder {
     if (version > 2) {
       out.attribute("/phyxel", "initial_speed", 3.5);
       out.attribute("/phyxel", "peak_energy", peak_energy);
-      write_looks(out, looks);
+      if (doubles) {
+        write_looks(out, looks);
+      } else {
+        write_looks_without_doublings(out, looks);
+      }
     }
     const std::vector<Vec3d> values{{1, 2, 3}};
     out.vectors("/state/displacement", values, false);
@@ -46,6 +51,18 @@ class CheckpointVersions : public test::Folder {
     std::filesystem::path file = folder_ / "checkpoint_000000007.h5";
     write_sealed(file, "checkpoint", out.content(), Durable::yes);
     return file;
+  }
+  static void write_looks_without_doublings(Hdf5Writer& out, const Looks& looks) {
+    const std::string group = "/state/looks";
+    out.group(group);
+    out.attribute(group, "next", looks.next);
+    out.attribute(group, "last", looks.last);
+    out.attribute(group, "ratio", looks.ratio);
+    out.attribute(group, "change", looks.change);
+    out.attribute(group, "measured", looks.measured);
+    out.attribute(group, "measured_ratio", looks.measured_ratio);
+    out.attribute(group, "measured_share", looks.measured_share);
+    out.attribute(group, "apart", looks.apart);
   }
   static std::string refusal_of(const std::filesystem::path& file) {
     try {
@@ -81,9 +98,18 @@ TEST_F(CheckpointVersions, LooksThatNoRunTookAreRefused) {
   for (const Looks& wrong :
        {Looks{.next = -1}, Looks{.last = -2}, Looks{.ratio = nan}, Looks{.change = nan},
         Looks{.measured = -5}, Looks{.apart = -1}, Looks{.measured_ratio = 0},
-        Looks{.measured_share = -1}, Looks{.measured_share = nan}}) {
+        Looks{.measured_share = -1}, Looks{.measured_share = nan}, Looks{.too_long = -2},
+        Looks{.doublings = -1}}) {
     EXPECT_THAT(refusal_of(written(3, "", wrong)), HasSubstr("/state/looks"));
   }
+}
+
+/// Files of the time before steps were doubled have eight numbers of looks, not ten.
+TEST_F(CheckpointVersions, LooksWithoutDoublingsAreRead) {
+  const Looks looks{.next = 9, .last = 8, .ratio = 1.5, .measured = 7, .apart = 32};
+  EXPECT_TRUE(read_checkpoint(written(3, "", looks, 4.5, false)).state.looks == looks);
+  const Looks doubled{.next = 9, .last = 8, .apart = 32, .too_long = 6, .doublings = 3};
+  EXPECT_TRUE(read_checkpoint(written(3, "", doubled)).state.looks == doubled);
 }
 
 TEST_F(CheckpointVersions, WhatIsWatchedIsReadAndRefusedIfNoRunHadIt) {

@@ -100,7 +100,9 @@ TEST_F(Files, ACheckpointComesBackToTheBitInEveryPrecision) {
                    .measured = 98,
                    .measured_ratio = 1.1,
                    .measured_share = 0.7,
-                   .apart = 512};
+                   .apart = 512,
+                   .too_long = 64,
+                   .doublings = 5};
     CheckpointInfo info;
     info.program = "phyxel 0 (test)";
     info.precision = precision;

@@ -65,7 +65,7 @@ const std::vector<Value>& values() {
       {"true", "true", {boolean}},
       {"'nonsense'", "\"nonsense\"", {text, path, choice}},
       {"''", "\"\"", {choice}},
-      {"3.25", "3.25", {number, number_or_auto}},
+      {"3.25", "3.25", {number, number_or_adaptive}},
       {"nan", "nan", {}},
       {"-inf", "-inf", {}},
       {"[]", "empty list", {choices}},
@@ -158,7 +158,7 @@ std::vector<Late> late_refusals() {
       {step("1e-4") + bar + material + "damping = 1e6\n",
        {"time.step = 0.0001 s", "damping = 1e+06 1/s"}},
       {step("0.1") + implicit + bar + material + shake, {"time.step = 0.1 s", "2000 Hz"}},
-      {"[time]\nend = 1.0\n" + implicit + bar + material, {"time.step = \"auto\""}},
+      {"[time]\nend = 1.0\n" + implicit + bar + material, {"time.step = \"adaptive\""}},
       {"[time]\nend = 9e8\n" + bar +
            "[body.material]\nyoung = 1e18\npoisson = 0.3\ndensity = 1e-6\n",
        {"time.end = 9e+08 s", "below 1e15"}},

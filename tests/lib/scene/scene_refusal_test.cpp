@@ -81,7 +81,7 @@ const std::vector<Malformed>& malformed() {
       {"[time]\nend = '1'\n" + dino, "2:7", "\"1\" found"},
       {"[time]\nend = 1\nstep = 'fast'\n" + dino, "3:8", "\"fast\" found"},
       {"[time]\nend = 1\nstep = 0\n" + dino, "3:8",
-       "\"auto\" or a number, 1e-18 <= step <= 1e+09 [s]"},
+       "\"adaptive\" or a number, 1e-18 <= step <= 1e+09 [s]"},
       {"[time]\nend = 1\nsafety = 1\n" + dino, "3:10", "0 < safety < 1"},
       {"[time]\nend = 1\nsafety = 0.5\nstep = 0.1\n" + dino, "3:10", "found together with step"},
       {"[time]\nends = 1\n" + dino, "2:1", "key time.ends: unknown (did you mean \"end\"?)"},

@@ -50,4 +50,28 @@ PHYXEL_HD Vec3<Real> verlet_velocity_damped(Vec3<Real> velocity, Vec3<Real> acce
   return fused(keep, velocity, gain * acceleration);
 }
 
+/// The move of a state (u, v) at t by which Verlet's steps change their size. With the acceleration
+/// a and its derivative a'(w) along a vector w,
+///
+///   u⁺ = u + first a + displacement a'(a),   v⁺ = v - first a'(v) + velocity a'(a'(v)).
+///
+/// Leapfrog keeps ½ v² + ½ ω² (1 - x) u² of a mode of frequency ω, with x = ω²Δt²/4. From one step
+/// to another that jumps, by an amount that depends on the phase, so that bodies which change their
+/// steps again and again gain energy. u⁺ = s u, v⁺ = v/s with s⁴ = (1 - x)/(1 - x⁺) keeps the
+/// action of the mode instead, whatever its phase. The coefficients give s and 1/s to second order
+/// in x.
+struct StepChange {
+  double first = 0;         ///< [s²]
+  double displacement = 0;  ///< [s⁴]
+  double velocity = 0;      ///< [s⁴]
+};
+
+/// The coefficients of a change of the step.
+/// @param before step size until now [s]. @param after step size from now on [s]
+inline StepChange step_change(double before, double after) {
+  const double a = before * before, b = after * after;
+  const double square = (a - b) * (a - b) / 512, difference = (a * a - b * b) / 128;
+  return {(a - b) / 16, square - difference, square + difference};
+}
+
 }  // namespace phyxel

@@ -1,0 +1,145 @@
+/// Verlet's steps, halved and doubled.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "phyxel/error.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "phyxel/solver.hpp"
+#include "solver/boundary_conditions.hpp"
+#include "solver/owned_vectors.hpp"
+
+namespace phyxel {
+namespace {
+
+using Vectors = std::vector<Vec3d>;
+
+/// The largest share of a support by which a phyxel moves where accelerations are compared: enough
+/// that, in float too, rounding leaves their differences right to some percent, and so little that
+/// second-order terms do.
+constexpr double compared_share = 3e-3;
+
+/// Accelerations of a model at states near the present one.
+class Accelerations {
+ public:
+  Accelerations(const Model& model, Backend& backend, double time)
+      : model_(model),
+        backend_(backend),
+        time_(time),
+        owned_(model, std::max(1, backend.threads())),
+        free_(free_axes(model)) {}
+
+  /// A vector of phyxel i without what is prescribed.
+  Vec3d free(Index i, Vec3d vector) const {
+    return free_.empty() ? vector : by_components(free_[i], vector);
+  }
+  /// Accelerations [m/s²] without damping at the displacements of a state, whose ghosts follow.
+  /// Prescribed ones are zero. Collective.
+  Vectors at(State& state) const {
+    owned_.refresh_ghosts(state.displacement);
+    backend_.upload(state);
+    Vectors all;
+    backend_.internal_forces(all);
+    const std::span<const Vec3d> external = backend_.external_forces();
+    for (std::size_t i = 0; i < external.size(); ++i) all[i] += external[i];
+    add_loads(model_, time_, all);
+    owned_.for_each(
+        [&](Index i) { all[i] = free(i, (1 / model_.mass[i]) * all[i] + model_.gravity); });
+    return all;
+  }
+  /// Derivatives of the accelerations, which are `here` at a state, along vectors w of any unit.
+  /// Collective.
+  Vectors derivatives(const State& state, const Vectors& here, const Vectors& w) const {
+    Vectors found(here.size());
+    const double largest = owned_.largest([&](Index i) { return norm(w[i]); });
+    if (!(largest > 0)) return found;
+    const double share = compared_share * owned_.smallest_support() / largest;
+    State moved = state;
+    owned_.for_each([&](Index i) { moved.displacement[i] += share * w[i]; });
+    const Vectors there = at(moved);
+    owned_.for_each([&](Index i) { found[i] = (1 / share) * (there[i] - here[i]); });
+    return found;
+  }
+
+ private:
+  const Model& model_;
+  Backend& backend_;
+  double time_;
+  OwnedVectors owned_;
+  Vectors free_;  // 0 along prescribed axes, 1 else; none are prescribed if it is empty
+};
+
+}  // namespace
+
+void Looks::halve_step() {
+  next *= 2;
+  for (std::int64_t* const step : {&last, &measured, &too_long}) {
+    if (*step >= 0) *step *= 2;
+  }
+  measured_share /= 4;
+  change /= 2;
+}
+
+void Looks::double_step() {
+  for (std::int64_t* const step : {&next, &last, &measured, &too_long}) {
+    if (*step >= 0) *step /= 2;
+  }
+  measured_share *= 4;
+  change *= 2;
+  ++doublings;
+}
+
+void Solver::change_step(std::int64_t steps, double dt) {
+  if (!model_ || method_ != Method::verlet) {
+    throw InputError("only Verlet's steps of a solver that knows its model change their size");
+  }
+  const Accelerations accelerations(*model_, backend_, time());
+  State state = this->state();
+  const Vectors before = accelerations.at(state);
+  Vectors v(before.size());  // at t
+  const auto for_each = [&](auto&& each) {
+    for (const Part& part : model_->parts) {
+      for (Index i = part.begin; i < part.owned_end(); ++i) each(i, part.material.damping);
+    }
+  };
+  for_each([&](Index i, double damping) {
+    const DampedFlow flow = damped_flow(damping, dt_ / 2);
+    v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * before[i]);
+  });
+  const Vectors rates = accelerations.derivatives(state, before, v);
+  const Vectors along_itself = accelerations.derivatives(state, before, before),
+                along_rates = accelerations.derivatives(state, before, rates);
+  const StepChange change = step_change(dt_, dt);
+  for_each([&](Index i, double) {
+    state.displacement[i] += change.first * before[i] + change.displacement * along_itself[i];
+    v[i] += change.velocity * along_rates[i] - change.first * rates[i];
+  });
+  const Vectors after = accelerations.at(state);
+  for_each([&](Index i, double damping) {
+    // Prescribed velocities stay what they are.
+    const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);
+    state.velocity[i] += accelerations.free(i, earlier - state.velocity[i]);
+  });
+  first_step_ += steps - steps_;  // as many have been taken as before
+  state.step = steps_ = steps;
+  state.dt = dt_ = dt;
+  backend_.upload(state);
+}
+
+void Solver::halve_step() {
+  change_step(2 * steps_, dt_ / 2);
+  looks_.halve_step();
+}
+
+void Solver::double_step() {
+  if (steps_ % 2 != 0) {
+    throw InputError(
+        fmt::format("step {}: steps can be doubled after an even number of steps only", steps_));
+  }
+  change_step(steps_ / 2, 2 * dt_);
+  looks_.double_step();
+}
+
+}  // namespace phyxel
