@@ -46,26 +46,20 @@ class CudaBackend final : public Backend {
 
   void upload(const State& state) override {
     check_sizes(state, size());
-    m_.use_device();
-    passes_->receive_displacements();
-    m_.wait();
-    if (m_.share()) m_.share()->communicator->largest(0);  // the others have come as far
-    fresh_ = true;
+    leave_steps();
     m_.put(state);
+    history_interval_ = state.history.empty() ? 0 : state.history_interval;
   }
   void download(State& state) const override {
     m_.use_device();
     passes_->receive_displacements();
     m_.wait();
     m_.take(state);
+    state.history_interval = m_.has_history() ? history_interval_ : 0;
   }
 
   void set_external_forces(std::span<const Vec3d> force) override {
-    if (!force.empty() && force.size() != static_cast<std::size_t>(size())) {
-      throw InputError(std::to_string(force.size()) + " external forces for " +
-                       std::to_string(size()) + " phyxels: allowed are " + std::to_string(size()) +
-                       " or none");
-    }
+    check_external_forces(force, size());
     m_.use_device();
     m_.wait();  // steps under way may read the forces that were set before
     const bool had_loads = m_.fields().load;
@@ -112,10 +106,22 @@ class CudaBackend final : public Backend {
     m_.wait();
   }
 
+  void put_displacements(std::span<const Vec3d> displacement) override {
+    leave_steps();
+    m_.put_displacements(displacement);
+  }
+  void set_history_interval(double interval) override { history_interval_ = interval; }
+  void commit_history() override {
+    if (!m_.has_history()) return;  // of all ranks alike
+    m_.use_device();
+    passes_->commit(history_interval_);
+    history_interval_ = 0;
+  }
+
   std::optional<Diagnostics> diagnostics(const Instant& now) override {
     m_.use_device();
     boundary_.sum_loads(now.time);
-    const DeviceArray<Real> forces = passes_->forces(),
+    const DeviceArray<Real> forces = passes_->forces(HistoryUse::trial, history_interval_),
                             gradients = m_.fields().pull ? passes_->gradients_and_residuals()
                                                          : passes_->gradients();
     const Index tiles = m_.tiles();
@@ -125,8 +131,8 @@ class CudaBackend final : public Backend {
     const DeviceArray<ExactTotals> all = sent(std::vector{none}, "sums");
     if (tiles > 0) {
       diagnose_tiles<<<tiles, diagnose_threads, 0, m_.stream()>>>(
-          m_.fields(), m_.materials(now.lag), boundary_.moved(), forces.data(), gradients.data(),
-          m_.number_at(), each.data());
+          m_.fields(), m_.materials(now.lag), history_interval_, boundary_.moved(), forces.data(),
+          gradients.data(), m_.number_at(), each.data());
       m_.launched("diagnose_tiles", static_cast<unsigned>(tiles), diagnose_threads);
       m_.launch_each("add_tiles", add_tiles, tiles, each.data(), tiles, all.data());
       m_.launch_each("find_fastest", find_fastest, tiles, each.data(), tiles, all.data());
@@ -164,10 +170,13 @@ class CudaBackend final : public Backend {
     return all.values();
   }
 
-  void internal_forces(std::vector<Vec3d>& force) override {
+  void internal_forces(std::vector<Vec3d>& force, HistoryUse use) override {
     m_.use_device();
-    const DeviceArray<Real> forces = passes_->forces();
+    const DeviceArray<Real> forces = passes_->forces(use, history_interval_);
     wait();
+    // The next stresses of another rank may differ from these, and must not come before these are
+    // read everywhere.
+    if (m_.share() && m_.has_history()) m_.share()->communicator->largest(0);
     const std::vector<Real> values = fetched(forces);
     force.resize(static_cast<std::size_t>(size()));
     for (Index i = 0; i < size(); ++i) {
@@ -254,19 +263,29 @@ class CudaBackend final : public Backend {
   std::string gradients_name() const { return "displacement gradients of " + m_.subject(); }
   using Advection = SurfelAdvection<Real, StateReal>;
 
+  /// Before phyxels are put elsewhere: steps under way end, on all ranks.
+  void leave_steps() {
+    m_.use_device();
+    passes_->receive_displacements();
+    m_.wait();
+    if (m_.share()) m_.share()->communicator->largest(0);  // the others have come as far
+    fresh_ = true;
+  }
   /// Launches the next steps that go together, at most `left`, from a time [s].
   /// @param surfels to be moved after each step, or null
   /// @returns the number of steps
   int launch_steps(double time, int left, const Advection* surfels) {
-    // The first step after an upload sees held phyxels where they were put, and then sets them.
-    if (!fresh_ && path_.residence) {
+    // The first step after an upload sees held phyxels where they were put, and then sets them; and
+    // the first of another size takes rates over a step of the size before.
+    const bool alike = !fresh_ && (!m_.has_history() || history_interval_ == m_.dt());
+    if (alike && path_.residence) {
       const int steps = std::min(left, surfels ? steps_together : path_.residence->most_steps);
       path_.residence->launch(m_.dt(), steps,
                               surfels ? surfels->trail() : Trail<Real, StateReal>{});
       if (surfels) surfels->launch_trail(steps);
       return steps;
     }
-    if (!fresh_ && left >= steps_together && graph_serves(surfels)) {
+    if (alike && left >= steps_together && graph_serves(surfels)) {
       graphs_[surfels != nullptr].launch(m_.stream(), [&] {
         for (int s = 0; s < steps_together; ++s) launch_step(time, surfels);
       });
@@ -284,7 +303,8 @@ class CudaBackend final : public Backend {
   }
   /// Launches one step of the present size from a time [s].
   void launch_step(double time, const Advection* surfels) {
-    passes_->stress();
+    passes_->stress(HistoryUse::commit, history_interval_);
+    history_interval_ = m_.dt();
     boundary_.sum_loads(time);
     if (fresh_ || boundary_.changes()) {
       passes_->advance(m_.dt());
@@ -326,6 +346,7 @@ class CudaBackend final : public Backend {
   std::optional<Advection> surfels_;        // once they have been asked for
   bool has_surfels_;                        // this or another rank
   bool fresh_ = true;                       // no step has been taken since the last upload
+  double history_interval_ = 0;             // from what laws remember to the displacements [s]
   StepGraph graphs_[2];                     // without surfels, and with
   DeviceArray<Real> stiffening_gradients_;  // of small bodies, once they have been looked at
   DeviceArray<TileStiffening> stiffest_;    // of each tile, likewise

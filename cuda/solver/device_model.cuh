@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "device.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/history.hpp"
 #include "phyxel/law_table.hpp"
 #include "setup/device_tiling.hpp"
 #include "setup/primitives.cuh"
@@ -71,6 +73,8 @@ class DeviceModel {
   Index boundary_tiles() const { return tiling_.boundary_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
+  /// True if a law remembers anything, here or elsewhere.
+  bool has_history() const { return !history_columns_.empty(); }
   bool closed() const { return closed_; }  ///< True if a body's gradients are, here or elsewhere.
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
 
@@ -155,11 +159,21 @@ class DeviceModel {
   }
   Real* loads() const { return load_.data(); }  ///< [3, places], or null.
 
+  /// @throws InputError for a history of other laws
   void put(const State& state) {
+    put_history(state);
     const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
                              v = sent(state.velocity, "velocities of " + subject_);
     launch_places("put_state", put_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
                   u.data(), v.data());
+    wait();
+  }
+  /// Puts phyxels elsewhere; velocities and history stay.
+  void put_displacements(std::span<const Vec3d> displacement) {
+    const DeviceArray<Vec3d> u = sent(std::vector<Vec3d>(displacement.begin(), displacement.end()),
+                                      "displacements of " + subject_);
+    launch_places("set_displacements", set_displacements<Real, StateReal>, fields_,
+                  tiling_.phyxel_at.data(), u.data());
     wait();
   }
   void take(State& state) const {
@@ -170,6 +184,7 @@ class DeviceModel {
                   u.data(), v.data());
     state.displacement = fetched(u);
     state.velocity = fetched(v);
+    take_history(state);
   }
 
   // --- launches ---------------------------------------------------------------------------------
@@ -257,6 +272,7 @@ class DeviceModel {
     if (load_.size()) list.push_back({"loads", load_.bytes()});
     if (external_.size()) list.push_back({"external forces", external_.bytes()});
     if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
+    if (history_.size()) list.push_back({"history", history_.bytes()});
     if (closed()) {
       list.push_back(
           {"closing vectors and stresses", closing_.bytes() + closing_stresses_.bytes()});
@@ -270,7 +286,7 @@ class DeviceModel {
     if (load_.size()) each += 3 * sizeof(Real);
     if (pull_.size()) each += 6 * sizeof(Real);
     if (closed()) each += 6 * sizeof(Real) + 2 * ClosingStresses<Real>::bytes;
-    return lists + each * places();
+    return lists + each * places() + 2 * history_.bytes();
   }
 
  private:
@@ -332,6 +348,7 @@ class DeviceModel {
       closing_stresses_.clear();
       fields_.closing_stresses = ClosingStresses<Real>::in(closing_stresses_.data(), places());
     }
+    make_history();
     tiles_ = {tiling_.part.size(), "tiles" + of};
     materials_ = {tiling_.part.size(), "tiles" + of};
 
@@ -342,6 +359,7 @@ class DeviceModel {
     fields_.displacement = displacement_.data();
     fields_.pull = pull_.data();
     fields_.closing = closing_.data();
+    fields_.history = history_.data();
     fields_.tiles = tiles_.data();
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
@@ -352,6 +370,52 @@ class DeviceModel {
     put_all_constants();
     velocity_.clear();
     if constexpr (mixed) displacement_.clear();
+  }
+
+  /// Makes room for what laws remember: of each part as many rows as its law has numbers.
+  void make_history() {
+    history_columns_ = history_columns(model_);
+    if (history_columns_.empty()) return;
+    std::size_t rows = 0;
+    for (const Part& part : model_.parts) {
+      columns_of_part_.push_back(columns_of(part.material, history_columns_));
+      rows = std::max(rows, columns_of_part_.back().size());
+    }
+    history_ = {rows * places(), "history of " + subject_};
+    history_.clear();
+    fields_.history_numbers = static_cast<int>(rows);
+  }
+  /// Calls visit(phyxel, column, where it is in `history_`) for each number that a phyxel of this
+  /// rank remembers.
+  template <class Visit>
+  void for_each_history(Visit&& visit) const {
+    for (std::size_t p = 0; p < columns_of_part_.size(); ++p) {
+      const Part& part = model_.parts[p];
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        const auto place = static_cast<std::size_t>(tiling_.place[i]);
+        for (std::size_t k = 0; k < columns_of_part_[p].size(); ++k) {
+          visit(i, columns_of_part_[p][k], k * places() + place);
+        }
+      }
+    }
+  }
+  void put_history(const State& state) {
+    const std::vector<const HistoryColumn*> history =
+        checked_history(state, history_columns_, size());
+    if (history_.size() == 0) return;
+    std::vector<Real> values(history_.size());
+    for_each_history([&](Index i, std::size_t column, std::size_t at) {
+      if (!history.empty()) values[at] = static_cast<Real>(history[column]->values[i]);
+    });
+    history_.upload(values.data());
+  }
+  void take_history(State& state) const {
+    state.history = virgin_history(model_);
+    if (history_.size() == 0) return;
+    const std::vector<Real> values = fetched(history_);
+    for_each_history([&](Index i, std::size_t column, std::size_t at) {
+      state.history[column].values[i] = values[at];
+    });
   }
 
   /// ĉ as rows [3, places], zero where a rank has none.
@@ -432,7 +496,9 @@ class DeviceModel {
   DeviceLists lists_{}, second_lists_{};
   DeviceArray<std::byte> points_, stresses_, closing_stresses_;
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, external_, pull_,
-      closing_;
+      closing_, history_;
+  std::vector<std::string> history_columns_;
+  std::vector<std::vector<std::size_t>> columns_of_part_;  // of the numbers of its law
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;  // with the damped flow over that lag [s]

@@ -27,6 +27,8 @@ enum Sum : int {
   strain_energy,
   volume_energy,
   hourglass_energy,
+  plastic_work,
+  viscous_work,
   gravity_energy,
   load_energy,
   force_scale,
@@ -94,12 +96,14 @@ inline constexpr int diagnose_threads = 128;
 
 /// @param force,gradient of the present displacements; with hourglass control, row 9 of `gradient`
 ///   has the residuals
+/// @param history_interval time from what laws remember to the displacements [s]
 /// @param moved along which axes phyxels follow a path (`Axes::bits`), or null
 /// @param number_at of each place: its phyxel's number
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
-                               const TileMaterial* materials, const char* moved, const Real* force,
-                               const Real* gradient, const Index* number_at, TileTotals* totals) {
+                               const TileMaterial* materials, double history_interval,
+                               const char* moved, const Real* force, const Real* gradient,
+                               const Index* number_at, TileTotals* totals) {
   __shared__ TileTotals shared[diagnose_threads];
   TileTotals both{};
   for (int part = 0; part < tile_size / diagnose_threads; ++part) {
@@ -149,11 +153,14 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
           f.external ? to<double>(column3(f.external, f.places, place)) : Vec3<double>{};
       t.sum[load_energy] = -dot(load - external, u);
       const double volume = f.moment_constants[6 * f.places + place];
-      t.sum[strain_energy] = volume * Laws::with<double>(m.law_index, m.law, [&](const auto& law) {
-                               return law.energy(grad_u);
-                             });
-      const VolumeConservation<double> conservation{m.volume_stiffness};
-      if (m.volume_stiffness > 0) t.sum[volume_energy] = volume * conservation.energy(grad_u);
+      const PointResponse<double> response = response_after_step<double>(
+          m.law_index, m.law, grad_u,
+          [&](int k) { return static_cast<double>(f.history[k * f.places + place]); },
+          history_interval);
+      t.sum[strain_energy] = volume * response.strain_energy;
+      t.sum[volume_energy] = volume * response.volume_energy;
+      t.sum[plastic_work] = volume * response.plastic_work;
+      t.sum[viscous_work] = volume * response.viscous_work;
       if (m.hourglass > 0) {
         t.sum[hourglass_energy] =
             phyxel::hourglass_energy(m.hourglass, gradient[9 * f.places + place]);

@@ -62,6 +62,21 @@ __global__ void put_state(Fields<Real, StateReal> f, const Index* phyxel_at,
   f.points.set(place, point);
 }
 
+/// Displacements by phyxel, into the fields.
+template <class Real, class StateReal>
+__global__ void set_displacements(Fields<Real, StateReal> f, const Index* phyxel_at,
+                                  const Vec3d* displacement) {
+  const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
+  const Index i = phyxel_at[place];
+  if (i < 0) return;
+  if constexpr (!std::is_same_v<Real, StateReal>) {
+    set_column3(f.displacement, f.places, place, to<StateReal>(displacement[i]));
+  }
+  auto point = f.points.get(place);
+  point.u = to<Real>(displacement[i]);
+  f.points.set(place, point);
+}
+
 /// Displacements and velocities by phyxel, out of the fields.
 template <class Real, class StateReal>
 __global__ void take_state(Fields<Real, StateReal> f, const Index* phyxel_at, Vec3d* displacement,

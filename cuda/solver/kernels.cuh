@@ -11,17 +11,14 @@
 #include "phyxel/physics/closing.hpp"
 #include "phyxel/physics/force.hpp"
 #include "phyxel/physics/hourglass.hpp"
-#include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/fused_halo.cuh"
+#include "solver/law_stress.cuh"
 #include "solver/records.cuh"
 
 namespace phyxel::cuda {
-
-/// The constants of any law, and the stiffness of volume conservation.
-inline constexpr int law_numbers = Laws::most_constants + 1;
 
 /// What the scene says of a tile's body, in the working precision.
 template <class Real, class StateReal>
@@ -59,29 +56,12 @@ struct Fields {
   const TileConstants<Real, StateReal>* tiles;
   Vec3<StateReal> gravity;
   std::size_t places;
-  const Real* external;  ///< The caller's share of `load`, [3, places], or null.
+  const Real* external;    ///< The caller's share of `load`, [3, places], or null.
+  Real* history;           ///< What laws remember, [history_numbers, places], or null.
+  int history_numbers;     ///< Of the phyxels that remember most.
+  HistoryUse history_use;  ///< What stresses do with it,
+  Real history_interval;   ///< and the time from it to the displacements [s].
 };
-
-/// A law that is chosen at run time, tile by tile: for resident kernels that serve bodies of
-/// several laws.
-struct AnyLaw {};
-
-/// P of a tile's body [Pa], by its law and, if it has any, volume conservation.
-/// @tparam Law one of `Laws`, or `AnyLaw`
-template <class Law, class Real, class Constants>
-__device__ Mat3<Real> first_piola_stress_of(const Constants& body, const Mat3<Real>& grad_u) {
-  const auto stress = [&](const auto& law) {
-    using Own = std::decay_t<decltype(law)>;
-    const VolumeConservation<Real> volume{body.law[constants_of_law<Own, Real>]};
-    if (!(volume.stiffness > Real(0))) return law.first_piola_stress(grad_u);
-    return SumOf<Own, VolumeConservation<Real>>{law, volume}.first_piola_stress(grad_u);
-  };
-  if constexpr (std::is_same_v<Law, AnyLaw>) {
-    return Laws::with<Real>(body.law_index, body.law, stress);
-  } else {
-    return stress(make_law<Law, Real>(body.law));
-  }
-}
 
 /// The velocity after a step. `force` is all but gravity; damping by the body's factors.
 template <class Real, class StateReal, bool damped, class Constants>
@@ -218,7 +198,7 @@ enum class Beyond { nothing, hourglass, closing };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
-/// @tparam Law one of `Laws`, or its sum with `VolumeConservation`
+/// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
 template <class Real, class StateReal, class Law, Beyond beyond, bool only_gradient,
           class Halo = NoHalo>
 __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
@@ -278,8 +258,14 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
-    const Law law = make_law<Law, Real>(body.law);
-    const Mat3<Real> stress = law.first_piola_stress(grad_u);
+    const HistoryColumns<Real> history{f.history, f.places, place};
+    Mat3<Real> stress;
+    if constexpr (std::is_same_v<Law, AnyViscousLaw>) {
+      stress = stress_of_material<Law>(body, grad_u, history, f.history_use, f.history_interval);
+    } else {
+      stress = stress_of_law(make_law<Law, Real>(body.law), grad_u, history, f.history_use,
+                             f.history_interval);
+    }
     Mat3<Real> q = pair_stress(c[6 * f.places], stress, inverse_moment);
     if constexpr (beyond == Beyond::closing) {
       const Vec3<Real> t = closing_stress(c[6 * f.places], stress, closing);

@@ -32,19 +32,24 @@ class Passes {
   }
 
   /// What ghosts are not needed for is launched before they are waited for.
-  void stress() const {
+  /// @param use what becomes of what laws remember. @param interval time from that to the present
+  ///   displacements [s]
+  void stress(HistoryUse use, double interval) const {
+    AllFields fields = m_.fields();
+    fields.history_use = use;
+    fields.history_interval = static_cast<Real>(interval);
     if (direct_) {
       const bool waits = halo_->begin_fused_pass(Sent::displacements, Sent::stresses);
       if (m_.closed()) {
-        fused_closed_.stress(direct_->template of_pass_1<ClosedStresses<Real>>(waits));
+        fused_closed_.stress(fields, direct_->template of_pass_1<ClosedStresses<Real>>(waits));
       } else {
-        fused_.stress(direct_->template of_pass_1<Stresses<Real>>(waits));
+        fused_.stress(fields, direct_->template of_pass_1<Stresses<Real>>(waits));
       }
       return;
     }
-    interior_.stress({});
+    interior_.stress(fields, {});
     receive(Sent::displacements);
-    boundary_.stress({});
+    boundary_.stress(fields, {});
     send(Sent::stresses);
   }
   /// Displacements may still change before other ranks get theirs (`send_displacements`).
@@ -92,10 +97,15 @@ class Passes {
     launch_pass_2<NoHalo>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
                           StateReal(0), forces, {});
   }
+  /// Commits what laws remember: it becomes that of the present displacements.
+  void commit(double interval) const {
+    stress(HistoryUse::commit, interval);
+    receive(Sent::stresses);
+  }
   /// Of ghosts: zero.
-  DeviceArray<Real> forces() const {
+  DeviceArray<Real> forces(HistoryUse use, double interval) const {
     DeviceArray<Real> forces = without_ghosts(3, "forces of ");
-    stress();
+    stress(use, interval);
     gather(forces.data());
     return forces;
   }
@@ -156,9 +166,9 @@ class Passes {
             return of.m_.own_supports() ? of.template pass_2_of<true, Halo2>(m)
                                         : of.template pass_2_of<false, Halo2>(m);
           })) {}
-    void stress(const Halo1& exchange) const {
+    void stress(const AllFields& fields, const Halo1& exchange) const {
       for (const auto& run : pass_1) {
-        of.template launch_pass_1<Halo1>(of.m_.fields(), run, {}, exchange);
+        of.template launch_pass_1<Halo1>(fields, run, {}, exchange);
       }
     }
     void advance(double dt, const Halo2& exchange) const {
@@ -199,8 +209,9 @@ class Passes {
   }
   template <Beyond beyond, class Halo>
   static Pass1<Halo> pass_1_of(const Material& m) {
+    if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, beyond, false, Halo>;
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
-      using WithVolume = SumOf<Law, VolumeConservation<Real>>;
+      using WithVolume = SolidLaw<Law, Real>;
       return m.volume_stiffness > 0
                  ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, beyond, false, Halo>)
                  : cuda::pass_1<Real, StateReal, Law, beyond, false, Halo>;

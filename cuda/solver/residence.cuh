@@ -139,8 +139,9 @@ class Residence {
   }
   template <class Channel>
   void use_channel(const ResidentPlan& plan) {
-    kernel_ =
-        m_.closed() ? kernel<Channel, AnyLaw, true, true>() : kernel_without_closing<Channel>();
+    kernel_ = m_.closed() ? m_.has_history() ? kernel<Channel, AnyLawWithHistory, true, true>()
+                                             : kernel<Channel, AnyLaw, true, true>()
+                          : kernel_without_closing<Channel>();
     threads_ = Channel::threads;
     shared_bytes_ = ResidentMemory<Real>::bytes(
         plan.most_slots, plan.longest[0], second_longest(plan), stress_packets_each(),
@@ -161,10 +162,14 @@ class Residence {
     };
     const auto& parts = m_.model().parts;
     const int law = chosen_law(parts.front().material).index;
-    const auto is_alike = [&](const Part& part) { return chosen_law(part.material).index == law; };
-    return std::all_of(parts.begin(), parts.end(), is_alike)
-               ? Laws::with_type<Real>(law, kernel_of)
-               : kernel_of(std::type_identity<AnyLaw>{});
+    const auto is_alike = [&](const Part& part) {
+      return chosen_law(part.material).index == law && !(part.material.viscosity > 0);
+    };
+    if (std::all_of(parts.begin(), parts.end(), is_alike)) {
+      return Laws::with_type<Real>(law, kernel_of);
+    }
+    return m_.has_history() ? kernel_of(std::type_identity<AnyLawWithHistory>{})
+                            : kernel_of(std::type_identity<AnyLaw>{});
   }
   /// One cluster a body, as many blocks each as the largest has slices.
   bool fits_clusters(const ResidentPlan& plan) {

@@ -120,7 +120,8 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
 }
 
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
-/// @tparam Law that of all bodies, or `AnyLaw`. @tparam controlled some bodies may have hourglass
+/// @tparam Law that of all bodies, `AnyLaw` or `AnyLawWithHistory`. @tparam controlled some bodies
+/// may have hourglass
 ///   control. @tparam closed some bodies have closed gradients
 template <class Real, class StateReal, class Channel, class Law, bool controlled, bool closed>
 __global__ void __launch_bounds__(Channel::threads)
@@ -177,6 +178,8 @@ __global__ void __launch_bounds__(Channel::threads)
   typename Points<Real>::Value point{};
   Vec3<StateReal> velocity, displacement;
   Vec3<Real> load;
+  const HistoryColumns<Real> history_columns{f.history, f.places, place};
+  HistoryRegisters<Real, kept_numbers<Law, Real>> history;
   if (owner) {
     point = f.points.get(place);
     velocity = column3(f.velocity, f.places, place);
@@ -186,6 +189,7 @@ __global__ void __launch_bounds__(Channel::threads)
       displacement = column3(f.displacement, f.places, place);
     }
     if (f.load) load = column3(f.load, f.places, place);
+    history.fetch(history_columns, f.history_numbers);
   }
   // Half a step more for the gradients of the last displacements.
   for (int step = 0; step < steps + (trail.gradients ? 1 : 0); ++step) {
@@ -215,7 +219,9 @@ __global__ void __launch_bounds__(Channel::threads)
         }
         set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
-      const Mat3<Real> stress = first_piola_stress_of<Law>(body, grad_u);
+      const HistoryUse use = step == steps ? HistoryUse::trial : HistoryUse::commit;
+      const Mat3<Real> stress =
+          stress_of_material<Law>(body, grad_u, history, use, static_cast<Real>(dt));
       q = pair_stress(volume, stress, inverse_moment);
       if constexpr (closed) {
         t = closing_stress(volume, stress, closing);
@@ -264,6 +270,7 @@ __global__ void __launch_bounds__(Channel::threads)
   if constexpr (!std::is_same_v<Real, StateReal>) {
     set_column3(f.displacement, f.places, place, displacement);
   }
+  history.put(history_columns, f.history_numbers);
 }
 
 }  // namespace phyxel::cuda

@@ -232,8 +232,9 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
 };
 
-/// The stiffness at the present displacements, by differences of forces there. The destructor
-/// restores the displacements; velocities are not touched.
+/// The stiffness at the present displacements, by differences of forces there, with what laws
+/// remember held: unloading is elastic. The destructor restores the displacements; velocities are
+/// not touched.
 template <class Real, class StateReal>
 class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;
@@ -249,7 +250,7 @@ class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
         farthest_(1, "sums") {
     model.launch_tiles("keep_displacements", keep_displacements<Real, StateReal>, model.fields(),
                        present_.data());
-    passes.stress();
+    passes.stress(HistoryUse::frozen, 0);
     passes.gather(forces_there_.data());
   }
   CudaDeformedVibration(const CudaDeformedVibration&) = delete;
@@ -272,7 +273,7 @@ class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
     m.launch_tiles("bend_from", bend_from<Real, StateReal>, m.fields(), present_.data(),
                    this->current().data(), amplitude);
     this->passes().send_displacements();
-    this->passes().stress();
+    this->passes().stress(HistoryUse::frozen, 0);
     this->passes().gather(this->force().data());
     m.launch_tiles("subtract", subtract_multiple<Real>, this->force().data(), forces_there_.data(),
                    m.places(), Real(1));

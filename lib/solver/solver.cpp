@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "phyxel/equilibrium.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"

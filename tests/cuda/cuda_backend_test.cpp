@@ -23,6 +23,8 @@ struct Case {
   bool closed = false;      ///< Gradients of the first body,
   bool one_each = false;    ///< whose neighbour has supports of its own.
   bool inclusions = false;  ///< Of other materials, in the first body.
+  bool plastic = false;     ///< The first body yields.
+  bool viscous = false;     ///< All materials are viscous.
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -62,10 +64,19 @@ Scene scene_of(const Case& c) {
     motion.frequency = 3;
     second.motions.push_back(motion);
   }
+  if (c.plastic) {
+    first.material.law = "j2";
+    first.material.parameters = {{"yield_stress", 2e3}, {"hardening", 1e4}};
+  }
+  if (c.viscous) {
+    first.material.viscosity = 2e-4;
+    second.material.viscosity = 1e-4;
+  }
   if (c.inclusions) {
     Material hard = first.material, light = first.material;
     hard.young *= 4;
     hard.law = "neo-hookean";
+    hard.parameters = {};
     light.poisson = 0.1;
     light.density *= 0.5;
     light.damping = 3;
@@ -154,6 +165,17 @@ TEST_P(CudaBackend, TrajectoriesStayWithTheCpus) {
     const State found = after(*gpu, model, scene, dt, 300);
     EXPECT_LT(apart(found.displacement, expected.displacement), tolerance);
     EXPECT_LT(apart(found.velocity, expected.velocity), 30 * tolerance);
+    ASSERT_EQ(found.history.size(), expected.history.size());
+    for (std::size_t k = 0; k < found.history.size(); ++k) {
+      const std::vector<double>&a = found.history[k].values, &b = expected.history[k].values;
+      double worst = 0, most = 0;
+      for (std::size_t i = 0; i < b.size(); ++i) {
+        worst = std::max(worst, std::abs(a[i] - b[i]));
+        most = std::max(most, std::abs(b[i]));
+      }
+      EXPECT_LT(worst, 30 * tolerance * most) << found.history[k].name;
+      EXPECT_GT(most, 0) << found.history[k].name;
+    }
   }
 }
 
@@ -173,6 +195,7 @@ TEST_P(CudaBackend, TwoRunsAndARestartAreBitwiseEqual) {
     while (rest.steps() < 200) rest.step();
     EXPECT_TRUE(rest.state().displacement == whole.displacement);
     EXPECT_TRUE(rest.state().velocity == whole.velocity);
+    EXPECT_TRUE(rest.state().history == whole.history);
   }
 }
 
@@ -206,6 +229,7 @@ TEST_P(CudaBackend, TheLimitOfADeformedStateIsTheHosts) {
     }
     EXPECT_TRUE(solver.state().displacement == other.state().displacement);
     EXPECT_TRUE(solver.state().velocity == other.state().velocity);
+    EXPECT_TRUE(solver.state().history == other.state().history);
   }
 }
 
@@ -264,6 +288,7 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
                   b = after(*launched, model, scene, dt, steps);
       EXPECT_TRUE(a.displacement == b.displacement) << resident->name() << ' ' << steps;
       EXPECT_TRUE(a.velocity == b.velocity) << resident->name() << ' ' << steps;
+      EXPECT_TRUE(a.history == b.history) << resident->name() << ' ' << steps;
     }
     Solver looked_at(*resident, initial_state(model, scene, dt));
     for (int s = 0; s < 40; ++s) {
@@ -273,6 +298,7 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
     const State unseen = after(*launched, model, scene, dt, 40);
     EXPECT_TRUE(looked_at.state().displacement == unseen.displacement) << resident->name();
     EXPECT_TRUE(looked_at.state().velocity == unseen.velocity) << resident->name();
+    EXPECT_TRUE(looked_at.state().history == unseen.history) << resident->name();
   }
 }
 
@@ -368,6 +394,22 @@ INSTANTIATE_TEST_SUITE_P(
                      "clusters",
                      {"", false, false, true, true, false, true},
                      with_surface(small_clouds(), {1.3, 0.4, 0.6})},
+        ResidentCase{"MailPlastic",
+                     "blocks",
+                     {"", false, false, false, false, false, false, true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"ClusterPlastic",
+                     "clusters",
+                     {"", false, false, false, false, false, false, true},
+                     {lattice(15, 5, 7, 0.1, 0.2, 3)}},
+        ResidentCase{"ClusterPlasticViscousInclusions",
+                     "clusters",
+                     {"", false, false, true, false, false, true, true, true},
+                     small_clouds()},
+        ResidentCase{"MailClosedPlasticViscous",
+                     "blocks",
+                     {"", false, false, true, true, false, false, true, true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
         ResidentCase{"ManyClusters", "clusters", {"", false, false, false}, many_clouds()}),
     [](const auto& test) { return std::string(test.param.name); });
 
@@ -413,14 +455,16 @@ TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
 
 INSTANTIATE_TEST_SUITE_P(
     Terms, CudaBackend,
-    ::testing::Values(Case{"Uniform", false, false, false}, Case{"Adaptive", true, false, false},
-                      Case{"Capped", true, true, false},
-                      Case{"UniformEverything", false, false, true},
-                      Case{"AdaptiveEverything", true, false, true},
-                      Case{"Closed", false, false, false, true},
-                      Case{"ClosedEverything", false, false, true, true},
-                      Case{"ClosedBesideAdaptive", false, false, true, true, true},
-                      Case{"Inclusions", false, false, true, false, false, true}),
+    ::testing::Values(
+        Case{"Uniform", false, false, false}, Case{"Adaptive", true, false, false},
+        Case{"Capped", true, true, false}, Case{"UniformEverything", false, false, true},
+        Case{"AdaptiveEverything", true, false, true}, Case{"Closed", false, false, false, true},
+        Case{"ClosedEverything", false, false, true, true},
+        Case{"ClosedBesideAdaptive", false, false, true, true, true},
+        Case{"Inclusions", false, false, true, false, false, true},
+        Case{"Plastic", false, false, true, false, false, false, true},
+        Case{"PlasticViscous", false, false, false, false, false, true, true, true},
+        Case{"ClosedPlasticViscous", false, false, true, true, false, false, true, true}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(CudaSurfels, EqualTheCpus) {
@@ -447,24 +491,41 @@ TEST(CudaSurfels, EqualTheCpus) {
   }
 }
 
+/// Surfels that are moved after each step of a call are where the phyxels are, and leave those and
+/// what they remember alone.
 TEST(CudaSurfels, FollowEveryStepOnEveryPath) {
-  const Model model = built_in_bodies("horn_bug", "horn_bug");
+  Scene scene = one_body();
+  scene.bodies[0].source.shape.name = "horn_bug";
+  scene.bodies.push_back(scene.bodies[0]);
+  scene.bodies[1].translation = {40, 0, 0};
+  Material& metal = scene.bodies[1].material;
+  metal.law = "j2";
+  metal.parameters = {{"yield_stress", 50}, {"hardening", 1e4}};
+  const Model model = build_model(scene);
   for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
     const auto resident = make_cuda_backend(model, precision),
-               launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
+               launched = make_cuda_backend(model, precision, 0, CudaPath::launches),
+               bare = make_cuda_backend(model, precision);
     // Step 1 goes by launches; then sixteen go together, and three. Surfels after 17 and after 20.
     std::vector<SurfelState> a, b;
+    std::vector<State> after;
+    const State start = state_of(random_deformation(model, 0.001));
     for (const auto& [backend, out] : {std::pair{&resident, &a}, std::pair{&launched, &b}}) {
-      Solver solver(**backend, state_of(random_deformation(model, 0.001)));
-      for (int s = 1; s <= 20; ++s) {
-        solver.step();
-        (*backend)->update_surfels();
-        if (s == 17 || s == 20) (*backend)->advect_surfels(out->emplace_back());
-      }
+      Solver solver(**backend, start);
+      solver.step(17, true);
+      (*backend)->advect_surfels(out->emplace_back());
+      solver.step(3, true);
+      (*backend)->advect_surfels(out->emplace_back());
+      after.push_back(solver.state());
     }
+    Solver alone(*bare, start);
+    alone.step(20);
+    after.push_back(alone.state());
     for (int k = 0; k < 2; ++k) {
       EXPECT_TRUE(a[k].position == b[k].position);
       EXPECT_TRUE(a[k].normal == b[k].normal);
+      EXPECT_TRUE(after[k].displacement == after[2].displacement) << k;
+      EXPECT_TRUE(after[k].history == after[2].history) << k;
     }
     EXPECT_FALSE(a[0].position == a[1].position);
     std::vector<Vec3d> moved;

@@ -230,7 +230,7 @@ struct J2 {
     if (!may_be_positive(rise)) return linear;
     const Real left = rise * (Real(1) + exp_minus_one(saturation_rate * before));
     Real increment{};
-#if defined(__CUDACC__)
+#if defined(__CUDA_ARCH__)
 #pragma unroll 1
 #endif
     for (int k = 0; k < 6; ++k) {
