@@ -36,6 +36,20 @@ Law law_of(Material material) {
   return make_law<Law, Real>(chosen_law(material).constants.data());
 }
 
+/// A law as its virgin material responds elastically: what an elastic law is anyway.
+template <class Law>
+struct Virgin {
+  Law law;
+  template <class Real>
+  Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
+    return elastic_stress(law, grad_u, HistoryOf<Law>{});
+  }
+  template <class Real>
+  Real energy(const Mat3<Real>& grad_u) const {
+    return stored_energy(law, grad_u, HistoryOf<Law>{});
+  }
+};
+
 /// Why a material is refused; "" if it is not.
 inline std::string law_refusal(const Material& material) {
   try {

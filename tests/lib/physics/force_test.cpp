@@ -110,7 +110,9 @@ Case make_case(const Terms& terms) {
     c.body.neighbours.emplace_back(row.begin(), row.end());
   }
   const auto told = [](const Material& m) {
-    return oracle::Material{m.young, m.poisson, m.volume_stiffness, m.law, m.parameters};
+    std::map<std::string, double> numbers;
+    for (const auto& [name, value] : m.parameters) numbers[name] = value.number();
+    return oracle::Material{m.young, m.poisson, m.volume_stiffness, m.law, numbers};
   };
   static_cast<oracle::Material&>(c.body) = told(material);
   for (const Part& part : c.model.parts) {
@@ -305,11 +307,13 @@ TEST(Force, LawsButHookesResistUntilTheBodyIsInsideOut) {
     for (const double stretch : {0.9, 0.7, 0.5, 0.3, 0.1, 0.0, -0.2, -0.5}) {
       Mat3d g{};
       g(0, 0) = stretch - 1;
-      const double push = chosen_by_name<Law>().first_piola_stress(g)(0, 0);
+      const double push = Virgin<Law>{chosen_by_name<Law>()}.first_piola_stress(g)(0, 0);
       resists = resists && push < before;
       before = push;
     }
-    EXPECT_EQ(resists, (!std::is_same_v<Law, StVenantKirchhoff<double>>)) << Law::name;
+    const bool in_green_strain = std::is_same_v<Law, StVenantKirchhoff<double>> ||
+                                 std::is_same_v<Law, Orthotropic<double>>;
+    EXPECT_EQ(resists, !in_green_strain) << Law::name;
   });
 }
 
@@ -322,15 +326,18 @@ TEST(Force, LawsAreHookesAtSmallStrains) {
       const Law law = chosen_by_name<Law>();
       // Laws of E and ν are Hooke's of the same; others say themselves whose they are.
       const bool is_of_young = has_parameter(Law::name, "young");
-      const Hooke<double> hooke = is_of_young
-                                      ? Hooke<double>{rubber().lame_lambda(), rubber().lame_mu()}
-                                      : law.at_rest(0).hooke;
+      Hooke<double> hooke{rubber().lame_lambda(), rubber().lame_mu()};
+      if constexpr (requires { law.at_rest(0).hooke; }) {
+        if (!is_of_young) hooke = law.at_rest(0).hooke;
+      } else {
+        return;  // anisotropic: tests of its own
+      }
       const Mat3d s = full(hooke.stress(cauchy_strain(g)));
-      const Mat3d p = law.first_piola_stress(g);
+      const Mat3d p = Virgin<Law>{law}.first_piola_stress(g);
       // Terms of second order are 1e-6 of the stress; and no digits are lost by what cancels at
       // rest.
       for (int e = 0; e < 9; ++e) EXPECT_NEAR(p(e / 3, e % 3), s(e / 3, e % 3), 1e-5) << Law::name;
-      EXPECT_NEAR(law.energy(g), hooke.energy(cauchy_strain(g)), 1e-11) << Law::name;
+      EXPECT_NEAR(Virgin<Law>{law}.energy(g), hooke.energy(cauchy_strain(g)), 1e-11) << Law::name;
     });
   }
 }

@@ -78,7 +78,7 @@ struct LawCase {
   const char* name;
   const char* law;
   double poisson, volume_stiffness;
-  std::map<std::string, double> parameters = {};
+  std::map<std::string, ParameterValue> parameters = {};
 };
 void PrintTo(const LawCase& c, std::ostream* out) { *out << c.name; }
 
@@ -101,8 +101,9 @@ class WaveStiffness : public ::testing::TestWithParam<LawCase> {
   double largest(const Mat3d& g, std::mt19937_64& engine) const {
     return Laws::with<double>(law_.index, law_.constants.data(), [&](const auto& law) {
       const VolumeConservation<double> volume{GetParam().volume_stiffness};
-      return largest_wave_stiffness(
-          SumOf<std::decay_t<decltype(law)>, VolumeConservation<double>>{law, volume}, g, engine);
+      using Elastic = testing::Virgin<std::decay_t<decltype(law)>>;
+      return largest_wave_stiffness(SumOf<Elastic, VolumeConservation<double>>{{law}, volume}, g,
+                                    engine);
     });
   }
 };
