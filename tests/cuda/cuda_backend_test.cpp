@@ -66,7 +66,7 @@ Scene scene_of(const Case& c) {
   }
   if (c.plastic) {
     first.material.law = "j2";
-    first.material.parameters = {{"yield_stress", 2e3}, {"hardening", 1e4}};
+    first.material.parameters = {{"yield_stress", 1e4}, {"hardening", 5e4}};
   }
   if (c.viscous) {
     first.material.viscosity = 2e-4;
