@@ -16,7 +16,8 @@ import re
 import subprocess
 import tempfile
 
-SLOW = ["elastica", "L-block", "spinning", "twist"]  # begun first
+SLOW = ["taylor", "elastica", "L-block", "spinning", "twist"]  # begun first
+OWN_WAYS = ["cycles", "simple-shear", "tube", "sphere", "taylor"]  # measured in no others than they name themselves
 
 
 def cases(program):
@@ -27,7 +28,12 @@ def cases(program):
 
 def slices(names):
     ways = [("nodes", "0"), ("nodes", "0.2"), ("cells", "0"), ("cells", "0.2"), ("mesh", "0")]
+    for name, lattice in itertools.product(names, ("nodes", "cells", "mesh")):
+        if name in OWN_WAYS:
+            yield [name, "--lattice", lattice]
     for name, (lattice, jitter), hourglass in itertools.product(names, ways, ("0", "0.1")):
+        if name in OWN_WAYS:
+            continue
         arguments = ["--lattice", lattice, "--jitter", jitter, "--hourglass", hourglass]
         if name == "elastica":
             for closure in ("0", "1e-3"):

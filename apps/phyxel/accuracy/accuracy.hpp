@@ -47,11 +47,17 @@ struct AccuracyCase {
   std::vector<int> across;  ///< Resolutions that it is run with if none are asked for.
   Solution (*solve)(const Discretisation&);
   std::vector<double> closures{0, 1e-3};  ///< Closures of gradients, likewise.
+  std::vector<double> jitters{0, 0.2};    ///< Of lattices, likewise.
+  std::vector<double> hourglass{0, 0.1};  ///< Strengths of hourglass control, likewise.
+  /// Fillings that the case has; it is run with no others.
+  std::vector<Filling> fillings{Filling::nodes, Filling::cells, Filling::mesh};
 };
 
-/// Bodies at rest, and bodies that move.
-std::vector<AccuracyCase> static_cases();
-std::vector<AccuracyCase> dynamic_cases();
+std::vector<AccuracyCase> static_cases();    ///< Elastic bodies at rest.
+std::vector<AccuracyCase> dynamic_cases();   ///< Elastic bodies that move.
+std::vector<AccuracyCase> plastic_cases();   ///< Bodies of metal in uniform states.
+std::vector<AccuracyCase> collapse_cases();  ///< Bodies of metal under their collapse loads.
+std::vector<AccuracyCase> impact_cases();    ///< Bars of metal that strike a wall.
 std::vector<AccuracyCase> accuracy_cases();  ///< All of them.
 
 }  // namespace phyxel::app

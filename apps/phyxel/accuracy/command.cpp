@@ -20,8 +20,8 @@ struct AccuracyOptions {
   std::vector<std::string> cases{"all"};
   std::vector<int> across;  ///< Empty: each case's own.
   std::vector<std::string> lattices{"nodes", "cells", "mesh"};
-  std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1};
-  std::vector<double> closures;  ///< Empty: each case's own.
+  std::vector<double> factors{1.8};
+  std::vector<double> jitters, hourglass, closures;  ///< Empty: each case's own.
   TableOptions table;
 };
 
@@ -46,17 +46,21 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
 
 std::vector<Discretisation> discretisations(const AccuracyOptions& options,
                                             const AccuracyCase& of) {
-  const std::vector<double>& closures = options.closures.empty() ? of.closures : options.closures;
+  const auto asked = [](const std::vector<double>& values, const std::vector<double>& own) {
+    return values.empty() ? own : values;
+  };
+  const std::vector<double> closures = asked(options.closures, of.closures);
+  const std::vector<double> jitters = asked(options.jitters, of.jitters);
   std::vector<Discretisation> list;
-  for (const Filling filling : {Filling::nodes, Filling::cells, Filling::mesh}) {
+  for (const Filling filling : of.fillings) {
     if (std::find(options.lattices.begin(), options.lattices.end(), filling_name(filling)) ==
         options.lattices.end()) {
       continue;
     }
-    for (const double jitter : options.jitters) {
-      if (filling == Filling::mesh && jitter != options.jitters.front()) continue;  // has none
+    for (const double jitter : jitters) {
+      if (filling == Filling::mesh && jitter != jitters.front()) continue;  // has none
       for (const double factor : options.factors) {
-        for (const double hourglass : options.hourglass) {
+        for (const double hourglass : asked(options.hourglass, of.hourglass)) {
           for (const double closure : closures) {
             list.push_back({.filling = filling,
                             .jitter = filling == Filling::mesh ? 0 : jitter,
@@ -176,20 +180,22 @@ void add_accuracy(CLI::App& program) {
       ->delimiter(',')
       ->check(CLI::IsMember({"nodes", "cells", "mesh"}))
       ->capture_default_str();
-  command->add_option("--jitter", options->jitters, "Phyxels moved by so many spacings")
+  command
+      ->add_option("--jitter", options->jitters,
+                   "Phyxels moved by so many spacings; otherwise each case's own, mostly 0 and 0.2")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 0.5))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 0.5));
   command
       ->add_option("--factor", options->factors,
                    "Supports, as multiples of the mean distance to the 10 nearest")
       ->delimiter(',')
       ->check(CLI::Range(1.0, 4.0))
       ->capture_default_str();
-  command->add_option("--hourglass", options->hourglass, "Strengths of hourglass control")
+  command
+      ->add_option("--hourglass", options->hourglass,
+                   "Strengths of hourglass control; otherwise each case's own, mostly 0 and 0.1")
       ->delimiter(',')
-      ->check(CLI::Range(0.0, 100.0))
-      ->capture_default_str();
+      ->check(CLI::Range(0.0, 100.0));
   command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 1.0));

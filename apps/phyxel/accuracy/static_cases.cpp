@@ -155,21 +155,69 @@ Load on_axis(const Model& model, const std::vector<Index>& end, double force) {
   return load;
 }
 
-Solution tension(const Discretisation& d) {
-  constexpr double length = 1, side = 0.2, strain = 1e-6;
-  Scene scene = bar(d, length, side);
-  const double force = strain * E * side * side;
+constexpr double small_strain = 1e-6;
+
+/// A bar, pulled at both ends by a stress of so much [Pa].
+Rest pulled(const Scene& scene, const Discretisation& d, double side, double stress) {
+  const double force = stress * side * side;
   const auto begin = Clock::now();
   const Cloud cloud = cloud_of(scene, d);
-  Rest rest = rest_of(begin, scene, cloud, [&](Model& model) {
+  return rest_of(begin, scene, cloud, [&](Model& model) {
     model.loads.push_back(on_axis(model, cloud.regions.at("x-"), -force));
     model.loads.push_back(on_axis(model, cloud.regions.at("x+"), force));
   });
-  const double stretch =
-      (rest.moved("x+").x - rest.moved("x-").x) / (rest.placed("x+").x - rest.placed("x-").x);
+}
+/// By how much it has become longer, of its length.
+double stretch_of(const Rest& rest) {
+  return (rest.moved("x+").x - rest.moved("x-").x) / (rest.placed("x+").x - rest.placed("x-").x);
+}
+
+Solution tension(const Discretisation& d) {
+  constexpr double length = 1, side = 0.2, strain = small_strain;
+  Rest rest = pulled(bar(d, length, side), d, side, strain * E);
+  const double stretch = stretch_of(rest);
   const double narrowing =
       (rest.moved("y+").y - rest.moved("y-").y) / (rest.placed("y+").y - rest.placed("y-").y);
   return with(std::move(rest), {{"E", strain * E / stretch, E}, {"ν", -narrowing / stretch, nu}});
+}
+
+/// Spruce (Forest Products Laboratory 2010, Wood handbook, tables 5-1 and 5-2: Sitka spruce),
+/// longitudinal, radial and tangential, of E along the grain.
+struct Spruce {
+  static constexpr double young[] = {E, 0.078 * E, 0.043 * E};  // [Pa]
+  static constexpr double poisson_lr = 0.372, poisson_lt = 0.467, poisson_rt = 0.435;
+  static constexpr double shear_lr = 0.064 * E, shear_lt = 0.061 * E, shear_rt = 0.003 * E;  // [Pa]
+};
+
+/// Young's modulus along the bar of wood whose grain is turned out of its axis by an angle.
+Quantity off_axis(const Discretisation& d, double degrees, Solution& total) {
+  constexpr double length = 1, side = 0.2;
+  const double angle = degrees * std::numbers::pi / 180, c = std::cos(angle), s = std::sin(angle);
+  Scene scene = bar(d, length, side);
+  Material& wood = scene.bodies[0].material;
+  wood.law = Orthotropic<double>::name;
+  wood.young = wood.poisson = 0;
+  wood.parameters = {{"young1", Spruce::young[0]},      {"young2", Spruce::young[1]},
+                     {"young3", Spruce::young[2]},      {"poisson12", Spruce::poisson_lr},
+                     {"poisson13", Spruce::poisson_lt}, {"poisson23", Spruce::poisson_rt},
+                     {"shear12", Spruce::shear_lr},     {"shear13", Spruce::shear_lt},
+                     {"shear23", Spruce::shear_rt},     {"axis1", Vec3d{c, s, 0}},
+                     {"axis2", Vec3d{-s, c, 0}}};
+  const double known =
+      1 / (std::pow(c, 4) / Spruce::young[0] + std::pow(s, 4) / Spruce::young[1] +
+           c * c * s * s * (1 / Spruce::shear_lr - 2 * Spruce::poisson_lr / Spruce::young[0]));
+  Rest rest = pulled(scene, d, side, small_strain * known);
+  add_to(total, rest.solution);
+  return {"E at " + std::to_string(static_cast<int>(degrees)) + "°",
+          small_strain * known / stretch_of(rest), known};
+}
+Solution wood(const Discretisation& d) {
+  Solution solution;
+  for (const double degrees : {0.0, 15.0, 45.0, 90.0}) {
+    const Quantity found = off_axis(d, degrees, solution);
+    solution.found.push_back(found);
+  }
+  return solution;
 }
 
 /// Where the end goes, along -z [m].
@@ -285,6 +333,13 @@ std::vector<AccuracyCase> static_cases() {
        "back.",
        {4, 6, 8, 12},
        tension},
+      {"wood",
+       "The same bar of spruce, 23 times as stiff along the grain as across, whose grain is turned "
+       "out of the bar's axis: Young's modulus along the bar. Reference: 1/E = c⁴/E₁ + s⁴/E₂ + c² "
+       "s² "
+       "(1/G₁₂ - 2 ν₁₂/E₁) with cosine c and sine s of the angle (Lekhnitskii 1963).",
+       {4, 6, 8},
+       wood},
       {"gravity",
        "A bar, five times as long as wide, clamped at one end, under its weight. Reference: finite "
        "elements of quadratic displacements and linear pressure, graded towards the held edges and "
