@@ -1,4 +1,4 @@
-/// The program on several ranks, as mpirun starts it: one answer, one message, no hang.
+/// The program on several ranks under mpirun: one result, one message, no hang.
 #include "mpirun.hpp"
 
 #include <gmock/gmock.h>
@@ -26,8 +26,8 @@ using test::text_of;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// Each rank starts itself once more, with threads that sleep soon while they wait: its OpenMP
-/// runtime says so, which has read the environment each time that it was loaded.
+/// Each rank restarts itself with a shorter spin of waiting threads, as the environment that its
+/// OpenMP runtime has read shows.
 TEST_F(Mpirun, WaitingThreadsOfEachRankSleepSoon) {
 #ifdef __clang__
   GTEST_SKIP() << "LLVM's OpenMP runtime waits as it will";
@@ -104,9 +104,8 @@ frequency = 0.05
   EXPECT_TRUE(end("parts").velocity == end("alone").velocity);
 }
 
-/// A body that stiffens has its steps halved at the same ones on any number of ranks, and a search
-/// for rest comes to the same bits, also when all ranks were stopped by a signal that one has
-/// heard.
+/// The steps of a body that stiffens are halved at the same step on any number of ranks. A search
+/// for equilibrium has the same bits, also after all ranks were stopped by a signal to one of them.
 TEST_F(Mpirun, HalvesStepsAndStopsSearchesAlikeOnAllRanks) {
   const auto scene = [&](const std::string& method, const std::string& spacing) {
     write("soft.toml",
@@ -155,7 +154,7 @@ region = "x-"
     return read_checkpoint(latest_checkpoint(folder_ / folder).value()).state.displacement;
   };
   EXPECT_TRUE(end_of("rest") == end_of("parts"));
-  // Energies count what lies across the cut, too.
+  // Energies include pairs across the cut.
   EXPECT_EQ(text_of(folder_ / "rest" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
 
   scene("implicit", "0.05");
@@ -171,8 +170,8 @@ region = "x-"
   EXPECT_EQ(text_of(folder_ / "one" / "energy.csv"), text_of(folder_ / "two" / "energy.csv"));
 }
 
-/// A vertex that no triangle uses, before a tetrahedron: the sampler warns of it, every rank
-/// samples, and one of them speaks.
+/// The sampler warns of a vertex that no triangle uses; all ranks sample, and one prints the
+/// warning.
 TEST_F(Mpirun, WarningsOfMeshesAreShownOnce) {
   write("t.obj",
         "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 2 4 3\nf 2 3 5\nf 3 4 5\nf 2 5 4\n");
@@ -257,7 +256,7 @@ TEST_F(Mpirun, DoctorListsTheRanksOnce) {
   EXPECT_EQ(alone["memory_bytes"].get<double>(), 2 * found["memory_bytes"].get<double>());
 }
 
-/// Each rank's spans lie within its own time, and steps are among them; files are another thread's.
+/// Each rank's spans lie within its own time and include steps; files belong to another thread.
 TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
   write_scene("0.03");
   const std::vector<std::string> command{"run", "scene.toml", "--quiet", "--profile", "trace.json"};
@@ -293,9 +292,8 @@ TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
       HasSubstr("trace.json: exists already and is kept; allowed: another file, or --force"));
 }
 
-/// How often a text stands in another.
 /// The plan of two ranks is that of one, and no file is written.
-TEST_F(Mpirun, CheckTellsThePlanOnce) {
+TEST_F(Mpirun, DryRunPrintsThePlanOnce) {
   write_scene();
   const Outcome one = run_on(0, {"run", "scene.toml", "--dry-run", "--json"});
   const Outcome two = run_on(2, {"run", "scene.toml", "--dry-run", "--json"});
@@ -310,8 +308,8 @@ TEST_F(Mpirun, CheckTellsThePlanOnce) {
   EXPECT_FALSE(fs::exists(folder_ / "out"));
 }
 
-/// Every rank judges a resumed run by the start of the run, not by values of its own: this body
-/// flies at five times the wave speed, of which only the first speed in the checkpoint tells.
+/// All ranks judge a resumed run by the state at the start of the run: this body flies at five
+/// times the wave speed, which only the first speed in the checkpoint shows.
 TEST_F(Mpirun, AFastBodyGoesOnOnAllRanks) {
   write("scene.toml", R"(
 [time]
@@ -365,7 +363,7 @@ TEST_F(Mpirun, StopsAndGoesOnOnOtherRanks) {
   EXPECT_EQ(text_of(folder_ / "alone" / "energy.csv"), text_of(folder_ / "parts" / "energy.csv"));
 }
 
-/// Written on three ranks, read on two, on one, and on three again, in short stretches.
+/// A checkpoint of three ranks is read on two, on one, and on three ranks, in short chunks.
 TEST_F(Mpirun, CheckpointsGoOnOnOtherRanksToTheByte) {
   write_scene();
   for (const char* precision : {"float", "double"}) {
@@ -438,7 +436,7 @@ density = 1000
   expect_same_files("alone", "three");
 }
 
-/// Processes that one has started, by number.
+/// Process ids of a process's children.
 std::vector<pid_t> children_of(pid_t parent) {
   std::vector<pid_t> children;
   for (const auto& entry : fs::directory_iterator("/proc")) {

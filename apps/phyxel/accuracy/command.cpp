@@ -1,4 +1,4 @@
-/// phyxel accuracy: problems with known answers, over resolutions and ways to discretise.
+/// phyxel accuracy: problems with known answers, over resolutions and discretisations.
 #include "command.hpp"
 
 #include <fmt/format.h>
@@ -18,10 +18,10 @@ namespace {
 
 struct AccuracyOptions {
   std::vector<std::string> cases{"all"};
-  std::vector<int> across;  ///< Empty: each case's own.
+  std::vector<int> across;  ///< Resolutions; if empty, those of each case.
   std::vector<std::string> lattices{"nodes", "cells", "mesh"};
   std::vector<double> jitters{0, 0.2}, factors{1.8}, hourglass{0, 0.1};
-  std::vector<double> closures;  ///< Empty: each case's own.
+  std::vector<double> closures;  ///< Closures; if empty, those of each case.
   TableOptions table;
 };
 
@@ -54,7 +54,7 @@ std::vector<Discretisation> discretisations(const AccuracyOptions& options,
       continue;
     }
     for (const double jitter : options.jitters) {
-      if (filling == Filling::mesh && jitter != options.jitters.front()) continue;  // has none
+      if (filling == Filling::mesh && jitter != options.jitters.front()) continue;  // no jitter
       for (const double factor : options.factors) {
         for (const double hourglass : options.hourglass) {
           for (const double closure : closures) {
@@ -71,8 +71,8 @@ std::vector<Discretisation> discretisations(const AccuracyOptions& options,
   return list;
 }
 
-/// The order in the spacing by which errors fall from one resolution to the next; "" where it says
-/// nothing: first ones, and errors that change their sign.
+/// The order of convergence in the spacing between two resolutions; "" for the first resolution,
+/// and for errors that change their sign.
 std::string order_of(double coarse, double fine, int across_coarse, int across_fine) {
   if (coarse * fine <= 0) return "";
   return fmt::format("{:.2f}", std::log(coarse / fine) /
@@ -94,7 +94,7 @@ void measure(const AccuracyOptions& options) {
         Solution solution;
         try {
           solution = c.solve(d);
-        } catch (const InputError& error) {  // so few phyxels that a mesh has no inside
+        } catch (const InputError& error) {  // too few phyxels for the inside of a mesh
           if (d.filling != Filling::mesh) throw;
           fmt::print(stderr, "phyxel: {} on a mesh, {} across, is left out: {}\n", c.name, across,
                      error.what());
@@ -129,7 +129,7 @@ struct HardOptions {
   TableOptions table;
 };
 
-/// @returns whether all were as they should be
+/// Runs the hard cases. @returns true if all are good
 bool measure_hard(const HardOptions& options) {
   const ChosenDevice device = choose_device(options.device);
   PrintedTable table(
@@ -162,7 +162,7 @@ bool measure_hard(const HardOptions& options) {
 
 void add_accuracy(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "accuracy", "Problems with known answers: errors beside time, on the CPU in double");
+      "accuracy", "Solve problems with known answers: errors and time, on the CPU in double");
   auto options = std::make_shared<AccuracyOptions>();
   std::string known = "Which, of:";
   for (const AccuracyCase& c : accuracy_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
@@ -172,11 +172,11 @@ void add_accuracy(CLI::App& program) {
       ->check(CLI::Range(2, 200));
   command
       ->add_option("--lattice", options->lattices,
-                   "nodes, cells; mesh: spread on and in the surface, as in any mesh")
+                   "Placement of phyxels: nodes, cells, or mesh (on and in a surface)")
       ->delimiter(',')
       ->check(CLI::IsMember({"nodes", "cells", "mesh"}))
       ->capture_default_str();
-  command->add_option("--jitter", options->jitters, "Phyxels moved by so many spacings")
+  command->add_option("--jitter", options->jitters, "Random displacements of phyxels, in spacings")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 0.5))
       ->capture_default_str();
@@ -190,13 +190,14 @@ void add_accuracy(CLI::App& program) {
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
+  command->add_option("--closure", options->closures, "Closures of gradients; 0 for none")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 1.0));
   add_table_options(*command, options->table);
   auto hard_options = std::make_shared<HardOptions>();
   CLI::App* hard = command->add_subcommand(
-      "hard", "Cases that are hard to keep stable: each answered, or refused with its cause");
+      "hard",
+      "Solve cases that are hard to keep stable: each is answered, or refused with its cause");
   std::string hard_names = "Which, of:";
   for (const HardCase& c : hard_cases()) hard_names += fmt::format("\n{}: {}", c.name, c.what);
   hard->add_option("cases", hard_options->cases, hard_names);
@@ -206,7 +207,7 @@ void add_accuracy(CLI::App& program) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember({"double", "mixed", "float"}))
       ->capture_default_str();
-  hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
+  hard->add_flag("--long", hard_options->include_long, "Include cases that take minutes");
   add_table_options(*hard, hard_options->table);
   hard->footer(
       "Examples:\n"
@@ -219,7 +220,7 @@ void add_accuracy(CLI::App& program) {
       "  phyxel accuracy all --csv accuracy.csv");
   hard->callback([=] {
     if (!measure_hard(*hard_options)) {
-      throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");
+      throw Error(ExitCode::diverged, "a case has failed (see the column \"good\")");
     }
   });
   command->callback([=] {
