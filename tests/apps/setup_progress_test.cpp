@@ -61,8 +61,8 @@ TEST_F(SetupLines, EachStageOfSetUpAndSampleIsShownToItsEnd) {
   ASSERT_EQ(dry.code, 0) << dry.err;
   EXPECT_THAT(lines_of(dry.err), IsSupersetOf(ends_of(of_meshes)));
   EXPECT_THAT(lines_of(dry.err), IsSupersetOf(ends_of({"distances between phyxels", "neighbours",
-                                                         "phyxels near the surface", "moments",
-                                                         "solver arrays", "largest time step"})));
+                                                       "phyxels near the surface", "moments",
+                                                       "solver arrays", "largest time step"})));
   const Outcome sample = run({"sample", "cube.obj", "--phyxels", "500", "--out", "cube.h5"});
   ASSERT_EQ(sample.code, 0) << sample.err;
   EXPECT_THAT(lines_of(sample.err), IsSupersetOf(ends_of(of_meshes)));
