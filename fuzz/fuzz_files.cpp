@@ -1,6 +1,6 @@
-/// Bodies, checkpoints, frames and series from arbitrary bytes: an InputError or a result, nothing
-/// else. The bytes lie behind a seal whose digest is theirs, as anybody can make one; whole files
-/// with a seal of their own, and series, are tried as well.
+/// Fuzzer of the readers of bodies, checkpoints, frames and series: the only outcomes are a result
+/// and an InputError. The input is put behind a seal with its digest; inputs are also read as whole
+/// files with their own seal, and as series.
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace phyxel;
 
-// What the first byte of an input chooses.
+// Kinds of files, chosen by the first byte of the input.
 enum Choice : std::uint8_t {
   body,
   checkpoint,
@@ -54,7 +54,7 @@ void write_bytes(const fs::path& file, const std::string& before, const std::uin
   stream.write(reinterpret_cast<const char*>(data), static_cast<std::streamsize>(size));
 }
 
-/// Reads everything that a file of ours may hold.
+/// Reads everything that a file may contain.
 void read_all(const fs::path& file) {
   const std::string kind = check_seal(file);
   if (kind == "body") {
@@ -74,7 +74,7 @@ void read_all(const fs::path& file) {
   }
 }
 
-/// A small file of ours, as it lies behind its seal.
+/// The content of a small valid file, without its seal.
 std::string example(Choice choice) {
   Hdf5Writer out;
   out.group("/phyxel");
@@ -127,7 +127,7 @@ std::string example(Choice choice) {
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
 
-/// Begins with files of ours, and changes fields at the places where HDF5 has its numbers, too.
+/// Mutator that starts from valid files, and also changes the fields that hold HDF5's numbers.
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size,
                                                std::size_t most, unsigned int seed) {
   std::minstd_rand random(seed);
@@ -144,7 +144,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   }
   if (random() % 3 == 0 || size < 64) return LLVMFuzzerMutate(data, size, most);
   for (unsigned changes = 1 + random() % 3; changes > 0; --changes) {
-    // Most fields of 8 bytes lie at multiples of 8 behind the first byte.
+    // Most fields of 8 bytes are at multiples of 8 after the first byte.
     const std::size_t at = 1 + 8 * (random() % ((size - 1) / 8));
     const std::uint64_t values[] = {0,
                                     1,

@@ -1,5 +1,5 @@
-/// Feeds the mesh readers: the first byte chooses the format, the rest is the file. Whatever it
-/// holds, the only error may be an InputError, and what is read must be fit for use.
+/// Fuzzer of the mesh readers: the first byte chooses the format, the rest is the file. The only
+/// error is an InputError, and a mesh that is read must be valid.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>

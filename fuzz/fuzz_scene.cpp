@@ -1,4 +1,4 @@
-/// Any text is a scene or an InputError.
+/// Fuzzer of the scene parser: any text gives a scene or an InputError.
 #include <cstddef>
 #include <cstdint>
 #include <string>

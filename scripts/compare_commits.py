@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Which of two commits steps faster: builds both beside each other and has them take turns, so that what else the
-machine does meets both.
+"""Compares the speed of two commits: builds both and runs them in turn, so that other load affects both alike.
 
     scripts/compare_commits.py main~5 main [--rounds 5] [--preset cpu] [-- options of phyxel bench step]
 
@@ -23,7 +22,7 @@ def git(*words):
 
 
 def built(revision, preset):
-    """The program of a commit."""
+    """Builds the program of a commit and returns its path."""
     commit = git("rev-parse", "--short", f"{revision}^{{commit}}")
     folder = ROOT / "build" / "commits" / commit
     if not folder.exists():

@@ -1,5 +1,5 @@
-"""Where small faults can be put into C++ sources: what scripts/mutate.py tries. A source is formatted by clang-format, which
-tells operators from template brackets and pointers by their spaces."""
+"""Finds small faults that scripts/mutate.py can put into C++ sources. Sources are formatted by clang-format, whose spaces
+distinguish operators from template brackets and pointers."""
 import dataclasses
 import hashlib
 import re
@@ -31,7 +31,7 @@ TOKEN = re.compile(r"""
 
 OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "+=": "-=", "-=": "+=", "*=": "/=", "/=": "*=", "<": "<=", "<=": "<",
              ">": ">=", ">=": ">", "==": "!=", "!=": "==", "&&": "||", "||": "&&"}
-# What only tells people something, and what is no statement of a function.
+# Output and messages, and declarations that are not statements of a function.
 TALK = re.compile(r"\b(fmt|printf|fprintf|cerr|cout|throw|\w*Error|warn\w*|complain\w*|static_assert|assert|pragma|message|describe\w*)\b")
 NO_CALL = {"return", "if", "for", "while", "switch", "catch", "sizeof", "alignof", "decltype", "static_cast", "else", "case",
            "using", "operator", "noexcept", "throw", "delete", "new", "do", "template", "requires", "alignas", "goto"}
@@ -46,7 +46,7 @@ class Token:
 
 
 def tokens_of(text):
-    """Code alone: no comments, strings, characters and preprocessor lines."""
+    """The tokens of code, without comments, strings, characters and preprocessor lines."""
     found = []
     for match in TOKEN.finditer(text):
         if match.lastgroup == "raw" or match.group("skip"):
@@ -70,7 +70,7 @@ def matching(tokens):
 
 
 def in_functions(tokens, partner):
-    """For each token whether it stands in the body of a function (initialisers in braces included)."""
+    """For each token, true if it is in the body of a function (including initialisers in braces)."""
     inside = [False] * len(tokens)
     for i, t in enumerate(tokens):
         if t.text != "{" or i not in partner:
@@ -107,7 +107,7 @@ def statements(tokens, partner, inside):
 
 
 def is_declaration_or_jump(tokens, partner, i, end):
-    """Two names in a row, or a type's name with its * or & before a name: what clang-format writes as `T* x`."""
+    """True for a declaration: two names in a row, or a type with * or & before a name, formatted as `T* x`."""
     if tokens[i].kind != "word" and tokens[i].text not in ("*", "++", "--", "("):
         return True
     if tokens[i].text in NO_CALL or tokens[i].text in ("break", "continue", "const", "auto", "static", "constexpr"):
@@ -143,7 +143,7 @@ class Finder:
         self.faults = []
 
     def talk(self):
-        """Tokens of statements that tell people something."""
+        """The tokens of statements that print or throw messages."""
         talks, first = [False] * len(self.tokens), 0
         for i, t in enumerate(self.tokens):
             if t.text in (";", "{", "}"):
@@ -221,7 +221,7 @@ class Finder:
 
 
 def faults_in(file, text):
-    """All places of a source, in its order."""
+    """All faults of a source, in its order."""
     finder = Finder(file, text)
     finder.operators_and_constants()
     finder.dropped_statements()
@@ -231,12 +231,12 @@ def faults_in(file, text):
 
 
 def lot(seed, fault, number):
-    """A fault's place in the draw. It comes from the fault alone: a change elsewhere in the sources leaves the draw as it was."""
+    """A fault's random rank. It depends on the fault alone, so that changes elsewhere do not change the selection."""
     return hashlib.sha256("\0".join([str(seed), fault.file, fault.kind, fault.change, str(number)]).encode()).digest()
 
 
 def chosen(sources, seed):
-    """The faults of these sources (name: text) in the order in which they are tried: kinds take turns, places are drawn."""
+    """The faults of these sources (name: text) in the order of trial: kinds in turn, places at random."""
     by_kind = {kind: [] for kind in KINDS}
     for file in sorted(sources):
         alike = {}

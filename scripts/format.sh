@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Formats every C++ file, or with --check says which are not formatted (exit code 1).
+# Formats all C++ files, or with --check lists those that are not formatted (exit code 1).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What the compiler makes of the production kernels: instructions, registers and stack of each.
+"""Tabulates instructions, registers and stack of the compiled production kernels.
 
-A change that should not touch a kernel must leave its code alone; this script shows what it did:
+A change that should not affect a kernel must not change its code; this script shows the differences:
 
     scripts/kernel_table.py build/cuda            compares with docs/results/kernels.csv
-    scripts/kernel_table.py build/cuda --write    writes that table anew
+    scripts/kernel_table.py build/cuda --write    rewrites that table
     scripts/kernel_table.py build/cuda --other build/before    compares two builds
 
 A build with tests (-DPHYXEL_TESTS=ON) is needed, whose device code is not compressed. For each kernel
@@ -60,7 +60,7 @@ def ptx_kernels(data):
 
 
 def end_of_block(ptx, begin):
-    """Where the block ends whose first character after the brace is at `begin`."""
+    """The end of the block whose first character after the brace is at `begin`."""
     depth = 1
     for brace in re.finditer(r"[{}]", ptx[begin:]):
         depth += 1 if brace.group() == "{" else -1
@@ -117,7 +117,7 @@ def usage(data):
 
 
 def shown_names(mangled):
-    """What users of a debugger would read, without parameters and namespaces."""
+    """The demangled name without parameters and namespaces."""
     text = subprocess.run(["c++filt"], input="\n".join(mangled), capture_output=True, text=True, check=True).stdout
     names = []
     for name in text.splitlines():
@@ -141,7 +141,7 @@ def cached(build, name):
 def rows_of(build):
     sources = pathlib.Path(cached(build, "CMAKE_HOME_DIRECTORY")) / "cuda/solver"
     objects = sorted(file for file in pathlib.Path(build).glob("cuda/CMakeFiles/phyxel_cuda.dir/solver/*.cu.o")
-                     if (sources / file.stem).exists())  # not what an earlier version has left there
+                     if (sources / file.stem).exists())  # no stale objects of earlier versions
     if not objects:
         sys.exit(f"{build}: has no objects of the production solver; build the target phyxel_cuda there")
     rows = {}

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measures the table behind docs/accuracy.md on a machine of many cores: `phyxel accuracy` in slices of one
-case, lattice, jitter and way, each on cores of its own, several at a time, put together in one file.
+"""Measures the table of docs/accuracy.md on a machine with many cores: runs `phyxel accuracy` in slices of one case,
+lattice, jitter and discretisation, several at a time on separate cores, and joins their rows in one file.
 
     scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4] [--case CASE]
 
-Times in the table are those of so many cores, with the rest of the machine at work. With --case the table is
-there already: rows of that case are replaced, and a fact says by which program. bench/make_pages.py writes the page.
+Times in the table are those of --cores cores, while other cores are busy. With --case, rows of that case are replaced in
+an existing table, and a fact names the program that measured them. bench/make_pages.py writes the page.
 """
 import argparse
 import concurrent.futures

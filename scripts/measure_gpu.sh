@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# On a machine with a GPU: the measurements behind docs/performance.md, into a folder of CSV files.
+# Makes the measurements of docs/performance.md on a machine with a GPU, as CSV files in a folder.
 #
 #   scripts/measure_gpu.sh [folder [part...]]   after cmake --preset cuda && cmake --build --preset cuda
 #
-# Parts: sizes, terms, small, setup; all of these, if none is named. And for hosts of several GPUs,
-# behind docs/scaling.md: ranks (2, 4, 8 GPUs), and large (LARGE phyxels on all GPUs; a billion, for 4 or more).
-# PHYXEL names another program than build/cuda/bin/phyxel, and PHYXEL_STUDIES another than phyxel_studies beside it.
-# bench/make_pages.py writes the pages. The largest body takes some 100 GB of the
-# GPU's memory while it is set up, and nearly as much of the host's.
+# Parts: sizes, terms, small and setup, which are the default; for docs/scaling.md on hosts with several GPUs, ranks
+# (2, 4, 8 GPUs) and large (LARGE phyxels on all GPUs; a billion by default, with 4 or more).
+# PHYXEL is the program (default: build/cuda/bin/phyxel), PHYXEL_STUDIES phyxel_studies (default: beside it).
+# bench/make_pages.py writes the pages. The set-up of the largest body takes about 100 GB of the GPU's memory, and
+# nearly as much of the host's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results}
@@ -36,7 +36,7 @@ if has terms; then
   step gpu_neighbours step --phyxels 2097152 --terms green --factor 1.45,1.6,1.8,2,2.15,2.3
   step gpu_cantilever cantilever
 fi
-# One table of several: one <table> <first>...
+# Joins tables of equal columns: one <table> <first>...
 one() {
   local table=$1 part
   shift
@@ -78,7 +78,7 @@ ranks() {
     grep -v '^#'
 }
 if (has ranks || has large) && ((gpus < 2)); then
-  echo "scripts/measure_gpu.sh: ranks and large take 2 GPUs or more; here is $gpus" >&2
+  echo "scripts/measure_gpu.sh: ranks and large need 2 GPUs or more; this host has $gpus" >&2
   exit 1
 fi
 if has ranks; then

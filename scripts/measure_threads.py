@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Measures steps per second with and without a limit on how long waiting OpenMP threads spin, beside 0, 1 and 2 busy programs.
+"""Measures steps per second with and without a limit on the spinning of waiting OpenMP threads, beside 0, 1 and 2 busy
+programs.
 
-    scripts/measure_threads.py [PROGRAM]     build/cpu/bin/phyxel, if none is named
+    scripts/measure_threads.py [PROGRAM]     default: build/cpu/bin/phyxel
 
-Policies take turns, twice, so that what else the machine does meets them alike. The table goes to
-docs/results/thread_policy.csv: one line for each run of some seconds, with the speed that the program shows at its end.
+Policies run in turn, twice, so that other load affects them alike. The table docs/results/thread_policy.csv has a row for
+each run of some seconds, with the speed that the program shows at its end.
 """
 import csv
 import os

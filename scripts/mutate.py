@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
-"""Puts small faults into the sources, one at a time, and sees whether a test notices.
+"""Mutation testing: puts small faults into the sources, one at a time, and checks whether a test fails.
 
     scripts/mutate.py                                 100 faults in what changed since main
     scripts/mutate.py --base v0.1                     in what changed since a revision
     scripts/mutate.py --files lib/solver 'mpi/*.cpp'  in these files and folders
-    scripts/mutate.py --count 200 --seed 2 --resume   goes on with what the table of results does not have
-    scripts/mutate.py --quick 6                       tests that take longer see only what the others let pass, at the end
-    scripts/mutate.py --page                          only makes the page of the table again
+    scripts/mutate.py --count 200 --seed 2 --resume   skips faults that are in the table of results
+    scripts/mutate.py --quick 6                       longer tests run at the end, on faults that no other test noticed
+    scripts/mutate.py --page                          rewrites the page from the table
 
-The faults are wrong operators, constants, dropped statements, swapped arguments and negated conditions, drawn from a fixed
-seed (scripts/faults.py). All happens in a copy, build/mutate/tree; the tree itself is only read. Of each fault only what it
-changes is built, and of the tests only the programs that link the file are run, the quickest first, until one fails: the
-fault is killed. A program that runs longer than --factor times what it takes without a fault hangs, which kills, too.
-A fault that does not compile does not count. Results go to docs/results/mutation.csv, one line each, and from there, with the
-explanations of docs/results/mutation_reasons.csv, to docs/results/mutation.md. The score is the share of killed faults among
-those that are not explained as equivalent: no input makes a difference.
+The faults are wrong operators, constants, dropped statements, swapped arguments and negated conditions, selected by a fixed
+seed (scripts/faults.py). They are put into a copy, build/mutate/tree; the tree itself is only read. The files affected by a
+fault are rebuilt, and the test programs that link the file are run, the quickest first, until one fails: the fault is
+killed. A program that runs longer than --factor times its time without a fault hangs, which also kills. A fault that does
+not compile does not count. The results, docs/results/mutation.csv, and the explanations, docs/results/mutation_reasons.csv,
+make docs/results/mutation.md. The score is the share of killed faults among those that are not explained as equivalent
+(no input makes a difference).
 
 Exit code 0 if the score is at least --aim (95%), else 1.
 """
@@ -41,7 +41,7 @@ KILLED, HUNG, SURVIVED, NOT_BUILT = "killed", "hung", "survived", "not built"
 SOURCES = ("lib/*.cpp", "lib/*.hpp", "mpi/*.cpp", "mpi/*.hpp", "partition/*.cpp", "partition/*.hpp", "apps/phyxel/*.cpp")
 
 
-# Signals mean to a test what they mean in a terminal, also where nohup or a shell's & ignores them for this program.
+# Tests receive signals as in a terminal, even if nohup or a shell's & makes this program ignore them.
 HEAR_SIGNALS = ["env", "--default-signal=HUP,INT,QUIT,PIPE"]
 
 
@@ -52,7 +52,7 @@ def git(source, *arguments):
 # --- the copy ------------------------------------------------------------------------------------
 
 class Copy:
-    """The sources of a tree and their build, in a folder of their own."""
+    """A copy of a tree and its build."""
 
     def __init__(self, source, folder, options=(), jobs=2):
         self.source, self.tree, self.jobs = source, folder / "tree", jobs
@@ -64,7 +64,7 @@ class Copy:
             self.environment.pop(name, None)
 
     def sync(self):
-        """Makes the copy what the tree is: writes what differs, which also takes a fault back that was left by a kill."""
+        """Synchronises the copy with the tree, which also removes a fault that a killed program has left."""
         names = [n for n in git(self.source, "ls-files", "-z", "--cached", "--others", "--exclude-standard").split("\0") if n]
         names = [n for n in names if (self.source / n).is_file()]
         for name in names:
@@ -83,7 +83,7 @@ class Copy:
                     (pathlib.Path(folder) / file).unlink()
 
     def run(self, command, seconds=None):
-        """Exit code and output; None as the code of what ran too long. All its children end with it."""
+        """Runs a command. Returns its exit code, or None after the time limit, and its output. Its children end with it."""
         with subprocess.Popen([*HEAR_SIGNALS, *command], cwd=self.build if self.build.exists() else self.tree, env=self.environment,
                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                               errors="replace", start_new_session=True) as child:
@@ -111,7 +111,7 @@ class Copy:
 # --- which tests reach a file --------------------------------------------------------------------
 
 class Graph:
-    """What is built of what, read from build.ninja and from what compilers have told about headers."""
+    """The dependency graph of the build, from build.ninja and the compilers' header dependencies."""
 
     def __init__(self, copy):
         self.inputs, self.order_only = {}, {}
@@ -139,14 +139,14 @@ class Graph:
         self.symbols = {}
 
     def symbols_of(self, file, defined_only):
-        """Names of functions and data with a place of their own: who links an archive's member has them."""
+        """The defined symbols of an object, which a program that links the archive's member has."""
         if file not in self.symbols:
             lines = subprocess.run(["nm", file], cwd=self.copy.build, capture_output=True, text=True).stdout.splitlines()
             self.symbols[file] = {w[2] for w in map(str.split, lines) if len(w) == 3 and w[1] in "TDBR"}
         return self.symbols[file]
 
     def links(self, program, reached):
-        """Whether a program has been linked of one of these objects: named, or a member of an archive that it has pulled in."""
+        """True if a program contains one of these objects, by name or as a member of an archive."""
         named, archives = set(), []
         for entry in self.inputs.get(program, []):
             (archives if entry.endswith(".a") else [named.add(entry)] and []).append(entry)
@@ -161,7 +161,7 @@ class Graph:
         return False
 
     def programs_reached(self, file, programs):
-        """Those of the programs that the file is part of, or of the programs that they run."""
+        """The jobs whose programs, or the programs that they run, contain the file."""
         reached = self.objects_of.get(file, set())
         found = []
         for program in programs:
@@ -218,7 +218,7 @@ def good(code):
 
 
 def time_clean(copy, jobs, state):
-    """How long each test takes without a fault; one that fails without is left out."""
+    """The time of each test without a fault; tests that fail are left out."""
     known = json.loads(state.read_text()) if state.exists() else {}
     kept = []
     for job in jobs:
@@ -238,13 +238,13 @@ def time_clean(copy, jobs, state):
 # --- one fault -----------------------------------------------------------------------------------
 
 def near_first(jobs, file):
-    """The test that bears the file's name before others, then the quickest."""
+    """The order of tests for a file: the test of the same name first, then by time."""
     stem = pathlib.Path(file).stem
     return sorted(jobs, key=lambda j: (stem not in j.name, j.seconds))
 
 
 def batches(jobs):
-    """The first alone, which mostly notices, then more and more at a time, which builds and runs them side by side."""
+    """Groups of tests that are built and run together: the first test alone, which mostly notices, then larger groups."""
     begin, size = 0, 1
     while begin < len(jobs):
         yield jobs[begin:begin + size]
@@ -252,7 +252,7 @@ def batches(jobs):
 
 
 def what_one_fault_does(copy, graph, jobs, fault, factor, least):
-    """Outcome, and the test of these that noticed. The copy is as before when this returns, whatever happens."""
+    """Tries a fault. Returns the outcome and the test that noticed. The copy is restored in any case."""
     path = copy.tree / fault.file
     original = path.read_text()
     try:
@@ -296,7 +296,7 @@ def add_row(file, row):
 
 
 def identity(row):
-    """A fault's name, whatever lines stand above it."""
+    """The identity of a fault, independent of line numbers."""
     return row["file"], row["kind"], row["change"]
 
 
@@ -343,7 +343,7 @@ def report(rows, reasons):
 
 
 def try_faults(faults, copy, graph, jobs, table, row_begin, options, begin):
-    """Writes a row for each fault that the table does not have. What the quick tests let pass waits for the slow ones."""
+    """Adds a row for each fault that the table lacks. Faults that quick tests do not notice wait for the slow tests."""
     done = {identity(r): r for r in read_rows(table)}
     quick = [j for j in jobs if j.seconds <= options.quick]
     slow = [j for j in jobs if j.seconds > options.quick]
@@ -386,7 +386,7 @@ def try_faults(faults, copy, graph, jobs, table, row_begin, options, begin):
 # --- the command ---------------------------------------------------------------------------------
 
 def sources_of(source, options):
-    """The names and texts of the files that get faults."""
+    """The names and texts of the files to be mutated."""
     if options.files:
         names = git(source, "ls-files").splitlines()
         wanted = [n for n in names for f in options.files
@@ -405,17 +405,17 @@ def arguments():
     add = parser.add_argument
     add("--count", type=int, default=100, help="faults that compile (100)")
     add("--seed", type=int, default=1)
-    add("--base", default="main", help="the revision whose differences get faults (main)")
-    add("--files", nargs="+", help="files, folders or patterns instead")
-    add("--resume", action="store_true", help="skip the faults that the table has; else it is begun anew")
-    add("--factor", type=float, default=5, help="a test hangs after so many times what it takes without a fault (5)")
-    add("--limit", type=float, default=20, help="the least time limit of a test in seconds (20)")
-    add("--quick", type=float, default=float("inf"), help="seconds of a test above which it waits for what the others let pass")
+    add("--base", default="main", help="mutate the differences from this revision (main)")
+    add("--files", nargs="+", help="mutate these files, folders or patterns instead")
+    add("--resume", action="store_true", help="keep the table, and skip its faults")
+    add("--factor", type=float, default=5, help="time limit of a test, relative to its time without a fault (5)")
+    add("--limit", type=float, default=20, help="smallest time limit of a test in seconds (20)")
+    add("--quick", type=float, default=float("inf"), help="time of a test [s] above which it runs at the end")
     add("--jobs", type=int, default=os.cpu_count(), help="compilers, or tests, at a time")
-    add("--minutes", type=float, default=float("inf"), help="begin no fault after so many")
-    add("--aim", type=float, default=95, help="the score in percent below which the exit code is 1 (95)")
+    add("--minutes", type=float, default=float("inf"), help="time after which no further fault is tried")
+    add("--aim", type=float, default=95, help="score in percent below which the exit code is 1 (95)")
     add("--list", action="store_true", help="print the faults, change nothing")
-    add("--page", action="store_true", help="make the page of the table, run nothing")
+    add("--page", action="store_true", help="write the page from the table only")
     add("--source", type=pathlib.Path, default=ROOT, help=argparse.SUPPRESS)
     add("--results", type=pathlib.Path, help="folder of the table (docs/results)")
     add("--cmake", nargs="*", default=[], metavar="NAME=VALUE", help="more settings of the copy's build")

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 """Counts the integer multiplications in the machine code of the kernels of 2008.
 
-The source asks for 24-bit products (__mul24, __umul24), as the paper does. This script compiles
-cuda/paper/paper_backend.cu for one architecture, disassembles it, and writes for each kernel what
-the compiler made of them:
+The source requests 24-bit products (__mul24, __umul24), as the paper does. This script compiles
+cuda/paper/paper_backend.cu for one architecture, disassembles it, and counts the instructions that
+the compiler has generated for them in each kernel:
 
     scripts/paper_machine_code.py                      to docs/results/paper/machine_code.csv
     scripts/paper_machine_code.py --check              compares with that file, writes nothing
-    scripts/paper_machine_code.py --check --ptx        the same of PTX alone, which needs no nvdisasm
+    scripts/paper_machine_code.py --check --ptx        compares PTX only, which needs no nvdisasm
     scripts/paper_machine_code.py --arch sm_75 -o FILE
 
-Two kernels of one line stand beside them, which multiply two integers with __mul24 and with `*`.
+Two kernels of one line, which multiply two integers with __mul24 and with `*`, are counted for comparison.
 `phyxel paper --redraw` puts the table on the page.
 
 Needs nvcc, and nvdisasm (in the CUDA Toolkit; alone: pip install nvidia-cuda-nvdisasm). They are
@@ -55,7 +55,7 @@ def find(variable, name):
 
 
 def output_of(*command):
-    """Standard output of a command; its complaint and exit code 1 if it fails."""
+    """Standard output of a command; exits with its error message and code 1 if it fails."""
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
@@ -75,27 +75,26 @@ def compiled(nvcc, nvdisasm, source, arch, folder):
 
 
 def by_kernel(text, begin):
-    """Mangled name -> the text from there to the next one."""
+    """Map from mangled names to the text of each kernel."""
     marks = list(re.finditer(begin, text, re.M))
     ends = [m.start() for m in marks[1:]] + [len(text)]
     return {m.group(1): text[m.end():end] for m, end in zip(marks, ends)}
 
 
 def kernel_of(mangled):
-    """(kernel, precision) of an instance that the paper's program runs; None for others."""
+    """(kernel, precision) of an instance that the paper's program runs; None for other instances."""
     match = re.match(r"_Z(?:N6phyxel5paper)?\d+(\w+?)(?:I([fd])((?:Lb[01]E)*)E)?(?:Evv?N|P)", mangled)
     if not match:
         return None
     name, real, flags = match.groups()
-    # Green's strain and the n x n matrix, which are what section 6 measures.
+    # Green's strain and the n x n matrix, as in the measurements of section 6.
     if flags and "Lb0E" in flags:
         return None
     return name, {"f": "float", "d": "double", None: ""}[real]
 
 
 def source_uses(name):
-    """How often the kernel's own text asks for 24 bits; products in the helpers it calls not
-    counted."""
+    """The number of 24-bit products in the kernel's source, without the helpers that it calls."""
     if name == "with_mul24":
         return 1
     if name == "with_asterisk":
@@ -111,7 +110,7 @@ def counts(name, precision, ptx, sass):
     """One row of the table."""
     opcodes = re.findall(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?U?P\w+\s+)?([A-Z][\w.]*)", sass, re.M)
     opcodes = [o for o in opcodes if o != "NOP"]
-    # IMAD is also how the machine moves, shifts and adds; those forms multiply nothing.
+    # Some forms of IMAD move, shift or add, and do not multiply.
     idle = re.compile(r"U?IMAD\.(MOV|SHL|IADD|X\b|U32$)")
     wide = [o for o in opcodes if re.match(r"U?(IMAD|IMUL)", o) and not idle.match(o)]
     narrow = [o for o in opcodes if "24" in o or o.startswith("XMAD")]
@@ -143,7 +142,7 @@ def rows_for(nvcc, nvdisasm, arch):
 
 
 def table_text(rows, facts):
-    """As the program's own tables are written."""
+    """Writes the table in the format of the program's tables."""
     text = io.StringIO()
     for key, value in facts:
         text.write(f"# {key}: {value}\n")
@@ -152,8 +151,8 @@ def table_text(rows, facts):
 
 
 def check(rows, arch, columns):
-    """Whether the table says the same of these kernels. Counts are one compiler's, so that only
-    whether there are any is compared."""
+    """Compares the table with these kernels. Counts depend on the compiler, so only their being zero is
+    compared."""
     lines = [l for l in TABLE.read_text().splitlines() if not l.startswith("#")]
     written = {(r["kernel"], r["precision"]): r for r in csv.DictReader(lines)}
     wrong = []

@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# On a machine with a GPU and Nsight Compute: what limits the two passes of a step, as a CSV file for
-# docs/performance.md.
+# Profiles the two passes of a step on a machine with a GPU and Nsight Compute, as a CSV file for docs/performance.md.
 #
 #   scripts/profile_gpu.sh [file]     after cmake --preset cuda && cmake --build --preset cuda
 #
-# PHYXEL names another program than build/cuda/bin/phyxel. Nsight Compute holds the clock at its base.
+# PHYXEL is the program (default: build/cuda/bin/phyxel). Nsight Compute fixes the clock at its base frequency.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 out=${1:-docs/results/gpu_profile.csv}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The main job: installs what is missing, builds, hangs the Dino by its mouth, draws it.
-# Further arguments go to `phyxel run`, e.g. scripts/run.sh --precision double
+# Installs missing packages, builds phyxel, simulates the dino hung by its mouth, and draws it.
+# Further arguments are passed to `phyxel run`, e.g. scripts/run.sh --precision double
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

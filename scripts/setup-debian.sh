@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Makes sure that Debian's packages for phyxel are there: the one place that lists them.
+# Installs the Debian packages that phyxel needs. No other file lists them.
 #
-#   scripts/setup-debian.sh            what building and running needs
-#   scripts/setup-debian.sh --tests    and what the tests need
+#   scripts/setup-debian.sh            packages for building and running
+#   scripts/setup-debian.sh --tests    also packages for the tests
 #
-# Installs what is missing as root or through sudo; otherwise prints the line to type, exit code 1.
+# Installs missing packages as root or through sudo; otherwise prints the command and ends with exit code 1.
 set -euo pipefail
 
 build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev libfmt-dev
@@ -12,9 +12,8 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
        libmetis-dev libopenmpi-dev openmpi-bin
        gnuplot-nox           # the figures of phyxel paper
        help2man dpkg-dev)    # the manual page, and packages
-# clang for the sanitizers, the fuzzers and a look at the sources, Doxygen for the reference, Python for the module and to
-# read our files independently, Chromium to look at pages, fish and zsh for their completions, and the HDF5 that knows MPI,
-# beside the serial one.
+# clang for sanitizers, fuzzers and static analysis, Doxygen for the reference, Python for the module and for independent
+# reading of files, Chromium for pages, fish and zsh for their completions, and parallel HDF5 beside the serial one.
 tests=(ccache pkg-config clang-format clang-tidy doxygen libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev llvm
        python3-h5py python3-vtk9 python3-dev pybind11-dev python3-numpy python3-pytest
        python3-matplotlib chromium fish zsh libhdf5-openmpi-dev)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What tests have skipped, counted by reason: one line each, the commonest first, and the cases' names behind it.
+"""Counts skipped tests by reason: a line for each reason, the most frequent first, with the names of the cases.
 
     scripts/skips.py FILE
 
-FILE is what tests append to where the environment variable PHYXEL_SKIPS names it: "case, tab, reason". A case that
-several programs or ranks skip counts each time. A file that is not there holds no skip.
+FILE is the file of the environment variable PHYXEL_SKIPS, to which tests append "case, tab, reason". A case that several
+programs or ranks skip counts each time. A missing file counts as empty.
 """
 import collections
 import pathlib

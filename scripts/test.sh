@@ -1,16 +1,15 @@
 #!/usr/bin/env bash
-# Configures, builds and tests.
+# Configures, builds and tests phyxel.
 #
 #   scripts/test.sh                   all stages: cpu, tidy, hdf5, asan, fuzz, tsan and cuda
 #   scripts/test.sh cpu asan          only these
 #
-# cpu runs every test; tidy looks at the sources by clang-format and clang-tidy, as cpu compiles them; hdf5 runs what writes
-# through an HDF5 that knows MPI; asan every test again under the sanitizers, with clang, but for those of numbers alone, and
-# fuzz takes the fuzzers of its build; tsan those that have threads; cuda those that CUDA changes.
-# Every stage runs even if an earlier one failed; a summary comes last, with the skipped cases of each stage by reason, and
-# exit code 1 if any failed. In CI (CI=1 or true) a missing tool is a failure, and so is a stage without its compiler;
-# without a GPU its cases are skipped there, too.
-# FUZZ_SECONDS (30) is the time for each fuzzer.
+# cpu runs all tests; tidy checks the sources by clang-format, scripts/sizes.py and clang-tidy; hdf5 tests output by
+# parallel HDF5; asan repeats the tests under sanitizers, with clang, except those of numerical results; fuzz runs the
+# fuzzers of that build; tsan runs the tests with threads; cuda runs the tests that CUDA affects.
+# All stages run even if one has failed. A summary follows, with the skipped cases of each stage by reason; the exit code is
+# 1 if any stage failed. In CI (CI=1 or true), a missing tool or compiler is a failure; cases without a GPU are skipped.
+# FUZZ_SECONDS (30) is the time of each fuzzer.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
@@ -33,13 +32,13 @@ command -v ninja >/dev/null || generator=(-G "Unix Makefiles")
 
 in_ci() { [[ -n ${CI-} && $CI != 0 && $CI != false ]]; }
 
-# In CI the configuration insists on what it would otherwise do without.
+# In CI the configuration requires optional parts.
 insist=()
 if in_ci; then
   insist=(-DPHYXEL_MPI=ON)
 fi
 
-# Tools without which tests are not even registered, or skip: those that are missing.
+# Lists missing tools without which tests are not registered or skip.
 missing_tools() {
   local tool module
   for tool in chromium doxygen dpkg-shlibdeps fish gnuplot help2man mpirun pkg-config zsh; do
@@ -57,12 +56,11 @@ build() {
   cmake --preset "$1" "${generator[@]}" "${insist[@]}" -DPHYXEL_TESTS=ON && cmake --build --preset "$2" --parallel "$jobs"
 }
 
-# ctest keeps the names of what failed in a file, which the summary repeats: the list of a stage is
-# far above when the last stage ends.
+# ctest writes the names of failed tests to a file, which the summary repeats.
 # tested <configure preset> [<build and test preset>]
 tested() {
   local failed=build/$1/Testing/Temporary/LastTestsFailed.log
-  export PHYXEL_SKIPS=$PWD/build/$1/skips.txt  # where test programs tell what they skip
+  export PHYXEL_SKIPS=$PWD/build/$1/skips.txt  # test programs append skipped cases to this file
   rm -f "$failed" "$PHYXEL_SKIPS"
   build "$1" "${2-$1}" && ctest --preset "${2-$1}" --parallel "$jobs"
 }
@@ -72,8 +70,8 @@ failed_tests() {
   [[ ! -f $log ]] || sed 's/^[0-9]*:/          /' "$log"
 }
 
-# GCC's libgomp does not tell the thread sanitizer about its barriers, so every parallel loop would
-# look like a race. LLVM's does, through its tool Archer, which says so on request (verbose=1).
+# The thread sanitizer does not see the barriers of GCC's libgomp, so that each parallel loop would look like a race.
+# LLVM's runtime reports them through its tool Archer (verbose=1 shows that it is active).
 tested_with_tsan() {
   local archer=
   archer=$(find "$(dirname "$(readlink -f "$(command -v clang++)")")/.." -name libarcher.so | head -1)
@@ -86,7 +84,7 @@ tested_with_tsan() {
   tested tsan
 }
 
-# fuzzed_by <fuzzer>: crashing inputs are kept under build/asan/fuzz/found, the whole log beside it.
+# fuzzed_by <fuzzer>: runs a fuzzer. Crashing inputs are kept under build/asan/fuzz/found, the log beside it.
 fuzzed_by() {
   local fuzzer=$1 name corpus seeds code=0
   name=$(basename "$fuzzer")
@@ -119,7 +117,8 @@ fuzzed() {
 have_tidy() { command -v clang-tidy >/dev/null && command -v clang-format >/dev/null; }
 
 looked_at() {
-  cmake --preset cpu "${generator[@]}" "${insist[@]}" -DPHYXEL_TESTS=ON >/dev/null && scripts/format.sh --check && scripts/tidy.sh
+  cmake --preset cpu "${generator[@]}" "${insist[@]}" -DPHYXEL_TESTS=ON >/dev/null && scripts/format.sh --check &&
+    python3 -B scripts/sizes.py && scripts/tidy.sh
 }
 
 have_nvcc() {
@@ -130,7 +129,7 @@ have_parallel_hdf5() {
   command -v mpirun >/dev/null && [[ -n $(find /usr/include/hdf5/openmpi "${HDF5_ROOT-/nowhere}" -name hdf5.h 2>/dev/null) ]]
 }
 
-# without <tool>: the stage cannot run. Its name stands in $lacking for the summary; 77 is the exit code of a skip.
+# without <tool>: skips a stage whose tool is missing, by exit code 77. The summary reads the tool from $lacking.
 lacking=$(mktemp)
 trap 'rm -f "$lacking"' EXIT
 without() {
@@ -143,7 +142,7 @@ stage() {
   case $1 in
     cpu) tested cpu ;;
     tidy) if have_tidy; then looked_at; else without "clang-tidy or clang-format"; fi ;;
-    hdf5) if have_parallel_hdf5; then tested hdf5; else without "an HDF5 that knows MPI (Debian: libhdf5-openmpi-dev)"; fi ;;
+    hdf5) if have_parallel_hdf5; then tested hdf5; else without "parallel HDF5 (Debian: libhdf5-openmpi-dev)"; fi ;;
     asan) if have_clang; then tested asan; else without clang; fi ;;
     fuzz) if have_clang; then fuzzed; else without clang; fi ;;
     tsan) if have_clang; then tested_with_tsan; else without clang; fi ;;

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# On a machine with a GPU: all tests of the CUDA build, then NVIDIA's sanitizers on the kernels.
+# Runs the tests of the CUDA build on a machine with a GPU, and then NVIDIA's sanitizers on the kernels.
 #
 #   scripts/test_gpu.sh [summary.txt [tests | cuda | sanitizers]]
 #
-# after cmake --preset cuda && cmake --build --preset cuda. Ends with exit code 1 if anything failed.
-# With a file name, a summary goes there too; with a part, that part is added to it. `cuda` is what CUDA
-# changes of the tests, and those of several ranks.
+# after cmake --preset cuda && cmake --build --preset cuda. The exit code is 1 if a test or check failed.
+# With a file name, the summary is also written there; with a part, the part's summary is appended. `cuda` are the tests
+# that CUDA affects, and those of several ranks.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 
@@ -29,12 +29,12 @@ say "$(build/cuda/bin/phyxel --version), $(nvidia-smi --query-gpu=name --format=
 run_tests() {
   OMP_WAIT_POLICY=passive ctest --test-dir build/cuda -j "$(nproc)" --timeout 300 \
     --no-tests=error --output-on-failure "$@" >"$logs/ctest.log" 2>&1 || failed=1
-  # Tests that find no device skip themselves.
+  # Tests without a device skip; here that is a failure.
   grep -q "no CUDA device" "$logs/ctest.log" && failed=1
   say "ctest${*:+ $*}: $(grep -E 'tests passed' "$logs/ctest.log")"
 }
 
-# Several at a time, a GPU each if there are several: a tool keeps a core busy more than a GPU.
+# Several checks run at a time, on different GPUs if possible: a tool needs a core more than a GPU.
 gpus=$(nvidia-smi -L | wc -l)
 most_jobs=$((4 * gpus))
 jobs_started=0
@@ -50,16 +50,15 @@ start() {
     sed -i 's/\x1b\[[0-9;]*m//g' "$log"
     ran=$(sed -nE 's/^\[==========\] ([1-9][0-9]* tests?) from .* ran.*/\1/p' "$log" | head -1)
     echo "$what, ${ran:-no test}: $(grep SUMMARY "$log" | sed 's/^=* //' | paste -sd ';')" >"$log.line"
-    # Tests that find no device skip themselves.
+    # Tests without a device skip; here that is a failure.
     ((code == 0)) && [[ -n $ran ]] && ! grep -q 'SKIPPED' "$log" && touch "$log.passed"
   ) &
   job_logs+=("$log")
   ((++jobs_started))
 }
 
-# Two ranks, each with its own tool, which does not see what the other rank stores in its memory:
-# no race, and no first value, so that `initcheck` is for ways through the host alone. NCCL's own
-# errors, which it asks for and handles, are not looked for.
+# Runs a test on two ranks, each under its own tool. A tool does not see the other rank's stores, so races cannot be
+# checked, and `initcheck` applies to transports through the host only. Errors that NCCL handles itself are ignored.
 # check_ranks <program> <filter> <tools>
 check_ranks() {
   local program=$1 filter=$2 tool
@@ -71,7 +70,7 @@ check_ranks() {
   done
 }
 
-# Small cases: each tool slows kernels down a hundredfold. `device_test` faults on purpose.
+# Runs small cases under each tool, which slow kernels down a hundredfold. `device_test` faults on purpose.
 # check <program> <filter> [tools]
 check() {
   local program=$1 filter=$2 tool
@@ -84,7 +83,7 @@ run_sanitizers() {
   rm -f "$logs"/*.passed "$logs"/*.line
   check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
   check cuda_backend_test '*Forces*/AdaptiveEverything:*Forces*/ClosedBesideAdaptive:*Energies*/UniformEverything:*Surf*'
-  # Blocks that wait for each other's mail take hours where every access is recorded for races.
+  # Blocks that wait for each other's packets take hours if each access is recorded for races.
   check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
   check setup_test '*Overlapping*'
   check physics_device_test '*'

@@ -286,15 +286,9 @@ void add_bench_step(CLI::App& bench) {
   options->sizes = {1000, 10648, 103823, 1000000};
   for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
   options->terms = all_terms;
-  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
-      ->delimiter(',')
-      ->check(CLI::Range(8, 2'000'000'000));
-  command->add_option("--threads", options->threads, "Thread counts, comma separated")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 4096));
+  add_size_options(*command, options->sizes, options->repeats);
+  add_thread_counts(*command, options->threads);
   add_table_options(*command, options->table);
-  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
   add_device_options(*command, *options);
   command
       ->add_option("--terms", options->terms,
@@ -305,8 +299,7 @@ void add_bench_step(CLI::App& bench) {
   add_factors(*command, *options);
   command->add_option("--bodies", options->bodies, "Number of bodies, side by side")
       ->check(CLI::Range(1, 100'000));
-  command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
-      ->check(CLI::Range(0.01, 60.0));
+  add_seconds_option(*command, options->seconds);
   command->footer(
       "Examples:\n"
       "  phyxel bench step\n"

@@ -28,14 +28,16 @@ std::vector<std::string> bench_terms() {
   return terms;
 }
 
-Cloud bench_cube(Index n, bool surfels) {
+ShapeRequest bench_shape(Index n, bool surfels) {
   const double side = std::round(std::cbrt(static_cast<double>(n))) * 0.1;
-  return make_shape({.name = "block",
-                     .size = {side, side, side},
-                     .spacing = 0.1,
-                     .jitter = 0.1,
-                     .surface = surfels});
+  return {.name = "block",
+          .size = {side, side, side},
+          .spacing = 0.1,
+          .jitter = 0.1,
+          .surface = surfels};
 }
+
+Cloud bench_cube(Index n, bool surfels) { return make_shape(bench_shape(n, surfels)); }
 
 Scene bench_scene(const std::string& terms, double factor, int bodies) {
   Scene scene;
@@ -59,6 +61,25 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   body.neighbourhood.factor = factor;
   scene.bodies.assign(static_cast<std::size_t>(bodies), body);
   return scene;
+}
+
+void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats) {
+  command.add_option("--phyxels", sizes, "Sizes, comma separated (rounded to cubes)")
+      ->delimiter(',')
+      ->check(CLI::Range(8, 2'000'000'000));
+  command.add_option("--repeat", repeats, "Repeats; the median is reported")
+      ->check(CLI::Range(1, 1000));
+}
+
+void add_thread_counts(CLI::App& command, std::vector<int>& threads) {
+  command.add_option("--threads", threads, "Thread counts, comma separated")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 4096));
+}
+
+void add_seconds_option(CLI::App& command, double& seconds) {
+  command.add_option("--seconds", seconds, "Length of one repeat [s]")
+      ->check(CLI::Range(0.01, 60.0));
 }
 
 }  // namespace phyxel::app

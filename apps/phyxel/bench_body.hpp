@@ -4,11 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "command.hpp"
 #include "phyxel/scene.hpp"
 
 namespace phyxel::app {
 
 /// A jittered cube of about `n` phyxels with a spacing of 0.1 m.
+ShapeRequest bench_shape(Index n, bool surfels = false);
 Cloud bench_cube(Index n, bool surfels = false);
 
 /// The names of `bench step --terms`: the laws, then terms added to St Venant-Kirchhoff's law;
@@ -20,5 +22,12 @@ std::vector<std::string> bench_terms();
 /// @param factor support factor
 Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
                   int bodies = 1);
+
+/// Adds the options --phyxels and --repeat of speed measurements.
+void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats);
+/// Adds the option --threads of speed measurements.
+void add_thread_counts(CLI::App& command, std::vector<int>& threads);
+/// Adds the option --seconds, the length of one repeat [s].
+void add_seconds_option(CLI::App& command, double& seconds);
 
 }  // namespace phyxel::app

@@ -12,6 +12,7 @@
 #include <set>
 #include <span>
 
+#include "bench_body.hpp"
 #include "device_option.hpp"
 #include "model/host_memory.hpp"
 #include "partition/partition.hpp"
@@ -38,19 +39,10 @@ struct Options {
 
 /// A jittered cube of about `phyxels` phyxels under gravity.
 Scene cube_scene(Index phyxels) {
-  Scene scene;
+  Scene scene = bench_scene("green");
   scene.time.end = 1;
-  scene.gravity = {0, 0, -9.81};
-  BodyRequest body;
-  body.name = "cube";
-  body.where = "phyxel bench scaling";
-  body.source.shape.name = "beam";
-  body.source.shape.size = {1, 1, 1};
-  body.source.shape.spacing = 1 / std::round(std::cbrt(phyxels));
-  body.source.shape.jitter = 0.1;
-  body.source.shape.surface = false;
-  body.material = {.young = 1e5, .poisson = 0.3, .density = 1000, .hourglass = 0};
-  scene.bodies.push_back(body);
+  scene.bodies[0].where = "phyxel bench scaling";
+  scene.bodies[0].source.shape = bench_shape(phyxels);
   return scene;
 }
 
@@ -274,9 +266,7 @@ void add_bench_scaling(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
       "scaling", "Measure the steps per second of a cube on mpirun's ranks, or on one");
   auto options = std::make_shared<Options>();
-  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
-      ->delimiter(',')
-      ->check(CLI::Range(8, 2'000'000'000));
+  add_size_options(*command, options->sizes, options->repeats);
   command->add_flag("--weak", options->weak, "Sizes are those of one rank, not of the body");
   command->add_flag("--without-one", options->without_one,
                     "Do not measure the first rank alone, with which speed-ups are computed");
@@ -290,10 +280,7 @@ void add_bench_scaling(CLI::App& bench) {
   command->add_option("--precision", options->precisions, "float, double, mixed")
       ->delimiter(',')
       ->check(CLI::IsMember({"float", "double", "mixed"}));
-  command->add_option("--seconds", options->seconds, "Length of one repeat [s]")
-      ->check(CLI::Range(0.01, 60.0));
-  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
+  add_seconds_option(*command, options->seconds);
   add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"

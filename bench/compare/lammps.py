@@ -1,4 +1,4 @@
-"""Running LAMMPS beside phyxel."""
+"""Runs LAMMPS, for comparison with phyxel."""
 import pathlib
 import re
 import subprocess
@@ -8,7 +8,7 @@ RESULTS = HERE.parent.parent / "docs" / "results"
 
 
 def output_of(lmp, script, ranks, **variables):
-    """What LAMMPS says of a script of this folder."""
+    """The output of LAMMPS for a script of this folder."""
     command = ["mpirun", "--allow-run-as-root", "--bind-to", "core", "-np", str(ranks), lmp, "-in", str(HERE / script),
                "-log", "none"]
     for name, value in variables.items():
@@ -18,7 +18,7 @@ def output_of(lmp, script, ranks, **variables):
 
 
 def loop_time(output):
-    """Of the last run, without set-up [s]."""
+    """The time of the last run, without set-up [s]."""
     return float(re.findall(r"Loop time of (\S+)", output)[-1])
 
 

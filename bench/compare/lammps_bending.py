@@ -24,7 +24,7 @@ WAVE = math.sqrt(1e6 * 0.7 / (1.3 * 0.4) / 1000)  # speed of pressure waves [m/s
 
 
 def frequency(looks):
-    """By the times at which the end rises through zero."""
+    """The frequency from the upward zero crossings of the end [Hz]."""
     rises = []
     for (t0, z0), (t1, z1) in zip(looks, looks[1:]):
         if z0 < 0 <= z1:
@@ -36,7 +36,7 @@ def frequency(looks):
 def lammps_rows(lmp, across, ranks):
     for share in (0.6, 0.5, 0.4, 0.3, 0.2, 0.1):
         step = share * 0.2 / across / WAVE
-        # Softer bars swing more slowly: as long as ten periods may last.
+        # Long enough for ten periods of the softer, coarse bars.
         steps = int((PERIODS + 1.2) * (1.8 if across < 6 else 1.4) / FREQUENCY / step)
         try:
             out = output_of(lmp, "lammps_bending.in", ranks, across=across, step=step, steps=steps,
@@ -45,10 +45,10 @@ def lammps_rows(lmp, across, ranks):
             continue
         looks = [(float(t), float(z)) for t, z in re.findall(r"^=== (\S+) (\S+)$", out, re.M)]
         largest = max(abs(z) for _, z in looks) if looks else math.inf
-        found = frequency(looks) if largest < 1e-3 else 0  # it swings by 2e-4
+        found = frequency(looks) if largest < 1e-3 else 0  # the amplitude is 2e-4
         if found == 0:
             continue
-        # Only as long as the periods counted.
+        # The time of the counted periods.
         seconds = loop_time(out) * ((PERIODS + 1) / found) / looks[-1][0]
         particles = int(re.search(r"Created (\d+) atoms", out)[1])
         yield ["LAMMPS smd/tlsph", "cells", across, particles, f"{step:.4g}", f"{found:.6g}",

@@ -11,13 +11,13 @@ from pages.tables import markdown_table, plain, read_if_there, read_table
 HEAD = """# Accuracy
 
 Written by `bench/make_pages.py` from the table of `phyxel accuracy` in `docs/results/`: problems with known answers, \
-solved on the CPU in double (*inf*: it flew apart). *Cells*: a phyxel in the middle of each cell of a lattice; *nodes*: \
-one at each corner, so on faces, edges and corners of the body, too; *mesh*: spread on and in the body's surface as \
-`phyxel sample --on-surface` does, as many as there are nodes. *Jitter*: phyxels moved at random by up to so many \
-spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: with closed gradients; *plain*: \
-with neither. *Order*: by which power of the spacing the error fell since the row before. *Evaluations*: of all phyxels' \
-forces, in Newton's method and what it needs. *Set-up*: from the scene to the first of them; bold rows and charts count \
-both times. Errors are relative to the reference, or to what the quantity says."""
+solved on the CPU in double (*inf*: the solution diverged). *Cells*: a phyxel in the middle of each cell of a lattice; \
+*nodes*: a phyxel at each corner of the cells, also on faces, edges and corners of the body; *mesh*: as many phyxels as \
+nodes, on and in the body's surface as `phyxel sample --on-surface` places them. *Jitter*: largest random displacement of \
+phyxels in spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: with closed gradients; \
+*plain*: with neither. *Order*: power of the spacing by which the error has fallen since the row before. *Evaluations*: \
+number of evaluations of all forces, in Newton's method and in its preparation. *Set-up*: time from the scene to the first \
+evaluation; bold rows and charts include it. Errors are relative to the reference, or as the quantity says."""
 
 #: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
@@ -76,7 +76,7 @@ def short_error(error):
     """An error as a percentage, or below 0.01% as a power of ten."""
     error = abs(error)
     if not math.isfinite(error):
-        return "flew apart"
+        return "diverged"
     if error < 1e-4:
         return f"{error:.0e}"
     return f"{100 * error:.2g}%" if error < 0.095 else f"{100 * error:.0f}%"
@@ -95,14 +95,14 @@ def summary(page, table):
             finest = []
             for way in ways:
                 of_way = [row for row in rows if way_of(row) == way]
-                # Of several as fine ones the last.
+                # Among equally fine rows, the last.
                 finest.append(max(reversed(of_way), key=lambda row: row.number("across")) if of_way else None)
             most = max((row.number("phyxels") for row in rows if way_of(row) in ways), default=0)
             cells.append([f"{case['name']}: {quantity}", f"{most:g}",
                           *(short_error(row.number("error")) if row else "–" for row in finest)])
-    page.paragraph("## What is reached")
-    page.paragraph("Errors at the finest resolution of each problem, with up to so many phyxels (cells have fewer). Scenes "
-                   "that say nothing have nodes (cells in round bodies), or meshes, with α = 0.1.")
+    page.paragraph("## Summary")
+    page.paragraph("Errors at the finest resolution of each problem, with the largest number of phyxels (cells have fewer). "
+                   "By default, scenes have nodes (cells in round bodies), or meshes, with α = 0.1.")
     page.add(markdown_table(["", "phyxels", *ways], cells))
 
 
@@ -121,9 +121,9 @@ def beside_lammps(page, results):
         cells.append([way, row["across"], row["phyxels"], short_error(row.number("error")), row["seconds"]])
     page.paragraph("## Beside LAMMPS")
     page.paragraph(
-        "The bar of *bending* below rings for ten periods, on the same cores: what its frequency is off by, and how long it "
-        f"takes. {table.fact('what')}. `bench/compare/lammps_bending.py` runs both, with the largest stable step of LAMMPS "
-        f"and without its set-up, with phyxel's own step and its set-up. {table.fact('program')} on "
+        "The bar of *bending* below rings for ten periods, on the same cores: the error of its frequency, and the time. "
+        f"{table.fact('what')}. `bench/compare/lammps_bending.py` runs both programs: LAMMPS with its largest stable step "
+        f"and without its set-up, phyxel with its default step and with its set-up. {table.fact('program')} on "
         f"{table.fact('hardware')}; {table.fact('date')}.")
     page.show(chart, "accuracy_lammps")
     page.add(markdown_table(["", "across", "phyxels", "error", "s"], cells))
@@ -147,13 +147,13 @@ def hourglass(page, results):
             costs.append(row)
     if not shown and not costs:
         return
-    page.paragraph("## What hourglass control holds, and what it costs")
+    page.paragraph("## Effect and cost of hourglass control")
     if shown:
-        page.paragraph("A soft bar of neo-Hookean material, clamped at its upper end, after it was let go: its phyxels as they "
-                       "lie, drawn by `phyxel_studies pictures`.")
+        page.paragraph("A soft bar of neo-Hookean material, clamped at its upper end, after its release: its phyxels, drawn by "
+                       "`phyxel_studies pictures`.")
         page.add(markdown_table([p["what"] for p in shown], [[f"![{p['what']}]({page.link}{p['file']})" for p in shown]]))
     if costs:
-        page.paragraph("Time of a step beside one without, from `phyxel bench step`:")
+        page.paragraph("Ratio of the time of a step to one without the term, from `phyxel bench step`:")
         page.add(markdown_table(["", "precision", "phyxels", "hourglass control", "closed gradients"], costs))
 
 
@@ -184,7 +184,7 @@ def section(page, table, case, quantity, styles):
     for irregular in (False, True):
         chart(page, case, quantity, rows, irregular, styles)
     front = front_of(rows)
-    page.paragraph("In bold: nothing measured here is both faster and more accurate.")
+    page.paragraph("Bold rows are on the Pareto front: no other row is both faster and more accurate.")
     columns = ["across", "phyxels", "neighbours", "value", "error", "order", "evaluations", "seconds", "setup_seconds"]
     page.add(markdown_table(
         ["discretisation", "across", "phyxels", "neighbours", "value", "error", "order", "evaluations", "s", "set-up s"],
@@ -232,11 +232,11 @@ def hard_section(page, results):
             refusals += f"- {hard['name']}: {messages[0]}\n"
     measured = " ".join(f"{device}: {measured_by(table)}." for device, table in tables.items())
     page.paragraph("## Hard cases")
-    page.paragraph("From `phyxel accuracy hard`: each is answered within what is allowed, or refused with its cause. "
+    page.paragraph("From `phyxel accuracy hard`: each case is answered within its tolerance, or refused with its cause. "
                    f"{measured}")
     page.add(markdown_table(["case", "what", "allowed", *tables], cells))
     if refusals:
-        page.paragraph("What refusals say:")
+        page.paragraph("Messages of refusals:")
         page.add(refusals)
 
 

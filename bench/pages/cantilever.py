@@ -30,12 +30,12 @@ def words(table):
     beam = problems()["cantilever"]
     text = (
         f"A square beam on a regular lattice, {beam['heights_long']:g} heights long, Poisson's ratio {beam['poisson']:g}, "
-        f"held at one end, under a shear at the other that bends it by {beam['deflection_by_length']:.2g} of its length; "
-        f"damped critically until its deflection changes by less than {beam['settled']:g} of itself while the first mode "
-        "decays by e. *Discretisation* is the difference from the known deflection, "
-        f"{beam['known_by_timoshenko']:.4g} of Timoshenko's (who lets the held end contract sideways, as held phyxels "
-        "cannot); *rounding* is the largest difference of a displacement from that in double on the same cloud after as "
-        "many steps, over the largest displacement. Times are those of the steps.\n\n")
+        f"clamped at one end, under a shear at the other that deflects it by {beam['deflection_by_length']:.2g} of its "
+        f"length; damped critically until its deflection changes by less than {beam['settled']:g} relative to itself while "
+        "the first mode decays by e. *Discretisation* is the difference from the known deflection, "
+        f"{beam['known_by_timoshenko']:.4g} of Timoshenko's (in which the clamped end may contract sideways, unlike fixed "
+        "phyxels); *rounding* is the largest difference of a displacement from double on the same cloud after the same "
+        "number of steps, over the largest displacement. Times are those of the steps.\n\n")
     usual = usual_factor(table)
     clouds = refinement(table, usual, "double")
     coarse, fine = clouds[0], clouds[-1]

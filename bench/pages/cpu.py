@@ -11,14 +11,14 @@ again](paper/paper.md) is a page of its own, made by `phyxel paper`; so is [the 
 performance](../performance.md)."""
 
 STEP = """A jittered cube; medians; `spread` is (fastest − slowest)/median over the repeats. The force error is the \
-largest difference from double over the largest force. Bytes are the least a step must move; the last column sets them \
-against a plain copy on the same threads (above 100%: the body fits in cache)."""
+largest difference from double over the largest force. Bytes are the minimum that a step must move; the last column \
+compares them with a plain copy on the same threads (above 100%: the body fits in cache)."""
 
 MORE_THREADS = """### More threads
 
-The speed over that of one thread. The last column is the time in nanoseconds in which two cores answer each other \
-through a cache line, measured right after: a virtual machine's cores move, and where they no longer share a cache, \
-small bodies scale less."""
+The speed over that of one thread. The last column is the round-trip time of two cores through a cache line in \
+nanoseconds, measured right after: a virtual machine may move its cores, and small bodies scale less if they do not share \
+a cache."""
 
 
 def measured(table):

@@ -21,31 +21,30 @@ unless said otherwise; *error* is the largest difference of a force from that in
 hold against the CPU), over the largest force, at strains of some 10%; *spread* is (fastest − slowest)/median of the \
 repeats: under load the GPU lowers its clock, so that the first repeat is the fastest."""
 
-PATH = """*Path*: `tiles` are two launches a step, which a graph repeats where launches would count; what is resident \
-stays in shared memory for many steps a launch, in a cluster of blocks a body or in blocks that send each other mail. \
-*Bytes moved* are the least that a step must move; their share of a plain copy's bandwidth says that memory is not the \
+PATH = """*Path*: `tiles` are two launches a step, repeated by a graph where the launch overhead matters; resident bodies \
+stay in shared memory for many steps a launch, in a cluster of blocks for each body or in blocks that exchange packets. \
+*Bytes moved* are the minimum of a step; their share of a plain copy's bandwidth shows that memory bandwidth is not the \
 limit."""
 
-ALONE = """Alone, a body takes as long as its slowest block needs for the chain of its longest list, twice, and for two \
-exchanges. Many side by side are limited by the loads from shared memory of all."""
+ALONE = """The time of a single body is the latency of its slowest block: twice the dependent operations of its longest \
+list, and two exchanges. Many bodies side by side are limited by the throughput of loads from shared memory."""
 
-SURFELS = """A resident body leaves what its surfels need after each of up to sixteen steps of a launch; then all surfels \
-move after all of those steps at once. Whoever wants to see them after a step ends the launch there."""
+SURFELS = """A resident body stores the data of its surfels after each of up to sixteen steps of a launch; one launch then \
+moves all surfels for all of those steps. A caller that reads surfels after a step ends the launch there."""
 
 TRIED = """## What was tried
 
-In the order of what it gained, from a thread a phyxel over compressed rows: tiles in shared memory with 16-bit slots; \
-lists ordered so that eight lanes never wait for a column of shared memory, with broadcasts counted as free; the own \
-stress through a constant of the cloud; a tile's own phyxels in its first slots, lists 16 bytes at a time, constants \
-fetched into the second-level cache ahead of their use. What lost: two phyxels a lane (half the loads, too few warps), \
-tiles of 512 and 1024 (too few blocks in residence), filling lists up with the lane's own phyxel instead of far points \
-(it meets others in a column), records half as precise. Launches that begin while the last one ends gained 2 to 5% at \
-half a million phyxels, nothing above, and lost a third at 27 thousand: graphs gain 4 to 17% below a million and lose \
-nowhere. For surfels, gradients found by each block of surfels itself lost a half to the tiles' own pass, and lists of \
-carriers common to a warp won 4% where surfels are dense and lost 20% where they are not; of a resident body's surfels, \
-one launch a step lost a third to sixteen steps together, and blocks that walk the sixteen steps one after another lost \
-up to a half to a block a step. In clusters: fetching the next neighbours' stresses while the present ones are summed \
-(the longer loop waits for its own instructions)."""
+Gains over one thread for each phyxel on compressed rows, largest first: tiles in shared memory with 16-bit slots; lists \
+ordered so that eight lanes have no bank conflicts, with broadcasts free; the phyxel's own stress by a constant of the \
+cloud; a tile's own phyxels in its first slots; lists loaded 16 bytes at a time; constants prefetched into the second-level \
+cache. Losses: two phyxels a lane (half the loads, too few warps); tiles of 512 and 1024 (too few resident blocks); lists \
+padded with the lane's own phyxel instead of null points (bank conflicts); records in half precision. Programmatic \
+dependent launches gained 2 to 5% at half a million phyxels, nothing above, and lost a third at 27 thousand; graphs gain 4 \
+to 17% below a million and never lose. For surfels, gradients computed by each block of surfels took twice as long as the \
+tiles' own pass, and carrier lists common to a warp gained 4% with dense surfels and lost 20% otherwise; for the surfels of \
+resident bodies, one launch a step was a third slower than sixteen steps together, and blocks that loop over the sixteen \
+steps up to twice as slow as one block a step. In clusters, prefetching the next neighbours' stresses lost (the longer \
+loop waits for instructions)."""
 
 #: Nsight Compute's name of a metric, the page's title and the factor between their units.
 METRICS = [

@@ -8,15 +8,15 @@ ASKED_OF_TWO = 1.8  # target speed-up of two ranks on two cores, from 200,000 ph
 HEAD = """# Scaling
 
 Written by `bench/make_pages.py` from the tables of `phyxel bench scaling` in `docs/results/`: one jittered cube under \
-gravity with Green's strain, stepped by ranks that `mpirun -n N` starts. Every rank count and partitioner \
-gives the same positions to the last bit (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), so the error of \
-a scaled run is that of one rank. Ranks have one ring of ghosts, whose displacements and stresses are exchanged; \
-rows of two rings, where the inner ring's stresses were found twice, are of versions that had them. *One alone*: 10⁶ phyxel-steps/s of the first rank by itself, with \
-the whole body or with one rank's part of it, measured in turn with all ranks; *speed-up*: over that; *efficiency*: that \
-by rank; *spread*: (largest - smallest) / median of the repeats, of all and of one. *Exchanging* is the largest share of \
-a rank's time for packing, waiting and unpacking, in which uneven work shows, too. *Shares*: until each rank has its part \
-of the body; *backend*: from there until it can step; *host*: what all ranks' programs have had of the host's memory at \
-most."""
+gravity with Green's strain, stepped by the ranks of `mpirun -n N`. Positions are equal bit by bit for any number of ranks \
+and any partitioner (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), so the error of a scaled run is that of \
+one rank. Ranks have one ring of ghosts, whose displacements and stresses are exchanged; rows with two rings, where the \
+stresses of the inner ring were computed twice, are from earlier versions. *One alone*: 10⁶ phyxel-steps/s of the first \
+rank by itself, with the whole body or with one rank's part of it, measured in turn with all ranks; *speed-up*: the ratio \
+to it; *efficiency*: the speed-up over the number of ranks; *spread*: (largest - smallest) / median of the repeats, of all \
+ranks and of one. *Exchanging* is the largest share of a rank's time for packing, waiting and unpacking, including load \
+imbalance. *Shares*: time until each rank has its share of the body; *backend*: time from there to the first step; *host*: \
+peak of the host's memory that all ranks use."""
 
 WITH_ONE = ["phyxels", "precision", "cut by", "ghost rings", "transport", "10⁶ phyxel-steps/s", "one alone", "speed-up",
             "efficiency", "spread", "most ghosts", "kB sent a step", "exchanging", "set-up [s]"]

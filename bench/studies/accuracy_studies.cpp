@@ -40,7 +40,7 @@ Stepped step_through(const Model& model, Scene scene, Precision precision, Metho
   return {solver.state(), solver.work().evaluations, app::seconds_since(start)};
 }
 
-/// A spinning block is thrown and falls for a second.
+/// Measures the error of a spinning block in free fall for a second, by precision.
 void measure_precision(const Add& add) {
   for (double young = 1e3; young < 2e12; young *= 10) {
     Scene scene = bar({.filling = Filling::cells, .across = 3}, 0.3, 0.3);
@@ -63,7 +63,7 @@ void measure_precision(const Add& add) {
   }
 }
 
-/// A bar sways for a second, about a period of it.
+/// Measures the error of a bar that sways for a second, about one period, by step.
 void measure_steps(const Add& add) {
   constexpr double end = 1;
   Scene scene =
@@ -87,7 +87,7 @@ void measure_steps(const Add& add) {
   for (const int steps : {25, 50, 100, 200, 400}) measure(Method::implicit, end / steps);
 }
 
-/// The bar of "gravity" over supports.
+/// Measures the bar of "gravity", by support.
 void measure_neighbours(const Add& add) {
   const std::pair<const char*, Discretisation> ways[] = {
       {"nodes", {.hourglass = 0.1, .across = 6}},

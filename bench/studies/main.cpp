@@ -7,8 +7,8 @@
 #include "version.hpp"
 
 int main(int argc, char** argv) {
-  phyxel::app::settle_thread_policy(argv);  // first: it starts the program again
-  CLI::App program("Measurements behind the pages in docs/, for those who develop phyxel.");
+  phyxel::app::settle_thread_policy(argv);  // first, since it restarts the program
+  CLI::App program("Measurements behind the pages in docs/, for developers of phyxel.");
   program.name("phyxel_studies");
   program.set_version_flag("--version", phyxel::program_version());
   program.require_subcommand(1);

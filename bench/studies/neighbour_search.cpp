@@ -57,17 +57,11 @@ void measure_search(const SearchOptions& options) {
 
 void add_neighbour_search(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "neighbour-search", "Neighbour search: time per phyxel against the number of phyxels");
+      "neighbour-search", "Measure the time of a neighbour search by the number of phyxels");
   auto options = std::make_shared<SearchOptions>();
   for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
-  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
-      ->delimiter(',')
-      ->check(CLI::Range(8, 2'000'000'000));
-  command->add_option("--threads", options->threads, "Thread counts, comma separated")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 4096));
-  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
+  app::add_size_options(*command, options->sizes, options->repeats);
+  app::add_thread_counts(*command, options->threads);
   app::add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"

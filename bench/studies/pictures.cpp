@@ -16,7 +16,7 @@ namespace {
 using app::Discretisation;
 using app::Filling;
 
-constexpr double seconds = 0.8;  // a swing down and half of one back
+constexpr double seconds = 0.8;  // one swing and half of the swing back
 
 /// The phyxels of a soft bar that hangs from one end, after its first swing.
 FrameData swung(const Discretisation& d) {
@@ -72,7 +72,7 @@ const std::vector<AccuracyPicture>& accuracy_pictures() {
 
 void add_pictures(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "pictures", "Draw what hourglass control holds, into the folder of the tables");
+      "pictures", "Draw pictures of a bar with and without hourglass control");
   auto results = std::make_shared<std::string>("docs/results");
   command->add_option("--results", *results, "Folder of the tables")->capture_default_str();
   command->footer(

@@ -1,4 +1,4 @@
-/// What hourglass control is for, to look at.
+/// Pictures of the effect of hourglass control.
 #pragma once
 
 #include <filesystem>
@@ -8,10 +8,10 @@
 namespace phyxel::studies {
 
 struct AccuracyPicture {
-  std::string file;  ///< In the results' folder.
+  std::string file;  ///< Name in the folder of the results.
   std::string what;
 };
-/// In the order in which a page shows them.
+/// The pictures, in the order of the page.
 const std::vector<AccuracyPicture>& accuracy_pictures();
 
 }  // namespace phyxel::studies

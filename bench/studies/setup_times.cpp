@@ -76,15 +76,11 @@ void measure_setup(const SetupOptions& options) {
 
 void add_setup(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "setup", "From a cloud to the first step: neighbours, moments, step limit");
+      "setup", "Measure the time from a cloud to the first step: neighbours, moments, step limit");
   auto options = std::make_shared<SetupOptions>();
-  command->add_option("--phyxels", options->sizes, "Sizes, comma separated (rounded to cubes)")
-      ->delimiter(',')
-      ->check(CLI::Range(8, 2'000'000'000));
+  app::add_size_options(*command, options->sizes, options->repeats);
   command->add_option("--device", options->device, app::device_help)->capture_default_str();
   command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
-  command->add_option("--repeat", options->repeats, "Repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
   app::add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"

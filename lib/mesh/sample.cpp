@@ -198,7 +198,7 @@ struct PreparedSurface {
 
 /// Inspects, scales, cleans and orients a surface, and reports its defects and each change.
 PreparedSurface prepare(const Surface& surface, SampleReport& found) {
-  const Stage inspecting("inspecting the surface");
+  Stage inspecting("inspecting the surface");
   found.defects = inspect_surface(surface);
   // The surface is scaled to a size of one to two, the range in which float offsets are accurate.
   PreparedSurface made{.surface = surface,
@@ -214,6 +214,7 @@ PreparedSurface prepare(const Surface& surface, SampleReport& found) {
   for (std::string& done : orient(made.surface)) found.warnings.push_back(std::move(done));
   made.surface.normal = vertex_normals(made.surface.position, made.surface.triangle);
   made.topology = connect(made.surface);
+  inspecting.finish();
   return made;
 }
 

@@ -1,4 +1,4 @@
-/// The problems of phyxel accuracy, at resolutions that take a second or two.
+/// The problems of phyxel accuracy, at resolutions that take one or two seconds.
 #include "accuracy/accuracy.hpp"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@
 
 namespace phyxel {
 namespace app {
-/// For messages of parametrised tests.
+/// Names of parametrised tests.
 void PrintTo(const HardCase& hard, std::ostream* out) { *out << hard.name; }
 }  // namespace app
 namespace {
@@ -41,8 +41,8 @@ Solution solved(const std::string& name, int across) {
   return named(name).solve({.hourglass = 0.3, .across = across});
 }
 
-/// Forces of a body that is turned are roundings of its strains, 10⁻¹⁶, times the condition of its
-/// moments; on irregular clouds, too.
+/// Forces of a rotated body are rounding errors of its strains, 10⁻¹⁶, times the condition number
+/// of its moments, also for irregular clouds.
 TEST(Accuracy, ATurnedBodyHasNoForces) {
   for (const double jitter : {0.0, 0.3}) {
     const Solution s = named("rotation").solve({.jitter = jitter, .hourglass = 0.3, .across = 5});
@@ -51,7 +51,7 @@ TEST(Accuracy, ATurnedBodyHasNoForces) {
   }
 }
 
-/// Seen: 1.8e-4, 4e-5.
+/// Errors seen: 1.8e-4 and 4e-5.
 TEST(Accuracy, TensionGivesTheMaterialBack) {
   const Solution s = solved("tension", 4);
   EXPECT_EQ(s.found.at(0).name, "E");
@@ -59,7 +59,8 @@ TEST(Accuracy, TensionGivesTheMaterialBack) {
   EXPECT_NEAR(s.found.at(1).value, s.found.at(1).reference, 5e-4 * s.found.at(1).reference);
 }
 
-/// Half of 1% of the finite elements' answer on 1,519 phyxels, where cells are 16% off.
+/// The error of nodes is half a percent of the finite elements' answer with 1,519 phyxels, that of
+/// cells 16%.
 TEST(Accuracy, NodesBendAsFiniteElementsDo) {
   for (const char* name : {"gravity", "shear"}) {
     const Solution nodes = solved(name, 6);
@@ -69,8 +70,9 @@ TEST(Accuracy, NodesBendAsFiniteElementsDo) {
   }
 }
 
-/// On 1,519 jittered phyxels: 13% too soft without, 1.9% with closed gradients; and the patch,
-/// whose outer phyxels alone are told where to go, is exact to what Newton's method is.
+/// Errors with 1,519 jittered phyxels: 13% too soft without closed gradients, 1.9% with them. The
+/// patch test, in which only outer phyxels are prescribed, is exact within the tolerance of
+/// Newton's method.
 TEST(Accuracy, ClosedGradientsServeIrregularClouds) {
   const Discretisation plain{.jitter = 0.2, .hourglass = 0.1, .across = 6};
   Discretisation closed = plain;
@@ -84,8 +86,8 @@ TEST(Accuracy, ClosedGradientsServeIrregularClouds) {
   EXPECT_LT(named("patch").solve(closed).found.at(0).value, 1e-8);
 }
 
-/// On 1,519 phyxels spread on and in the bar's surface: 4.5% and 4.4% off as they come, seen 0.25%
-/// and 0.7% with hourglass control and closed gradients.
+/// Errors with 1,519 phyxels on and in the bar's surface: 4.5% and 4.4% without, 0.25% and 0.7%
+/// with hourglass control and closed gradients.
 TEST(Accuracy, MeshesOfPhyxelsBendAsFiniteElementsDo) {
   const Discretisation plain{.filling = app::Filling::mesh, .across = 6};
   Discretisation better = plain;
@@ -97,7 +99,7 @@ TEST(Accuracy, MeshesOfPhyxelsBendAsFiniteElementsDo) {
   }
 }
 
-/// A quarter and half a turn of 525 and 1,519 phyxels.
+/// Energies of a quarter and a half turn, with 525 and 1,519 phyxels.
 TEST(Accuracy, ColumnsTwistAsFiniteElementsDo) {
   double before = 0;
   for (const int across : {4, 6}) {
@@ -111,7 +113,7 @@ TEST(Accuracy, ColumnsTwistAsFiniteElementsDo) {
   }
 }
 
-/// On 525 phyxels; torsion has four cells across where its shear changes sign.
+/// Frequencies with 525 phyxels; torsion, whose shear changes sign, has only four cells across.
 TEST(Accuracy, BarsRingAsFiniteElementsDo) {
   const std::pair<const char*, double> seen[] = {
       {"bending", 0.0078}, {"torsion", 0.0601}, {"stretching", 0.000251}};
@@ -140,8 +142,8 @@ TEST_F(AccuracyCommand, HardCasesAreAnsweredOrRefused) {
   EXPECT_THAT(hard.out, HasSubstr("step 1.01,float,refusal,refusal"));
 }
 
-/// Each is answered within its tolerance or refused, as it should be; those that take minutes are
-/// in docs/accuracy.md.
+/// Each hard case is answered within its tolerance, or refused as it must be. Cases that take
+/// minutes are in docs/accuracy.md only.
 class HardCases : public ::testing::TestWithParam<app::HardCase> {
  protected:
   void expect_good(const app::Machine& machine) const {
@@ -153,7 +155,7 @@ class HardCases : public ::testing::TestWithParam<app::HardCase> {
       EXPECT_LE(outcome.error, hard.tolerance);
       return;
     }
-    // Refused for its own cause, not for just any.
+    // The refusal must name the case's own cause.
     EXPECT_TRUE(outcome.refused);
     const std::map<std::string, std::string> causes{
         {"single phyxel", "nothing in this model resists deformation"},
@@ -162,7 +164,7 @@ class HardCases : public ::testing::TestWithParam<app::HardCase> {
     ASSERT_TRUE(causes.contains(hard.name)) << hard.name;
     EXPECT_THAT(outcome.message, HasSubstr(causes.at(hard.name)));
   }
-  /// Newton's method computes in double: other precisions do not have such a case.
+  /// Cases of Newton's method exist in double only.
   static std::vector<Precision> precisions(bool gpu) {
     if (GetParam().in_double) return {Precision::double_};
     if (gpu) return {Precision::double_, Precision::single, Precision::mixed};

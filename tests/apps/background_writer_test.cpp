@@ -1,4 +1,4 @@
-/// Writing beside the stepping: the order of jobs, how many are held, errors, and the same files.
+/// Asynchronous output: the order of jobs, the length of the queue, errors, and equal files.
 #include "background_writer.hpp"
 
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::text_of;
 
-/// A gate that jobs can be made to wait at.
+/// A gate at which jobs can be made to wait.
 class Gate {
  public:
   void open() { opened_.set_value(); }
@@ -162,7 +162,7 @@ TEST(BackgroundWriter, TheEndDoesWhatWaitsAlsoWhenAnExceptionPasses) {
   });
 }
 
-/// All files of a folder by name.
+/// The files of a folder, by name.
 std::map<std::string, std::string> content_of(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::directory_iterator(folder)) {

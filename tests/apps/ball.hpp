@@ -1,4 +1,4 @@
-/// A ball as a frame, and the message of an error: shared by the tests of pictures.
+/// A ball as a frame, and the message of an error, for the tests of pictures.
 #pragma once
 
 #include <cmath>

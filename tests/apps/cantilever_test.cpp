@@ -1,4 +1,4 @@
-/// The cantilever that speed and error are measured on: what it settles to, and the table about it.
+/// The cantilever of `bench cantilever`: its deflection, and the table.
 #include "cantilever.hpp"
 
 #include <gmock/gmock.h>
@@ -18,8 +18,8 @@ using app::settle;
 using app::Settled;
 using ::testing::HasSubstr;
 
-constexpr double factor = 1.4;  // 18 neighbours inside: the least work
-constexpr int threads = 1;      // two wait for each other on a busy machine
+constexpr double factor = 1.4;  // 18 interior neighbours, for the least work
+constexpr int threads = 1;      // more threads wait for each other on a busy machine
 
 Settled settled(int across, Precision precision, std::int64_t frames = 0) {
   const Scene scene = cantilever_scene(across, factor);
@@ -38,10 +38,10 @@ TEST(Cantilever, ConvergesToTheKnownDeflectionWithSecondOrder) {
     return settled(across, Precision::single).deflection / app::known_deflection() - 1;
   };
   const double coarse = error(3), fine = error(5);
-  EXPECT_GT(fine, 0);  // too soft: the fit at a surface phyxel is one-sided
-  // Terms of higher order still add a fifth at 3 across, which raises the order by 0.3 at most.
+  EXPECT_GT(fine, 0);  // too soft, since the fit at a surface phyxel is one-sided
+  // Terms of higher order add a fifth at 3 across, which raises the order by at most 0.3.
   EXPECT_NEAR(std::log(coarse / fine) / std::log(5.0 / 3.0), 2, 0.3);
-  // Without the share that the held face takes, 0.66% here, this would be 0.063.
+  // Without the effect of the fixed face, 0.66% here, this would be 0.063.
   EXPECT_NEAR(fine, 0.070, 0.003);
 }
 
@@ -50,8 +50,8 @@ TEST(Cantilever, PrecisionsDifferByRounding) {
   for (const Precision precision : {Precision::single, Precision::mixed}) {
     const Settled rounded = settled(3, precision, exact.frames);
     EXPECT_EQ(rounded.steps, exact.steps) << precision_name(precision);
-    // Lattice and moments are rounded to 6e-8; a strain is a small difference of displacements,
-    // which loses two digits at most.
+    // Lattice and moments are rounded to 6e-8; a strain, a small difference of displacements, loses
+    // at most two digits.
     const double rounding = std::abs(rounded.deflection / exact.deflection - 1);
     EXPECT_GT(rounding, 0) << precision_name(precision);
     EXPECT_LT(rounding, 6e-6) << precision_name(precision);
@@ -88,7 +88,7 @@ TEST(Cantilever, SaysSoIfItDoesNotSettle) {
 
 class CantileverBench : public test::Program {};
 
-/// Double is measured although only float is asked for: it is what float is compared with.
+/// Double is measured even if only float is requested, as the reference of float.
 TEST_F(CantileverBench, MeasuresDoubleBesideWhatIsAskedFor) {
   const test::Outcome bench = run({"bench", "cantilever", "--device", "cpu", "--across", "2,3",
                                    "--factor", "1.4", "--precision", "float"});

@@ -1,4 +1,4 @@
-/// Command lines that are not quite right, and files of another kind: what they are told.
+/// Messages for wrong command lines, and for files of a wrong kind.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using ::testing::StartsWith;
 
 class CommandLine : public test::Program {};
 
-/// One line that begins with the word as it was typed, and holds the nearest right one.
+/// The message is one line that begins with the typed word and suggests the nearest valid one.
 TEST_F(CommandLine, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
   const struct {
     std::vector<std::string> arguments;
@@ -56,7 +56,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
     EXPECT_EQ(outcome.out, "");
   }
-  // -h, whatever follows it.
+  // -h prints help whatever follows it.
   const Outcome help = run({"-help"});
   EXPECT_EQ(help.code, 0);
   EXPECT_THAT(help.out, HasSubstr("Usage: phyxel"));
@@ -69,14 +69,14 @@ TEST_F(CommandLine, OptionsAreQuotedAsTheyWereTyped) {
               StartsWith("phyxel: error: --until abc: cannot be read; allowed: FLOAT\n"));
   EXPECT_THAT(
       run({"info", "x.toml", "--partition=0"}).err,
-      // In the words of CLI11, which differ between its versions.
+      // CLI11's messages differ between its versions.
       AnyOf(StartsWith("phyxel: error: --partition=0: Value 0 not in range 1 to 100000\n"),
             StartsWith("phyxel: error: --partition=0: Value 0 not in range [1 - 100000]\n")));
   EXPECT_THAT(run({"run", "x.toml", "--until"}).err, StartsWith("phyxel: error: --until: "));
 }
 
-/// Each command that takes a file, given one of each kind: those that it does not take are named
-/// with the command for them and with what is allowed; no other is.
+/// Each command with a file argument is given one file of each kind. For a wrong kind, and only
+/// then, the message names the kind, the command that takes it, and the allowed kinds.
 TEST_F(CommandLine, FilesOfAnotherKindAreToldApart) {
   write("cow.OBJ", "v 0 0 0\n");
   write("scene.toml", "");

@@ -1,4 +1,4 @@
-/// Drawing: where points land, what triangles and dots cover, how labels read.
+/// Drawing: projected positions, covered areas of triangles and dots, labels.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// At the origin, looking along y, z up; 1 m across at 10 m depth is `focal` / 10 pixels.
+/// A camera at the origin, looking along y with z up; 1 m at a depth of 10 m is `focal` / 10
+/// pixels.
 Camera camera_at_origin(int width, int height, double focal) {
   return {width, height, {0, 0, 0}, {1, 0, 0}, {0, 0, 1}, {0, 1, 0}, focal};
 }
@@ -103,7 +104,7 @@ TEST(Camera, TheFitIsTheTightestThatShowsEveryPoint) {
         across = std::max(across, std::abs(place.x / width - 0.5));
         down = std::max(down, std::abs(place.y / height - 0.5));
       }
-      // 7% of the picture stay free on each side; the tighter direction is filled up to there.
+      // A margin of 7% remains on each side; the tighter direction is filled up to it.
       EXPECT_NEAR(std::max(across, down), 0.43, 1e-9);
       // The axes are orthonormal and right-handed: right x up = -forward.
       EXPECT_NEAR(norm(camera.right), 1, 1e-12);

@@ -1,4 +1,4 @@
-/// A run whose energy is wrong at its end says so.
+/// The warning of a run whose energy has drifted.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -16,8 +16,8 @@ using ::testing::Not;
 
 class EnergyDrift : public test::Program {
  protected:
-  /// Three layers of phyxels, one of them held: most of its motion is in modes near the fastest,
-  /// which steps at the very limit do not resolve.
+  /// A body of three layers of phyxels, one of them fixed. Most of its motion is in modes near the
+  /// fastest one, which steps at the stability limit do not resolve.
   Outcome run_with(const std::string& safety) const {
     write("beam.toml", R"(
 [time]

@@ -1,4 +1,5 @@
-/// Bodies far from the origin: frames that tell their points apart, alike on ranks and restarts.
+/// Bodies far from the origin: frames resolve the distances of points, also on ranks and after
+/// restarts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 using test::Outcome;
 using test::text_of;
 
-/// On the CPU, and on a GPU where there is one: frames are made of what a device has computed.
+/// The tests run on the CPU, and on a GPU if there is one.
 class FarAway : public test::Program, public ::testing::WithParamInterface<const char*> {
  protected:
   void SetUp() override {
@@ -64,7 +65,7 @@ density = 1000
   Outcome run_on(int ranks, const std::vector<std::string>& arguments) {
     launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n",
                  std::to_string(ranks)};
-    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI's own
+    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI leaks
     const Outcome outcome = run(arguments);
     launcher_ = {};
     return outcome;
@@ -73,7 +74,7 @@ density = 1000
     return read_frame(
         read_series(folder_ / folder / (family + std::string(".hdf.series")))[k].file);
   }
-  /// All frames of a folder and what lists them, by name.
+  /// The frames, series and log of a folder, by name.
   std::map<std::string, std::string> frames_of(const std::string& folder) const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::directory_iterator(folder_ / folder)) {
@@ -124,8 +125,7 @@ TEST_P(FarAway, FramesKeepTheDistancesBetweenNeighbours) {
   EXPECT_TRUE(std::equal(phyxels.point.begin(), phyxels.point.end(), all.begin()));
 }
 
-/// Floats do for a body near the origin, and frames of a run in float hold nothing else, as they
-/// did before frames knew of bodies far away.
+/// Frames of a run in float near the origin have positions in float.
 TEST_P(FarAway, FramesNearTheOriginStayFloat) {
   write("near.toml", scene("translation = [3, 0, 0]"));
   ASSERT_EQ(run({"run", "near.toml", "--until", "0.02"}).code, 0);
@@ -138,11 +138,11 @@ TEST_P(FarAway, FramesNearTheOriginStayFloat) {
   }
 }
 
-/// Bodies that fly off: the first frames are of float, the last ones of double, and which are is
-/// the same on two ranks and after a stop between the two.
+/// For bodies that fly away, the first frames have floats and the last ones doubles; the frame of
+/// the change is the same on two ranks and after a restart.
 TEST_P(FarAway, FramesTurnToDoubleAtTheSameTimeOnRanksAndAfterRestarts) {
-  // Floats do for phyxels 0.05 m apart up to 0.05e-3 m / 2^-23 = 420 m, and for surfels that are
-  // closer not as far; 600 m are flown.
+  // Float is precise enough for a spacing of 0.05 m up to 0.05e-3 m / 2^-23 = 420 m, and for
+  // surfels up to a shorter distance; the bodies fly 600 m.
   write("thrown.toml", scene("velocity = [6000, 0, 0]"));
   const Outcome whole = run({"run", "thrown.toml", "--out", "whole"});
   ASSERT_EQ(whole.code, 0) << whole.err;

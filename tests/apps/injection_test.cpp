@@ -1,5 +1,5 @@
-/// What stands in files and names of folders stays text: no shell and no gnuplot executes it, no
-/// page takes it for markup, and pictures are drawn all the same.
+/// Content of files and names of folders stays text: neither a shell nor gnuplot executes it, pages
+/// do not interpret it as markup, and pictures are still drawn.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using test::text_of;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// Each would make a file "canary" if a shell or gnuplot looked into it.
+/// Texts that would create a file "canary" if a shell or gnuplot evaluated them.
 const std::vector<std::string> hostile_words{
     "`touch canary`",
     "$(touch canary)",
@@ -73,7 +73,7 @@ TEST_F(Injection, LabelsOfChartsAreText) {
   EXPECT_THAT(text_of(folder_ / "a.svg"), HasSubstr("$(a)"));
 }
 
-/// `paper --redraw`, whose charts name what stands in cells.
+/// `paper --redraw` puts cells of tables into charts.
 TEST_F(Injection, CellsOfPaperPagesAreText) {
   for (std::size_t k = 1; k < hostile_words.size(); k += 2) {
     const std::string& words = hostile_words[k];

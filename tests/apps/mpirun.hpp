@@ -1,4 +1,4 @@
-/// The program on several ranks, as mpirun starts it.
+/// Runs of the program on several ranks under mpirun.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace phyxel {
 
 class Mpirun : public test::Program {
  protected:
-  /// Two bodies of which one is held, pulled and moved, with surfels and every field.
+  /// Two bodies, one of them fixed, loaded and moved, with surfels and all fields.
   void write_scene(const std::string& end = "0.1") const {
     write("scene.toml", "gravity = [0.0, 0.0, -9.81]\n[time]\nend = " + end + R"(
 [solver]
@@ -57,13 +57,13 @@ density = 1000
     if (count == 0) return;
     launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n",
                  std::to_string(count)};
-    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI's own
+    environment_ = {{"ASAN_OPTIONS", "detect_leaks=0"}};  // Open MPI leaks
   }
   test::Outcome run_on(int count, const std::vector<std::string>& arguments) {
     use_ranks(count);
     return run(arguments);
   }
-  /// All files of an output folder, by name, but for run.json, which tells of times and ranks.
+  /// The files of an output folder, by name, without run.json, which has times and ranks.
   std::map<std::string, std::string> files_of(const std::string& directory) const {
     std::map<std::string, std::string> files;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / directory)) {
@@ -83,7 +83,7 @@ density = 1000
   }
 };
 
-/// How often `what` is said.
+/// Number of occurrences of `what`.
 inline int count_of(const std::string& what, const std::string& text) {
   int count = 0;
   for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++count;

@@ -1,4 +1,4 @@
-/// What several ranks refuse: every rank stops, and one of them says why, once.
+/// Refusals on several ranks: all ranks stop, and one of them prints the message once.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -59,8 +59,8 @@ density = 1000
   EXPECT_EQ(count_of("Usage:", run_on(2, {"--help"}).out), 1);
 }
 
-/// Each rank reads its own command line: what changes the plan must be the same on all, or they
-/// would step to different ends and wait for each other for ever.
+/// Options that change the plan must be equal on all ranks, each of which reads its own command
+/// line; otherwise ranks would step to different ends and wait for each other for ever.
 TEST_F(Mpirun, OptionsThatDifferBetweenRanksAreToldOnce) {
   write_scene();
   const struct {

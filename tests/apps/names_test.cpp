@@ -1,4 +1,4 @@
-/// Names of files that are no UTF-8, which Linux allows, in what every command says as JSON.
+/// File names that are not UTF-8, which Linux allows, in the JSON output of all commands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ using test::Outcome;
 
 class Names : public test::Program {
  protected:
-  /// The JSON that a command prints to stdout, and nothing else.
+  /// The output of a command, which must be JSON only.
   nlohmann::json json_of(std::vector<std::string> arguments) const {
     arguments.emplace_back("--json");
     const Outcome outcome = run(arguments);

@@ -1,4 +1,4 @@
-/// `phyxel paper` as a user meets it, on the CPU; what it measures on a GPU is in docs/results.
+/// `phyxel paper` on the CPU; docs/results has its measurements on a GPU.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 
 class Paper : public test::Program {
  protected:
-  /// Short measurements: what is tested is not speed.
+  /// Options for short measurements, since speed is not tested.
   Outcome paper(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {"paper", "--repeat", "1", "--seconds", "0.001"});
     return run(arguments);
@@ -66,7 +66,7 @@ TEST_F(Paper, WithoutAGpuMeasuresTheCpuAndSaysWhatItLeftOut) {
   EXPECT_THAT(page, AllOf(HasSubstr("No GPU was measured"), HasSubstr("sequential of 2008")));
 }
 
-/// A table as a GPU would have given it.
+/// A table as measured on a GPU.
 TEST_F(Paper, RealTimeIsCountedInObjectsAndDrawn) {
   CsvTable frames{{{"repeats", "1"}},
                   {"body", "phyxels", "surfels", "program", "cores", "threads", "objects",
@@ -195,7 +195,7 @@ TEST_F(Paper, WrongOptionsNameWhatIsAllowed) {
       {{"--device", "cuda:x"}, "allowed: auto, cpu, cuda, cuda:0"},
       {{"--figure", "7"}, "--figure"},
       {{"--repeat", "0"}, "--repeat"},
-      {{"--redraw", "--out", "nothing"}, "nothing: none of the tables is there"},
+      {{"--redraw", "--out", "nothing"}, "nothing: has none of the tables"},
   };
   for (const auto& c : cases) {
     const Outcome outcome = run([&] {
@@ -209,7 +209,7 @@ TEST_F(Paper, WrongOptionsNameWhatIsAllowed) {
   }
 }
 
-/// Holds with and without GPUs in the machine, and in builds with and without CUDA.
+/// The test passes with and without GPUs, and in builds with and without CUDA.
 TEST_F(Paper, AGpuThatIsNotThereIsExitCode4) {
   environment_ = {{"CUDA_VISIBLE_DEVICES", ""}};
   const Outcome outcome = paper({"--device", "cuda", "--figure", "4"});

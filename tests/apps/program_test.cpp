@@ -1,4 +1,4 @@
-/// The program as a user meets it: whole runs, exit codes, messages, signals and restart.
+/// The program as a user runs it: whole runs, exit codes, messages, signals and restarts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -97,9 +97,9 @@ TEST_F(Program, StoppedByASignalAndResumedIsBitwiseTheWholeRun) {
   }
 }
 
-/// A search for rest, and a long implicit step, hear a signal while Newton's method is at work:
-/// they leave a checkpoint, end with 75, and go on to the same bits. Nothing on the way is called
-/// at rest.
+/// A signal during Newton's method, in a search for equilibrium or a long implicit step, leaves a
+/// checkpoint and exit code 75, and a continued run has the same bits. No intermediate state is
+/// reported as an equilibrium.
 TEST_F(Program, StopsNewtonsMethodWithACheckpointAndGoesOn) {
   for (const std::string method : {"equilibrium", "implicit"}) {
     const std::string parts = "parts_" + method;
@@ -134,8 +134,9 @@ TEST_F(Program, StopsNewtonsMethodWithACheckpointAndGoesOn) {
   }
 }
 
-/// A neo-Hookean beam that is far too soft stretches until the planned step would be unstable: it
-/// is halved, said so, written into run.json, and a run resumed after that gives the same bytes.
+/// A very soft neo-Hookean beam stretches until the planned step would be unstable. The step is
+/// halved, with a message and an entry in run.json, and a run resumed after that gives the same
+/// bytes.
 TEST_F(Program, HalvesTheStepOfABodyThatStiffens) {
   write_beam("0.6");
   replace_in_beam("[0.0, 0.0, -9.81]", "[30.0, 0.0, 0.0]");  // pulls it to twice its length
@@ -344,7 +345,7 @@ TEST_F(Program, TablesAndWhatWasWrittenAreJsonOnRequest) {
   EXPECT_EQ(nlohmann::json::parse(gathered.out)["bytes"], fs::file_size(folder_ / "one.vtkhdf"));
 }
 
-/// doctor reads the environment that its process began with, which is what the runtime has read.
+/// doctor reads the initial environment of its process, as the OpenMP runtime does.
 TEST_F(Program, WaitingThreadsSleepSoonUnlessTheUserSaysOtherwise) {
   const auto policy = [&] {
     return nlohmann::json::parse(run({"doctor", "--json"}).out)["thread_policy"].get<std::string>();
@@ -358,7 +359,7 @@ TEST_F(Program, WaitingThreadsSleepSoonUnlessTheUserSaysOtherwise) {
   EXPECT_EQ(policy(), "OMP_WAIT_POLICY=active");
 }
 
-/// On a terminal, where stderr is shown beside stdout.
+/// Run on a pseudo-terminal, where stderr and stdout are the same.
 TEST_F(Program, ColoursAreForTerminalsOnly) {
   EXPECT_THAT(run({"run", "none.toml", "--dry-run"}).err, Not(HasSubstr("\033[")));
   write("on_terminal.sh", "exec script -qec \"$*\" /dev/null\n");
@@ -396,7 +397,7 @@ TEST_F(Program, InfoCutsAScene) {
   EXPECT_GT(sent["pair forces"], sent["pair stresses"]);
   EXPECT_LT(sent["summed forces"], sent["pair stresses"]);
   const Outcome table = run({"info", "beam.toml", "--partition", "3"});
-  EXPECT_THAT(table.out, AllOf(HasSubstr("Tiles by metis"), HasSubstr("kB, to the same bits")));
+  EXPECT_THAT(table.out, AllOf(HasSubstr("Tiles by metis"), HasSubstr("kB, with the same bits")));
 
   const Outcome unknown = run({"info", "beam.toml", "--partition", "3", "--partitioner", "rcb"});
   EXPECT_EQ(unknown.code, 2);
@@ -406,7 +407,7 @@ TEST_F(Program, InfoCutsAScene) {
   EXPECT_THAT(folder.err, HasSubstr("allowed here: a scene (.toml)"));
 }
 
-/// Holds with and without GPUs in the machine, and in builds with and without CUDA.
+/// The test passes with and without GPUs, and in builds with and without CUDA.
 TEST_F(Program, AGpuThatIsNotThereIsExitCode4AndAutoTakesTheCpu) {
   write_beam("0.01");
   environment_ = {{"CUDA_VISIBLE_DEVICES", ""}};

@@ -1,4 +1,4 @@
-/// Progress lines: what they say, how often, and how wide they are.
+/// Progress lines: content, frequency and width.
 #include "progress.hpp"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-/// A stream in memory and a clock that stands still until told.
+/// A stream in memory and a clock that the test advances.
 class ProgressLines : public ::testing::Test {
  protected:
   ProgressLines() : stream_(open_memstream(&text_, &size_)) {
@@ -59,8 +59,8 @@ TEST_F(ProgressLines, ALineTellsShareTimeLeftAndSpeeds) {
             "E = -1.25 J\n");
 }
 
-/// A search by Newton's method has its own parts, at the same pace; a line that stays is said at
-/// once.
+/// A search by Newton's method shows its own parts at the same frequency; a permanent line is
+/// printed at once.
 TEST_F(ProgressLines, ShowsACallersOwnPartsAndLinesThatStay) {
   Progress progress(2, stream_, style_);
   progress.update({"residual 1e-03", "newton 2"});
@@ -76,7 +76,7 @@ TEST_F(ProgressLines, ShowsACallersOwnPartsAndLinesThatStay) {
   EXPECT_THAT(text(), HasSubstr("0.500/2 s"));
 }
 
-/// Two threads of a run on two cores are a load of 2, and averages are a little off.
+/// Two threads of a run on two cores are a load of 2, except for the noise of the average.
 TEST_F(ProgressLines, ALoadAboveTheCoresIsShown) {
   HostLoad host{2.5, 2};
   style_.load = [&] { return host; };
@@ -182,7 +182,7 @@ TEST(Progress, WithoutAStreamItIsSilent) {
   EXPECT_EQ(asked, 0);  // not even the clock is read
 }
 
-/// A set-up of half a minute, whose second stage takes most of it.
+/// A set-up of half a minute, most of which is the second stage.
 void tell_stages(double& now) {
   in_stage("reading", [&] { now += 1; });
   Stage filling("filling");

@@ -1,4 +1,4 @@
-/// Pictures of a trajectory: what is on them, which frames are drawn, which files are written.
+/// Pictures of a trajectory: content, choice of frames, and files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <png.h>
@@ -68,7 +68,7 @@ TEST(Picture, ShowsPhyxelsAsDotsOnTheSurfaceAndTheTimeBelow) {
   }
 }
 
-/// A frame behind a right digest may hold any normal; its picture is drawn.
+/// A frame with a valid digest may have any normals; its picture is drawn.
 TEST(Picture, NormalsAndSpacingsThatAreNotFiniteAreDrawn) {
   FrameData ball = sphere({0, 0, 0}, 1, 16), dots;
   const double infinity = std::numeric_limits<double>::infinity();
@@ -222,7 +222,7 @@ class Trajectory : public Files {
     request_.width = 160;
     request_.height = 120;
   }
-  /// Writes the trajectory, with that scene's text in its frames.
+  /// Writes the trajectory, with the text of a scene in its frames.
   void record(const std::string& scene_text) {
     scene_.text = scene_text;
     const FrameData& ball = ball_;
@@ -266,7 +266,7 @@ double height_of_body(const Image& image) {
   return sum / count;
 }
 
-/// Positions, camera and depths are in double, so that a body looks the same wherever it is.
+/// Positions, camera and depths are in double, so that a body looks the same at any position.
 TEST_F(Trajectory, PicturesFarFromTheOriginShowTheBodyAsNearIt) {
   render(run_, folder_ / "near", request_, false);
   const Vec3d far{1e7, -1e7, 1e7};
@@ -286,7 +286,7 @@ TEST_F(Trajectory, PicturesFarFromTheOriginShowTheBodyAsNearIt) {
   }
 }
 
-/// The scene that a frame carries turns its pictures; options go before it.
+/// The scene in a frame sets the directions of pictures; options override it.
 TEST_F(Trajectory, PicturesAreUpAsTheirSceneSays) {
   const auto drop = [&](const std::string& keys) {
     fs::remove_all(run_);
@@ -313,7 +313,7 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
   EXPECT_GT(drop("gravity = [0, 0, 9.81]"), 20);
 }
 
-/// Whoever made a frame does not decide what reporting on it takes.
+/// The author of a frame cannot make a report take unlimited time or memory.
 TEST_F(Trajectory, ReportsBuildNoMoreThanTheFramesHold) {
   const auto note = [&](const std::string& body) {
     fs::remove_all(run_);
@@ -337,7 +337,7 @@ TEST_F(Trajectory, ReportsBuildNoMoreThanTheFramesHold) {
               HasSubstr("outside the run's folder"));
 }
 
-/// A run that was killed between its two frames of one time, or a folder put together by hand.
+/// A run that was killed between the two frames of one time, or a folder assembled by hand.
 TEST_F(Trajectory, ReportsLeaveOutFramesWithoutOneOfTheirFamilies) {
   const fs::path series = run_ / "phyxels.hdf.series";
   std::string text = test::text_of(series);

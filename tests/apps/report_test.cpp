@@ -1,4 +1,4 @@
-/// The pages of phyxel report: what is in them, and that a browser draws it.
+/// The pages of phyxel report: their content, and that a browser draws them.
 #include "report/report.hpp"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ std::string between(const std::string& text, const std::string& begin, const std
   return text.substr(start, text.find(end, start) - start);
 }
 
-/// Of base64, by hand.
+/// Decodes base64.
 std::string decoded(const std::string& text) {
   const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string bytes;
@@ -80,10 +80,16 @@ TEST(Page, NothingOfAUserEndsItsElement) {
   const std::string safe = app::script_json({{"title", "</script><!-- @data@"}});
   EXPECT_THAT(safe, Not(HasSubstr("<")));
   EXPECT_EQ(json::parse(safe)["title"], "</script><!-- @data@");
-  const std::string page = app::filled_page(
-      "results.html", {{"title", "@summary@"}, {"summary", "s"}, {"footer", ""}, {"data", "{}"}});
-  EXPECT_THAT(page, HasSubstr("<title>@summary@</title>"));  // filled in once
-  EXPECT_THROW(app::filled_page("results.html", {}), std::logic_error);
+  const std::string page = app::filled_page("replay.html", {{"title", "@summary@"},
+                                                            {"summary", "s"},
+                                                            {"warnings", ""},
+                                                            {"facts", ""},
+                                                            {"scene", ""},
+                                                            {"frames", ""},
+                                                            {"data", "{}"},
+                                                            {"footer", ""}});
+  EXPECT_THAT(page, HasSubstr("<title>@summary@</title>"));  // replaced once
+  EXPECT_THROW(app::filled_page("replay.html", {}), std::logic_error);
 }
 
 TEST(FramesThatFit, MotionComesBeforeDetail) {
@@ -104,7 +110,7 @@ TEST(FramesThatFit, MotionComesBeforeDetail) {
 
 class Reports : public test::Program {
  protected:
-  /// A beam that falls on its own weight, run into `out`.
+  /// Runs a beam under its own weight, into the folder `out`.
   void run_beam(const std::string& fields = "[\"displacement\", \"velocity\"]",
                 const std::string& frames_per_second = "50") const {
     write("beam.toml", R"(title = "A </script> beam"
@@ -139,8 +145,7 @@ region = "x-"
     EXPECT_EQ(done.code, 0) << done.err;
     return text_of(folder_ / "page.html");
   }
-  /// The attributes of a page's body, as a browser leaves it; "" if there is no browser.
-  /// The `<body ...>` that Chromium has after it ran the page's scripts.
+  /// The element `<body ...>` of a page after Chromium has run its scripts.
   std::string seen_by_browser(const fs::path& page) const {
     const std::string command =
         "HOME=" + folder_.string() +

@@ -1,5 +1,4 @@
-/// Runs that go on: what a resume may touch, what it finds after any end, and how signals end a
-/// run.
+/// Continued runs: the files that they may change, the state after any end, and signals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -22,13 +21,13 @@ using ::testing::HasSubstr;
 
 class Resuming : public test::BeamProgram {
  protected:
-  /// The beam on the CPU; `more` goes behind the keys of its output.
+  /// The beam on the CPU; `more` is added to the keys of its output.
   void write_beam(const std::string& end, const std::string& more = "") const {
     BeamProgram::write_beam(end);
     replace_in_beam("threads = 1", "device = \"cpu\"\nthreads = 1");
     replace_in_beam("frames_per_second = 50\n", "frames_per_second = 50\n" + more);
   }
-  /// Every file below a folder, by its path.
+  /// The files below a folder, by path.
   std::map<std::string, std::string> files_of(const std::string& directory) const {
     std::map<std::string, std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(folder_ / directory)) {
@@ -75,7 +74,7 @@ TEST_F(Resuming, AnotherRunsFolderIsKept) {
   EXPECT_EQ(read_series(folder_ / "c" / "phyxels.hdf.series").size(), 10u);
 }
 
-/// The checkpoint of one run beside the frames of another, in one folder.
+/// A folder with the checkpoint of one run and the frames of another.
 TEST_F(Resuming, TheLogsFirstEnergyTellsRunsApart) {
   write_beam("0.1");
   ASSERT_EQ(run({"run", "beam.toml"}).code, 0);

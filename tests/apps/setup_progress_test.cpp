@@ -1,4 +1,4 @@
-/// The stages of set-up as the program shows them: in logs, under mpirun, and never unasked.
+/// Output of the stages of set-up: in logs, under mpirun, and not in quiet runs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ phyxels = 500
 material = { young = 1e5, poisson = 0.3, density = 1000 }
 )");
   }
-  /// Every stage is shown, however short it is.
+  /// Makes the program show all stages, however short.
   void show_all() { environment_ = {{"PHYXEL_PROGRESS_SECONDS", "0"}}; }
   static std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;
@@ -43,7 +43,7 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
     for (std::string line; std::getline(in, line);) lines.push_back(line);
     return lines;
   }
-  /// "100.0%  stage": the ends of these stages.
+  /// The lines "100.0%  stage" of these stages.
   static std::vector<std::string> ends_of(const std::vector<std::string>& stages) {
     std::vector<std::string> lines;
     for (const std::string& stage : stages) lines.push_back("100.0%  " + stage);
@@ -55,14 +55,14 @@ const std::vector<std::string> of_meshes{"reading the mesh",      "inspecting th
                                          "filling the surface",   "placing phyxels",
                                          "evening out distances", "volumes of phyxels"};
 
-TEST_F(SetupLines, EachStageOfCheckAndSampleIsShownToItsEnd) {
+TEST_F(SetupLines, EachStageOfSetUpAndSampleIsShownToItsEnd) {
   show_all();
-  const Outcome check = run({"run", "scene.toml", "--dry-run"});
-  ASSERT_EQ(check.code, 0) << check.err;
-  EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of(of_meshes)));
-  EXPECT_THAT(lines_of(check.err), IsSupersetOf(ends_of({"distances between phyxels", "neighbours",
-                                                         "phyxels near the surface", "moments",
-                                                         "solver arrays", "largest time step"})));
+  const Outcome dry = run({"run", "scene.toml", "--dry-run"});
+  ASSERT_EQ(dry.code, 0) << dry.err;
+  EXPECT_THAT(lines_of(dry.err), IsSupersetOf(ends_of(of_meshes)));
+  EXPECT_THAT(lines_of(dry.err), IsSupersetOf(ends_of({"distances between phyxels", "neighbours",
+                                                       "phyxels near the surface", "moments",
+                                                       "solver arrays", "largest time step"})));
   const Outcome sample = run({"sample", "cube.obj", "--phyxels", "500", "--out", "cube.h5"});
   ASSERT_EQ(sample.code, 0) << sample.err;
   EXPECT_THAT(lines_of(sample.err), IsSupersetOf(ends_of(of_meshes)));
@@ -84,14 +84,14 @@ TEST_F(SetupLines, ShortStagesAndSilentCommandsLeaveNothing) {
 TEST_F(SetupLines, OneRankShowsThemForAll) {
   PHYXEL_NEEDS_TOOL(std::string(PHYXEL_MPIRUN) != "", "mpirun");
   show_all();
-  environment_.emplace_back("ASAN_OPTIONS", "detect_leaks=0");  // Open MPI's own
+  environment_.emplace_back("ASAN_OPTIONS", "detect_leaks=0");  // Open MPI leaks
   launcher_ = {PHYXEL_MPIRUN, "--allow-run-as-root", "--oversubscribe", "-n", "2"};
-  const Outcome check = run({"run", "scene.toml", "--dry-run"});
-  ASSERT_EQ(check.code, 0) << check.err;
-  const std::vector<std::string> lines = lines_of(check.err);
+  const Outcome dry = run({"run", "scene.toml", "--dry-run"});
+  ASSERT_EQ(dry.code, 0) << dry.err;
+  const std::vector<std::string> lines = lines_of(dry.err);
   for (const std::string& end : ends_of({"reading the mesh", "volumes of phyxels", "making phyxels",
                                          "partition", "lists", "share", "largest time step"})) {
-    EXPECT_EQ(std::count(lines.begin(), lines.end(), end), 1) << end << '\n' << check.err;
+    EXPECT_EQ(std::count(lines.begin(), lines.end(), end), 1) << end << '\n' << dry.err;
   }
 }
 

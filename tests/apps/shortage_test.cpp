@@ -1,4 +1,4 @@
-/// The program when memory runs out, disks fill up or folders vanish.
+/// The program without enough memory or disk space, and without its output folder.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -94,7 +94,7 @@ density = 1000
             static_cast<std::size_t>(checkpoint.info.frames_written));
 }
 
-/// A file system of its own, unmounted at the end.
+/// A small file system that is unmounted at the end.
 class SmallDisk {
  public:
   SmallDisk(const fs::path& folder, const std::string& size) : folder_(folder) {
@@ -141,7 +141,7 @@ TEST_F(Shortage, ADiskThatFillsUpEndsTheRunAndSpoilsNothing) {
   EXPECT_EQ(outcome.code, 74) << outcome.out << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("disk/out"));
   EXPECT_THAT(outcome.err, HasSubstr("No space left"));
-  // Whatever the series lists was finished before and is whole; the log has its line.
+  // Each frame in the series was finished before, and has its line in the log.
   const auto series = read_series(out / "phyxels.hdf.series");
   EXPECT_GE(series.size(), 3u);
   for (const SeriesEntry& entry : series) EXPECT_NO_THROW(read_frame(entry.file));
@@ -169,7 +169,7 @@ TEST_F(Shortage, AnOutputFolderThatGoesAwayEndsTheRunAndWhatWasWrittenIsWhole) {
   }
 }
 
-/// No frame comes by that would meet the error.
+/// The error occurs between frames.
 TEST_F(Shortage, ACheckpointThatCannotBeWrittenEndsTheRunBetweenFrames) {
   write_beam("1000");
   replace_in_beam("frames_per_second = 50", "frames_per_second = 0\ncheckpoint_every = 0.02");
@@ -187,7 +187,6 @@ TEST_F(Shortage, ACheckpointThatCannotBeWrittenEndsTheRunBetweenFrames) {
   const Outcome outcome = finish(child);
   EXPECT_EQ(outcome.code, 74) << outcome.out << outcome.err;
   // The series, the log and the folder are flushed first; the folder may vanish between any two.
-  // any two.
   EXPECT_THAT(outcome.err,
               ContainsRegex("error: out(/[a-z_0-9.]+)?: (cannot be flushed to the disk|cannot be "
                             "written|[0-9]+ bytes could not be written)"));

@@ -1,4 +1,4 @@
-/// What a user is told when a GPU refuses, runs out of memory or fails.
+/// Messages when a GPU refuses a launch, runs out of memory or fails.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -76,7 +76,7 @@ TEST_F(DeviceErrors, DevicesAreListed) {
   EXPECT_GT(cuda_free_memory(), 0u);
 }
 
-/// A fault leaves the process without its GPU, so each has a process of its own.
+/// A fault makes the GPU unusable for the process, so each test has its own process.
 void fault_and_report(bool at_once, bool later_launch = false) {
   if (at_once) setenv("PHYXEL_CUDA_SYNC", "1", 1);
   try {

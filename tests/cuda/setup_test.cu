@@ -1,4 +1,4 @@
-/// Neighbours, tiles and moments found on the GPU against those found on the CPU.
+/// Neighbours, tiles and moments found on the GPU, compared with those of the CPU.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,14 +24,14 @@ namespace {
 
 using namespace phyxel::testing;
 
-/// A scene and its clouds, which both set-ups are given.
+/// A scene and its clouds, for both set-ups.
 struct Bodies {
   Scene scene;
   std::vector<Cloud> clouds;
 };
 
 Bodies jittered() { return {one_body(), {lattice(23, 17, 19, 0.1, 0.2)}}; }
-/// Distances that are equal up to rounding: ties are decided alike.
+/// A lattice, whose distances are equal up to rounding: ties must be decided alike.
 Bodies regular() {
   Bodies b{one_body(), {lattice(16, 16, 16, 0.1)}};
   b.scene.bodies[0].neighbourhood.radius = 0.2;
@@ -42,7 +42,7 @@ Bodies adaptive() {
   b.scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
   return b;
 }
-/// Bodies inside one another, of different spacings, which must not see each other.
+/// Bodies inside one another with different spacings, which must not be neighbours.
 Bodies overlapping() {
   Bodies b{one_body(), {lattice(9, 9, 9, 0.1, 0.2), lattice(14, 5, 6, 0.05, 0.1)}};
   b.scene.bodies.push_back(b.scene.bodies[0]);
@@ -68,7 +68,7 @@ Bodies degenerate() {
   cloud.volume.assign(cloud.position.size(), 1e-3);
   return {one_body(), {cloud}};
 }
-/// Two clumps so far apart that most cells are empty and the search takes its detours.
+/// Two clusters so far apart that most cells are empty, for the special cases of the search.
 Bodies clumps() {
   Cloud cloud = lattice(8, 8, 8, 0.1, 0.3);
   Cloud far = lattice(3, 2, 2, 0.1, 0.3);
@@ -152,7 +152,7 @@ TEST_P(Setup, MomentsEqualTheCpusToTheLastBit) {
   }
 }
 
-/// One of three shares, with the lists of the whole, and without.
+/// One of three shares, with the lists of the whole model and without lists.
 ModelShare a_share(const Model& whole) {
   const Graph graph = phyxel_graph(whole);
   const Groups tiles = curve_groups(whole, cuda::tile_size);
@@ -247,8 +247,8 @@ TEST(SetupOnGpu, ListsLeftThereAreMissedOnTheCpu) {
   EXPECT_THROW(make_cpu_backend(model, Precision::double_), InputError);
 }
 
-/// The limit found on the GPU, by a linear law in working precision, is that of the CPU, which
-/// differences the forces in double.
+/// The step limit of the GPU, by a linear law in working precision, equals that of the CPU, by
+/// differences of forces in double.
 TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
   for (const bool volume : {false, true}) {
     for (const LawEntry& law : law_table()) {
@@ -271,7 +271,7 @@ TEST(SetupOnGpu, StepLimitEqualsTheCpus) {
   }
 }
 
-/// 100 steps from either set-up end at the same place, to the rounding of the moments' last bits.
+/// 100 steps from either set-up give the same positions, up to rounding of the moments.
 TEST(SetupOnGpu, StepsFromEitherSetUpAgree) {
   Bodies b = jittered();
   b.scene.gravity = {0, 0, -9.81};

@@ -1,4 +1,4 @@
-/// The layout for a GPU: everyone placed once, lists complete, shared memory never waited for.
+/// The layout for a GPU: each phyxel has one place, lists are complete, no bank conflicts.
 #include "setup/tiling.hpp"
 
 #include <gtest/gtest.h>
@@ -20,8 +20,8 @@ namespace {
 using namespace phyxel::testing;
 
 TEST(HilbertCurve, StepsFromCellToCell) {
-  // All 16³ cells of a coarse grid, each the first fine cell of its cube: neighbours on the curve
-  // share a face, which no other order of cells along bits does.
+  // All 16³ cells of a coarse grid, each the first fine cell of its cube: successive cells on the
+  // curve share a face, unlike in other orders by bits.
   constexpr int cells = 16, shift = hilbert_bits - 4;
   std::vector<std::pair<std::uint64_t, std::array<int, 3>>> order;
   for (int x = 0; x < cells; ++x) {
@@ -95,7 +95,7 @@ TEST_P(Tiling, PlacesEveryPhyxelOnce) {
     ++seen[i];
     EXPECT_EQ(tiling.place[i], place);
     const Part& part = model.parts[tiling.part[place / tile_size]];
-    EXPECT_TRUE(i >= part.begin && i < part.end);  // a tile never mixes bodies
+    EXPECT_TRUE(i >= part.begin && i < part.end);  // a tile has phyxels of one body
   }
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), model.size());
 }
@@ -221,7 +221,7 @@ TEST_P(Tiling, EightLanesNeverWaitForAColumn) {
   }
 }
 
-/// Slices of a tile walk the same neighbours in the same order, in slots of the same columns.
+/// Slices of a tile visit the same neighbours in the same order, in slots of the same columns.
 TEST_P(ResidentSlices, KeepTheOrderOfTheirTile) {
   const Model model = GetParam().make();
   const cuda::Tiling tiling = make_tiling(model);
@@ -325,9 +325,8 @@ INSTANTIATE_TEST_SUITE_P(Models, ResidentSlices,
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(TileLists, AreNotMuchLongerThanTheirNeighbours) {
-  // What the order costs: lanes of a warp walk as many steps as the longest of them. 15% is a
-  // warp's spread of neighbour counts in a jittered cloud; teams that had to wait would add a
-  // third.
+  // The cost of the order: all lanes of a warp take the steps of the longest list. 15% is the
+  // spread of neighbour counts in a warp of a jittered cloud; bank conflicts would add a third.
   const Model model = model_of(one_body(), lattice(24, 24, 24, 0.1, 0.1));
   const cuda::Tiling tiling = make_tiling(model);
   std::int64_t steps = 0;

@@ -1,5 +1,5 @@
-/// A program whose kernels were built for another GPU. CMakeLists.txt builds the device code of
-/// this test for no GPU that is there.
+/// The error of a program whose kernels were built for another GPU. CMakeLists.txt builds the
+/// device code of this test for an architecture that is not present.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-/// Collective calls on as many ranks as mpirun starts.
+/// Collective calls on the ranks of mpirun.
 #include "mpi/communicator.hpp"
 
 #include <gmock/gmock.h>
@@ -69,7 +69,7 @@ TEST(Communicator, BroadcastsFromAnyRank) {
   EXPECT_EQ(world().broadcast(values, last), (std::vector<double>{1, 2.5, -3}));
 }
 
-/// Several ranks agree; one has nobody to agree with, and throws what it met.
+/// Several ranks agree on an error; a single rank throws its own exception.
 bool is_agreed(const Error& error) { return dynamic_cast<const AgreedError*>(&error) != nullptr; }
 
 TEST(Communicator, AFailureOfOneIsThatOfAll) {

@@ -1,5 +1,5 @@
-/// Ranks inside a program that uses MPI itself: its communicators, messages and errors stay its
-/// own.
+/// Ranks in a program that uses MPI itself: its communicators, messages and error handlers are not
+/// affected.
 #include <gmock/gmock.h>
 #include <mpi.h>
 
@@ -19,7 +19,7 @@ using test::world;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// A communicator of the test's own: the ranks of even number, or those of odd number.
+/// A communicator of the ranks with an even or an odd number.
 class Embedding : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -37,7 +37,7 @@ class Embedding : public ::testing::Test {
   MPI_Comm half_ = MPI_COMM_NULL;
 };
 
-/// Each rank sends each other rank one number per round, by both kinds of messages.
+/// Exchanges a number between all ranks in each round, by both kinds of messages.
 void expect_right_exchanges(const MpiCommunicator& ranks) {
   for (int round = 0; round < 20; ++round) {
     const auto number = [&](int from, int to) { return 10'000 * round + 100 * from + to; };
@@ -62,7 +62,7 @@ void expect_right_exchanges(const MpiCommunicator& ranks) {
   }
 }
 
-/// A receive of the caller's that any message would fill, and messages of the same tags.
+/// The caller posts a receive that matches any message, and sends messages with the same tags.
 TEST_F(Embedding, MessagesOfTheCallerArriveAtTheCaller) {
   const int size = world().size(), next = (world().rank() + 1) % size;
   constexpr std::array tags{static_cast<int>(Tag::alltoallv), static_cast<int>(Tag::halo)};
@@ -96,7 +96,7 @@ TEST_F(Embedding, ACommunicatorOfTheCallersHasItsOwnRanks) {
   EXPECT_EQ(sum, half_size());
 }
 
-/// Each half steps a body of its own.
+/// Each half of the ranks steps a different body.
 TEST_F(Embedding, HalvesOfTheRanksStepBodiesOfTheirOwn) {
   Scene scene = testing::one_body();
   scene.bodies[0].source.shape = {.name = "beam", .size = {1, 0.5, 0.5}, .spacing = 0.1};
@@ -138,7 +138,7 @@ TEST_F(Embedding, ErrorsOfTheCallersCommunicatorAreHandledAsBefore) {
   half.close();
 }
 
-/// One rank's end before another's: nobody waits in a destructor.
+/// Ranks end at different times: no destructor waits.
 TEST_F(Embedding, DestructorsAreLocal) {
   auto half = std::make_optional<Ranks>(handle());
   if (half->rank() == 0) half.reset();
@@ -146,8 +146,8 @@ TEST_F(Embedding, DestructorsAreLocal) {
   half.reset();
 }
 
-/// Messages that nobody has waited for go on, in memory that stays theirs: the next ones are not
-/// taken for them.
+/// Messages of destroyed `Transfers` complete in memory that is kept for them, and are not confused
+/// with later messages.
 TEST_F(Embedding, MessagesOutliveTheirTransfers) {
   Ranks half(handle());
   const MpiCommunicator& ranks = half.communicator();

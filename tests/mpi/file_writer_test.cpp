@@ -1,4 +1,5 @@
-/// Files of all ranks' values, written on the first one's thread: those that one rank writes.
+/// Files of values of all ranks, written on the first rank's thread, are equal to those of one
+/// rank.
 #include "file_writer.hpp"
 
 #include <gmock/gmock.h>
@@ -38,10 +39,10 @@ Scene two_bodies(const fs::path& directory) {
   return scene;
 }
 
-/// A number that tells which phyxel or surfel of the whole it is of, and of what.
+/// A number from which the global id and the quantity follow.
 double value_of(Index number, int what) { return 0.25 * number + 1e4 * what; }
 
-/// Values at time `k` of whatever this model has.
+/// The values of a model at the time `k`.
 std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
   const auto state = std::make_shared<State>();
   const auto moment = std::make_shared<Moment>();
@@ -70,7 +71,7 @@ std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
   return moment;
 }
 
-/// The ranks, as this program's.
+/// The ranks of this program.
 class SharedFiles : public phyxel::test::Folder {
  protected:
   static void SetUpTestSuite() { set_ranks(phyxel::test::all_ranks()); }
@@ -86,7 +87,7 @@ class SharedFiles : public phyxel::test::Folder {
   SharedModel shared_{phyxel::test::all_ranks(), scene_, ChosenDevice{}};
 };
 
-/// Or else the tests of this program would say nothing of mpi/parallel_file.cpp.
+/// Checks that the tests of this program cover mpi/parallel_file.cpp.
 TEST_F(SharedFiles, AreWrittenByAllRanksWithAParallelHdf5) {
   EXPECT_EQ(can_write_collectively(), PHYXEL_PARALLEL_HDF5 == 1);
 }
@@ -128,7 +129,7 @@ TEST_F(SharedFiles, AreThoseOfOneRankToTheByte) {
   EXPECT_EQ(files, 2 * frames + 4);
 }
 
-/// No call for more than a stretch: what the first rank holds beside its own.
+/// No request is larger than a chunk, the additional memory of the first rank.
 TEST_F(SharedFiles, TakeAStretchOfTheFirstRanksMemory) {
   if (world().size() == 1) GTEST_SKIP() << "one rank has all values anyway";
   const Index all = shared_.here().global_count();
@@ -202,7 +203,7 @@ TEST_F(SharedFiles, MayBeLeftUnfinished) {
   }
 }
 
-/// A state of the whole reaches owners and ghosts, whatever the length of a stretch.
+/// A state of the whole model reaches owners and ghosts, for any length of chunks.
 TEST_F(SharedFiles, StatesComeBackToAllRanks) {
   if (world().size() == 1) GTEST_SKIP() << "one rank reads all";
   const Model& here = shared_.here();

@@ -1,5 +1,5 @@
-/// main() of the tests that run on several ranks: each rank runs them all, the first one tells. A
-/// failure of any rank is the program's.
+/// main() of the tests on several ranks: each rank runs all tests, and the first one prints. The
+/// program fails if any rank does.
 #include "ranks.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 
 std::optional<Ranks> the_ranks;
 
-/// Other ranks speak only of failures.
+/// Output of the other ranks: failures only.
 class OnlyFailures : public ::testing::EmptyTestEventListener {
   void OnTestPartResult(const ::testing::TestPartResult& result) override {
     if (!result.failed()) return;
@@ -23,8 +23,7 @@ class OnlyFailures : public ::testing::EmptyTestEventListener {
   }
 };
 
-/// The other ranks would wait for ever for one that has left a test by an exception, to which
-/// GoogleTest gives no file.
+/// Aborts on an exception from a test, for which the other ranks would wait for ever.
 class EndsAllAtExceptions : public ::testing::EmptyTestEventListener {
   void OnTestPartResult(const ::testing::TestPartResult& result) override {
     if (result.failed() && !result.file_name()) world().abort(ExitCode{1});
@@ -50,7 +49,7 @@ int main(int argc, char** argv) {
   if (world().size() > 1) listeners.Append(new EndsAllAtExceptions);
   const int failed = static_cast<int>(world().largest(static_cast<std::int64_t>(RUN_ALL_TESTS())));
   const int own_code = exit_code_of(failed, world().rank() == 0);
-  // Skipped as a whole where no rank has run a case.
+  // The program is skipped if no rank has run a case.
   const int code = static_cast<int>(world().smallest(static_cast<std::int64_t>(own_code)));
   the_ranks->close();
   return code;

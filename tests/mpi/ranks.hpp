@@ -7,7 +7,7 @@
 namespace phyxel::test {
 
 const Ranks& all_ranks();
-/// What they talk through.
+/// The communicator of the test program.
 const MpiCommunicator& world();
 
 }  // namespace phyxel::test

@@ -1,5 +1,5 @@
-/// A program that starts MPI for one thread, and then asks for ranks: they are refused by name. Its
-/// exit code is 0 if they were.
+/// A program that starts MPI for one thread and then constructs ranks. Its exit code is 0 if they
+/// are refused with a message that names the thread level.
 #include <mpi.h>
 
 #include <cstdio>

@@ -1,4 +1,4 @@
-/// Bodies that are hard to cut.
+/// Bodies that are difficult to partition.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@ struct CutCase {
 inline void PrintTo(const CutCase& c, std::ostream* out) { *out << c.name; }
 
 inline Model cube() { return model_of(one_body(), lattice(14, 14, 14, 0.1, 0.2)); }
-/// 3 × 3 phyxels across, four turns: near in space is far along the wire.
+/// A coil of four turns with 3 × 3 phyxels across: points near in space are far along the wire.
 inline Model coil() {
   Cloud cloud;
   constexpr int steps = 900;
@@ -35,7 +35,7 @@ inline Model coil() {
   return model_of(one_body(), cloud);
 }
 inline Model thread() { return model_of(one_body(), lattice(700, 1, 1, 0.1, 0.05)); }
-/// Lists of one side, three bodies of different size that never meet.
+/// Three bodies of different sizes without contact, with one-sided lists.
 inline Model apart() {
   Scene scene = one_body();
   scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;

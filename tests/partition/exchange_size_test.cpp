@@ -1,4 +1,4 @@
-/// What parts would send each other in a step, against the definition and the plans in use.
+/// Communication volume of a step, compared with its definition and with the halos.
 #include "partition/exchange_size.hpp"
 
 #include <gtest/gtest.h>
@@ -47,8 +47,8 @@ TEST_P(Exchange, SizesAreThoseOfTheirDefinitions) {
 INSTANTIATE_TEST_SUITE_P(Bodies, Exchange, ::testing::ValuesIn(cut_cases()),
                          [](const auto& test) { return test.param.name; });
 
-/// Across a cut through a body, which is no thread, every phyxel within reach of it has more than
-/// three neighbours on the other side on average: nine numbers are fewer than three a neighbour.
+/// Near a cut through a compact body, phyxels have more than three neighbours on the other side on
+/// average, so that nine numbers are fewer than three for each neighbour.
 TEST(ExchangeSizes, PairStressesAreFewerNumbersThanTheForcesOfEachPair) {
   const Model model = cube();
   const Graph graph = phyxel_graph(model);

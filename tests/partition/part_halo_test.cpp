@@ -1,4 +1,4 @@
-/// Plans of who sends what to whom, against their definition and in use.
+/// Halos of parts, compared with their definition and in use.
 #include "partition/part_halo.hpp"
 
 #include <gtest/gtest.h>
@@ -71,7 +71,7 @@ TEST_P(Halo, WhatOneSendsTheOtherReceives) {
   }
 }
 
-/// Two gathers, one after the other, as a step has them.
+/// Two successive exchanges, as in a step.
 std::vector<std::int64_t> gathered(const Graph& graph, const std::vector<std::int64_t>& values,
                                    const std::vector<Index>& rows) {
   std::vector<std::int64_t> sums(values.size(), -1);

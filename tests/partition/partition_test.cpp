@@ -1,4 +1,4 @@
-/// Parts of bodies: all there, of equal weight, and few ghosts.
+/// Partitions: complete, of equal weight, with few ghosts.
 #include "partition/partition.hpp"
 
 #include <gtest/gtest.h>

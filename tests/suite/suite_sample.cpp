@@ -1,4 +1,4 @@
-/// Not part of the suite: cases that pass, skip and fail, for tests/suite/skips_test.py to run.
+/// Cases that pass, skip and fail, run by tests/suite/skips_test.py only.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -8,7 +8,7 @@
 
 namespace {
 
-/// As the tests on a GPU do it: all cases are skipped by an environment.
+/// An environment that skips all cases, as that of the tests on a GPU.
 class SkipsAll : public ::testing::Environment {
   void SetUp() override {
     if (std::getenv("SAMPLE_SKIPS_ALL")) GTEST_SKIP() << "no CUDA device";

@@ -1,4 +1,4 @@
-/// Problems with known answers, and how far from them phyxels come.
+/// Benchmark problems with known answers, and the errors of phyxels.
 #pragma once
 
 #include <cstdint>
@@ -10,41 +10,41 @@
 
 namespace phyxel::app {
 
-/// Where phyxels lie: at the nodes of a lattice or in the middle of its cells; or spread on and in
-/// the body's surface as in any mesh, as many as there would be nodes.
+/// Placement of phyxels: at the nodes of a lattice, in the middle of its cells, or on and in the
+/// body's surface as in any mesh, with the number of nodes of the lattice.
 enum class Filling { nodes, cells, mesh };
 const char* filling_name(Filling filling);
 
-/// What a problem is solved with.
+/// The discretisation of a problem.
 struct Discretisation {
   Filling filling = Filling::nodes;
-  double jitter = 0;     ///< Of a lattice, in spacings.
-  double factor = 1.8;   ///< Of the support.
+  double jitter = 0;     ///< Random displacement of lattice phyxels, in spacings.
+  double factor = 1.8;   ///< Support factor.
   double hourglass = 0;  ///< Strength of hourglass control.
-  double closure = 0;    ///< Of gradients.
-  int across = 6;        ///< Cells across the thinner sides.
+  double closure = 0;    ///< Closure of gradients.
+  int across = 6;        ///< Number of cells across the thinner sides.
 };
 
 struct Quantity {
   std::string name;
   double value = 0;
-  double reference = 0;  ///< 0: the value is an error itself.
+  double reference = 0;  ///< Known answer; 0 if the value itself is an error.
   double error() const { return reference == 0 ? value : value / reference - 1; }
 };
 
 struct Solution {
   Index phyxels = 0;
-  double neighbours = 0;         ///< Mean.
-  std::int64_t evaluations = 0;  ///< Of all phyxels' forces: steps, of bodies that move.
-  double seconds = 0;            ///< That they and what belongs to them took.
-  double setup_seconds = 0;      ///< From the scene to the first of them.
+  double neighbours = 0;         ///< Mean number of neighbours.
+  std::int64_t evaluations = 0;  ///< Number of force evaluations; steps, for moving bodies.
+  double seconds = 0;            ///< Time of the solution [s].
+  double setup_seconds = 0;      ///< Time of the set-up [s].
   std::vector<Quantity> found;
 };
 
 struct AccuracyCase {
   std::string name;
-  std::string what;         ///< The problem and where its answer comes from, in a sentence or two.
-  std::vector<int> across;  ///< Resolutions that it is run with if none are asked for.
+  std::string what;         ///< Description of the problem and the source of its answer.
+  std::vector<int> across;  ///< Default resolutions.
   Solution (*solve)(const Discretisation&);
   std::vector<double> closures{0, 1e-3};  ///< Closures of gradients, likewise.
   std::vector<double> jitters{0, 0.2};    ///< Of lattices, likewise.

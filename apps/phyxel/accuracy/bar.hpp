@@ -1,4 +1,4 @@
-/// The bar that most problems are about.
+/// The bar of most problems.
 #pragma once
 
 #include "accuracy/accuracy.hpp"
@@ -9,15 +9,15 @@ inline constexpr double E = 1e6, nu = 0.3, rho = 1000;  // [Pa], -, [kg/m³]
 
 ShapeRequest::Placement placement_of(Filling filling);
 
-/// A bar along x, whose outer layers of phyxels are `length` apart: on cells, layers lie half a
-/// spacing inside.
+/// A bar along x whose outer layers of phyxels are `length` apart; with phyxels in cells, the
+/// layers are half a spacing inside the body.
 Scene bar(const Discretisation& d, double length, double side, double poisson = nu);
-/// Its end at x = 0 held.
+/// The scene with the end at x = 0 fixed.
 Scene clamped(Scene scene);
-/// The phyxels of its first body, with the regions of a shape's faces.
+/// The cloud of the scene's first body, with regions of its faces.
 Cloud cloud_of(const Scene& scene, const Discretisation& d);
 
-/// Mean of vectors over some phyxels, by volumes.
+/// Volume-weighted mean of vectors over some phyxels.
 Vec3d mean_of(const Model& model, const std::vector<Index>& phyxels, const std::vector<Vec3d>& v);
 
 }  // namespace phyxel::app

@@ -1,4 +1,4 @@
-/// phyxel accuracy: problems with known answers, over resolutions and ways to discretise.
+/// phyxel accuracy: problems with known answers, over resolutions and discretisations.
 #include "command.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace {
 
 struct AccuracyOptions {
   std::vector<std::string> cases{"all"};
-  std::vector<int> across;  ///< Empty: each case's own.
+  std::vector<int> across;  ///< Resolutions; if empty, those of each case.
   std::vector<std::string> lattices{"nodes", "cells", "mesh"};
   std::vector<double> factors{1.8};
   std::vector<double> jitters, hourglass, closures;  ///< Empty: each case's own.
@@ -75,8 +75,8 @@ std::vector<Discretisation> discretisations(const AccuracyOptions& options,
   return list;
 }
 
-/// The order in the spacing by which errors fall from one resolution to the next; "" where it says
-/// nothing: first ones, and errors that change their sign.
+/// The order of convergence in the spacing between two resolutions; "" for the first resolution,
+/// and for errors that change their sign.
 std::string order_of(double coarse, double fine, int across_coarse, int across_fine) {
   if (coarse * fine <= 0) return "";
   return fmt::format("{:.2f}", std::log(coarse / fine) /
@@ -98,7 +98,7 @@ void measure(const AccuracyOptions& options) {
         Solution solution;
         try {
           solution = c.solve(d);
-        } catch (const InputError& error) {  // so few phyxels that a mesh has no inside
+        } catch (const InputError& error) {  // too few phyxels for the inside of a mesh
           if (d.filling != Filling::mesh) throw;
           fmt::print(stderr, "phyxel: {} on a mesh, {} across, is left out: {}\n", c.name, across,
                      error.what());
@@ -133,7 +133,7 @@ struct HardOptions {
   TableOptions table;
 };
 
-/// @returns whether all were as they should be
+/// Runs the hard cases. @returns true if all are good
 bool measure_hard(const HardOptions& options) {
   const ChosenDevice device = choose_device(options.device);
   PrintedTable table(
@@ -166,7 +166,7 @@ bool measure_hard(const HardOptions& options) {
 
 void add_accuracy(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "accuracy", "Problems with known answers: errors beside time, on the CPU in double");
+      "accuracy", "Solve problems with known answers: errors and time, on the CPU in double");
   auto options = std::make_shared<AccuracyOptions>();
   std::string known = "Which, of:";
   for (const AccuracyCase& c : accuracy_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
@@ -176,7 +176,7 @@ void add_accuracy(CLI::App& program) {
       ->check(CLI::Range(2, 200));
   command
       ->add_option("--lattice", options->lattices,
-                   "nodes, cells; mesh: spread on and in the surface, as in any mesh")
+                   "Placement of phyxels: nodes, cells, or mesh (on and in a surface)")
       ->delimiter(',')
       ->check(CLI::IsMember({"nodes", "cells", "mesh"}))
       ->capture_default_str();
@@ -202,7 +202,8 @@ void add_accuracy(CLI::App& program) {
   add_table_options(*command, options->table);
   auto hard_options = std::make_shared<HardOptions>();
   CLI::App* hard = command->add_subcommand(
-      "hard", "Cases that are hard to keep stable: each answered, or refused with its cause");
+      "hard",
+      "Solve cases that are hard to keep stable: each is answered, or refused with its cause");
   std::string hard_names = "Which, of:";
   for (const HardCase& c : hard_cases()) hard_names += fmt::format("\n{}: {}", c.name, c.what);
   hard->add_option("cases", hard_options->cases, hard_names);
@@ -212,7 +213,7 @@ void add_accuracy(CLI::App& program) {
       ->allow_extra_args(false)
       ->check(CLI::IsMember({"double", "mixed", "float"}))
       ->capture_default_str();
-  hard->add_flag("--long", hard_options->include_long, "Those, too, that take minutes");
+  hard->add_flag("--long", hard_options->include_long, "Include cases that take minutes");
   add_table_options(*hard, hard_options->table);
   hard->footer(
       "Examples:\n"
@@ -225,7 +226,7 @@ void add_accuracy(CLI::App& program) {
       "  phyxel accuracy all --csv accuracy.csv");
   hard->callback([=] {
     if (!measure_hard(*hard_options)) {
-      throw Error(ExitCode::diverged, "a case is not as it should be (see the column \"good\")");
+      throw Error(ExitCode::diverged, "a case has failed (see the column \"good\")");
     }
   });
   command->callback([=] {

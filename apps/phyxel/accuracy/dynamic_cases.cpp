@@ -1,4 +1,4 @@
-/// Bodies that move: the bar's frequencies, a free body that spins.
+/// Problems of moving bodies: frequencies of a bar, and free bodies.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -17,19 +17,19 @@
 namespace phyxel::app {
 namespace {
 
-constexpr double safety = 0.8;  ///< Of the step limit.
+constexpr double safety = 0.8;  ///< Time step over the stability limit.
 
 /// A body and its steps.
 struct Motions {
-  Clock::time_point begin = Clock::now();  ///< Of the set-up: the first member.
+  Clock::time_point begin = Clock::now();  ///< Begin of the set-up; must be the first member.
   Cloud cloud;
   Model model;
   std::unique_ptr<Backend> backend;
-  double dt = 0;  ///< [s]
+  double dt = 0;  ///< Time step [s].
 
   Motions(const Scene& scene, const Discretisation& d)
       : Motions(scene, [&] { return cloud_of(scene, d); }) {}
-  /// @param make the body's cloud
+  /// @param make function that returns the body's cloud
   template <class Make>
   Motions(const Scene& scene, Make&& make)
       : cloud(make()), model(build_model(scene, std::span(&cloud, 1))) {
@@ -47,7 +47,7 @@ struct Motions {
   }
 };
 
-/// The frequency of a signal about zero, by the times at which it rises through zero [Hz].
+/// The frequency of a signal from its upward zero crossings [Hz].
 class Crossings {
  public:
   void add(double time, double value) {
@@ -67,9 +67,9 @@ class Crossings {
   int count_ = 0;
 };
 
-/// The clamped bar, set in motion near one of its modes, over ten periods.
-/// @param velocity at rest position x [m/s], small
-/// @param signal of the end's phyxels
+/// Solves for the frequency of the clamped bar, started near one of its modes, over ten periods.
+/// @param velocity initial velocity at rest position x [m/s], small
+/// @param signal observed signal, from the end's phyxels
 Solution ringing(const Discretisation& d, double reference,
                  const std::function<Vec3d(Vec3d)>& velocity,
                  const std::function<double(const Motions&, const State&)>& signal) {
@@ -85,7 +85,7 @@ Solution ringing(const Discretisation& d, double reference,
   const auto start = Clock::now();
   Solver solver(*m.backend, state);
   Crossings crossings;
-  // Looked at a hundred times a period.
+  // The signal is sampled a hundred times a period.
   const auto look = std::max<std::int64_t>(1, static_cast<std::int64_t>(0.01 / reference / m.dt));
   const auto most = static_cast<std::int64_t>(2 * (periods + 2) / reference / m.dt);
   while (crossings.count() <= periods && solver.steps() < most) {
@@ -208,12 +208,13 @@ Solution spinning(const Discretisation& d) {
   Solver solver(*m.backend, initial_state(m.model, scene, m.dt));
   const auto look = [&] { return diagnose(m.model, *m.backend, solver.steps(), m.dt); };
   const Diagnostics first = look();
-  // The body springs out at first, and its energy with the step's error: means of a hundred looks.
+  // The body expands at first, and its energy oscillates with the error of the step, so that means
+  // of a hundred samples are compared.
   double early = 0, late = 0, turned = 0, pushed = 0, speed = 0;
   for (int k = 0; k < looks; ++k) {
     solver.step(each);
     const Diagnostics now = look();
-    if (now.bad_phyxel >= 0) {  // it has flown apart: nothing stays
+    if (now.bad_phyxel >= 0) {  // the body has diverged
       turned = pushed = late = HUGE_VAL;
       break;
     }
@@ -231,11 +232,10 @@ Solution spinning(const Discretisation& d) {
 
 // --- an L-shaped block ---------------------------------------------------------------------------
 
-/// Two arms, three times as long as thick: a cube's lattice without a corner of it, or the surface
-/// filled.
+/// Width and length of the arms of the L [m]: a lattice without a corner, or a filled surface.
 constexpr double arm = 1, reach = 3;  // [m]
 
-/// The L, as a polygon in x and y, and its prism along z.
+/// The surface of the prism of the L.
 Surface l_surface() {
   const double corners[6][2] = {{0, 0},     {reach, 0},   {reach, arm},
                                 {arm, arm}, {arm, reach}, {0, reach}};
@@ -257,7 +257,7 @@ Surface l_surface() {
   return surface;
 }
 
-/// Whether a point is inside, off the surface.
+/// True if a point is inside the L, not on its surface.
 bool in_l(Vec3d p) {
   return std::min({p.x, p.y, p.z}) > 0 && std::max(p.x, p.y) < reach && p.z < arm &&
          (p.x < arm || p.y < arm);
@@ -277,14 +277,14 @@ Cloud l_cloud(const Discretisation& d) {
         Vec3d p =
             s * (Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)} +
                  (cells ? 0.5 : 0.0) * Vec3d{1, 1, 1});
-        // A node has an eighth of each cell around it.
+        // A node gets an eighth of the volume of each adjacent cell.
         int around = 0;
         for (int corner = 0; corner < 8; ++corner) {
           const auto half = [&](int bit) { return corner & bit ? 0.25 * s : -0.25 * s; };
           around += in_l(p + Vec3d{half(1), half(2), half(4)});
         }
         if (around == 0) continue;
-        // Those on the surface stay on it.
+        // Nodes on the surface are not jittered.
         if (d.jitter > 0 && around == 8) p += d.jitter * s * Vec3d{random(), random(), random()};
         cloud.position.push_back(p);
         cloud.volume.push_back(s * s * s * around / 8);
@@ -300,18 +300,18 @@ Cloud l_cloud(const Discretisation& d) {
   return cloud;
 }
 
-constexpr double pushed_for = 5;  ///< [s]
+constexpr double pushed_for = 5;  ///< Duration of the load [s].
 
-/// What is left of what should stay.
-struct Left {
-  double momentum = 0;  ///< [kg m/s]
-  double turned = 0;    ///< Largest change of angular momentum, by that at the beginning.
-  double drift = 0;     ///< Of energy, by that at the beginning.
+/// Changes of conserved quantities.
+struct Changes {
+  double momentum = 0;  ///< Largest momentum [kg m/s].
+  double turned = 0;    ///< Largest change of angular momentum, relative to its initial value.
+  double drift = 0;     ///< Drift of energy, relative to its initial value.
   std::int64_t steps = 0;
 };
 
-/// Under load first, then free for so many steps.
-Left left_to_itself(const Motions& under_load, const Motions& free, const Scene& scene, double dt,
+/// Steps a body under load, and then free.
+Changes free_motion(const Motions& under_load, const Motions& free, const Scene& scene, double dt,
                     std::int64_t steps) {
   constexpr int looks = 1000;
   Solver first(*under_load.backend, initial_state(under_load.model, scene, dt));
@@ -335,8 +335,8 @@ Left left_to_itself(const Motions& under_load, const Motions& free, const Scene&
           first.steps() + steps};
 }
 
-/// Pushed apart at the ends of its arms, then left to itself. Source of the problem: Simo and
-/// Tarnow 1992, whose pushes grow and fade as a triangle of the same impulse.
+/// Solves an L-shaped block that is pushed at the ends of its arms and then moves freely. Source of
+/// the problem: Simo and Tarnow 1992, whose load is a triangle in time of the same impulse.
 Solution l_block(const Discretisation& d) {
   const Vec3d push = 1.25 * Vec3d{150, 300, 450};  // [N]
   BodyRequest body;
@@ -359,8 +359,8 @@ Solution l_block(const Discretisation& d) {
   scene.bodies[0].loads.clear();
   const Motions free(scene, [&] { return l_cloud(d); });
   const auto start = Clock::now();
-  const Left usual = left_to_itself(under_load, free, scene, free.dt, 100'000),
-             halved = left_to_itself(under_load, free, scene, free.dt / 2, 200'000);
+  const Changes usual = free_motion(under_load, free, scene, free.dt, 100'000),
+                halved = free_motion(under_load, free, scene, free.dt / 2, 200'000);
   return under_load.solution(start, usual.steps + halved.steps,
                              {{"momentum by impulse", usual.momentum / (norm(push) * pushed_for)},
                               {"change of angular momentum", usual.turned},

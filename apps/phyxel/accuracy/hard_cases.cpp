@@ -7,11 +7,9 @@
 #include <random>
 
 #include "accuracy/bar.hpp"
-#include "phyxel/diagnostics.hpp"
-#include "phyxel/equilibrium.hpp"
+#include "accuracy/trial.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/laws.hpp"
-#include "phyxel/solver.hpp"
 #include "setup.hpp"
 #include "stopwatch.hpp"
 
@@ -20,70 +18,7 @@ namespace {
 
 using Placement = ShapeRequest::Placement;
 
-/// A scene on a machine, stepped under the watch that runs have.
-class Trial {
- public:
-  Trial(const Scene& scene, const Machine& machine) : Trial(scene, clouds_of(scene), machine) {}
-  Trial(const Scene& scene, std::vector<Cloud> clouds, const Machine& machine)
-      : scene_(scene),
-        clouds_(std::move(clouds)),
-        model_(build_model(scene_, clouds_)),
-        backend_(make_backend(model_, machine.precision, machine.device)) {}
-
-  const Model& model() const { return model_; }
-  Backend& backend() { return *backend_; }
-  const std::vector<Index>& region(const char* name) const { return clouds_[0].regions.at(name); }
-
-  Equilibrium rest() { return find_equilibrium(model_, *backend_); }
-
-  /// @param safety share of the largest stable step
-  double step_at(double safety) { return safety * step_limit(model_, *backend_).largest_step; }
-  /// Over `steps` of dt, in `looks` equal shares, after each of which look(state, diagnostics).
-  template <class Look>
-  void run(const State& start, int looks, std::int64_t steps, Look&& look) {
-    Solver solver(*backend_, start);
-    first_ = diagnose(model_, *backend_, solver.now());
-    StabilityWatch watch(model_, first_);
-    for (int k = 1; k <= looks; ++k) {
-      const std::int64_t until = steps * k / looks;
-      solver.step(until - solver.steps());
-      const Diagnostics now = diagnose(model_, *backend_, solver.now());
-      watch.check(now);
-      look(solver.state(), now);
-    }
-  }
-  State at_rest(double dt) const { return initial_state(model_, scene_, dt); }
-  const Diagnostics& first() const { return first_; }
-
- private:
-  static std::vector<Cloud> clouds_of(const Scene& scene) {
-    std::vector<Cloud> clouds;
-    for (const BodyRequest& body : scene.bodies) clouds.push_back(make_cloud(body));
-    return clouds;
-  }
-  Scene scene_;
-  std::vector<Cloud> clouds_;
-  Model model_;
-  std::unique_ptr<Backend> backend_;
-  Diagnostics first_;
-};
-
-/// By what energy strays, as a share of what is in motion.
-class Drift {
- public:
-  void look(const Diagnostics& first, const Diagnostics& now) {
-    stray_ = std::max(stray_, std::abs(now.total_energy() - first.total_energy()));
-    if (!std::isfinite(now.total_energy())) stray_ = HUGE_VAL;
-    motion_ =
-        std::max({motion_, first.kinetic_and_elastic_energy(), now.kinetic_and_elastic_energy()});
-  }
-  double share() const { return stray_ / motion_; }
-
- private:
-  double stray_ = 0, motion_ = 0;
-};
-
-/// Nodes, closed, with hourglass control: what is the most accurate (docs/accuracy.md).
+/// The most accurate discretisation: nodes, closed gradients, hourglass control (docs/accuracy.md).
 constexpr Discretisation best{
     .filling = Filling::nodes, .hourglass = 0.1, .closure = 1e-3, .across = 6};
 
@@ -99,7 +34,7 @@ Cloud box_of(int nx, int ny, int nz, double spacing) {
   }
   return cloud;
 }
-Scene scene_of(const Cloud&, const char* law = StVenantKirchhoff<double>::name) {
+Scene scene_of(const char* law = StVenantKirchhoff<double>::name) {
   BodyRequest body;
   body.name = "body";
   body.where = "phyxel accuracy";
@@ -111,9 +46,10 @@ Scene scene_of(const Cloud&, const char* law = StVenantKirchhoff<double>::name) 
 
 // --- Poisson's ratio -----------------------------------------------------------------------------
 
-/// Sag of the clamped bar of the case `gravity`.
-/// @param reference quadratic displacements with linear pressure, on meshes graded towards the
-///   clamped face up to 40 × 16 × 16, extrapolated: known to 0.003% [m]
+/// Relative error of the sag of the clamped bar of the case `gravity`.
+/// @param reference sag by finite elements with quadratic displacements and linear pressure, on
+/// meshes
+///   graded towards the clamped face up to 40 × 16 × 16, extrapolated: known to 0.003% [m]
 double sag_error(double poisson, double reference, const Machine& machine) {
   Scene scene = clamped(bar(best, 1, 0.2, poisson));
   scene.gravity = {0, 0, -0.1};
@@ -130,14 +66,14 @@ double sag_04999(const Machine& m) { return sag_error(0.4999, -3.7322e-3, m); }
 
 // --- shapes --------------------------------------------------------------------------------------
 
-/// Swings under its weight from where it is held, without stiffness against bending.
+/// Energy drift of a cloud without bending stiffness that swings under its weight.
 double swing(Cloud cloud, const Machine& machine) {
-  Scene scene = scene_of(cloud);
+  Scene scene = scene_of();
   scene.gravity = {0, 0, -9.81};
   scene.bodies[0].neighbourhood.radius = 0.09;
   scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -9, -9}, {0.01, 9, 9}}}});
   Trial trial(scene, {std::move(cloud)}, machine);
-  if (trial.model().warnings.empty()) return HUGE_VAL;  // it has to be told
+  if (trial.model().warnings.empty()) return HUGE_VAL;  // a warning is required
   const double dt = trial.step_at(0.5);
   Drift drift;
   trial.run(trial.at_rest(dt), 50, static_cast<std::int64_t>(1 / dt),
@@ -149,18 +85,18 @@ double thread(const Machine& machine) { return swing(box_of(41, 1, 1, 0.05), mac
 
 double single_phyxel(const Machine& machine) {
   Cloud cloud = box_of(1, 1, 1, 0.1);
-  Scene scene = scene_of(cloud);
+  Scene scene = scene_of();
   scene.bodies[0].neighbourhood.radius = 0.2;
   Trial trial(scene, {cloud}, machine);
   return trial.step_at(0.5);
 }
 
-/// A block, and one more phyxel out of its reach, which falls freely.
+/// A block and a phyxel out of its reach, which falls freely.
 double lone_phyxel(const Machine& machine) {
   Cloud cloud = box_of(4, 4, 4, 0.1);
   cloud.position.push_back({5, 0, 0});
   cloud.volume.push_back(1e-3);
-  Scene scene = scene_of(cloud);
+  Scene scene = scene_of();
   scene.gravity = {0, 0, -9.81};
   scene.bodies[0].neighbourhood.radius = 0.18;
   Trial trial(scene, {cloud}, machine);
@@ -173,13 +109,13 @@ double lone_phyxel(const Machine& machine) {
   return error;
 }
 
-/// A block with phyxels in one place, and others all but in one place, shaken.
+/// A spinning block with coincident and nearly coincident phyxels.
 double coincident(const Machine& machine) {
   Cloud cloud = box_of(5, 5, 5, 0.1);
   cloud.position[31] = cloud.position[32];
   cloud.position[62] = cloud.position[63] + Vec3d{1e-12, 0, 0};
   cloud.position[93] = cloud.position[94] + Vec3d{0, 1e-6, 1e-6};
-  Scene scene = scene_of(cloud);
+  Scene scene = scene_of();
   scene.bodies[0].spin = {1, 2, 3};
   Trial trial(scene, {cloud}, machine);
   if (trial.model().degenerate.coincident.empty()) return HUGE_VAL;
@@ -190,8 +126,8 @@ double coincident(const Machine& machine) {
   return drift.share();
 }
 
-/// A cube whose phyxels lie ten times as close in its middle as at its faces; its outer ones follow
-/// an affine motion, the others should.
+/// A cube with a spacing ten times smaller in its middle than at its faces. The outer phyxels
+/// follow an affine motion, which the inner ones should follow, too.
 double graded(const Machine& machine) {
   constexpr int half = 5;
   Cloud cloud;
@@ -200,7 +136,7 @@ double graded(const Machine& machine) {
       for (int x = -half; x <= half; ++x) {
         const Vec3d at{static_cast<double>(x), static_cast<double>(y), static_cast<double>(z)};
         const double r = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}) / half;
-        // Spacings grow by their distance from the middle: 1 to 10.
+        // Spacings grow with the distance from the middle, from 1 to 10.
         const double stretch = 0.1 + 0.45 * r;
         cloud.position.push_back((stretch / half) * at);
         const double s = stretch / half;
@@ -208,7 +144,7 @@ double graded(const Machine& machine) {
       }
     }
   }
-  Scene scene = scene_of(cloud);
+  Scene scene = scene_of();
   scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
   Mat3d g;
   for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = 1e-3 * std::sin(1.0 + e);
@@ -226,7 +162,7 @@ double graded(const Machine& machine) {
       worst = std::max(worst, std::abs(found(e / 3, e % 3) - g(e / 3, e % 3)) / 1e-3);
     }
   }
-  // And it is stable: let go, it rings.
+  // The released cube must ring stably.
   Drift drift;
   trial.run(state, 50, 2000,
             [&](const State&, const Diagnostics& now) { drift.look(trial.first(), now); });
@@ -276,7 +212,7 @@ Scene block(const char* law, double damping) {
   return scene;
 }
 
-/// Of a block at rest but for rotation and translation: what of its energy is left.
+/// Elastic energy that remains when a released block has come to rest, relative to the first.
 double sprung_back(const char* law, double safety, const std::function<Vec3d(Vec3d)>& start,
                    const Machine& machine) {
   Trial trial(block(law, 30), machine);
@@ -304,7 +240,7 @@ double flattened_neo(const Machine& m) {
 double flattened_corotated(const Machine& m) {
   return sprung_back(Corotated<double>::name, 0.8, flattened, m);
 }
-/// Mirrored, with an irregularity of a hundredth, since no side is the right one of a mirror.
+/// A mirror image with random displacements of a hundredth spacing, which break the symmetry.
 Vec3d mirrored(Vec3d x) {
   std::mt19937_64 engine(static_cast<std::uint64_t>(1e6 * (x.x + 7 * x.y + 49 * x.z + 100)));
   const auto jolt = [&] { return 1e-3 * (static_cast<double>(engine() >> 11) * 0x1p-52 - 1); };
@@ -318,8 +254,8 @@ double inside_out_corotated(const Machine& m) {
   return sprung_back(Corotated<double>::name, 0.4, mirrored, m);
 }
 
-/// A column, stretched by a fifth, so that it does not buckle into a helix, and one end turned
-/// three times: its middle, by symmetry, by half of that.
+/// A column stretched by a fifth, so that it does not buckle into a helix, with one end turned
+/// three times: its middle must turn by half of that, by symmetry.
 double twist(const Machine& machine) {
   Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 3}, 1, 0.1));
   scene.bodies[0].material.law = NeoHookean<double>::name;
@@ -335,14 +271,15 @@ double twist(const Machine& machine) {
     const double r = std::hypot(x.y, x.z);
     if (std::abs(x.x - 0.5) > 1e-9 || r < 1e-9) continue;
     const Vec3d y = x + found.displacement[i];
-    turned += (x.y * y.y + x.z * y.z) / (r * std::hypot(y.y, y.z));  // cosine: half a turn
+    turned += (x.y * y.y + x.z * y.z) /
+              (r * std::hypot(y.y, y.z));  // cosine of the rotation, -1 after 1.5 turns
     ++count;
   }
   return std::abs(turned / count + 1);
 }
 
-/// A bar flies at a wall with a tenth of its wave speed, sticks, and would fly back when the wave
-/// comes back from its free end: its momentum vanishes after L / c.
+/// A bar hits a wall with a tenth of its wave speed and sticks: its momentum vanishes after L / c,
+/// when the wave returns from its free end.
 double impact(const Machine& machine) {
   Discretisation d = best;
   d.across = 4;
@@ -373,7 +310,7 @@ double ringing(double safety, std::int64_t steps, const Machine& machine) {
   scene.time.end = 1;
   Trial trial(scene, machine);
   const double dt = trial.step_at(safety);
-  // As runs choose their steps.
+  // A run plans its steps likewise.
   scene.time.step = dt;
   plan_steps(scene, trial.model(), trial.backend(), false);
   State state = trial.at_rest(dt);
@@ -392,14 +329,14 @@ double ten_million_steps(const Machine& m) { return ringing(0.5, 10'000'000, m);
 
 // --- sizes and places ----------------------------------------------------------------------------
 
-/// The clamped bar sags for a while; displacements by its length.
+/// Displacements of the clamped bar while it sags, relative to its length.
 std::vector<Vec3d> sagging(double size, Vec3d where, const Machine& machine) {
   Scene scene = clamped(bar({.filling = Filling::nodes, .hourglass = 0.1, .across = 4}, 1, 0.2));
   scene.bodies[0].scale = size;
   scene.bodies[0].translation = where;
   scene.gravity = {0, 0, -1 / size};
   Trial trial(scene, machine);
-  // A millisecond for a metre, and the same number of steps whatever the rounding.
+  // The step is proportional to the length, so that the number of steps is the same.
   const double dt = 4e-4 * size;
   std::vector<Vec3d> moved;
   trial.run(trial.at_rest(dt), 1, 500,

@@ -10,7 +10,7 @@
 
 namespace phyxel::app {
 
-/// What a case is run on.
+/// The machine of a case.
 struct Machine {
   ChosenDevice device;
   Precision precision = Precision::double_;
@@ -18,11 +18,11 @@ struct Machine {
 
 struct HardCase {
   std::string name;
-  std::string what;        ///< The case, and what its error is measured by.
-  double tolerance = 0;    ///< Of the error; 0: the case is to be refused.
-  bool in_double = false;  ///< Newton's method finds it, which computes in double.
-  bool is_long = false;    ///< Minutes.
-  /// @returns its error. @throws Error to refuse it
+  std::string what;        ///< Description of the case and of its error.
+  double tolerance = 0;    ///< Largest error; 0 if the case must be refused.
+  bool in_double = false;  ///< True if Newton's method solves the case, in double.
+  bool is_long = false;    ///< True if it takes minutes.
+  /// Runs the case. @returns its error @throws Error to refuse it
   double (*error)(const Machine&);
 };
 
@@ -31,9 +31,9 @@ std::vector<HardCase> hard_cases();
 struct HardOutcome {
   bool refused = false;
   double error = 0;
-  std::string message;  ///< Of the refusal.
+  std::string message;  ///< Message of the refusal.
   double seconds = 0;
-  /// As the case asks: never NaN, never another error.
+  /// True if the error is within the tolerance, or if the case was refused as it must be.
   bool good = false;
 };
 HardOutcome outcome_of(const HardCase& hard, const Machine& machine);

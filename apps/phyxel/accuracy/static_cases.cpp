@@ -1,4 +1,4 @@
-/// Bodies at rest: an affine motion of a surface, a rotation, tension, cantilevers.
+/// Problems of bodies at rest: affine motion of a surface, rotation, tension, cantilevers.
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -28,8 +28,9 @@ struct Rest {
   }
 };
 
-/// @param begin when the cloud began to be made
-/// @param change what is to be done with the model first
+/// Solves for the equilibrium of a scene.
+/// @param begin begin of the set-up
+/// @param change function applied to the model first
 template <class Change>
 Rest rest_of(Clock::time_point begin, const Scene& scene, Cloud cloud, Change&& change,
              const EquilibriumOptions& options = {}) {
@@ -52,7 +53,7 @@ Rest rest_of(const Scene& scene, const Discretisation& d) {
   return rest_of(begin, scene, cloud_of(scene, d), [](Model&) {});
 }
 
-/// A case of several solutions takes as long as all of them.
+/// Adds the time and evaluations of a solution to those of a case.
 void add_to(Solution& total, const Solution& one) {
   total.phyxels = one.phyxels;
   total.neighbours = one.neighbours;
@@ -68,7 +69,7 @@ Solution with(Rest&& rest, std::vector<Quantity> found) {
 
 // --- the cases -----------------------------------------------------------------------------------
 
-/// ∂u_a/∂X_b of an affine motion.
+/// Displacement gradient ∂u_a/∂X_b of an affine motion.
 Mat3d affine(double size) {
   std::mt19937_64 engine(7);
   Mat3d g;
@@ -114,7 +115,7 @@ Solution rotation(const Discretisation& d) {
   const Model model = build_model(scene, std::span(&cloud, 1));
   State state;
   for (const Vec3d& x : model.position) {
-    state.displacement.push_back(Vec3d{x.y, x.z, x.x} - x);  // a third of a turn about the diagonal
+    state.displacement.push_back(Vec3d{x.y, x.z, x.x} - x);  // 120 degrees about the diagonal
   }
   state.velocity.resize(state.displacement.size());
   const auto backend = make_cpu_backend(model, Precision::double_);
@@ -133,8 +134,8 @@ Solution rotation(const Discretisation& d) {
   return solution;
 }
 
-/// A pull along x whose line is the axis: shared out by volumes, evened so that it does not turn a
-/// body that nothing holds, however irregular its end is.
+/// A load along x with its line of action on the axis: distributed by volume and corrected by a
+/// linear function, so that an irregular end does not cause a torque.
 Load on_axis(const Model& model, const std::vector<Index>& end, double force) {
   double all = 0, yy = 0, yz = 0, zz = 0, y = 0, z = 0;
   for (const Index i : end) {
@@ -143,7 +144,7 @@ Load on_axis(const Model& model, const std::vector<Index>& end, double force) {
     yy += model.mass[i] * x.y * x.y, yz += model.mass[i] * x.y * x.z;
     zz += model.mass[i] * x.z * x.z;
   }
-  // (1 + a y + b z) m: a and b take the first moments away.
+  // Weights (1 + a y + b z) m, with a and b such that the first moments vanish.
   const double det = yy * zz - yz * yz, a = -(y * zz - z * yz) / det, b = -(z * yy - y * yz) / det;
   const double sum = all + a * y + b * z;
   Load load;
@@ -250,7 +251,7 @@ Solution elastica(const Discretisation& d) {
   return with(std::move(rest), {{"down", down, 0.49457}, {"back", back, 0.16133}});
 }
 
-/// Energy [J] of a column whose end is turned about its axis.
+/// Energy of a column whose end is rotated about its axis [J].
 double energy_of_twist(const Discretisation& d, double degrees, Solution& total) {
   Scene scene = clamped(bar(d, 1, 0.2));
   scene.bodies[0].material.law = NeoHookean<double>::name;
@@ -269,9 +270,9 @@ Solution twist(const Discretisation& d) {
   return solution;
 }
 
-/// Cook's panel, 48 by 44 to 16, three layers of phyxels between smooth walls: displacements along
-/// y of the middle of the right side and of its upper corner, times E over the force on a unit of
-/// thickness.
+/// Cook's membrane, 48 by 44 to 16, with three layers of phyxels between smooth walls. @returns the
+///   displacements along y of the middle of the right side and of its upper corner, times E over
+///   the force per unit of thickness
 std::pair<double, double> cook_of(const Discretisation& d, double poisson, Solution& total) {
   constexpr double length = 48, left = 44, strain = 1e-5;
   const double spacing = left / d.across, thickness = 2 * spacing;

@@ -1,4 +1,4 @@
-/// The figures of section 6: Figure 1 from a simulation, the others from the tables.
+/// The figures of section 6: Figure 1 from a simulation, the other figures from the tables.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr double hanging_seconds = 0.6;
 
-/// Direction of sight: a head is seen from the front, the others from the side.
+/// Direction of the camera: from the front for the head, from the side for the other bodies.
 Vec3d view_of(const std::string& body, Pose pose) {
   if (body != "alien_head") return {-1, 2, -0.6};
   return pose == Pose::rest ? Vec3d{-1, -0.15, -0.06} : Vec3d{-1, -0.15, 0.06};
@@ -40,7 +40,7 @@ void draw_body(const fs::path& file, Vec3d view, const FrameData& surface,
   write_png(file, draw_picture(&surface, &phyxels, setting));
 }
 
-/// The body as the solver has it now.
+/// Draws the present state of a body.
 void draw_state(const fs::path& file, Vec3d view, const Model& model, paper::PaperBackend& backend,
                 const Solver& solver) {
   const State state = solver.state();
@@ -57,7 +57,7 @@ void draw_state(const fs::path& file, Vec3d view, const Model& model, paper::Pap
   draw_body(file, view, surface, phyxels);
 }
 
-/// y against x of the rows that match.
+/// The curve of y over x of matching rows.
 Curve curve_of(const CsvTable& table, const std::string& label, const std::string& x,
                const std::string& y, const Match& match) {
   Curve curve{label, {}, {}};
@@ -73,8 +73,7 @@ void add_if_any(LineChart& chart, Curve curve) {
   if (!curve.x.empty()) chart.curves.push_back(std::move(curve));
 }
 
-/// The frame rate that is real time: that of the video in the paper's introduction. The paper names
-/// no other.
+/// Adds the line of real time, the frame rate of video in the paper's introduction.
 void add_real_time(LineChart& chart, const CsvTable& frames) {
   if (chart.curves.empty()) return;
   double most = 1;
@@ -87,12 +86,12 @@ void add_real_time(LineChart& chart, const CsvTable& frames) {
   chart.curves.push_back(std::move(line));
 }
 
-/// Figures 2 and 3. A frame is a step; dashed: as many as a second of motion takes.
+/// Figures 2 and 3. A frame is a step; dashed lines are the number of steps in a second of motion.
 LineChart rates(const CsvTable& frames, const std::string& title, const std::string& with_surfels) {
   LineChart chart{title, "objects", "frames per second", false, true, {}};
   const std::vector<std::string>& bodies = paper::body_names();
   for (const bool needed : {false, true}) {
-    if (needed && !frames.has("step_s")) break;  // a table of before
+    if (needed && !frames.has("step_s")) break;  // a table of an earlier version
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       Curve curve = curve_of(frames, bodies[b], "objects", needed ? "step_s" : "frames_per_s",
                              {{"body", bodies[b]},
@@ -112,8 +111,8 @@ LineChart rates(const CsvTable& frames, const std::string& title, const std::str
   return chart;
 }
 
-/// Figures 4 and 5: the GPU, the paper's sequential program (dashed), and phyxel's own CPU solver
-/// on all cores (dotted).
+/// Figures 4 and 5: the GPU, the paper's sequential program (dashed), and phyxel's CPU solver on
+/// all cores (dotted).
 LineChart comparison(const CsvTable& frames, const std::string& title,
                      const std::string& with_surfels) {
   LineChart chart{title, "objects", "frames per second", false, true, {}};
@@ -147,8 +146,8 @@ LineChart comparison(const CsvTable& frames, const std::string& title,
   return chart;
 }
 
-/// What Figures 4 and 5 of the paper are quoted for: the GPU over the sequential program, one
-/// object, beside the paper's own numbers.
+/// Speed-ups of the GPU over the sequential program for one object, beside those of Figures 4 and 5
+/// of the paper.
 BarChart speedup_chart(const CsvTable& frames) {
   BarChart chart{"GPU over the sequential program, one object", "speedup", true, {}, {}};
   BarChart::Series of_paper{"the paper prints", {}}, phyxels{"phyxels", {}},
@@ -283,7 +282,7 @@ std::vector<fs::path> draw_figures(const fs::path& folder) {
   const auto draw = [&](const char* name, const auto& chart, bool any) {
     const fs::path file = folder / (std::string(name) + ".svg");
     if (!any) {
-      fs::remove(file);  // of an earlier measurement, with a GPU perhaps
+      fs::remove(file);  // it belongs to an earlier measurement
       return;
     }
     draw_svg(script_of(chart), file);

@@ -1,4 +1,5 @@
-/// What ranks that step a body together would send each other, and what that does to the bits.
+/// Communication volume of ranks that step a body, by three ways to exchange forces, and their
+/// effect on the bits of forces.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,7 +16,7 @@ namespace {
 
 using Vec3f = Vec3<float>;
 
-/// A body that is as thick as it is wide, which has fewer ghosts than the paper's for its size.
+/// Size of a compact block, which has fewer ghosts for its size than the paper's bodies.
 constexpr Index block_phyxels = 30'000;
 
 Vec3f to_float(Vec3d v) {
@@ -24,7 +25,7 @@ Vec3f to_float(Vec3d v) {
 
 float length_of(Vec3f v) { return std::sqrt(dot(v, v)); }
 
-/// Forces on phyxels of a body that several ranks step, from the same pair forces in float.
+/// Forces on the phyxels of a partitioned body, from equal pair forces in float.
 class SummedForces {
  public:
   SummedForces(const Model& model, const std::vector<Vec3d>& pair_forces)
@@ -35,11 +36,12 @@ class SummedForces {
       for (const Index j : neighbours_.row(i)) {
         const Vec3f force = to_float(pair_forces[static_cast<std::size_t>(entry++)]);
         own_[i] -= force;
-        pushes_[j].push_back({i, force});  // i ascending, as calcStrainStressB sums them
+        pushes_[j].push_back({i, force});  // i ascending, the order of sums in calcStrainStressB
       }
     }
   }
-  /// Each rank sums what its own phyxels apply; the owner adds these sums, in the order of ranks.
+  /// The force on phyxel j if each part sums the forces of its phyxels, and the owner adds these
+  /// sums in the order of parts.
   Vec3f summed_by_part(Index j, const std::vector<int>& part_of, int parts) const {
     Vec3f total = own_[j];
     for (const Push& push : pushes_[j]) {
@@ -55,7 +57,7 @@ class SummedForces {
     }
     return total;
   }
-  /// In the order of phyxels, which no cut changes.
+  /// The force on phyxel j summed in the order of phyxels, whatever the partition.
   Vec3f summed_by_phyxel(Index j) const {
     Vec3f total = own_[j];
     for (const Push& push : pushes_[j]) total += push.force;
@@ -102,7 +104,7 @@ void add_cuts(const std::string& name, const Model& model, CsvTable& table) {
                             std::to_string(other_bits), fmt::format("{:.1e}", apart / largest)});
       say(
           fmt::format("{:10} {} parts by {:10}: pair stresses {:.1f} kB, pair forces {:.1f} kB, "
-                      "summed forces {:.1f} kB a step, the last with other bits in {} phyxels",
+                      "summed forces {:.1f} kB a step, the latter with other bits in {} phyxels",
                       name, parts, by, 4e-3 * static_cast<double>(sent.pair_stresses),
                       4e-3 * static_cast<double>(sent.pair_forces),
                       4e-3 * static_cast<double>(sent.summed_forces), other_bits));

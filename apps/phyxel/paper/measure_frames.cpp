@@ -22,7 +22,7 @@ struct Body {
   State start;
 };
 
-/// @param one a cloud of the body, in place
+/// Makes a body. @param one a positioned cloud of the body
 Body make_body(const std::string& name, int copies, const Cloud& one) {
   Body body{name, paper::body_scene(name, copies), {}, {}};
   const std::vector<Cloud> clouds(static_cast<std::size_t>(copies), one);
@@ -31,7 +31,7 @@ Body make_body(const std::string& name, int copies, const Cloud& one) {
   return body;
 }
 
-/// Seconds a frame: the median over the repeats.
+/// Time of a frame [s]: the median over the repeats.
 Median time_frames(const PaperRequest& request, const std::function<void(int)>& run_frames) {
   run_frames(2);
   auto start = Clock::now();
@@ -47,7 +47,7 @@ Median time_frames(const PaperRequest& request, const std::function<void(int)>& 
   return median_of(seconds);
 }
 
-/// Several objects of the 2008 program, one after the other: one body a launch.
+/// Several objects of the 2008 program, each with its own launches.
 class Objects {
  public:
   template <class Make>
@@ -58,8 +58,9 @@ class Objects {
       objects_.back()->upload(body.start);
     }
   }
-  /// @param wait whether each frame ends with the host knowing that it is done, as it must be where
-  ///   frames are shown.
+  /// Steps all objects. @param wait true if the host synchronises after each frame, as it must to
+  /// show
+  ///   frames
   void run(int frames, bool wait) {
     for (int f = 0; f < frames; ++f) {
       for (auto& object : objects_) {
@@ -87,7 +88,7 @@ class FrameTable {
                       "threads",      "objects", "with_surfels", "frames",  "frames_per_s",
                       "ms_per_frame", "spread",  "step_s"};
   }
-  /// @param cores offered to a CPU program, which may leave some alone; 0: a GPU's
+  /// Adds a row. @param cores cores available to a CPU program, which may use fewer; 0 for a GPU
   void add(const Body& body, const char* program, int cores, int threads, int objects, bool surfels,
            const char* frames, const std::function<void(int)>& run) {
     const Median time = time_frames(request_, run);
@@ -123,8 +124,8 @@ void measure_gpu(const PaperRequest& request, const Body& body, bool surfels, bo
   }
 }
 
-/// The sequential program of 2008, and phyxel's own CPU solver on one core and on all.
-/// @param together as many objects in one model
+/// Measures the sequential program of 2008, and phyxel's CPU solver on one core and on all.
+/// @param together the same number of objects in one model
 void measure_cpu(const Body& one, const Body& together, bool surfels, FrameTable& table) {
   const int objects = static_cast<int>(together.scene.bodies.size());
   Objects group(one, objects, surfels, paper::make_sequential_backend<float>);

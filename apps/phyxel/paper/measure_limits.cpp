@@ -1,4 +1,4 @@
-/// Where the program of 2008 ends: memory, 16-bit indices, and single precision.
+/// Limits of the program of 2008: memory, 16-bit indices, and single precision.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -79,7 +79,7 @@ CsvTable measure_memory(const PaperRequest& request) {
         add(n, 1, numbers, program, 0, 0, 0, error.what());
       }
     }
-    // The paper's figure, 34.33 MB for 1,000 phyxels, is that of nine numbers a pair.
+    // The paper's 34.33 MB for 1,000 phyxels correspond to nine numbers a pair.
     const std::size_t nine =
         9 * sizeof(float) * static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
     try {
@@ -92,7 +92,7 @@ CsvTable measure_memory(const PaperRequest& request) {
     }
   }
 
-  // Several of the largest bodies, until the matrices no longer fit.
+  // Several of the largest bodies, until the matrices do not fit.
   const Model largest = paper_block(paper::most_phyxels);
   std::vector<std::unique_ptr<PaperBackend>> bodies;
   const std::size_t before = cuda_free_memory();
@@ -110,7 +110,7 @@ CsvTable measure_memory(const PaperRequest& request) {
   }
   bodies.clear();
 
-  // One more phyxel than 16 bits can name.
+  // One phyxel more than 16-bit indices allow.
   const Model more = paper_block(paper::most_phyxels + 1);
   try {
     paper::make_gpu_backend(more, {.device = request.gpu->index});
@@ -123,7 +123,7 @@ CsvTable measure_memory(const PaperRequest& request) {
 namespace {
 
 /// A free bar of 54 phyxels that spins about its middle at 10 rad/s: displacements become as large
-/// as the bar, while strains fall with 1/E. What float cannot hold shows in the stress.
+/// as the bar, while strains fall with 1/E. The rounding of float shows in the stress.
 struct Spinning {
   static constexpr double spin = 10, density = 1000, end = 0.1, spacing = 0.1;
   Scene scene;
@@ -148,7 +148,7 @@ struct Spinning {
 
 struct SpunState {
   std::vector<Vec3d> displacement;
-  std::vector<Sym3d> stress;  ///< Second Piola–Kirchhoff [Pa].
+  std::vector<Sym3d> stress;  ///< Second Piola–Kirchhoff stress [Pa].
 };
 
 SpunState spin(PaperBackend& backend, const Spinning& bar, double dt, std::int64_t steps) {
@@ -210,14 +210,14 @@ CsvTable measure_stiffness(const PaperRequest& request) {
       cases.push_back(std::move(c));
     }
   }
-  // The reference keeps 64 bits of mantissa; the longest runs go first.
+  // The reference has 64 bits of mantissa; the longest runs go first.
   const auto count = static_cast<std::ptrdiff_t>(cases.size());
   say(fmt::format("reference runs in long double: {} cases", count));
 #pragma omp parallel for schedule(dynamic)
   for (std::ptrdiff_t k = 0; k < count; ++k) {
     SpinCase& c = cases[static_cast<std::size_t>(count - 1 - k)];
-    // Above the limit the exact motion diverges too, by the same scheme: what counts there is the
-    // motion at half the step.
+    // Above the limit the exact motion also diverges with the same scheme, so the reference there
+    // is the motion at half the step.
     const bool above = c.fraction >= 1;
     c.exact = spin(*paper::make_sequential_backend<long double>(c.bar.model), c.bar,
                    above ? c.dt / 2 : c.dt, above ? 2 * c.steps : c.steps);

@@ -1,5 +1,5 @@
-/// How far the kernels of 2008 are from the same equations in higher precision: kernel by kernel,
-/// and over a second of motion.
+/// Errors of the kernels of 2008 relative to the same equations in higher precision: kernel by
+/// kernel, and over a second of motion.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -25,20 +25,20 @@ double size_of(const Mat3d& a) {
   return std::sqrt(sum);
 }
 
-/// Largest |a - b| over the largest |b|.
+/// The largest |a - b| over the largest |b|.
 template <class T>
 double distance(const std::vector<T>& a, const std::vector<T>& b) {
   double error = 0, size = 0;
   for (std::size_t k = 0; k < b.size(); ++k) {
     const double apart = size_of(a[k] - b[k]);
-    if (!std::isfinite(apart)) return apart;  // which a maximum would hide
+    if (!std::isfinite(apart)) return apart;  // std::max would hide NaN
     error = std::max(error, apart);
     size = std::max(size, size_of(b[k]));
   }
   return size > 0 ? error / size : error;
 }
 
-/// Everything that the kernels leave behind, after one step from that state.
+/// The results of all kernels after one step from a state.
 struct Results {
   PaperBackend::ImmutableValues immutable;
   std::vector<Mat3d> gradient;
@@ -116,7 +116,7 @@ CsvTable measure_kernels(const PaperRequest& request) {
 
 namespace {
 
-/// Where a backend has brought a body at some times.
+/// The states of a body at some times.
 std::vector<State> follow(PaperBackend& backend, const State& start,
                           std::initializer_list<double> times) {
   Solver solver(backend, start);

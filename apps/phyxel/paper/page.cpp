@@ -1,5 +1,5 @@
-/// The page that sets the paper's printed figures beside ours. Every number on it is read from the
-/// tables.
+/// The page that compares the paper's printed figures with new measurements. Each number on it is
+/// read from the tables.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -77,7 +77,8 @@ class Page {
     all_rates(t);
   }
 
-  /// GPU over each CPU program, for one object and for as many as the CPU was given.
+  /// Adds the speed-ups of the GPU over each CPU program, for one object and for the number of
+  /// objects measured on the CPU.
   void speedups(const CsvTable& t) {
     struct Program {
       std::string name, cores;
@@ -100,7 +101,7 @@ class Page {
       Match on_cpu = body;
       on_cpu.emplace_back("program", "sequential of 2008");
       const std::vector<std::string> counts = t.values("objects", on_cpu);
-      for (const std::string& objects : counts) {  // the figures have the others
+      for (const std::string& objects : counts) {  // other counts are in the figures
         if (objects != counts.front() && objects != counts.back()) continue;
         const auto rate = [&](const Program& program, const char* surfels) {
           Match match = body;
@@ -214,7 +215,7 @@ class Page {
     std::vector<Match> columns;
     for (const std::string& precision : t.values("precision")) {
       for (const std::string& program : t.values("program", {{"precision", precision}})) {
-        if (program == "CSR gather") continue;  // bitwise the same
+        if (program == "CSR gather") continue;  // results are equal bit by bit
         for (const std::string& body : t.values("body")) {
           head.push_back(fmt::format("{}, {}, {}", program, precision, body));
           columns.push_back({{"precision", precision}, {"program", program}, {"body", body}});
@@ -358,8 +359,8 @@ class Page {
 
   static constexpr const char* stable_fractions[] = {"0.1", "0.5", "0.9"};
 
-  /// The first E of the table with an error of a tenth or more; where there is none, the E that the
-  /// last row's error extrapolates to, growing as E does.
+  /// The first E of the table with an error of at least a tenth; if there is none, the E to which
+  /// the last row's error extrapolates linearly.
   static std::string breaks(const CsvTable& t, const std::string& precision,
                             const std::string& fraction) {
     double last_young = 0, last_error = 0;

@@ -12,7 +12,7 @@
 namespace phyxel::app {
 namespace {
 
-/// The most objects with frame rates of `rate` or more, and how many were measured.
+/// The largest number of objects with a frame rate of at least `rate`, and the number measured.
 std::string keeping_up(const CsvTable& t, const Match& match, double rate) {
   int most = 0, measured = 0;
   for (std::size_t r = 0; r < t.rows.size(); ++r) {

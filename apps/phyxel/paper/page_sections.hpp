@@ -1,4 +1,4 @@
-/// Sections of the page that follow from one table alone, as Markdown.
+/// Sections of the page that follow from one table, as Markdown.
 #pragma once
 
 #include <string>
@@ -7,16 +7,16 @@
 
 namespace phyxel::app {
 
-/// A paragraph that says what measured a table, where and when.
+/// A paragraph about the origin of a table: program, machine and date.
 std::string measured_by(const CsvTable& table);
 
-/// What real time asks for, and how many objects of each kind keep to it. @param table frames
+/// The section about real time and the numbers of objects that reach it. @param table frames
 std::string real_time_section(const CsvTable& table);
-/// A second of motion at both ends of Young's modulus.
+/// The section about a second of motion at both ends of the range of Young's modulus.
 std::string young_section(const CsvTable& table);
-/// What ranks would send each other.
+/// The section about the communication volume of ranks.
 std::string exchange_section(const CsvTable& table);
-/// What the compiler makes of 24-bit products.
+/// The section about 24-bit products in machine code.
 std::string machine_code_section(const CsvTable& table);
 
 }  // namespace phyxel::app

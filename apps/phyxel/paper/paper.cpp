@@ -1,4 +1,4 @@
-/// What the measurements of `phyxel paper` share.
+/// Functions that the measurements of `phyxel paper` share.
 #include "paper.hpp"
 
 #include <fmt/format.h>

@@ -59,7 +59,7 @@ std::string script_json(const nlohmann::ordered_json& json) {
   const std::string text = json_text(json, -1);
   std::string safe;
   safe.reserve(text.size());
-  for (const char c : text) {  // neither </script> nor <!-- can begin
+  for (const char c : text) {  // "<" is escaped, so that </script> and <!-- cannot occur
     if (c == '<') {
       safe += "\\u003c";
     } else {

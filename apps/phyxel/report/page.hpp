@@ -1,4 +1,4 @@
-/// Pages that are one file: HTML with its style, its script and its data.
+/// Self-contained pages: HTML with its style, script and data in one file.
 #pragma once
 
 #include <cstddef>
@@ -10,21 +10,21 @@
 
 namespace phyxel::app {
 
-/// What stands in for @name@.
+/// Texts by the names that they replace.
 using Fillings = std::map<std::string, std::string, std::less<>>;
 
-/// A file of report/page whose @names@ are replaced: by a filling, or another file of that name.
-/// What is filled in is not looked at again.
+/// A file of report/page in which each @name@ is replaced by a filling, or by the file of that
+/// name. Replacements are not expanded again.
 std::string filled_page(std::string_view name, const Fillings& fillings);
 
-/// Text as HTML shows it.
+/// The text with HTML's special characters escaped.
 std::string html_text(std::string_view text);
-/// JSON that may stand in a page's script element.
+/// JSON for a script element of a page.
 std::string script_json(const nlohmann::ordered_json& json);
-/// RFC 4648.
+/// Base64 encoding by RFC 4648.
 std::string base64(std::span<const std::byte> bytes);
 
-/// An element for each warning.
+/// A paragraph for each warning.
 std::string html_warnings(std::span<const std::string> warnings);
 /// A table of names and values.
 std::string html_facts(std::span<const std::pair<std::string, std::string>> facts);

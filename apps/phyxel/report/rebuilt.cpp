@@ -18,11 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double most_pairs = 1e9;                           // of neighbours: 4 GB of lists
-constexpr double most_relaxed = 3e8;                         // phyxels times sweeps: minutes
-constexpr std::size_t largest_scene = std::size_t{2} << 20;  // bytes, as for scene files
+constexpr double most_pairs = 1e9;                           // pairs of neighbours: 4 GB of lists
+constexpr double most_relaxed = 3e8;                         // phyxels times sweeps: some minutes
+constexpr std::size_t largest_scene = std::size_t{2} << 20;  // [bytes], as for scene files
 
-/// sqrt(2/3 E':E') of Green's strain, E' its deviator.
+/// Equivalent strain sqrt(2/3 E':E'), where E' is the deviator of Green's strain.
 double equivalent_strain(const Mat3d& gradient) {
   const Sym3d e = green_strain(gradient);
   const double mean = (e.xx + e.yy + e.zz) / 3;
@@ -30,7 +30,7 @@ double equivalent_strain(const Mat3d& gradient) {
   return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)) / 3);
 }
 
-/// Phyxels that a source makes, about; 0 where only making it tells.
+/// Approximate number of phyxels of a source; 0 if it is not known in advance.
 double phyxels_of(const BodySource& source) {
   if (!source.file.empty()) {
     check_seal(source.file, "body");
@@ -38,14 +38,14 @@ double phyxels_of(const BodySource& source) {
   }
   if (source.phyxels > 0) return source.phyxels;
   const ShapeRequest& shape = source.shape;
-  if (is_paper_shape(shape.name)) return 238;  // of the smallest of them
+  if (is_paper_shape(shape.name)) return 238;  // the smallest of these bodies
   const auto along = [&](double length) { return std::max(1.0, length / shape.spacing); };
   if (shape.name == "sphere") return std::pow(along(1.6 * shape.radius), 3);
   if (shape.name == "cylinder") return std::pow(along(1.7 * shape.radius), 2) * along(shape.length);
   return along(shape.size.x) * along(shape.size.y) * along(shape.size.z);
 }
 
-/// Neighbours of a phyxel of a body of `phyxels` that lie `spacing` apart, about.
+/// Approximate number of neighbours of a phyxel. @param spacing distance between phyxels [m]
 double neighbours_of(const NeighbourhoodRule& rule, double phyxels, double spacing) {
   const double reach =
       rule.radius ? *rule.radius / std::max(spacing, 1e-300)
@@ -61,7 +61,7 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
   return !error && !inside.empty() && *inside.begin() != "..";
 }
 
-/// Whether the scene's file is there, and still says what the frame does.
+/// True if the scene's file exists and is equal to the frame's scene.
 bool is_users_own(const Scene& scene) {
   std::error_code ignored;
   if (!fs::is_regular_file(scene.file, ignored)) return false;
@@ -85,12 +85,12 @@ std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double
       if (file.empty()) continue;
       if (!own && !lies_in(file, folder)) {
         return fmt::format(
-            "it names {}, which is outside the run's folder, and {} is not there with the same "
+            "it names {}, which is outside the run's folder, and {} does not exist with the same "
             "text",
             file.string(), scene.file.string());
       }
       if (!fs::is_regular_file(file, ignored)) {
-        return fmt::format("{} is no regular file", file.string());
+        return fmt::format("{} is not a regular file", file.string());
       }
     }
     const double some = phyxels_of(body.source);
@@ -98,7 +98,7 @@ std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double
     all += some;
     pairs += some * neighbours_of(body.neighbourhood, some, body.scale * apart);
     if (!body.source.mesh.empty()) relaxed += some * body.source.relaxations;
-    // Written so that NaN is an obstacle.
+    // The negated comparison also refuses NaN.
     if (!(all <= most)) {
       return fmt::format("it asks for about {:.3g} phyxels, the frames have {}", all, phyxels);
     }
@@ -134,7 +134,7 @@ void Rebuilt::add_fields(const FrameData& frame, std::vector<Field>& fields) {
     state.displacement[i] = frame.point[i] - model_.position[i];
   }
   if (const auto u = frame.field.find("displacement"); u != frame.field.end()) {
-    for (std::size_t i = 0; i < frame.point.size(); ++i) {  // with all its digits
+    for (std::size_t i = 0; i < frame.point.size(); ++i) {  // in full precision
       state.displacement[i] = {u->second[3 * i], u->second[3 * i + 1], u->second[3 * i + 2]};
     }
   }

@@ -1,4 +1,4 @@
-/// The scene of a trajectory, built anew to find what its frames do not say.
+/// A model rebuilt from the scene of a trajectory, which computes fields that its frames lack.
 #pragma once
 
 #include <filesystem>
@@ -13,29 +13,29 @@
 
 namespace phyxel::app {
 
-/// A quantity of each phyxel, by which colours go.
+/// A quantity of each phyxel that colours show.
 struct Field {
   std::string name, unit;
   std::vector<double> values;
 };
 
-/// Why a scene that a frame carries is not built, or "". Anybody may have written the frame, so
-/// what building takes is bounded by the run's own files: about as many phyxels as the frames have,
-/// with a bounded number of neighbours, and no file outside the run's folder, unless the scene file
-/// that `scene.file` names is still there with the same text, as the user then has it.
+/// The reason why the scene in a frame must not be rebuilt; "" if it may. Frames may come from an
+/// untrusted source, so rebuilding is limited by the run's files: about as many phyxels as the
+/// frames have, with a bounded number of neighbours, and no file outside the run's folder unless
+/// the scene file `scene.file` still exists with the same text.
 /// @param spacing typical distance between phyxels of the frames [m]
 std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double spacing,
                                  const std::filesystem::path& folder);
 
-/// A model of the scene, which finds strains and stresses from frames.
+/// A model of the scene that computes strains and stresses of frames.
 class Rebuilt {
  public:
-  /// @throws InputError if it has another number of phyxels than the frames
+  /// Builds the model. @throws InputError if its number of phyxels differs from that of the frames
   Rebuilt(Scene scene, std::size_t phyxels);
 
-  /// Fields that are not there yet.
+  /// Adds the fields that `fields` lacks.
   void add_fields(const FrameData& frame, std::vector<Field>& fields);
-  /// Positions at rest.
+  /// Rest positions [m].
   const std::vector<Vec3d>& rest() const { return model_.position; }
 
  private:

@@ -1,4 +1,4 @@
-/// phyxel report: one file that a browser opens, offline.
+/// phyxel report: a self-contained page for a browser.
 #pragma once
 
 #include <filesystem>
@@ -7,36 +7,34 @@
 
 namespace phyxel::app {
 
-/// How a trajectory becomes a page.
+/// Settings of a page.
 struct ReplayRequest {
-  std::filesystem::path input;  ///< A run's folder, a series, or one frame.
-  double megabytes = 64;        ///< The page may have so many.
-  bool stress = true;           ///< Whether strain and stress are found, where frames lack them.
+  std::filesystem::path input;  ///< A run's folder, a series or a frame.
+  double megabytes = 64;        ///< Largest size of the page [MB].
+  bool stress = true;           ///< True if strains and stresses that frames lack are computed.
 };
 
-/// A page, and what it holds.
+/// A page and a summary of its content.
 struct Report {
   std::string html;
-  std::size_t frames = 0, phyxels = 0, surfels = 0;  ///< Shown.
-  std::vector<std::string> fields;                   ///< That colours can show.
-  std::vector<std::string> notes;                    ///< What was left out, and why.
+  std::size_t frames = 0, phyxels = 0, surfels = 0;  ///< Numbers that the page shows.
+  std::vector<std::string> fields;                   ///< Names of the fields that colours can show.
+  std::vector<std::string> notes;                    ///< What was left out, with reasons.
 };
 
-/// A trajectory, replayed; its energies, scene, timing and warnings.
-/// @throws InputError if there is none, or not even two of its frames fit
+/// A page that replays a trajectory, with its energies, scene, timing and warnings.
+/// @throws InputError if there is no trajectory, or if the page has no room for two frames
 Report replay_page(const ReplayRequest& request);
 
-/// Measurements: tables as `write_csv` leaves them, with charts.
-/// @throws InputError for other files
-Report results_page(const std::vector<std::filesystem::path>& tables);
-
-/// How much of a trajectory fits into a page.
+/// The part of a trajectory that a page shows.
 struct FramePlan {
   std::size_t frames = 0;
-  std::size_t phyxel_stride = 1;  ///< One phyxel in so many is shown.
+  std::size_t phyxel_stride = 1;  ///< One phyxel in this number is shown.
 };
-/// @param surface_bytes,phyxel_bytes of a frame, as text @param bytes for all frames
-/// @throws InputError if no two frames fit, or not the only one
+/// Chooses the frames and phyxels that fit a size.
+/// @param surface_bytes,phyxel_bytes size of a frame's surface and phyxels, as text [bytes]
+/// @param bytes size for all frames [bytes]
+/// @throws InputError if two frames do not fit, or a trajectory's single frame
 FramePlan plan_frames(std::size_t frames, double surface_bytes, double phyxel_bytes, double bytes);
 
 }  // namespace phyxel::app

@@ -1,4 +1,4 @@
-/// Checkpoints that a run goes on from.
+/// Continuation of a run from a checkpoint.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -12,7 +12,7 @@ namespace phyxel::app {
 
 namespace {
 
-/// How often a run that planned one step had halved it to the other; nothing if it never does.
+/// Number of halvings that lead from the planned step to `step`; unset if none does.
 std::optional<int> halvings_between(double planned, double step) {
   for (int k = 0; k <= StepControl::most_halvings; ++k) {
     if (std::ldexp(planned, -k) == step) return k;
@@ -32,7 +32,7 @@ std::optional<CheckpointReader> Run::find_checkpoint() {
     file = latest.value_or(std::filesystem::path());
   }
   if (file.empty()) {
-    // A run that was ended before its first checkpoint begins again.
+    // A run that was stopped before its first checkpoint begins again.
     replace_ = options_.force || (options_.resume == "auto" && holds_only_a_start(folder, scene_));
     if (!options_.dry_run) check_output_folder(folder, replace_);
     return std::nullopt;
@@ -62,7 +62,7 @@ std::optional<CheckpointReader> Run::find_checkpoint() {
 
 std::optional<Checkpoint> Run::checkpoint_for_all() {
   require_alike(std::hash<std::string>{}(scene_.text), "scenes");
-  // Options change what the scene says.
+  // Options override the scene.
   require_alike(std::hash<std::string>{}(fmt::format(
                     "{:a} {:a} {:a} {:a} {} {} {}", scene_.time.end, scene_.time.step.value_or(0),
                     scene_.time.safety, scene_.output.frames_per_second,
@@ -111,14 +111,14 @@ Index Run::stretch_length() {
 }
 
 void Run::check_resumed() const {
-  // On the first rank, which has read the checkpoint; one of version 2 has no parameters.
+  // The first rank has read the checkpoint; version 2 has no parameters.
   if (checkpoint_reader_ && checkpoint_reader_->info().version > 2) {
     const std::string differences =
         parameter_differences(checkpoint_reader_->info().parameters, scene_parameters(scene_));
     if (!differences.empty()) {
       throw InputError(fmt::format(
-          "{}: the checkpoint belongs to another model or run: allowed are the values of the "
-          "run that wrote it\n{}",
+          "{}: the checkpoint belongs to another model or run; allowed: the values of the run that "
+          "wrote it\n{}",
           options_.resume, differences));
     }
   }

@@ -38,12 +38,11 @@ Run::Run(const RunOptions& options)
       first_step_(solver_.steps()),
       start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
   StopSignal::work_begins();
-  // Last, because it replaces what an earlier run has left: all that could be refused, or find no
-  // memory, has been tried by now.
+  // Last, since it replaces the files of an earlier run: everything that could fail has been done.
   ranks().collectively([&] {
     if (!leads() || options_.dry_run) return;
     const std::filesystem::path& folder = scene_.output.directory;
-    // What is done and summed up stays as it is.
+    // A finished run with a summary is left unchanged.
     if (begin_ && solver_.steps() >= plan_.steps && fs::exists(folder / summary_name)) return;
     recorder_.emplace(model(), scene_, replace_, continuation_);
   });
@@ -107,12 +106,12 @@ void Run::execute() {
 
 void Run::step_to_end() {
   StabilityWatch watch = alike([&] { return StabilityWatch(model(), now_, watched_); });
-  watched_.start_speed = watch.watched().start_speed;  // a checkpoint of version 2 knows none
+  watched_.start_speed = watch.watched().start_speed;  // a checkpoint of version 2 has none
   good_ = good_state(now_);
   if (!begin_) {
-    // Without a rate only the last frame is wanted.
+    // Without a frame rate only the last frame is written.
     if (scene_.output.frames_per_second > 0) write_frame(good_);
-    // However early a run ends, it can go on.
+    // The first checkpoint lets a run continue however early it stops.
     if (scene_.solver.method != Method::equilibrium) write_state();
   }
   Watchdog watchdog(ranks(), watchdog_seconds());
@@ -126,7 +125,7 @@ void Run::step_to_end() {
     throw AgreedError(error.code(), stopped_in_search(error, progress));
   } catch (const DivergedError& error) {  // on all ranks
     throw AgreedError(error.code(), with_last_good_state(error.what(), progress));
-  } catch (const DeviceError& error) {  // on this one
+  } catch (const DeviceError& error) {  // on this rank
     if (ranks().size() > 1) throw;
     throw DeviceError(with_last_good_state(error.what(), progress));
   } catch (const std::bad_alloc&) {
@@ -173,7 +172,7 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     auto good = good_state(now_);
     look_seconds = seconds_since(look_start);
     if (frame) write_frame(good);
-    // Only now: a checkpoint of a state counts its frame as written, so that comes first.
+    // After the frame: the checkpoint of a state counts its frame as written.
     good_ = std::move(good);
     if (last || stop || due) {
       write_state();
@@ -232,7 +231,7 @@ std::optional<double> Run::forecast() {
     return std::max(1e-9, seconds_since(start)) / static_cast<double>(steps);
   };
   const double first = timed(2);
-  // As many on all ranks.
+  // All ranks must take the same number of steps.
   const auto more = ranks().largest(static_cast<std::int64_t>(std::min(1000.0, 0.2 / first)));
   return (more > 2 ? timed(more) : first) * static_cast<double>(plan_.steps);
 }

@@ -1,4 +1,4 @@
-/// One run of a scene: the class behind `phyxel run` and `phyxel check`.
+/// A run of a scene: the implementation of `phyxel run`.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,7 @@ struct RunOptions {
   Overrides overrides;
   CutOptions cut;
   std::string transport = "auto";
-  std::string profile;  // a file, or ""
+  std::string profile;  // file of the timeline, or ""
   std::string resume;   // "", "auto" or a checkpoint file
   bool force = false;
   bool no_pictures = false;
@@ -40,8 +40,8 @@ struct GoodState {
   Watched watched;
 };
 
-/// `work()`, which does the same on every rank and fails on all of them, if it does; unless a GPU
-/// fails, which ends all.
+/// Returns `work()`, which either succeeds or fails on all ranks; the failure of a GPU ends all
+/// ranks.
 template <class Work>
 auto alike(Work&& work) {
   try {
@@ -53,23 +53,24 @@ auto alike(Work&& work) {
   }
 }
 
-/// One run from its plan to its summary, on one rank or on several: all step, and the first one
-/// speaks and writes. Files are written on a thread of their own, while stepping goes on if a core
-/// is left for that. HDF5 is not made for threads: after the constructor that thread alone uses it,
-/// until all is written. A rank holds its values of at most two frames, the one being written and
-/// one that waits, and its last good state, which often is that of the latter.
+/// A run from its plan to its summary, on one or several ranks. All ranks step; the first one
+/// prints and writes. Files are written on a separate thread, during stepping if a core is free.
+/// HDF5 is not thread-safe: after the constructor only that thread uses it until all files are
+/// written. A rank holds its values of at most two frames (one being written and one queued) and
+/// its last good state, often that of the latter.
 class Run {
  public:
   explicit Run(const RunOptions& options);
 
-  /// The plan, and how long it would take: a few steps tell. Writes nothing.
+  /// Prints the plan and a forecast from a few steps. Writes no files.
   void rehearse();
 
-  /// Steps to the end and writes everything; or what is missing of a run that was finished.
+  /// Steps to the end and writes the output; completes the files of a finished run.
   void execute();
 
  private:
-  // Often enough to stop a blow-up early; where looking takes long, after that many times as long.
+  // Steps between checks, frequent enough to stop a blow-up early; or, if a check is expensive,
+  // this many times its cost.
   static constexpr std::int64_t watch_interval = 250;
   static constexpr double watch_share = 50;
 
@@ -77,36 +78,36 @@ class Run {
 
   void step_to_end();
   void take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& progress);
-  /// Whether the output folder lacks run.json, as after an end before it was written.
+  /// True if the output folder has no run.json, as when a run stopped before writing it.
   bool summary_is_missing() const;
   void draw_and_sum_up();
 
-  /// Of all steps [s]; none for a search for equilibrium, whose length nobody knows.
+  /// Forecast of the time of all steps [s]; unset for a search for equilibrium.
   std::optional<double> forecast();
 
-  /// What a summary or a plan in JSON begins with.
+  /// The first entries of a summary or plan in JSON.
   nlohmann::ordered_json identity() const;
 
   bool steps_explicitly() const { return scene_.solver.method == Method::verlet; }
   double end_time() const { return static_cast<double>(plan_.steps) * plan_.dt; }
-  /// Whether this rank speaks and writes.
+  /// True on the rank that prints and writes.
   static bool leads() { return ranks().rank() == 0; }
-  /// Ranks ask each other now and then, and one alone itself after every step.
+  /// Number of steps after which ranks agree on signals; 1 for one rank.
   std::int64_t agree_interval() const;
   static bool anyone(bool here);
 
-  /// How long a rank may stay where it is before it is named.
+  /// Time without progress after which the watchdog reports a rank [s].
   static double watchdog_seconds();
 
-  /// One step, after a look at whether it has to be shorter or may be longer.
+  /// Takes steps, after adapting the step size to the stiffness.
   void take_step(Progress& progress);
-  /// Has Newton's method show how far it has come, serve files, and hear signals.
+  /// Makes Newton's method show its progress, serve the file writer, and react to signals.
   void watch_newton(Progress& progress);
   void show_progress(Progress& progress, const Diagnostics& now) const;
-  /// Writes the state that an interrupted search has left. @returns the message of the run's end
+  /// Writes the state of an interrupted search. @returns the run's last message
   std::string stopped_in_search(const InterruptedError& error, Progress& progress);
 
-  /// Writes it, and says so.
+  /// Writes the last good state. @returns the error with a note about it
   std::string with_last_good_state(const char* error, Progress& progress);
 
   double speed() const {
@@ -114,42 +115,43 @@ class Run {
            std::max(1e-9, seconds_since(loop_start_));
   }
 
-  /// Before the model is built, so that a wrong --resume or output folder costs no time.
+  /// Finds the checkpoint before the model is built, so that a wrong --resume or output folder
+  /// fails at once.
   std::optional<CheckpointReader> find_checkpoint();
 
-  /// What it says, without arrays; the first rank's, the others may not see its folder.
+  /// The checkpoint without arrays, sent by the first rank; other ranks may not see its folder.
   std::optional<Checkpoint> checkpoint_for_all();
 
-  /// The checkpoint's, or that of rest.
+  /// The state of the checkpoint, or the state at rest.
   State first_state();
 
-  /// Phyxels of which values are brought to the first rank at a time: fewer, in tests.
+  /// Number of phyxels whose values are sent to the first rank at a time; tests set fewer.
   static Index stretch_length();
 
   void check_resumed() const;
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const;
 
-  /// Whether one is left for the writer. Threads that step on all of them wait for one another
-  /// twice a step, and lose more to a writer that comes between than writing beside them saves.
+  /// True if a core is free for the writer. Threads that occupy all cores synchronise twice a step,
+  /// and would lose more to a writer that interrupts them than concurrent writing saves.
   bool core_is_left() const;
 
   void hand_over(std::shared_ptr<const Moment> moment, FileWriter::Job job);
 
   static std::shared_ptr<Moment> moment_of(const std::shared_ptr<const GoodState>& good);
 
-  /// Takes what the frame needs from the backend now; it is written in the background.
+  /// Copies the values of a frame from the backend, and queues the frame.
   void write_frame(const std::shared_ptr<const GoodState>& good);
 
-  /// The last good one, in the background, after the frames handed over before.
+  /// Queues a checkpoint of the last good state, after the frames queued before.
   void write_state();
 
   void say_plan() const;
 
-  /// Not an error: a job script that resumes until it is done ends here.
+  /// Prints that the run had been finished; no error, so that job scripts may resume until done.
   void say_finished_already() const;
 
-  /// Where the seconds went, in the order of the run.
+  /// Time of each stage [s], in the order of the run.
   nlohmann::ordered_json timing() const;
 
   double energy_drift(const Diagnostics& now) const;
@@ -165,38 +167,37 @@ class Run {
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
 
   const RunOptions& options_;
-  StopSignal signals_{ranks().rank() == 0};  // first, to hear those that come during set-up
+  StopSignal signals_{ranks().rank() == 0};  // first, to catch signals during set-up
   Clock::time_point start_ = Clock::now();
   TimeSpent spent_;
   Scene scene_;
   ChosenDevice device_;
-  // Found with the checkpoint, on the first rank: its file, and whether an earlier trajectory may
-  // be replaced.
+  // The checkpoint's file, and whether an earlier trajectory may be replaced; on the first rank.
   std::filesystem::path resumed_from_;
   bool replace_ = false;
   std::optional<Continuation> continuation_;
-  std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until its state is read
-  std::optional<Checkpoint> begin_;                    // without arrays
+  std::optional<CheckpointReader> checkpoint_reader_;  // on the first rank, until the state is read
+  std::optional<Checkpoint> begin_;                    // the checkpoint without arrays
   SharedModel shared_;
   std::unique_ptr<Backend> backend_;
   StepPlan plan_;
-  BoundarySize boundary_;  // of the whole
+  BoundarySize boundary_;  // of the whole model
   Solver solver_;
   StepControl control_;
   std::int64_t first_step_ = 0;
-  int halvings_told_ = plan_.halvings;  // of the planned step, the most so far
+  int halvings_told_ = plan_.halvings;  // largest number of halvings printed so far
   Diagnostics start_diagnostics_, now_;
   std::optional<Recorder> recorder_;       // on the first rank
-  std::string transport_;                  // between ranks
-  std::vector<int> gpus_;                  // of the ranks
-  std::shared_ptr<const GoodState> good_;  // the last one
+  std::string transport_;                  // transport between ranks
+  std::vector<int> gpus_;                  // GPU of each rank
+  std::shared_ptr<const GoodState> good_;  // last good state
   Watched watched_;                        // for checkpoints: start and frames
-  double peak_energy_ = 0;                 // of all states looked at
-  double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // steps alone; with output
+  double peak_energy_ = 0;                 // largest energy of the checked states [J]
+  double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // loop includes output
   Clock::time_point loop_start_;
   std::filesystem::path checkpoint_;
   std::vector<std::filesystem::path> pictures_;
-  // Last: it ends first, and its jobs use the recorder.
+  // Last, since it must be destroyed first: its jobs use the recorder.
   FileWriter writer_{shared_, stretch_length()};
 };
 

@@ -1,4 +1,4 @@
-/// A run's steps: as long as the limit allows, and watched while Newton's method is at work.
+/// The steps of a run: as long as the stability limit allows, with the progress of Newton's method.
 #include <fmt/format.h>
 
 #include "run/run.hpp"
@@ -13,9 +13,9 @@ void Run::take_step(Progress& progress) {
   const int halvings = control_.look(solver_, plan_.halvings);
   if (halvings != 0) {
     plan_.halve(halvings);
-    first_step_ += solver_.steps() - steps;  // as many have been taken as before
+    first_step_ += solver_.steps() - steps;  // keeps the number of steps taken
   }
-  // A body that swings halves its steps again and again: that is told once.
+  // An oscillating body may halve its steps repeatedly; only a new number of halvings is printed.
   if (plan_.halvings > halvings_told_) {
     halvings_told_ = plan_.halvings;
     if (!options_.json && !options_.quiet) {
@@ -29,7 +29,7 @@ void Run::take_step(Progress& progress) {
   const auto next = [&](std::int64_t every) { return (solver_.steps() / every + 1) * every; };
   const std::int64_t limit = std::min({plan_.steps, next(plan_.steps_per_frame),
                                        next(watch_interval), control_.next_look(solver_)});
-  naming(scene_, [&] { solver_.step(solver_.steps_to(limit)); });  // a search may be refused
+  naming(scene_, [&] { solver_.step(solver_.steps_to(limit)); });  // a search may fail
 }
 
 void Run::watch_newton(Progress& progress) {
@@ -41,7 +41,7 @@ void Run::watch_newton(Progress& progress) {
                                              now.tolerance),
                       energy = fmt::format("E = {:.4g} J", now.energy);
     if (scene_.solver.method == Method::equilibrium) {
-      // Before the first step there is none but that of the start.
+      // Before the first step there is only the residual of the start.
       progress.update(now.step > 0 ? std::vector{residual, newton, iteration, energy}
                                    : std::vector{residual, newton, iteration});
     } else {

@@ -1,4 +1,4 @@
-/// What a run says of itself: its plan and its summary.
+/// The plan and the summary of a run.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,11 +12,11 @@
 namespace phyxel::app {
 namespace {
 
-/// Relative energy drift above which a run warns. Bodies that ring at the very limit of the step
-/// reach 9%; all other hard cases stay below 2%.
+/// Relative energy drift above which a run warns. Bodies that ring at the stability limit reach 9%;
+/// the other hard cases stay below 2%.
 constexpr double largest_drift = 0.1;
 
-/// Energy that rounding gives a body at rest [J]: that of strains of 1e-7.
+/// Energy of a body at rest from rounding errors [J], as strains of 1e-7 have.
 double rounding_energy(const Model& model) {
   double energy = 0;
   for (const Part& part : model.parts) {
@@ -111,7 +111,7 @@ double Run::torque_balance(const Diagnostics& now) {
 
 std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
   std::vector<std::string> warnings;
-  // Implicit steps may lose energy: they damp modes that they do not resolve.
+  // Implicit steps may lose energy, since they damp modes that they do not resolve.
   const double wrong = steps_explicitly() ? std::abs(energy_drift(now)) : energy_drift(now);
   if (scene_.solver.method != Method::equilibrium && is_conservative(model()) &&
       wrong > largest_drift &&

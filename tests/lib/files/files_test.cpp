@@ -1,4 +1,4 @@
-/// Files: what is written comes back, damage is found before HDF5 sees it, nothing is lost.
+/// Files: content is read back as written, damage is found before parsing, nothing is lost.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -250,7 +250,7 @@ TEST_F(Files, ForeignFilesAreNamed) {
   }
 }
 
-/// Bodies whose seal is right and whose content is not.
+/// Bodies with a valid seal and invalid content.
 TEST_F(Files, WrongContentIsNamedByArrayAndRow) {
   using Write = std::function<void(Hdf5Writer&)>;
   const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -399,7 +399,7 @@ TEST_F(Files, AFileOnDiskSealedAfterwardsIsReadLikeAnother) {
   EXPECT_EQ(in.text("/note"), "hello");
 }
 
-/// Of a billion phyxels: only what is asked for is ever in memory.
+/// Arrays of a billion phyxels: only the requested chunk is in memory.
 TEST_F(Files, ArraysThatComeLaterTakeNoMemory) {
   constexpr std::size_t rows = 1'000'000'000;
   Hdf5Writer out;
@@ -435,7 +435,7 @@ TEST_F(Files, ArraysThatComeLaterTakeNoMemory) {
   EXPECT_GT(next, 0);
 }
 
-/// As a file on a disk: what is cut off is gone, and comes back as zeros.
+/// As in a file on a disk, bytes that were cut off are zero when the file grows again.
 TEST(SparseBytes, CutAndGrownAreZero) {
   const auto read_all = [](const SparseBytes& bytes) {
     std::vector<std::byte> all(bytes.size());

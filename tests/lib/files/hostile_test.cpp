@@ -1,5 +1,5 @@
-/// Files made on purpose: behind a right digest, which anybody can compute, no content crashes,
-/// hangs or takes memory, and what is refused is named.
+/// Crafted files with a valid digest: no content makes the readers crash, hang or allocate without
+/// limit, and refusals name the fault.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -36,14 +36,14 @@ std::string refusal(const std::function<void()>& call) {
 
 class HostileFiles : public test::Folder {
  protected:
-  /// A file of that kind whose digest fits the content.
+  /// A file of a kind with a valid digest.
   fs::path sealed(const std::string& name, const std::string& kind,
                   const std::string& content) const {
     const fs::path file = write(name, std::string(seal_size, '\n') + content);
     seal_in_place(file, kind);
     return file;
   }
-  /// What lies behind a file's seal.
+  /// The content of a file behind its seal.
   static std::string content_of(const fs::path& file) { return text_of(file).substr(seal_size); }
 
   std::string body_content() const {
@@ -57,7 +57,8 @@ class HostileFiles : public test::Folder {
   }
 };
 
-/// Old HDF5 libraries read beyond their buffers for some of these, and never end for others.
+/// Old HDF5 libraries read beyond their buffers for some of these files, and do not terminate for
+/// others.
 TEST_F(HostileFiles, EveryFieldMayHoldAnythingBehindARightDigest) {
   const std::string good = body_content();
   const fs::path file = folder_ / "crafted.h5";
@@ -77,7 +78,7 @@ TEST_F(HostileFiles, EveryFieldMayHoldAnythingBehindARightDigest) {
       }
     }
   }
-  // Most bytes of so small a file are room for members of groups, which nobody looks at.
+  // Most bytes of so small a file are free space of groups, which is not read.
   EXPECT_GT(refused, 200);
   EXPECT_GT(read, 200);
 }
@@ -90,7 +91,7 @@ TEST_F(HostileFiles, EveryCutIsRefused) {
   }
 }
 
-/// An array of 4e18 numbers in a file of a few kilobytes: memory is not asked for.
+/// A claim of 4e18 numbers in a file of a few kilobytes must not allocate memory.
 TEST_F(HostileFiles, ClaimsBeyondTheFileTakeNoMemory) {
   std::string bad = body_content();
   const auto put = [&](std::string from, const std::string& to) {
@@ -199,7 +200,7 @@ TEST_F(HostileFiles, ManyRegionsComeBack) {
   EXPECT_EQ(read_body(folder_ / "many.h5").regions, cloud.regions);
 }
 
-/// Names that are no steps of a path, behind which a member would hide or lead elsewhere.
+/// Names that are not path components, which would hide a member or lead elsewhere.
 TEST_F(HostileFiles, MembersHaveProperNames) {
   const std::string good = body_content();
   const std::size_t at = good.find("mouth");
@@ -215,7 +216,7 @@ TEST_F(HostileFiles, MembersHaveProperNames) {
   }
 }
 
-/// What HDF5 can store and phyxel never does.
+/// Features of HDF5 that phyxel does not use.
 TEST_F(HostileFiles, OtherPartsOfHdf5AreRefused) {
   using Make = std::function<void(hid_t)>;
   const auto array = [](hid_t file, hid_t type, hid_t properties) {
@@ -279,8 +280,7 @@ TEST_F(HostileFiles, OtherPartsOfHdf5AreRefused) {
   }
 }
 
-/// Numbers are those that HDF5 reads, in every type and across the conversions that readers ask
-/// for.
+/// Numbers are equal to those that HDF5 reads, in each type and each conversion.
 TEST_F(HostileFiles, NumbersAreThoseOfHdf5) {
   Hdf5Writer out;
   const std::vector<double> reals{0, -1.5, 1e-300, 1e300, std::nextafter(1.0, 2.0), 0.1};

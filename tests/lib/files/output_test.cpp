@@ -1,6 +1,5 @@
-/// Files that are written and read by name: nothing but a regular file is replaced, no link is
-/// followed that somebody planted, nothing is waited for, and what must last is on the disk before
-/// it counts.
+/// Files written and read by name: only regular files are replaced, planted links are not followed,
+/// no call blocks, and durable data are flushed to the disk before they are renamed.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -22,7 +21,7 @@
 
 namespace {
 
-/// Calls that change what is on the disk, in their order.
+/// System calls that change the disk, in their order.
 std::vector<std::string>& disk_calls() {
   static std::vector<std::string> calls;
   return calls;
@@ -30,7 +29,7 @@ std::vector<std::string>& disk_calls() {
 
 }  // namespace
 
-// In place of the C library's, for all of this program.
+// Replacements of the C library's functions in this program.
 extern "C" int fsync(int fd) {
   struct stat status {};
   fstat(fd, &status);
@@ -73,7 +72,7 @@ TEST_F(Outputs, AreOnTheDiskBeforeTheirNameIs) {
   EXPECT_THAT(disk_calls(), ElementsAre("sync file", "rename", "sync folder"));
 }
 
-/// Given up on the way, by an exception that has nothing to do with the file.
+/// A file that is abandoned because of an unrelated exception.
 TEST_F(Outputs, GivenUpLeaveTheOldFileAndNothingElse) {
   const auto open_files = [] {
     return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator());

@@ -1,4 +1,4 @@
-/// Trajectories: frames read back by our own reader and by VTK and h5py, restarts, nothing lost.
+/// Trajectories: frames are read by phyxel, VTK and h5py; restarts; nothing is lost.
 #include "phyxel/recorder.hpp"
 
 #include <gmock/gmock.h>
@@ -64,7 +64,7 @@ TEST_F(Recording, FramesComeBack) {
   }
 }
 
-/// Counts what is asked for.
+/// A source that counts requests.
 class Counted : public FrameSource {
  public:
   using FrameSource::FrameSource;
@@ -95,7 +95,7 @@ TEST_F(Recording, FramesAreTheSameBytesWhateverTheLengthOfStretches) {
   }
 }
 
-/// Stands for ranks that write all arrays by themselves: through HDF5, which changes the layout.
+/// Imitates ranks that write arrays collectively through HDF5, which changes the layout.
 class WrittenBeside : public FrameSource {
  public:
   using FrameSource::FrameSource;
@@ -132,7 +132,7 @@ TEST_F(Recording, FramesThatOthersWriteAreTheSameBytes) {
   EXPECT_EQ(read.point[4].x, model_.position[4].x + 1.5);
 }
 
-/// Files of this process may not grow beyond so many bytes: a disk that is full.
+/// Limits the size of files of this process, as a full disk does.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) : handler_(signal(SIGXFSZ, SIG_IGN)) {
@@ -273,8 +273,7 @@ TEST_F(Recording, SeriesThatAreNoneAreRefused) {
   EXPECT_THROW(read_frame(write("x.hdf", "no frame")), InputError);
 }
 
-/// The independent readers: VTK's own reader and h5py, through Debian's Python, or another one that
-/// the environment names.
+/// Independent readers: VTK and h5py, in Debian's Python or the one that the environment names.
 int read_back(const fs::path& folder, const std::string& what, double far) {
   const char* named = std::getenv("PHYXEL_PYTHON");
   const std::string python = named ? named : "/usr/bin/python3";
@@ -296,8 +295,8 @@ TEST_F(Recording, VtkAndH5pyReadTheSameNumbers) {
   }
 }
 
-/// Ten thousand kilometres from the origin floats are a metre apart: a run in float writes doubles
-/// there, which VTK and h5py read too, and the single file keeps them.
+/// Floats have a spacing of a metre ten thousand kilometres from the origin: a run in float writes
+/// doubles there, which VTK and h5py read, and the single file keeps them.
 TEST_F(Recording, FramesFarFromTheOriginTellAllPointsApart) {
   constexpr double far = 1e7;
   for (Vec3d& x : model_.position) x.x += far;

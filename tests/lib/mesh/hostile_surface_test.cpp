@@ -1,4 +1,4 @@
-/// Surfaces with a large box and little inside: the search for their inside ends after counted
+/// Surfaces with a large box and a small volume: the search for their inside ends after limited
 /// work.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// A small ball, each of whose triangles is drawn out to a spike.
+/// A small ball with a spike on each triangle.
 Surface star(double core, int levels) {
   Surface s = test::sphere({0, 0, 0}, core, levels);
   std::vector<Triangle> spikes;
@@ -64,7 +64,7 @@ Surface wavy_sheet(Index n, double thickness) {
   return s;
 }
 
-/// The same surface, turned so that no edge of a box lies along an axis.
+/// The surface rotated so that no edge of a box is parallel to an axis.
 Surface askew(Surface s) {
   const Mat3d turn = rotation_by({0.7, 0.4, 1.1});
   for (Vec3d& p : s.position) p = turn * p;
@@ -93,7 +93,7 @@ struct Found {
   std::string refusal;
 };
 
-/// What the search does for 5,000 phyxels with 4 samples each.
+/// The result of a search for 5,000 phyxels with 4 samples each.
 Found fill(const Surface& surface) {
   FillingRequest request{.phyxels = 5000, .samples = 20'000, .triangles = surface.triangle.size()};
   const bool closed = connect(surface).closed;
@@ -109,9 +109,9 @@ Found fill(const Surface& surface) {
   return found;
 }
 
-// The volume tells before the first sweep that the samples are too many for the surface; what is
-// then tried, in case the volume cancels, is a hundredth of the limit. A sweep ends at the limit,
-// but for the first few hundred cells, which may each have to look at all triangles.
+// The volume shows before the first sweep that the surface would need too many samples; a hundredth
+// of the limit is then tried, in case parts of the volume cancel. A sweep ends at the limit, except
+// for the first few hundred cells, each of which may visit all triangles.
 TEST(HostileSurface, WithTooLittleInsideIsRefusedAfterLittleWork) {
   const struct {
     const char* name;
@@ -140,7 +140,7 @@ TEST(HostileSurface, WithTooLittleInsideIsRefusedAfterLittleWork) {
   }
 }
 
-// Without the test of edges (`may_touch`) a needle askew takes a hundred times the work.
+// Without the test of edges (`may_touch`), an oblique needle takes a hundred times the work.
 TEST(HostileSurface, WithRoomInsideIsFilledWithinTheLimit) {
   const struct {
     const char* name;
@@ -177,9 +177,9 @@ TEST(HostileSurface, IsNamedByItsFigureInTheUsersUnits) {
   }
 }
 
-/// A sweep of a closed surface walks from cell to cell and skips cells that no triangle touches;
-/// one of an open surface asks for the winding number nearly everywhere. On a closed surface both
-/// find the same points, unless a triangle that touches a cell was thought to miss it.
+/// A sweep of a closed surface walks from cell to cell and skips cells without triangles; a sweep
+/// of an open surface evaluates the winding number nearly everywhere. On a closed surface both find
+/// the same points, unless a triangle was wrongly found to miss a cell.
 TEST(HostileSurface, HasTheSameInsideByEitherWay) {
   for (const Surface& surface : {askew(needle(0.02)), askew(plate(0.01)), star(0.4, 1),
                                  askew(star(0.3, 2)), askew(wavy_sheet(6, 0.05))}) {

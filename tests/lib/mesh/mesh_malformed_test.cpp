@@ -1,4 +1,4 @@
-/// Damaged mesh files: what is said of each, and where.
+/// Malformed mesh files and their messages.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ struct Bad {
   const char* what;
   MeshFormat format;
   std::string content;
-  const char* message;  ///< Part of it; every message starts with the file's name.
+  const char* message;  ///< Part of the message, which starts with the file's name.
 };
 
 std::vector<Bad> bad_files() {

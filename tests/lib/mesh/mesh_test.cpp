@@ -1,4 +1,4 @@
-/// Readers of surface meshes: what they make of good files, and of files that are none.
+/// Readers of surface meshes.
 #include "phyxel/mesh.hpp"
 
 #include <fmt/format.h>
@@ -81,7 +81,7 @@ TEST(Mesh, ObjTakesCarriageReturnsContinuedLinesColoursAndFacesFirst) {
   expect_unit_cube(obj(text));
 }
 
-/// To the last digit: a box in a scene may end where the mesh does.
+/// Coordinates are exact, since a box in a scene may end at the mesh's face.
 TEST(Mesh, ObjCoordinatesAreReadExactly) {
   const Surface s = obj("v 0.3 -0.7 0.1\nv 1.1 2.2e-3 -4.7e5\nv 0.88 1e-7 3.3\nf 1 2 3\n");
   EXPECT_EQ(s.position,
@@ -117,8 +117,7 @@ TEST(Mesh, NonConvexPolygonsAreCutInside) {
   EXPECT_DOUBLE_EQ(area, 2 * 3 + 8 * 2);  // triangles outside the notch would add to it
 }
 
-/// A polygon with a notch keeps its outline and its side whichever way it faces: along each axis,
-/// and back, it is seen from its own front.
+/// A polygon with a notch keeps its outline and its orientation in each direction of its normal.
 TEST(Mesh, PolygonsThatFaceAnyWayKeepTheirSide) {
   // The L of area 3, in the plane of the two axes after `axis`, counter-clockwise seen against it.
   const double corners[][2] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};

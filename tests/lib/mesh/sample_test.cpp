@@ -1,4 +1,4 @@
-/// Filling surfaces with phyxels: exact counts, inside, spread, volumes, refusals.
+/// Filling surfaces with phyxels: counts, positions, spacing, volumes, refusals.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ Vec3d random_point(std::mt19937_64& engine, double low, double high) {
   return {x, y, z};
 }
 
-/// Distance from each point to the nearest other one, by looking at all pairs.
+/// Distance from each point to the nearest other one, by all pairs.
 std::vector<double> nearest_distances(const std::vector<Vec3d>& points) {
   std::vector<double> nearest(points.size(), HUGE_VAL);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -283,7 +283,7 @@ TEST(Sample, UnusedVerticesAreNoSurfels) {
               ::testing::ElementsAre(HasSubstr("1 vertices that no triangle uses")));
 }
 
-/// Distance inside the unit cube's nearest face; 0 on it.
+/// Distance to the nearest face of the unit cube, from inside.
 double depth_in_cube(Vec3d p) { return std::min({p.x, p.y, p.z, 1 - p.x, 1 - p.y, 1 - p.z}); }
 
 TEST(SampleOnSurface, CornersEdgesFacesAndInsideGetTheirShares) {
@@ -322,8 +322,8 @@ TEST(SampleOnSurface, CornersEdgesFacesAndInsideGetTheirShares) {
   EXPECT_GT(report.smallest_gap, 0.5 * report.spacing);
 }
 
-/// Two ends of an edge, and a vertex in its middle that only one side knows: the triangle between
-/// has no area.
+/// An edge with a vertex in its middle that only one of its triangles uses; the triangle in between
+/// is degenerate.
 TEST(SampleOnSurface, EdgesAreFoundBesideTrianglesWithoutArea) {
   Surface cube = test::unit_cube();
   cube.position.push_back({0.5, 0, 0});

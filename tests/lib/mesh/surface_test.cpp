@@ -1,4 +1,4 @@
-/// Surfaces: how often they wind around a point, and what is wrong with them.
+/// Winding numbers and defects of surfaces.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -77,9 +77,9 @@ TEST(WindingNumber, FastSummationAgreesWithTheDirectSum) {
   }
 }
 
-/// A far group counts by its area, which falls as 1/r^2, and its moment, as 1/r^3. What is left out
-/// then falls as 1/r^4: from twice as far the error is a sixteenth. Without the moment it would be
-/// an eighth.
+/// The expansion of a distant group has its area, a term of 1/r^2, and its moment, of 1/r^3. The
+/// error is of 1/r^4: at twice the distance it is a sixteenth; without the moment it would be an
+/// eighth.
 TEST(WindingNumber, FarGroupsKeepTheirSecondOrder) {
   // An open half of a ball, which has a moment about its centre; all of it is one far group.
   Surface bowl = test::sphere({0, 0, 0}, 1, 3);

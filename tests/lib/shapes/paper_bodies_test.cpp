@@ -1,4 +1,4 @@
-/// The paper's three bodies: counts, surfaces, and phyxels that can carry the physics.
+/// The paper's three bodies: counts, surfaces, and the quality of their phyxels.
 #include "shapes/paper_bodies.hpp"
 
 #include <gtest/gtest.h>
@@ -165,14 +165,14 @@ TEST_P(PaperBodies, AreTheSameEveryTimeOnAnyNumberOfThreads) {
   EXPECT_EQ(again.surface.triangle, cloud_.surface.triangle);
 }
 
-/// Where a line of sight along -x, from in front of the face, meets the body [m].
+/// The x coordinate at which a ray along -x from in front of the face meets the body [m].
 double face_at(const ImplicitBody& form, double y, double z) {
   double x = 1;
   while (x > -1 && form.value({x, y, z}) > 0) x -= 1e-4;
   return x;
 }
 
-/// Half the width of the body at a height, where it is widest [m].
+/// Half the largest width of the body at a height [m].
 double half_width_at(const ImplicitBody& form, double z, double from_x) {
   double widest = 0;
   for (double x = from_x; x < 0.5; x += 0.01) {
@@ -183,7 +183,7 @@ double half_width_at(const ImplicitBody& form, double z, double from_x) {
   return widest;
 }
 
-/// What everybody knows the head by, seen from the front.
+/// The features of the head, seen from the front.
 TEST(AlienHead, HasALargeCraniumASmallChinAndBulgingEyesThatSlant) {
   const ImplicitBody& form = find_paper_body("alien_head")->form;
   const double cranium = half_width_at(form, 0.2, -0.5), chin = half_width_at(form, -0.25, 0.1);

@@ -166,7 +166,7 @@ TEST(Shapes, NeighboursInSpaceAreNeighboursInMemory) {
   }
 }
 
-/// The region must be exactly the phyxels whose coordinate lies in the outermost cell.
+/// Checks that a region has exactly the phyxels whose coordinate is in the outermost cell.
 void expect_layer(const Cloud& cloud, const std::string& name, double Vec3d::*axis, double from,
                   double to) {
   std::vector<Index> expected;
@@ -256,7 +256,7 @@ TEST(Shapes, TheSpacingGivesTheCountAskedFor) {
   EXPECT_NEAR(spacing_for(cube, 1), 1, rounding);
 }
 
-/// Nodes fill the box to its faces, and share its volume out.
+/// Nodes fill the box up to its faces, and their volumes sum to that of the box.
 TEST(Shapes, NodesLieOnFacesEdgesAndCorners) {
   ShapeRequest request = beam();
   request.size = {2, 0.5, 0.25};

@@ -19,12 +19,12 @@ class Phyxel(CMakePackage, CudaPackage):
 
     license("BSD-3-Clause")
 
-    # The clone that this recipe lies in.
+    # The clone that contains this recipe.
     git = "file://" + os.path.abspath(os.path.join(os.path.dirname(__file__), *[os.pardir] * 6))
     version("main", branch="main")
 
     variant("mpi", default=True, description="Bodies shared by MPI ranks")
-    variant("parallel_hdf5", default=False, description="All ranks write long arrays together")
+    variant("parallel_hdf5", default=False, description="Ranks write long arrays collectively")
     variant("shared", default=True, description="Shared libraries")
 
     depends_on("c", type="build")
@@ -45,9 +45,9 @@ class Phyxel(CMakePackage, CudaPackage):
     depends_on("cuda@12:", when="+cuda")
     depends_on("gnuplot", type="run")  # the figures of phyxel paper
 
-    conflicts("~mpi", when="+parallel_hdf5", msg="Parallel HDF5 is for ranks: allowed with +mpi")
-    conflicts("cuda_arch=none", when="+cuda", msg="Which GPUs? Allowed is e.g. cuda_arch=90")
-    conflicts("%gcc@:10", msg="phyxel is written in C++20: allowed is GCC 11 or later")
+    conflicts("~mpi", when="+parallel_hdf5", msg="Parallel HDF5 needs MPI; allowed: +mpi")
+    conflicts("cuda_arch=none", when="+cuda", msg="No GPU architecture; allowed: e.g. cuda_arch=90")
+    conflicts("%gcc@:10", msg="phyxel is written in C++20; allowed: GCC 11 or later")
 
     def cmake_args(self):
         args = [

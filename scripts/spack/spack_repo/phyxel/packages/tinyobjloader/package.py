@@ -1,4 +1,4 @@
-"""Spack's own recipe ends at 1.0, whose callbacks cannot tell of warnings."""
+"""Recipe for tinyobjloader: Spack's own recipe ends at version 1.0, whose callbacks cannot report warnings."""
 
 from spack_repo.builtin.packages.tinyobjloader.package import Tinyobjloader as Builtin
 
