@@ -85,6 +85,9 @@ run_sanitizers() {
   check cuda_backend_test '*Forces*/AdaptiveEverything:*Forces*/ClosedBesideAdaptive:*Energies*/UniformEverything:*Surf*'
   # Blocks that wait for each other's packets take hours if each access is recorded for races.
   check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
+  # Laws that remember: by tiles, and in residence.
+  check cuda_backend_test '*Forces*/ClosedPlasticViscous'
+  check history_cuda_test 'History.EvaluationsNeverCommit' 'memcheck initcheck synccheck'
   check setup_test '*Overlapping*'
   check physics_device_test '*'
   check_ranks share_test 'Bodies/Shares.MayBeLookedAtAtAnyTime/ApartGpuDirect' memcheck
