@@ -14,10 +14,10 @@
 #include "device.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/history.hpp"
 #include "phyxel/law_table.hpp"
 #include "setup/device_tiling.hpp"
 #include "setup/primitives.cuh"
+#include "solver/device_history.cuh"
 #include "solver/diagnose.cuh"
 #include "solver/host_arrays.cuh"
 #include "solver/hourglass.hpp"
@@ -43,7 +43,10 @@ class DeviceModel {
 
   /// @throws DeviceError; InputError if a tile does not fit what one block may have
   DeviceModel(const Model& model, int device)
-      : model_(model), device_(use_cuda_device(device)), tiling_(make_device_tiling(model)) {
+      : model_(model),
+        device_(use_cuda_device(device)),
+        tiling_(make_device_tiling(model)),
+        history_(model, tiling_) {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
     own_supports_ = !one_support_each();
@@ -74,7 +77,7 @@ class DeviceModel {
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
   /// True if a law remembers anything, here or elsewhere.
-  bool has_history() const { return !history_columns_.empty(); }
+  bool has_history() const { return history_.columns() > 0; }
   bool closed() const { return closed_; }  ///< True if a body's gradients are, here or elsewhere.
   int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
 
@@ -161,7 +164,7 @@ class DeviceModel {
 
   /// @throws InputError for a history of other laws
   void put(const State& state) {
-    put_history(state);
+    history_.put(state);
     const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
                              v = sent(state.velocity, "velocities of " + subject_);
     launch_places("put_state", put_state<Real, StateReal>, fields_, tiling_.phyxel_at.data(),
@@ -184,7 +187,7 @@ class DeviceModel {
                   u.data(), v.data());
     state.displacement = fetched(u);
     state.velocity = fetched(v);
-    take_history(state);
+    history_.take(state);
   }
 
   // --- launches ---------------------------------------------------------------------------------
@@ -272,7 +275,7 @@ class DeviceModel {
     if (load_.size()) list.push_back({"loads", load_.bytes()});
     if (external_.size()) list.push_back({"external forces", external_.bytes()});
     if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
-    if (history_.size()) list.push_back({"history", history_.bytes()});
+    if (history_.bytes()) list.push_back({"history", history_.bytes()});
     if (closed()) {
       list.push_back(
           {"closing vectors and stresses", closing_.bytes() + closing_stresses_.bytes()});
@@ -348,7 +351,6 @@ class DeviceModel {
       closing_stresses_.clear();
       fields_.closing_stresses = ClosingStresses<Real>::in(closing_stresses_.data(), places());
     }
-    make_history();
     tiles_ = {tiling_.part.size(), "tiles" + of};
     materials_ = {tiling_.part.size(), "tiles" + of};
 
@@ -360,6 +362,7 @@ class DeviceModel {
     fields_.pull = pull_.data();
     fields_.closing = closing_.data();
     fields_.history = history_.data();
+    fields_.history_numbers = history_.rows();
     fields_.tiles = tiles_.data();
     fields_.gravity = to<StateReal>(model_.gravity);
     fields_.places = places();
@@ -370,52 +373,6 @@ class DeviceModel {
     put_all_constants();
     velocity_.clear();
     if constexpr (mixed) displacement_.clear();
-  }
-
-  /// Makes room for what laws remember: of each part as many rows as its law has numbers.
-  void make_history() {
-    history_columns_ = history_columns(model_);
-    if (history_columns_.empty()) return;
-    std::size_t rows = 0;
-    for (const Part& part : model_.parts) {
-      columns_of_part_.push_back(columns_of(part.material, history_columns_));
-      rows = std::max(rows, columns_of_part_.back().size());
-    }
-    history_ = {rows * places(), "history of " + subject_};
-    history_.clear();
-    fields_.history_numbers = static_cast<int>(rows);
-  }
-  /// Calls visit(phyxel, column, where it is in `history_`) for each number that a phyxel of this
-  /// rank remembers.
-  template <class Visit>
-  void for_each_history(Visit&& visit) const {
-    for (std::size_t p = 0; p < columns_of_part_.size(); ++p) {
-      const Part& part = model_.parts[p];
-      for (Index i = part.begin; i < part.owned_end(); ++i) {
-        const auto place = static_cast<std::size_t>(tiling_.place[i]);
-        for (std::size_t k = 0; k < columns_of_part_[p].size(); ++k) {
-          visit(i, columns_of_part_[p][k], k * places() + place);
-        }
-      }
-    }
-  }
-  void put_history(const State& state) {
-    const std::vector<const HistoryColumn*> history =
-        checked_history(state, history_columns_, size());
-    if (history_.size() == 0) return;
-    std::vector<Real> values(history_.size());
-    for_each_history([&](Index i, std::size_t column, std::size_t at) {
-      if (!history.empty()) values[at] = static_cast<Real>(history[column]->values[i]);
-    });
-    history_.upload(values.data());
-  }
-  void take_history(State& state) const {
-    state.history = virgin_history(model_);
-    if (history_.size() == 0) return;
-    const std::vector<Real> values = fetched(history_);
-    for_each_history([&](Index i, std::size_t column, std::size_t at) {
-      state.history[column].values[i] = values[at];
-    });
   }
 
   /// ĉ as rows [3, places], zero where a rank has none.
@@ -496,9 +453,8 @@ class DeviceModel {
   DeviceLists lists_{}, second_lists_{};
   DeviceArray<std::byte> points_, stresses_, closing_stresses_;
   DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, external_, pull_,
-      closing_, history_;
-  std::vector<std::string> history_columns_;
-  std::vector<std::vector<std::size_t>> columns_of_part_;  // of the numbers of its law
+      closing_;
+  DeviceHistory<Real> history_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
   DeviceArray<TileMaterial> materials_;  // with the damped flow over that lag [s]

@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "exact_sum.hpp"
-#include "phyxel/physics/verlet.hpp"
 #include "solver/kernels.cuh"
+#include "solver/phyxel_totals.hpp"
 #include "solver/totals.hpp"
 
 namespace phyxel::cuda {
@@ -21,25 +21,8 @@ struct TileMaterial {
   Vec3<double> origin;  ///< What positions are taken from [m].
 };
 
-/// Everything that adds up, in the order of `Totals::for_each_sum`.
-enum Sum : int {
-  kinetic_energy,
-  strain_energy,
-  volume_energy,
-  hourglass_energy,
-  plastic_work,
-  viscous_work,
-  gravity_energy,
-  load_energy,
-  force_scale,
-  torque_scale,
-  momentum,  // three components each
-  angular_momentum = momentum + 3,
-  internal_force = angular_momentum + 3,
-  internal_torque = internal_force + 3,
-  inverted = internal_torque + 3,  // last: a number of phyxels
-  sums
-};
+/// The sums of a tile: `Sums`, then the number of phyxels that are inside out.
+inline constexpr int inverted = Sums::count, sums = inverted + 1;
 
 inline constexpr Index no_phyxel = INT32_MAX;
 
@@ -86,12 +69,6 @@ __device__ inline void add_exactly(unsigned long long* words, double value) {
   });
 }
 
-template <class T>
-__device__ void put3(double* sum, Vec3<T> v) {
-  sum[0] = v.x;
-  sum[1] = v.y;
-  sum[2] = v.z;
-}
 inline constexpr int diagnose_threads = 128;
 
 /// @param force,gradient of the present displacements; with hourglass control, row 9 of `gradient`
@@ -114,64 +91,37 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
     t.fastest = t.first_bad = no_phyxel;
     if (inverse_mass != Real(0)) {  // somebody is there
       const TileMaterial m = materials[blockIdx.x];
-      const bool held = inverse_mass < Real(0);
-      const double mass = 1 / fabs(static_cast<double>(inverse_mass));
+      const auto column = [&](const auto* array) {
+        return array ? to<double>(column3(array, f.places, place)) : Vec3<double>{};
+      };
       const auto point = f.points.get(place);
-      const Vec3<double> u = std::is_same_v<Real, StateReal>
-                                 ? to<double>(point.u)
-                                 : to<double>(column3(f.displacement, f.places, place));
-      const Vec3<double> x = m.origin + to<double>(point.x) + u;
-      const Vec3<double> internal = to<double>(column3(force, f.places, place));
-      const Vec3<double> load =
-          f.load ? to<double>(column3(f.load, f.places, place)) : Vec3<double>{};
-      const Vec3<double> half_step_velocity = to<double>(column3(f.velocity, f.places, place));
-      const Vec3<double> gravity = to<double>(f.gravity);
-      Mat3<double> grad_u;
-      double trace_of_all = 0;
-      for (int e = 0; e < 9; ++e) {
-        grad_u(e / 3, e % 3) = gradient[e * f.places + place];
-        trace_of_all += grad_u(e / 3, e % 3);
-      }
-      const double finite = trace_of_all + u.x + u.y + u.z + internal.x + internal.y + internal.z +
-                            half_step_velocity.x + half_step_velocity.y + half_step_velocity.z;
-      if (!isfinite(finite)) t.first_bad = number_at[place];
-
-      const Vec3<double> acceleration = (1 / mass) * (internal + load) + gravity;
-      const Vec3<double> change =
-          m.flow.gain * acceleration - (1 - m.flow.keep) * half_step_velocity;
-      const int moves = held ? 7 : moved ? moved[place] : 0;
-      Vec3<double> v = half_step_velocity;
-      if (!(moves & 1)) v.x += change.x;
-      if (!(moves & 2)) v.y += change.y;
-      if (!(moves & 4)) v.z += change.z;
-      const Vec3<double> p = mass * v;
-      t.sum[kinetic_energy] = 0.5 * dot(p, v);
-      put3(t.sum + momentum, p);
-      put3(t.sum + angular_momentum, cross(x, p));
-      t.sum[gravity_energy] = -mass * dot(gravity, u);
-      const Vec3<double> external =
-          f.external ? to<double>(column3(f.external, f.places, place)) : Vec3<double>{};
-      t.sum[load_energy] = -dot(load - external, u);
-      const double volume = f.moment_constants[6 * f.places + place];
-      const PointResponse<double> response = response_after_step<double>(
-          m.law_index, m.law, grad_u,
-          [&](int k) { return static_cast<double>(f.history[k * f.places + place]); },
-          history_interval);
-      t.sum[strain_energy] = volume * response.strain_energy;
-      t.sum[volume_energy] = volume * response.volume_energy;
-      t.sum[plastic_work] = volume * response.plastic_work;
-      t.sum[viscous_work] = volume * response.viscous_work;
-      if (m.hourglass > 0) {
-        t.sum[hourglass_energy] =
-            phyxel::hourglass_energy(m.hourglass, gradient[9 * f.places + place]);
-      }
-      t.sum[inverted] = volume_change(grad_u) <= -1 ? 1 : 0;
-      put3(t.sum + internal_force, internal);
-      put3(t.sum + internal_torque, cross(x, internal));
-      t.sum[force_scale] = sqrt(dot(internal, internal));
-      t.sum[torque_scale] = sqrt(dot(x, x)) * t.sum[force_scale];
-      t.largest_displacement = fmax(sqrt(dot(u, u)), 0.0);  // not NaN
-      t.largest_speed = fmax(sqrt(dot(v, v)), 0.0);
+      PhyxelState p{};
+      p.mass = 1 / fabs(static_cast<double>(inverse_mass));
+      p.volume = f.moment_constants[6 * f.places + place];
+      p.displacement =
+          std::is_same_v<Real, StateReal> ? to<double>(point.u) : column(f.displacement);
+      p.position = m.origin + to<double>(point.x) + p.displacement;
+      p.velocity = column(f.velocity);
+      p.flow = m.flow;
+      const int moves = inverse_mass < Real(0) ? 7 : moved ? moved[place] : 0;
+      p.free = {moves & 1 ? 0.0 : 1.0, moves & 2 ? 0.0 : 1.0, moves & 4 ? 0.0 : 1.0};
+      p.internal = column(force);
+      p.external = column(f.external);
+      p.load = column(f.load) - p.external;
+      p.gravity = to<double>(f.gravity);
+      for (int e = 0; e < 9; ++e) p.grad_u(e / 3, e % 3) = gradient[e * f.places + place];
+      p.hourglass = m.hourglass;
+      if (m.hourglass > 0) p.residual = gradient[9 * f.places + place];
+      const PhyxelTotals own = totals_of(
+          p, response_after_step<double>(
+                 m.law_index, m.law, p.grad_u,
+                 [&](int k) { return static_cast<double>(f.history[k * f.places + place]); },
+                 history_interval));
+      for (int k = 0; k < Sums::count; ++k) t.sum[k] = own.sum[k];
+      t.sum[inverted] = own.inverted ? 1 : 0;
+      if (!own.finite) t.first_bad = number_at[place];
+      t.largest_displacement = fmax(own.displacement, 0.0);  // not NaN
+      t.largest_speed = fmax(own.speed, 0.0);
       if (t.largest_speed > 0) t.fastest = number_at[place];
     }
     both = part == 0 ? t : combined(both, t);

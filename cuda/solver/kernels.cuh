@@ -194,12 +194,12 @@ struct Gradients {
 
 /// What is done with the part of the neighbours' displacements that a linear fit leaves. Closing
 /// serves bodies with hourglass control, too.
-enum class Beyond { nothing, hourglass, closing };
+enum class PairTerm { none, hourglass, closing };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
 /// the gradients are stored, and nothing else is written.
 /// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
-template <class Real, class StateReal, class Law, Beyond beyond, bool only_gradient,
+template <class Real, class StateReal, class Law, PairTerm term, bool only_gradient,
           class Halo = NoHalo>
 __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
@@ -230,7 +230,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
     const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
     add_gradient_term(sum, u, w * x);
-    if constexpr (beyond != Beyond::nothing) add_pull(pull, u, w);
+    if constexpr (term != PairTerm::none) add_pull(pull, u, w);
   });
 
   const Real* c = f.moment_constants + place;
@@ -239,7 +239,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
   const Mat3<Real> fit = displacement_gradient(sum, inverse_moment);
   Mat3<Real> grad_u = fit;
   Vec3<Real> moment_offset, closing;
-  if constexpr (beyond == Beyond::closing) {
+  if constexpr (term == PairTerm::closing) {
     moment_offset = column3(f.force_constants, f.places, place);
     closing = column3(f.closing, f.places, place);
     grad_u = closed_gradient(fit, pull, moment_offset, closing);
@@ -267,12 +267,12 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
                              f.history_interval);
     }
     Mat3<Real> q = pair_stress(c[6 * f.places], stress, inverse_moment);
-    if constexpr (beyond == Beyond::closing) {
+    if constexpr (term == PairTerm::closing) {
       const Vec3<Real> t = closing_stress(c[6 * f.places], stress, closing);
       q = closed_pair_stress(q, t, moment_offset, inverse_moment);
       f.closing_stresses.set(place, t);
     }
-    if (beyond == Beyond::hourglass || (beyond == Beyond::closing && f.pull)) {
+    if (term == PairTerm::hourglass || (term == PairTerm::closing && f.pull)) {
       q = with_hourglass(q, body.hourglass, fit);
       set_column3(f.pull, f.places, place, pull_force(body.hourglass, pull));
     }
@@ -282,10 +282,10 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
 }
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
-/// `force`, shape [3, places], and nothing else is written. With `more`, what the scene has of
-/// loads and pulls is added; with `closed` what closing stresses do.
-template <class Real, class StateReal, bool own_supports, bool damped, bool more, bool only_force,
-          class Halo = NoHalo, bool closed = false>
+/// `force`, shape [3, places], and nothing else is written. With `extra_forces`, what the scene has
+/// of loads and pulls is added; with `closed` what closing stresses do.
+template <class Real, class StateReal, bool own_supports, bool damped, bool extra_forces,
+          bool only_force, class Halo = NoHalo, bool closed = false>
 __global__ void __launch_bounds__(tile_size,
                                   closed ? pass_2_blocks_closed<Real> : pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
@@ -344,7 +344,7 @@ __global__ void __launch_bounds__(tile_size,
 
   const Real inverse_mass = f.force_constants[3 * f.places + place];
   if (inverse_mass > Real(0)) {
-    if constexpr (more) {
+    if constexpr (extra_forces) {
       if (f.pull) sum += column3(f.pull, f.places, place);
       if (f.load) sum += column3(f.load, f.places, place);
     }

@@ -125,8 +125,8 @@ class Passes {
     receive(Sent::displacements);
     using Any = StVenantKirchhoff<Real>;  // gradients know no law
     launch_pass_1<NoHalo>(m_.fields(),
-                          {m_.closed() ? pass_1<Real, StateReal, Any, Beyond::closing, true>
-                                       : pass_1<Real, StateReal, Any, Beyond::nothing, true>,
+                          {m_.closed() ? pass_1<Real, StateReal, Any, PairTerm::closing, true>
+                                       : pass_1<Real, StateReal, Any, PairTerm::none, true>,
                            0, tiles},
                           gradients, {});
   }
@@ -198,23 +198,23 @@ class Passes {
   template <class Halo>
   Pass1<Halo> pass_1_of(const Material& m) const {
     if constexpr (std::is_same_v<Halo, FusedClosed1>) {
-      return pass_1_of<Beyond::closing, Halo>(m);
+      return pass_1_of<PairTerm::closing, Halo>(m);
     } else {
       if constexpr (std::is_same_v<Halo, NoHalo>) {
-        if (m_.closed()) return pass_1_of<Beyond::closing, Halo>(m);
+        if (m_.closed()) return pass_1_of<PairTerm::closing, Halo>(m);
       }
-      return m.hourglass > 0 ? pass_1_of<Beyond::hourglass, Halo>(m)
-                             : pass_1_of<Beyond::nothing, Halo>(m);
+      return m.hourglass > 0 ? pass_1_of<PairTerm::hourglass, Halo>(m)
+                             : pass_1_of<PairTerm::none, Halo>(m);
     }
   }
-  template <Beyond beyond, class Halo>
+  template <PairTerm term, class Halo>
   static Pass1<Halo> pass_1_of(const Material& m) {
-    if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, beyond, false, Halo>;
+    if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, term, false, Halo>;
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using WithVolume = SolidLaw<Law, Real>;
       return m.volume_stiffness > 0
-                 ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, beyond, false, Halo>)
-                 : cuda::pass_1<Real, StateReal, Law, beyond, false, Halo>;
+                 ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, term, false, Halo>)
+                 : cuda::pass_1<Real, StateReal, Law, term, false, Halo>;
     });
   }
   /// Pass 1 by the linear law that a material has at rest.
@@ -222,11 +222,11 @@ class Passes {
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using Linear = decltype(std::declval<Law>().at_rest(Real()));
       if (m_.closed()) {
-        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, Beyond::closing, false>);
+        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, PairTerm::closing, false>);
       }
       return m_.fields().pull
-                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, Beyond::hourglass, false>)
-                 : cuda::pass_1<Real, StateReal, Linear, Beyond::nothing, false>;
+                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, PairTerm::hourglass, false>)
+                 : cuda::pass_1<Real, StateReal, Linear, PairTerm::none, false>;
     });
   }
   template <bool own_supports, class Halo>
@@ -236,13 +236,13 @@ class Passes {
                  ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo, true>
                  : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo, true>;
     }
-    const bool more = m_.fields().load || m_.fields().pull;
+    const bool extra_forces = m_.fields().load || m_.fields().pull;
     if (m.damping > 0) {
-      return more ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo>
-                  : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Halo>;
+      return extra_forces ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo>
+                          : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Halo>;
     }
-    return more ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo>
-                : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Halo>;
+    return extra_forces ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo>
+                        : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Halo>;
   }
 
   template <bool closed>

@@ -21,12 +21,6 @@
 namespace phyxel {
 namespace {
 
-bool all_finite(const Mat3d& m) {
-  double sum = 0;
-  for (int e = 0; e < 9; ++e) sum += m(e / 3, e % 3);
-  return std::isfinite(sum);
-}
-
 /// sqrt(3/2 s:s) of the deviator of σ = P Fᵀ / det F.
 double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
   const Mat3d f = identity<double>() + grad_u;
@@ -65,15 +59,10 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   std::vector<double> residual;
   if (has_hourglass_control(model)) backend.fit_residuals(residual);
 
-  // Total force with loads, for the velocity at t; the loads' potential on the way.
   Totals all;
   const std::span<const Vec3d> external = backend.external_forces();
-  std::vector<Vec3d> applied(external.begin(), external.end());
-  if (!model.loads.empty()) applied.resize(force.size());
-  for_each_load(model, now.time, [&](Index i, Vec3d load) {
-    applied[i] += load;
-    if (model.owns(i)) all.load_energy.add(-dot(load, state.displacement[i]));
-  });
+  std::vector<Vec3d> loads(model.loads.empty() ? 0 : force.size());
+  if (!loads.empty()) add_loads(model, now.time, loads);
   const std::vector<Vec3d> free = free_axes(model);
   const std::vector<std::string> columns = history_columns(model);
 
@@ -102,36 +91,26 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
       const DampedFlow half = damped_flow(m.damping, now.lag);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
-        const Vec3d u = state.displacement[i], x = model.position[i] + u;
-        if (!(is_finite(u) && is_finite(state.velocity[i]) && is_finite(force[i]) &&
-              all_finite(gradient[i]))) {
-          own.first_bad = std::min(own.first_bad, model.global_id(i));
-        }
-        Vec3d acceleration = (1 / model.mass[i]) * force[i] + model.gravity;
-        if (!applied.empty()) acceleration += (1 / model.mass[i]) * applied[i];
-        Vec3d change = half.gain * acceleration - (1 - half.keep) * state.velocity[i];
-        if (!free.empty()) change = by_components(free[i], change);
-        const Vec3d v = state.velocity[i] + change;
-        const Vec3d momentum = model.mass[i] * v;
-        own.kinetic_energy.add(0.5 * dot(momentum, v));
-        own.momentum.add(momentum);
-        own.angular_momentum.add(cross(x, momentum));
-        own.gravity_energy.add(-model.mass[i] * dot(model.gravity, u));
+        const Vec3d u = state.displacement[i], none{};
         const PointResponse<double> response = error.caught([&] {
           return law.after_step(gradient[i], history.of(i, numbers), state.history_interval);
         });
-        own.strain_energy.add(model.volume[i] * response.strain_energy);
-        own.volume_energy.add(model.volume[i] * response.volume_energy);
-        own.plastic_work.add(model.volume[i] * response.plastic_work);
-        own.viscous_work.add(model.volume[i] * response.viscous_work);
-        if (kappa > 0) own.hourglass_energy.add(hourglass_energy(kappa, residual[i]));
-        own.inverted += volume_change(gradient[i]) <= -1;
-        own.internal_force.add(force[i]);
-        own.internal_torque.add(cross(x, force[i]));
-        own.force_scale.add(norm(force[i]));
-        own.torque_scale.add(norm(x) * norm(force[i]));
-        own.largest_displacement = std::max(own.largest_displacement, norm(u));
-        own.look_at_speed(norm(v), model.global_id(i));
+        own.add(totals_of({.mass = model.mass[i],
+                           .volume = model.volume[i],
+                           .position = model.position[i] + u,
+                           .displacement = u,
+                           .velocity = state.velocity[i],
+                           .flow = half,
+                           .free = free.empty() ? Vec3d{1, 1, 1} : free[i],
+                           .internal = force[i],
+                           .load = loads.empty() ? none : loads[i],
+                           .external = external.empty() ? none : external[i],
+                           .gravity = model.gravity,
+                           .grad_u = gradient[i],
+                           .hourglass = kappa,
+                           .residual = kappa > 0 ? residual[i] : 0},
+                          response),
+                model.global_id(i));
       }
     }
 #pragma omp critical

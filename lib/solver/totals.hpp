@@ -9,6 +9,7 @@
 #include "exact_sum.hpp"
 #include "phyxel/communicator.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "solver/phyxel_totals.hpp"
 
 namespace phyxel {
 
@@ -38,6 +39,15 @@ struct Totals {
       largest_speed = speed;
       fastest = phyxel;
     }
+  }
+  /// Adds one phyxel. @param id its index in the whole model
+  void add(const PhyxelTotals& phyxel, Index id) {
+    const double* term = phyxel.sum;
+    for_each_sum([&](ExactSum& sum) { sum.add(*term++); });
+    inverted += phyxel.inverted;
+    if (!phyxel.finite) first_bad = std::min(first_bad, id);
+    largest_displacement = std::max(largest_displacement, phyxel.displacement);
+    look_at_speed(phyxel.speed, id);
   }
   void add(Totals other) {
     std::vector<ExactSum*> own;
