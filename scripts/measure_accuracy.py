@@ -5,7 +5,8 @@ lattice, jitter and discretisation, several at a time on separate cores, and joi
     scripts/measure_accuracy.py path/to/phyxel docs/results/accuracy.csv [--cores 4] [--case CASE]
 
 Times in the table are those of --cores cores, while other cores are busy. With --case, rows of that case are replaced in
-an existing table, and a fact names the program that measured them. bench/make_pages.py writes the page.
+an existing table or added to it, and a fact names the program that measured them, and the machine if it is another one.
+bench/make_pages.py writes the page.
 """
 import argparse
 import concurrent.futures
@@ -83,13 +84,18 @@ def main():
     if options.case:
         with open(options.table) as table:
             lines = table.read().splitlines()
-        program = next(fact for fact in facts if fact.startswith("# program: ")).split(": ", 1)[1]
+        def fact(name, of):
+            return next(line for line in of if line.startswith(f"# {name}: ")).split(": ", 1)[1]
+
+        program = fact("program", facts)
+        if fact("hardware", facts) != fact("hardware", lines):
+            program += " on " + fact("hardware", facts)
         said = f"# {options.case}: "
         facts = [line for line in lines if line.startswith("#") and not line.startswith(said)] + [said + program]
         old = [line for line in lines if not line.startswith("#")]
         if old[0] != head:
             raise SystemExit(f"{options.table}: has other columns")
-        place = next(k for k, row in enumerate(old) if row.startswith(options.case + ","))
+        place = next((k for k, row in enumerate(old) if row.startswith(options.case + ",")), len(old))
         others = [row for row in old[1:] if not row.startswith(options.case + ",")]
         rows = others[:place - 1] + rows + others[place - 1:]
     else:

@@ -246,8 +246,12 @@ def make(results, link):
     page = Page(link)
     cases = problems()["cases"]
     page.paragraph(HEAD)
-    # Cases that another program has measured since.
-    apart = "".join(f"; {c['name']} by {table.fact(c['name'])}" for c in cases if table.fact(c["name"]))
+    # Cases that another program, or another machine, has measured since.
+    since = {}
+    for case in cases:
+        if table.fact(case["name"]):
+            since.setdefault(table.fact(case["name"]), []).append(case["name"])
+    apart = "".join(f"; {', '.join(names)} by {program}" for program, names in since.items())
     page.paragraph(f"Measured by {measured_by(table)}{apart}.")
     summary(page, table)
     beside_lammps(page, results)

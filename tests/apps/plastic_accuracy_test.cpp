@@ -76,11 +76,11 @@ TEST(PlasticAccuracy, TaylorsBarIsAsLongAndWideAsPublished) {
   EXPECT_LT(std::abs(error_of(s, "energy")), 1e-3);
 }
 
-/// Seen: 0.11% at most, along the grain.
+/// Seen: 0.11% at most, along the grain; the issue asks for 0.5%.
 TEST(WoodAccuracy, BarsOfWoodHaveTheModulusOfTheirAngle) {
   const Solution s = solved("wood", {.hourglass = 0.1, .across = 4});
   ASSERT_EQ(s.found.size(), 4u);
-  for (const Quantity& q : s.found) EXPECT_LT(std::abs(q.error()), 0.005) << q.name;
+  for (const Quantity& q : s.found) EXPECT_LT(std::abs(q.error()), 0.002) << q.name;
 }
 
 /// Seen: 1.4e-4.

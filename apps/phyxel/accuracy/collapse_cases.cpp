@@ -17,8 +17,8 @@ constexpr double pi = std::numbers::pi;
 constexpr double inner_radius = 0.1, outer_radius = 0.2;               // [m]
 constexpr double young = 210e9, poisson = 0.3, yield_stress = 0.24e9;  // [Pa], -
 
-/// What is known of a round body of perfectly plastic material whose pressure grows: of thickness,
-/// direction and pressure all the same formulas, in two or three dimensions.
+/// Closed forms for a tube in plane strain, or a hollow sphere, of perfectly plastic material under
+/// growing inner pressure.
 struct Shape {
   bool sphere = false;
 
@@ -36,7 +36,7 @@ struct Shape {
                   : collapse(a, radius) +
                         yield_stress / std::sqrt(3.0) * (1 - std::pow(radius / b, 2));
   }
-  /// That radius [m], of a pressure.
+  /// The radius [m] up to which the wall is plastic at a pressure [Pa].
   double plastic_radius(double pressure) const {
     double low = inner_radius, high = outer_radius;
     for (int k = 0; k < 60; ++k) {
@@ -45,8 +45,8 @@ struct Shape {
     }
     return low;
   }
-  /// That radius [m], of the displacement of the outer surface [m], which what is still elastic
-  /// follows.
+  /// The same radius [m], from the outward displacement of the outer surface [m]: the wall beyond
+  /// the radius is elastic.
   double plastic_radius_moved(double outward) const {
     const double b = outer_radius;
     if (sphere) return std::cbrt(outward * young * b * b / ((1 - poisson) * yield_stress));
@@ -55,7 +55,8 @@ struct Shape {
   }
 };
 
-/// A wall whose inner surface is pushed outwards.
+/// A body whose inner surface is pushed outwards by prescribed displacements, since there are no
+/// loads by pressure.
 class Wall {
  public:
   Wall(const Discretisation& d, Shape shape) : shape_(shape) {
@@ -102,7 +103,8 @@ class Wall {
                  .setup_seconds = seconds_since(begin)};
   }
 
-  /// Pushes the inner surface to so far outwards [m], in equal parts.
+  /// Pushes the inner surface to a displacement [m], in `parts` equal increments, each brought to
+  /// rest by Newton's method.
   void push_to(double outward, int parts) {
     const auto start = Clock::now();
     const double from = pushed_;
@@ -119,7 +121,7 @@ class Wall {
     }
     solution_.seconds += seconds_since(start);
   }
-  /// Of the inner surface's reactions, over its present area [Pa].
+  /// Pressure [Pa]: the reactions of the inner surface over its present area.
   double pressure() {
     std::vector<Vec3d> force;
     backend_->internal_forces(force);
@@ -130,7 +132,7 @@ class Wall {
   }
   double inner_now() const { return inner_radius + pushed_; }        ///< [m]
   double outer_now() const { return outer_radius + outer_moved(); }  ///< [m]
-  /// Mean over the outer surface [m].
+  /// Mean outward displacement of the outer surface [m].
   double outer_moved() const {
     double sum = 0, volume = 0;
     for (const Index i : outer_) {
@@ -157,7 +159,8 @@ class Wall {
   Solution solution_;
 };
 
-/// @param partly,collapsed displacements of the inner surface [m]
+/// @param partly displacement of the inner surface [m] at which the wall is plastic half-way
+/// @param collapsed displacement [m] at which the wall is plastic throughout
 Solution burst(const Discretisation& d, Shape shape, double partly, double collapsed) {
   Wall wall(d, shape);
   wall.push_to(partly, 4);

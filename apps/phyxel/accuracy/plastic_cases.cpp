@@ -25,12 +25,11 @@ Scene metal(const Discretisation& d, double growth) {
   return scene;
 }
 
-/// A rod of one number under tension and compression: what J2 plasticity is in one dimension.
+/// J2 plasticity with linear hardening in one dimension: the closed form of uniaxial stress.
 struct Rod {
   double plastic_strain = 0, equivalent = 0;
 
-  /// Kirchhoff stress [Pa] at the end of a way to a logarithmic strain along which it only grows or
-  /// only falls.
+  /// Kirchhoff stress [Pa] after a monotonic change of the logarithmic strain.
   double stress_at(double strain) {
     const double trial = E * (strain - plastic_strain);
     const double excess = std::abs(trial) - yield_stress - hardening * equivalent;
@@ -118,7 +117,7 @@ class Sheared {
   }
 
   void step(std::int64_t count) { solver_->step(count); }
-  /// Turns the whole body at once, and ends a step there.
+  /// Turns the whole body at once, as a step would, and commits its history.
   void turn_by(const Mat3d& more) {
     std::vector<Vec3d> moved = solver_->state().displacement;
     for (Index i = 0; i < model_.size(); ++i) {
@@ -135,7 +134,7 @@ class Sheared {
     for (const double q : von_mises) most = std::max(most, std::abs(q / yield_stress - 1));
     return most;
   }
-  /// Inner forces [N] in the frame that is not turned.
+  /// Internal forces [N], turned back into the frame of the shear.
   std::vector<Vec3d> forces() {
     std::vector<Vec3d> force;
     backend_->internal_forces(force);
