@@ -1,4 +1,4 @@
-# What the library and the program need. CMAKE_PREFIX_PATH may point to any of it.
+# The dependencies of the library and the program. CMAKE_PREFIX_PATH may name their folders.
 #
 # Header-only use of toml++, xxHash and tinyobjloader keeps them out of what an installed
 # libphyxel needs: only fmt, HDF5 and OpenMP are left for cmake/phyxelConfig.cmake.in to find.

@@ -1,6 +1,5 @@
-# Target `docs`: the API reference, where Doxygen is installed, into docs/html of the build folder. As a
-# script (cmake -DDOXYGEN=... -DFOLDER=... -P PhyxelDocs.cmake) it runs Doxygen; the target and the
-# test both go through that.
+# Target `docs`: the API reference, if Doxygen is installed, in docs/html of the build folder. As a script
+# (cmake -DDOXYGEN=... -DFOLDER=... -P PhyxelDocs.cmake) this file runs Doxygen, for the target and the test.
 if(CMAKE_SCRIPT_MODE_FILE)
   cmake_minimum_required(VERSION 3.25)
   file(REMOVE_RECURSE ${FOLDER}/html)
@@ -9,8 +8,8 @@ if(CMAKE_SCRIPT_MODE_FILE)
     message(FATAL_ERROR "exit code ${code} of ${DOXYGEN}: ${said}")
   endif()
   file(STRINGS ${FOLDER}/warnings.txt warnings REGEX "[.]hpp:[0-9]+|/README.md:[0-9]+")
-  # Pages of docs/ are not asked. Every type and function says what it is; members whose name says
-  # all, operators of mathematics, and what the compiler makes by itself need no words.
+  # Warnings about pages of docs/ are ignored. Types and functions need a comment; members with a
+  # self-explanatory name, mathematical operators and implicit functions need none.
   list(FILTER warnings EXCLUDE REGEX "\\(variable\\)|Member operator|=default|&&\\) noexcept")
   if(warnings)
     list(JOIN warnings "\n" text)

@@ -1,10 +1,10 @@
-# Optional parts: AUTO uses what is found, ON insists, OFF ignores. One table tells which.
+# Optional parts: AUTO uses a part if it is found, ON requires it, OFF ignores it. A table lists the result.
 
 set(PHYXEL_HAVE_CUDA OFF)
 if(NOT PHYXEL_CUDA STREQUAL "OFF")
   include(CheckLanguage)
   if(NOT CMAKE_CUDA_COMPILER AND NOT DEFINED ENV{CUDACXX} AND EXISTS /usr/local/cuda/bin/nvcc)
-    set(ENV{CUDACXX} /usr/local/cuda/bin/nvcc)  # often installed, seldom on the PATH
+    set(ENV{CUDACXX} /usr/local/cuda/bin/nvcc)  # often installed without being on the PATH
   endif()
   check_language(CUDA)
   if(CMAKE_CUDA_COMPILER)
@@ -16,7 +16,7 @@ if(NOT PHYXEL_CUDA STREQUAL "OFF")
     endif()
     enable_language(CUDA)
     find_package(CUDAToolkit REQUIRED)
-    if(BUILD_SHARED_LIBS)  # one runtime a program, not one in each library
+    if(BUILD_SHARED_LIBS)  # one runtime for the program instead of one in each library
       set(CMAKE_CUDA_RUNTIME_LIBRARY Shared)
     endif()
     set(CMAKE_CUDA_STANDARD 20)
@@ -35,7 +35,7 @@ if(NOT PHYXEL_CUDA STREQUAL "OFF")
   endif()
 endif()
 
-# Lets a target's CUDA sources say for which architectures they were built.
+# Defines the CUDA architectures of a target for its messages.
 function(phyxel_name_architectures target)
   get_target_property(architectures ${target} CUDA_ARCHITECTURES)
   list(JOIN architectures ", " text)
@@ -43,8 +43,8 @@ function(phyxel_name_architectures target)
     $<$<COMPILE_LANGUAGE:CUDA>:PHYXEL_CUDA_ARCHITECTURES="${text}">)
 endfunction()
 
-# Debian installs the compiler wrapper without the headers (openmpi-bin without libopenmpi-dev), and
-# there FindMPI stops the configuration instead of finding nothing.
+# Checks the compiler wrapper: Debian may install it without the headers (openmpi-bin without
+# libopenmpi-dev), and FindMPI then stops the configuration.
 function(phyxel_mpi_wrapper_works result)
   set(${result} TRUE PARENT_SCOPE)
   find_program(PHYXEL_MPI_WRAPPER NAMES mpicxx mpic++)

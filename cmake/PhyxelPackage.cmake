@@ -1,6 +1,5 @@
-# cpack: an archive of all that is installed, which runs wherever it is unpacked, and two Debian
-# packages, phyxel (the program) and libphyxel-dev (headers and libraries). For other machines than
-# this one: `cmake --workflow --preset package`.
+# cpack: a relocatable archive of the installation, and two Debian packages, phyxel (the program) and libphyxel-dev (headers
+# and libraries). `cmake --workflow --preset package` makes them for other machines.
 set(CPACK_PACKAGE_VENDOR "the phyxel authors")
 set(CPACK_PACKAGE_CONTACT "the phyxel authors <maintainers@phyxel.invalid>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})

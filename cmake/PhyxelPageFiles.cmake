@@ -1,5 +1,5 @@
-# phyxel_page_files(target file...): what `phyxel report` puts into its pages, as `page_file(name)`
-# of report/page_files.hpp.
+# phyxel_page_files(target file...): embeds the files of `phyxel report`'s pages, for `page_file(name)` of
+# report/page_files.hpp.
 function(phyxel_page_files target)
   set(made ${CMAKE_CURRENT_BINARY_DIR}/page_files.cpp)
   set(text "#include \"report/page_files.hpp\"\n\nnamespace phyxel::app {\n\n")
@@ -8,7 +8,7 @@ function(phyxel_page_files target)
     set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
     file(READ ${file} content)
     get_filename_component(name ${file} NAME)
-    # In pieces: compilers need not take long literals. No file of ours has a line that is this end.
+    # In pieces, since compilers limit the length of literals. No file has a line equal to this delimiter.
     string(REPLACE "\n" "\n)phyxel\" R\"phyxel(" content "${content}")
     string(APPEND text "  if (name == \"${name}\") return R\"phyxel(${content})phyxel\";\n")
   endforeach()

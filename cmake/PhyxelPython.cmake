@@ -1,6 +1,5 @@
-# PHYXEL_HAVE_PYTHON: whether the Python module is built. AUTO: if an interpreter with its headers,
-# NumPy, pytest and pybind11 are there, and no sanitizers are wanted, which an interpreter would have to be
-# built with, too.
+# PHYXEL_HAVE_PYTHON: true if the Python module is built. AUTO builds it if an interpreter with its headers, NumPy, pytest
+# and pybind11 are found, and no sanitizers are used, with which the interpreter would have to be built, too.
 set(default_of_python OFF)
 if(PROJECT_IS_TOP_LEVEL)
   set(default_of_python AUTO)
@@ -11,7 +10,7 @@ if(PHYXEL_SANITIZE OR NOT (PHYXEL_PYTHON STREQUAL "AUTO" OR PHYXEL_PYTHON))
   return()
 endif()
 
-# Among several interpreters, the first that has NumPy and can test.
+# The first interpreter with NumPy and pytest.
 if(NOT DEFINED Python_EXECUTABLE)
   find_program(PHYXEL_PYTHON3 python3)
   mark_as_advanced(PHYXEL_PYTHON3)
@@ -34,7 +33,7 @@ if(Python_FOUND)
 endif()
 if(Python_FOUND AND pybind11_FOUND)
   set(PHYXEL_HAVE_PYTHON ON)
-  set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # of the libraries that go into the module
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)  # for the libraries that are linked into the module
 elseif(NOT PHYXEL_PYTHON STREQUAL "AUTO")
   message(FATAL_ERROR "PHYXEL_PYTHON=ON, but Python's headers or pybind11 were not found. On Debian: "
                       "apt-get install python3-dev pybind11-dev python3-numpy")

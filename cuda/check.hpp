@@ -1,4 +1,4 @@
-/// CUDA calls that fail become a DeviceError which says what was asked.
+/// Errors of CUDA calls as DeviceErrors that name the request.
 #pragma once
 
 #include <cuda_runtime_api.h>
@@ -9,40 +9,40 @@
 
 namespace phyxel {
 
-/// @throws DeviceError naming `call` and the device.
+/// Checks the result of a call. @throws DeviceError naming `call` and the device
 void check_cuda(cudaError_t error, const char* call);
 #define PHYXEL_CUDA(call) ::phyxel::check_cuda(call, #call)
 
-/// One kernel launch, for messages.
+/// Description of a kernel launch, for messages.
 struct Launch {
   const char* kernel = "no kernel yet";
   unsigned blocks = 0, threads = 0;
-  std::string subject;  ///< e.g. "body \"dino\", 575 phyxels".
+  std::string subject;  ///< Data of the launch, e.g. "body \"dino\", 575 phyxels".
   std::string describe() const;
 };
 
-/// To be called right after a launch: what CUDA refuses at once. With PHYXEL_CUDA_SYNC=1 in the
-/// environment it waits for the kernel, so that a fault inside names its own launch.
-/// @throws DeviceError
+/// Checks, right after a launch, that CUDA has accepted it. With PHYXEL_CUDA_SYNC=1 in the
+/// environment it waits for the kernel, so that a fault is attributed to its launch. @throws
+/// DeviceError
 void check_launch(const Launch& launch);
-/// Whether `check_launch` waits, which launches that are only recorded do not survive.
+/// True if `check_launch` waits, which is not possible while launches are recorded into a graph.
 bool launches_are_waited_for();
 
-/// Waits for everything launched. @throws DeviceError naming the last launch.
+/// Waits for all launches. @throws DeviceError naming the last launch
 void wait_for_device(const Launch& last);
 
 namespace detail {
-/// Never returns nullptr for `bytes` > 0. @throws DeviceError: how much was asked for what, how
-/// much there is.
+/// Allocates device memory; the result is not null for `bytes` > 0.
+/// @throws DeviceError naming the purpose, the requested and the free memory
 void* allocate(std::size_t bytes, const std::string& what);
 }  // namespace detail
 
-/// Device memory that is freed with its owner. Contents start undefined.
+/// An array in device memory with RAII, initially undefined.
 template <class T>
 class DeviceArray {
  public:
   DeviceArray() = default;
-  /// @param what for the message when memory runs out, e.g. "the force matrix (575 x 575)".
+  /// @param what name of the array for messages, e.g. "the force matrix (575 x 575)"
   DeviceArray(std::size_t count, const std::string& what)
       : data_(static_cast<T*>(detail::allocate(count * sizeof(T), what))), count_(count) {}
   DeviceArray(DeviceArray&& other) noexcept { swap(other); }
@@ -56,11 +56,11 @@ class DeviceArray {
   std::size_t size() const { return count_; }
   std::size_t bytes() const { return count_ * sizeof(T); }
 
-  /// `from` holds size() values.
+  /// Copies size() values from the host.
   void upload(const T* from) const {
     if (count_) PHYXEL_CUDA(cudaMemcpy(data_, from, bytes(), cudaMemcpyHostToDevice));
   }
-  /// All bits zero.
+  /// Sets all bytes to zero.
   void clear(cudaStream_t stream = nullptr) const {
     if (count_) PHYXEL_CUDA(cudaMemsetAsync(data_, 0, bytes(), stream));
   }

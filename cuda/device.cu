@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* sync_hint = "; PHYXEL_CUDA_SYNC=1 in the environment tells which one failed";
 
-/// Only asked whether the device could run it.
+/// A kernel for the query whether the device can run this program.
 __global__ void probe() {}
 
 std::string version_text(int version) {
@@ -44,7 +44,7 @@ std::string current_device() {
   return "GPU " + std::to_string(index) + ", " + p.name;
 }
 
-/// Nothing if there are devices, else why there are none.
+/// The reason why there are no devices; "" if there are some.
 std::string why_no_device(int* count) {
   const cudaError_t error = cudaGetDeviceCount(count);
   if (error == cudaSuccess && *count > 0) return "";
@@ -80,7 +80,7 @@ std::vector<Device> cuda_devices(std::string* why) {
 Device use_cuda_device(int index) {
   std::string why;
   const std::vector<Device> devices = cuda_devices(&why);
-  if (devices.empty()) throw DeviceError(why + "; allowed is the CPU");
+  if (devices.empty()) throw DeviceError(why + "; allowed: the CPU");
   if (index < 0 || index >= static_cast<int>(devices.size())) {
     throw DeviceError("CUDA device " + std::to_string(index) + ": there is none; allowed 0 to " +
                       std::to_string(devices.size() - 1));
@@ -89,7 +89,7 @@ Device use_cuda_device(int index) {
   cudaFuncAttributes attributes{};
   const cudaError_t error = cudaFuncGetAttributes(&attributes, probe);
   if (error == cudaErrorNoKernelImageForDevice || error == cudaErrorInvalidDeviceFunction) {
-    cudaGetLastError();  // an answer, not a failure to be met again later
+    cudaGetLastError();  // clears the error, which is the answer of the query
     throw DeviceError("this program holds no kernels for " + devices[index].describe() +
                       ", only for the architectures " PHYXEL_CUDA_ARCHITECTURES
                       ": build it with -DCMAKE_CUDA_ARCHITECTURES=" +
@@ -160,8 +160,8 @@ std::string Launch::describe() const {
 void check_launch(const Launch& launch) {
   cudaError_t error = cudaGetLastError();
   if (error != cudaSuccess) {
-    // A launch that was refused leaves the device usable; a fault inside an earlier kernel does
-    // not, and comes to light at some later call.
+    // A refused launch leaves the device usable; a fault in an earlier kernel does not, and shows
+    // at a later call.
     if (const cudaError_t earlier = cudaDeviceSynchronize()) {
       throw DeviceError(current_device() + ": a kernel launched before " + launch.describe() +
                         " failed: " + reason(earlier) + sync_hint);

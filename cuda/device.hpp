@@ -1,5 +1,5 @@
-/// The GPUs of this machine. No CUDA header is needed to include this, and a program built without
-/// CUDA has it too: it then finds none and says why.
+/// The GPUs of this machine. This header does not include CUDA's, and also exists in builds without
+/// CUDA, which find no GPU and give the reason.
 #pragma once
 
 #include <string>
@@ -9,29 +9,29 @@
 
 namespace phyxel {
 
-/// The devices found; if there are none, `why` says for what reason.
+/// The devices of this machine. @param why receives the reason if there are none; may be null
 std::vector<Device> cuda_devices(std::string* why = nullptr);
 
 /// Makes a device the current one of this thread.
 /// @throws DeviceError if this program was built without CUDA, if there is no such device, if the
-///   driver is too old, or if the program holds no kernels for the device's architecture.
+///   driver is too old, or if the program has no kernels for the device's architecture
 Device use_cuda_device(int index = 0);
 
-/// Whether kernels of one device may read and write another's memory.
+/// True if kernels of one device can access the memory of another.
 bool cuda_peers(int from, int to);
 
-/// Bytes free on the current device.
+/// Free memory of the current device [bytes].
 std::size_t cuda_free_memory();
 
-/// By how much the free memory of the current device falls while `bytes` are allocated.
-/// @throws DeviceError if they do not fit, naming `what`.
+/// Decrease of the current device's free memory by an allocation of `bytes` [bytes].
+/// @throws DeviceError naming `what` if the allocation fails
 std::size_t cuda_measured_allocation(std::size_t bytes, const std::string& what);
 
-/// Bytes per second that the current device copies between two arrays of 1 GiB (or a quarter of
-/// what is free), reads and writes both counted; best of five.
+/// Copy bandwidth of the current device between two arrays of 1 GiB, or of a quarter of the free
+/// memory [bytes/s], reads and writes counted; the best of five.
 double cuda_copy_bandwidth();
 
-/// Toolkit and driver, e.g. "CUDA 13.0, driver for 13.0"; "no CUDA" if built without.
+/// Versions of toolkit and driver, e.g. "CUDA 13.0, driver for 13.0"; "no CUDA" if built without.
 std::string cuda_version();
 
 }  // namespace phyxel

@@ -1,4 +1,4 @@
-/// What a program built without CUDA answers.
+/// Substitutes of a program built without CUDA.
 #include "device.hpp"
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
@@ -20,7 +20,7 @@ std::vector<Device> cuda_devices(std::string* why) {
 
 Device use_cuda_device(int) {
   throw DeviceError(without +
-                    ": allowed is the CPU, or a build with -DPHYXEL_CUDA=ON where nvcc is");
+                    "; allowed: the CPU, or a build with -DPHYXEL_CUDA=ON where nvcc is installed");
 }
 
 bool cuda_peers(int, int) { return false; }

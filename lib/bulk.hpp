@@ -1,5 +1,5 @@
-/// Arrays whose elements have no value until they are given one: nobody writes a billion zeros
-/// first, and the thread that fills a stretch is the first to touch its memory.
+/// Arrays with uninitialised elements: a billion zeros need not be written first, and the thread
+/// that fills a range is the first to touch its memory.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace phyxel {
 
 template <class T>
 struct Unfilled : std::allocator<T> {
-  // Objects of such types begin to live with their memory.
+  // The lifetime of objects of such types begins with their memory.
   static_assert(std::is_trivially_copy_constructible_v<T> && std::is_trivially_destructible_v<T>);
   Unfilled() = default;
   template <class Other>
@@ -29,11 +29,11 @@ struct Unfilled : std::allocator<T> {
   }
 };
 
-/// Bulk<T>(n) and resize(n) leave new elements to be written.
+/// A vector whose constructor and resize leave new elements uninitialised.
 template <class T>
 using Bulk = std::vector<T, Unfilled<T>>;
 
-/// Gives the memory back.
+/// Releases the memory of a vector.
 template <class Vector>
 void release(Vector& values) {
   Vector().swap(values);

@@ -5,8 +5,7 @@
 namespace phyxel {
 namespace {
 
-/// Insertions, deletions, substitutions and swaps of neighbouring letters that turn `a` into `b`
-/// (optimal string alignment).
+/// Edit distance with swaps of neighbouring letters (optimal string alignment).
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});

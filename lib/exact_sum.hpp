@@ -1,6 +1,6 @@
-/// Sums without rounding: the same bits in whatever order, and on however many threads and ranks,
-/// the terms are added. Source: U. Kulisch's long accumulator; limbs of 32 bits in 64-bit words, so
-/// that a billion terms are added before a carry has to move.
+/// Sums without rounding, whose bits do not depend on the order of the terms, nor on the number of
+/// threads and ranks. Source: U. Kulisch's long accumulator, with limbs of 32 bits in 64-bit words,
+/// so that a billion terms can be added before carries are propagated.
 #pragma once
 
 #include <array>
@@ -16,16 +16,16 @@
 namespace phyxel {
 
 class ExactSum {
-  // Bit 0 of limb 0 stands for 2^lowest; a double reaches from 2^-1074 to below 2^1024.
+  // Bit 0 of limb 0 is 2^lowest; doubles range from 2^-1074 to below 2^1024.
   static constexpr int lowest = -1074, limb_bits = 32;
-  static constexpr int limbs = (1024 - lowest) / limb_bits + 3;  // two more for the carry
+  static constexpr int limbs = (1024 - lowest) / limb_bits + 3;  // two more for carries
 
  public:
-  /// Words that ranks, and threads of a GPU, may add element by element: up to 2^30 terms before
-  /// a carry has to move.
+  /// Number of words that ranks and GPU threads may add element-wise: up to 2^30 terms before
+  /// carries are propagated.
   static constexpr int words = limbs + 1;
 
-  /// What a term adds to `words`, as calls add(word, number).
+  /// Calls add(word, number) for the contributions of a term to the words.
   template <class Add>
   PHYXEL_HD static void split(double value, Add&& add) {
     std::uint64_t bits;
@@ -37,9 +37,10 @@ class ExactSum {
       return;
     }
     if (exponent > 0) mantissa |= std::uint64_t{1} << 52;
-    const int at = exponent > 0 ? exponent - 1 : 0;  // of the lowest bit, above 2^-1074
+    const int at = exponent > 0 ? exponent - 1 : 0;  // position of the lowest bit above 2^-1074
     const int limb = at / limb_bits, shift = at % limb_bits;
-    const std::uint64_t low = mantissa << shift;  // 53 + 31 bits: the top ones are added apart
+    const std::uint64_t low = mantissa
+                              << shift;  // 53 + 31 bits; the upper bits are added separately
     const std::uint64_t top = shift ? mantissa >> (64 - shift) : 0;
     const std::int64_t sign = bits >> 63 ? -1 : 1;
     add(limb, sign * static_cast<std::int64_t>(low & 0xFFFF'FFFF));
@@ -59,7 +60,7 @@ class ExactSum {
     carry();
   }
 
-  /// For sums over ranks: after `ready`, the words of all ranks may be added.
+  /// Propagates carries and returns the words, which may then be added over ranks.
   std::span<std::int64_t> ready() {
     carry();
     return words_;
@@ -70,7 +71,7 @@ class ExactSum {
     if (words_[limbs] != 0) return std::numeric_limits<double>::quiet_NaN();
     ExactSum whole = *this;
     whole.carry();
-    // Carries leave limbs of [0, 2^32) below one that has the sign.
+    // After propagation, limbs are in [0, 2^32), except for the highest one, which has the sign.
     const bool negative = whole.words_[limbs - 1] < 0;
     if (negative) {
       for (int k = 0; k < limbs; ++k) whole.words_[k] = -whole.words_[k];
@@ -79,8 +80,8 @@ class ExactSum {
     int top = limbs - 1;
     while (top >= 0 && whole.words_[top] == 0) --top;
     if (top < 0) return 0;
-    // The leading 64 bits; whether any is set below them goes into the last, so that the one
-    // rounding to a double is right.
+    // The leading 64 bits, with a sticky last bit for the bits below, so that the conversion to
+    // double rounds correctly.
     const auto limb = [&](int k) {
       return k < 0 ? 0 : static_cast<std::uint64_t>(whole.words_[k]);
     };
@@ -100,17 +101,17 @@ class ExactSum {
 
   void carry() {
     for (int k = 0; k + 1 < limbs; ++k) {
-      words_[k + 1] += words_[k] >> limb_bits;  // rounds down, also of negative ones
+      words_[k + 1] += words_[k] >> limb_bits;  // rounds down, also for negative words
       words_[k] &= 0xFFFF'FFFF;
     }
     terms_ = 0;
   }
 
-  std::array<std::int64_t, words> words_{};  // the last: terms that were not finite
-  std::int64_t terms_ = 0;                   // since the last carry
+  std::array<std::int64_t, words> words_{};  // the last word counts terms that are not finite
+  std::int64_t terms_ = 0;  // number of terms since the last propagation of carries
 };
 
-/// Three of them.
+/// An exact sum of vectors.
 struct ExactVector {
   ExactSum x, y, z;
   void add(Vec3d v) {

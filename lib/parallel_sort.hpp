@@ -13,18 +13,18 @@
 
 namespace phyxel {
 
-/// Samples cut what there is into buckets, more of them than threads, each of which is sorted by
-/// itself. Not stable.
+/// Sample sort: samples divide the values into more buckets than threads, which are sorted
+/// separately. Not stable.
 template <class Vector, class Less = std::less<>>
 void parallel_sort(Vector& values, Less less = {}) {
   using T = typename Vector::value_type;
-  constexpr std::size_t least = 1 << 16, samples = 32;  // of a thread; of a bucket
+  constexpr std::size_t least = 1 << 16, samples = 32;  // values per thread; samples per bucket
   const std::size_t n = values.size();
   const std::size_t threads =
       std::min({static_cast<std::size_t>(omp_get_max_threads()), n / least, std::size_t{4096}});
   if (threads < 2) return std::sort(values.begin(), values.end(), less);
   const std::size_t buckets = 8 * threads;
-  Bulk<T> ends;  // samples, then the first of each bucket but the first
+  Bulk<T> ends;  // samples, then the first value of each bucket but the first
   for (std::size_t k = 0; k < buckets * samples; ++k) {
     ends.push_back(values[n * k / (buckets * samples)]);
   }
@@ -32,7 +32,7 @@ void parallel_sort(Vector& values, Less less = {}) {
   for (std::size_t b = 1; b < buckets; ++b) ends[b - 1] = ends[b * samples];
   ends.resize(buckets - 1);
 
-  // Threads take stretches; where each begins in a bucket.
+  // Each thread has a range of values, for which it counts the values of each bucket.
   const auto begin_of = [&](std::size_t stretch) { return n * stretch / threads; };
   Bulk<std::uint16_t> bucket(n);
   std::vector<std::vector<std::size_t>> at(threads, std::vector<std::size_t>(buckets, 0));

@@ -5,7 +5,7 @@
 
 namespace phyxel {
 
-/// Ascending, each value once.
+/// Sorts values and removes duplicates.
 template <class T>
 void sort_unique(std::vector<T>& values) {
   std::sort(values.begin(), values.end());

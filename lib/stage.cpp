@@ -6,7 +6,7 @@
 namespace phyxel {
 namespace {
 
-/// Null on threads that set nothing up, as those of a parallel region.
+/// The observer of this thread; null on other threads, as those of a parallel region.
 thread_local const StageObserver* heard_by = nullptr;
 
 }  // namespace
@@ -39,7 +39,7 @@ void Stage::expect(std::size_t parts) {
 void Stage::count() {
   if (!observer_) return;
   const std::size_t counted = ++counted_;
-  // The observer's thread is the first of a region, and takes part in its loops.
+  // The observer's thread is the first one of a parallel region, and takes part in its loops.
   if (heard_by != observer_ || error_ || counted >= parts_) return;
   try {
     reach(from_ + (1 - from_) * static_cast<double>(counted) / static_cast<double>(parts_));

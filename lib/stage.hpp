@@ -1,4 +1,4 @@
-/// The stages of a set-up, as the library tells of them.
+/// Stages of a set-up, reported to observers and profiles.
 #pragma once
 
 #include <atomic>
@@ -11,36 +11,37 @@
 
 namespace phyxel {
 
-/// A stage of a set-up, which this thread's observer hears of and a profile shows.
+/// A stage of a set-up. Its progress is reported to this thread's observer, and its span to the
+/// profile.
 class Stage {
  public:
-  /// @param name lives as long as the program
+  /// Begins the stage. @param name must live as long as the program
   explicit Stage(const char* name);
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
-  /// Tells that so much is done; less than was told before, or NaN, is passed over. Not for
+  /// Reports the share that is done; smaller values than before, and NaN, are ignored. Not for
   /// parallel regions. @throws what the observer throws
   void reach(double share);
-  /// The next `parts` calls of `count` bring the stage from where it is to its end.
+  /// Announces `parts` calls of `count`, which bring the stage to its end.
   void expect(std::size_t parts);
-  /// One more part is done. For parallel regions, too: an exception of the observer waits for the
+  /// Reports one more part, also in parallel regions: an exception of the observer is thrown by the
   /// next call of `reach` or `finish`.
   void count();
-  /// Tells the end. @throws what the observer throws
+  /// Reports the end; the destructor does not. @throws what the observer throws
   void finish() { reach(1); }
 
  private:
   const Phase phase_;
   const char* name_;
-  const StageObserver* observer_;  // null: nobody
+  const StageObserver* observer_;  // may be null
   double reached_ = 0, from_ = 0;
   std::size_t parts_ = 1;
   std::atomic<std::size_t> counted_ = 0;
   std::exception_ptr error_;
 };
 
-/// `work()` as a stage.
+/// Returns `work()`, run as a stage.
 template <class Work>
 auto in_stage(const char* name, Work&& work) {
   Stage stage(name);

@@ -19,19 +19,19 @@ Vector filled(std::size_t n, F&& f) {
   return values;
 }
 
-/// f(0) to f(n - 1).
+/// The values f(0) to f(n - 1).
 template <class F>
 auto tabulated(std::size_t n, F&& f) {
   return filled<std::vector<decltype(f(std::size_t{0}))>>(n, f);
 }
-/// The same for what is large and soon gone.
+/// The values f(0) to f(n - 1) in a `Bulk`, for large temporary arrays.
 template <class F>
 auto in_bulk(std::size_t n, F&& f) {
   return filled<Bulk<decltype(f(std::size_t{0}))>>(n, f);
 }
 
-/// Those from `begin` to `end` that are wanted, ascending.
-/// @param wants is asked twice
+/// The indices from `begin` to `end` for which `wants` is true, ascending.
+/// @param wants is called twice for each index
 template <class Wants>
 std::vector<Index> chosen(Index begin, Index end, Wants&& wants) {
   const auto stretches = static_cast<std::size_t>(omp_get_max_threads());
@@ -57,8 +57,8 @@ std::vector<Index> chosen(Index begin, Index end, Wants&& wants) {
   return all;
 }
 
-/// What add(sum, k) adds for k from `begin` to `end` in any order: to sums without rounding, which
-/// may be added to each other.
+/// The sum by add(sum, k) for k from `begin` to `end`, in any order: `Sum` must be without
+/// rounding, so that partial sums can be added.
 template <class Sum, class Number, class Add>
 Sum added_up(Number begin, Number end, Add&& add) {
   Sum all{};

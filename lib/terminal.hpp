@@ -1,4 +1,4 @@
-/// What a stream leads to, and words that stand out there.
+/// Properties of output streams, and coloured words.
 #pragma once
 
 #include <cstdio>
@@ -6,11 +6,11 @@
 
 namespace phyxel {
 
-/// Whether lines can be drawn again and coloured: a terminal, and none that calls itself dumb.
+/// True for a terminal that can redraw and colour lines (TERM is not "dumb").
 bool is_terminal(std::FILE* stream);
 
-/// "error: " and "warning: " as stderr can show them: coloured on a terminal, unless NO_COLOR is
-/// set (no-color.org).
+/// The words "error: " and "warning: ", coloured if stderr is a terminal and NO_COLOR is not set
+/// (no-color.org).
 std::string error_word();
 std::string warning_word();
 

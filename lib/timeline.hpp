@@ -1,4 +1,4 @@
-/// What this program does when: for `phyxel run --profile`. Costs a comparison where nobody asks.
+/// Timeline of spans for `phyxel run --profile`. If it is not started, a span costs a comparison.
 #pragma once
 
 #include <chrono>
@@ -11,25 +11,25 @@ class Timeline {
   struct Span {
     const char* what;
     double start, seconds;  ///< [s], from the start of the record.
-    bool aside;             ///< On another thread than the one that started it.
-    double peak_memory;     ///< Of the program, when the span ended [bytes].
+    bool aside;             ///< True on a thread other than the one that started the record.
+    double peak_memory;     ///< Peak memory of the program at the end of the span [bytes].
   };
-  /// Enough for a look; what comes later is counted only.
+  /// Largest number of recorded spans; further ones are only counted.
   static constexpr std::size_t most_spans = 200'000;
 
-  /// From now on spans are recorded.
+  /// Starts recording.
   static void start();
   static bool is_on() { return on_; }
   static void add(const char* what, std::chrono::steady_clock::time_point since);
   static std::vector<Span> spans();
-  /// Spans that found no room.
+  /// Number of spans that were not recorded.
   static std::size_t left_out();
 
  private:
   static bool on_;
 };
 
-/// A span, from here to the end of the block. @param what lives as long as the program
+/// A span from its construction to the end of its block.
 class Phase {
  public:
   explicit Phase(const char* what) : what_(Timeline::is_on() ? what : nullptr) {

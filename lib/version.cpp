@@ -1,6 +1,6 @@
 #include "version.hpp"
 
-// Set by the build for this file alone, so that a new commit recompiles nothing else.
+// The build defines it for this file only, so that a new commit recompiles nothing else.
 #ifndef PHYXEL_VERSION
 #define PHYXEL_VERSION "0.0.0"
 #endif

@@ -1,4 +1,4 @@
-/// NumPy arrays from and to what the library holds.
+/// Conversions between NumPy arrays and the library's vectors.
 #pragma once
 
 #include <fmt/format.h>
@@ -19,7 +19,7 @@
 
 namespace pybind11::detail {
 
-/// (x, y, z) as the library has it.
+/// Conversion of a vector to (x, y, z).
 template <>
 struct type_caster<phyxel::Vec3d> {
   PYBIND11_TYPE_CASTER(phyxel::Vec3d, const_name("tuple[float, float, float]"));
@@ -43,10 +43,10 @@ namespace py = pybind11;
 
 using Shape = std::vector<py::ssize_t>;
 
-/// An array of memory that `owner` keeps alive.
+/// A NumPy array of memory that `owner` keeps alive.
 template <class T>
 py::array over(const T* data, Shape shape, py::handle owner) {
-  // NumPy takes no null for an array, not even for an empty one.
+  // NumPy does not accept a null pointer, even for an empty array.
   if (data == nullptr) return py::array_t<T>(std::move(shape));
   return py::array(py::dtype::of<T>(), std::move(shape), data, owner);
 }
@@ -67,7 +67,7 @@ py::array over(const std::vector<T>& values, py::handle owner) {
   return over(values.data(), {static_cast<py::ssize_t>(values.size())}, owner);
 }
 
-/// The same, read-only: a view of what belongs to `owner`.
+/// A read-only NumPy view of memory that belongs to `owner`.
 template <class... What>
 py::array view(What&&... what) {
   py::array array = over(std::forward<What>(what)...);
@@ -75,7 +75,7 @@ py::array view(What&&... what) {
   return array;
 }
 
-/// An array that takes over a vector, without a copy.
+/// A NumPy array that takes ownership of a vector, without a copy.
 template <class T>
 py::array taken(std::vector<T>&& values) {
   auto* kept = new std::vector<T>(std::move(values));
@@ -83,18 +83,19 @@ py::array taken(std::vector<T>&& values) {
   return over(*kept, owner);
 }
 
-/// "(5, 2)"
+/// The shape of an array as text, e.g. "(5, 2)".
 inline std::string shape_words(const py::array& array) {
   return py::str(array.attr("shape")).cast<std::string>();
 }
 
-/// Rows of three finite numbers. @param rows -1: any. @throws InputError naming `what`
+/// Rows of three finite numbers from an array. @param rows required number of rows; -1 for any
+/// @throws InputError naming `what`
 inline std::vector<Vec3d> vectors_from(const py::handle& object, const char* what,
                                        py::ssize_t rows = -1) {
   const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
   if (!array) {
     PyErr_Clear();
-    throw InputError(fmt::format("{}: no array of numbers; allowed: shape ({}, 3)", what,
+    throw InputError(fmt::format("{}: not an array of numbers; allowed: shape ({}, 3)", what,
                                  rows < 0 ? "n" : std::to_string(rows)));
   }
   if (array.ndim() != 2 || array.shape(1) != 3 || (rows >= 0 && array.shape(0) != rows)) {

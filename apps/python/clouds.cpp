@@ -1,4 +1,4 @@
-/// Bodies at rest: built-in shapes, filled meshes, arrays of the caller's own.
+/// Clouds: built-in shapes, filled meshes, and the caller's arrays.
 #include <algorithm>
 
 #include "arrays.hpp"
@@ -43,7 +43,7 @@ Surface surface_from(const py::handle& points, const py::handle& triangles) {
   return surface;
 }
 
-/// (points, triangles).
+/// The surface of a pair (points, triangles).
 Surface surface_from(const py::handle& pair, const char* what) {
   if (!py::isinstance<py::sequence>(pair) || py::len(pair) != 2) {
     throw InputError(fmt::format("{}: {} found; allowed: a pair, points and triangles", what,
@@ -119,7 +119,7 @@ Cloud make(const std::string& name, Vec3d size, double radius, double length, do
   return make_shape(request);
 }
 
-/// A mesh file, or (points, triangles).
+/// The surface of a mesh file, or of a pair (points, triangles).
 Surface surface_of(const py::object& mesh) {
   if (py::isinstance<py::str>(mesh) || py::hasattr(mesh, "__fspath__")) {
     return read_mesh(mesh.cast<std::filesystem::path>());
@@ -183,7 +183,7 @@ void add_clouds(py::module_& module) {
             return regions;
           },
           "Named phyxels: {name: indices}.")
-      .def_readonly("warnings", &Cloud::warnings, "What made it has to say.")
+      .def_readonly("warnings", &Cloud::warnings, "Warnings of the generator or sampler.")
       .def("__len__", [](const Cloud& cloud) { return cloud.position.size(); })
       .def("__repr__",
            [](const Cloud& cloud) {
@@ -196,7 +196,7 @@ void add_clouds(py::module_& module) {
             write_body(file, cloud, overwrite);
           },
           "file"_a, "overwrite"_a = false, "Writes a body file, which scenes name as `file`.");
-  module.def("read_body", &read_body, "file"_a, "A body file as `phyxel sample` writes it.");
+  module.def("read_body", &read_body, "file"_a, "Reads a body file as `phyxel sample` writes it.");
   module.def("sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
              "on_surface"_a = py::none(), "progress"_a = py::none(),
              "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
@@ -213,11 +213,11 @@ void add_clouds(py::module_& module) {
         return py::make_tuple(taken(std::move(surface.position)),
                               taken(std::move(surface.triangle)));
       },
-      "file"_a, "Points (n, 3) [m] and triangles (t, 3) of an OBJ, PLY or STL file.");
+      "file"_a, "Reads points (n, 3) [m] and triangles (t, 3) of an OBJ, PLY or STL file.");
   module.def(
       "inspect",
       [](const py::object& mesh) { return inspect_surface(surface_of(mesh)).describe(); }, "mesh"_a,
-      "What is wrong with a surface, in one line.");
+      "Describes the defects of a surface in one line.");
 }
 
 }  // namespace phyxel::python

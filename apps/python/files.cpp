@@ -6,20 +6,20 @@ namespace phyxel::python {
 
 void add_files(py::module_& module) {
   using namespace py::literals;
-  py::class_<FrameData, std::shared_ptr<FrameData>>(module, "Frame", "One instant of a trajectory.")
+  py::class_<FrameData, std::shared_ptr<FrameData>>(module, "Frame", "A frame of a trajectory.")
       .def_readonly("time", &FrameData::time, "[s]")
       .def_property_readonly(
           "points", [](py::object self) { return view(self.cast<FrameData&>().point, self); },
           "Deformed positions [m], (n, 3).")
       .def_property_readonly(
           "triangles", [](py::object self) { return view(self.cast<FrameData&>().triangle, self); },
-          "Of the surface, (t, 3); empty for phyxels.")
+          "Triangles of the surface, (t, 3); empty for phyxels.")
       .def_property_readonly(
           "normals", [](py::object self) { return view(self.cast<FrameData&>().normal, self); },
-          "Of the surface, (n, 3); empty for phyxels.")
+          "Normals of the surface, (n, 3); empty for phyxels.")
       .def_property_readonly(
           "body", [](py::object self) { return view(self.cast<FrameData&>().body, self); },
-          "Which body each point is of, (n,); empty if there is one.")
+          "Index of the body of each point, (n,); empty if there is one body.")
       .def_property_readonly(
           "fields",
           [](py::object self) {
@@ -33,7 +33,7 @@ void add_files(py::module_& module) {
             }
             return fields;
           },
-          "What the scene's output.fields asked for: {name: array}, (n,) or (n, 3).")
+          "Fields of the scene's output.fields: {name: array}, (n,) or (n, 3).")
       .def("__len__", [](const FrameData& frame) { return frame.point.size(); })
       .def("__repr__", [](const FrameData& frame) {
         return fmt::format("<phyxel.Frame: t = {:g} s, {} points, {} triangles>", frame.time,
@@ -45,7 +45,7 @@ void add_files(py::module_& module) {
         const py::gil_scoped_release others;
         return read_frame(file, true);
       },
-      "file"_a, "One frame, with all its fields.");
+      "file"_a, "Reads a frame with all its fields.");
   module.def(
       "read_series",
       [](const std::filesystem::path& file) {
@@ -55,7 +55,7 @@ void add_files(py::module_& module) {
         }
         return entries;
       },
-      "file"_a, "Files and times [s] of a series: [(file, time), ...].");
+      "file"_a, "Reads the files and times [s] of a series: [(file, time), ...].");
 }
 
 }  // namespace phyxel::python

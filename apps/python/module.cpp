@@ -1,4 +1,4 @@
-/// The compiled half of the Python module: `phyxel/__init__.py` has the other.
+/// The compiled part of the Python module; `phyxel/__init__.py` is the other part.
 #include <omp.h>
 #include <pthread.h>
 
@@ -8,7 +8,7 @@
 namespace phyxel::python {
 namespace {
 
-// Of the interpreter's whole life: never released.
+// Kept until the interpreter ends.
 struct Exceptions {
   py::handle error, input, output, device, diverged;
   py::handle of(ExitCode code) const {
@@ -35,7 +35,7 @@ py::handle add_exception(py::module_& module, const char* name, const py::object
   return made;
 }
 
-/// What Python programs expect to catch: wrong input is a ValueError, too.
+/// Defines the exceptions. InputError is also a ValueError.
 const Exceptions& add_exceptions(py::module_& module) {
   static Exceptions e;
   const auto base = [](py::handle type) { return py::reinterpret_borrow<py::object>(type); };
@@ -48,9 +48,9 @@ const Exceptions& add_exceptions(py::module_& module) {
   return e;
 }
 
-/// Ends the waiting OpenMP threads of the thread that is about to fork. A fork copies no threads
-/// but its own, so a child that believed in the others would wait for them for ever; parent and
-/// child start new ones when they need them.
+/// Ends the waiting OpenMP threads before a fork, which copies the calling thread only: the child
+/// would wait for the other threads for ever. Parent and child start new threads when they need
+/// them.
 void end_waiting_threads() { omp_pause_resource_all(omp_pause_hard); }
 
 }  // namespace

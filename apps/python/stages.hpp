@@ -1,4 +1,4 @@
-/// How far a set-up or a run is, as Python hears of it.
+/// Progress of set-ups and runs for Python.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -14,9 +14,9 @@ namespace phyxel::python {
 
 namespace py = pybind11;
 
-/// An observer that calls `progress(stage, share)`, ten times a second at most but for the
-/// beginnings and ends of stages, and hears Ctrl-C. It throws py::error_already_set.
-/// @param progress must outlive it; None: Ctrl-C alone
+/// An observer that calls `progress(stage, share)` at the beginning and the end of stages, and at
+/// most ten times a second in between, and that reacts to Ctrl-C. It throws py::error_already_set.
+/// @param progress must outlive the observer; None to react to Ctrl-C only
 inline StageObserver observer_for(const py::object& progress) {
   using Clock = std::chrono::steady_clock;
   return [&progress, last = Clock::time_point()](std::string_view stage, double share) mutable {
@@ -30,15 +30,15 @@ inline StageObserver observer_for(const py::object& progress) {
   };
 }
 
-/// While it lives, `progress` is called for the stages of all that this thread sets up.
+/// A scope in which `progress` is called for the stages of set-ups on this thread.
 inline ObserveStages stages_for(const py::object& progress) {
   return ObserveStages(observer_for(progress));
 }
 
-/// How far a run is, for who has asked.
+/// Progress of a run, reported to a callback.
 class RunProgress {
  public:
-  /// The run, which is one stage. @param begin,end times of the first and the last state [s]
+  /// Scope of a run, which is one stage. @param begin,end times of the first and the last state [s]
   class Scope {
    public:
     Scope(RunProgress& told, const py::object& progress, Method method, double begin, double end)
@@ -56,16 +56,16 @@ class RunProgress {
   };
 
   RunProgress() = default;
-  /// @throws py::error_already_set
+  /// Reports a simulated time [s]. @throws py::error_already_set
   void reach_time(double time) {
     if (!searches_) reach((time - begin_) / (end_ - begin_));
   }
-  /// Of a search for rest, whose residual falls by about as much in each of Newton's steps.
-  /// @throws py::error_already_set
+  /// Reports the residual of a search for equilibrium, which falls by a similar factor in each
+  /// Newton step. @throws py::error_already_set
   void reach_residual(double residual, double tolerance) {
     if (searches_) reach(std::log(residual) / std::log(tolerance));
   }
-  /// @throws py::error_already_set
+  /// Reports the end. @throws py::error_already_set
   void end() {
     if (heard_) heard_(stage(), 1);
   }
@@ -75,14 +75,14 @@ class RunProgress {
       : heard_(std::move(heard)), searches_(searches), begin_(begin), end_(end) {}
 
   const char* stage() const { return searches_ ? "search for rest" : "steps"; }
-  /// Less than was told before, or NaN, is passed over.
+  /// Reports a share; smaller values than before, and NaN, are ignored.
   void reach(double share) {
     if (!heard_ || !(share > told_) || !(share < 1)) return;
     told_ = share;
     heard_(stage(), share);
   }
 
-  StageObserver heard_;  // none: nobody has asked
+  StageObserver heard_;  // empty without a callback
   bool searches_ = false;
   double begin_ = 0, end_ = 0, told_ = 0;
 };

@@ -1,13 +1,13 @@
-/// phyxel as a library: two loads that scenes do not have, set before every step. A spinning block
-/// hangs from a spring whose other end is pulled up, and a pressure follows its top face. What is
-/// known: inner forces cancel, so that its momentum is the impulse of spring, pressure and gravity.
+/// phyxel as a library: two loads that scenes do not have, set before each step. A spinning block
+/// hangs from a spring whose other end is pulled up, and a pressure follows its top face. Internal
+/// forces cancel, so its momentum must equal the impulse of spring, pressure and gravity.
 #include <algorithm>
 #include <cstdio>
 #include <phyxel/phyxel.hpp>
 
 namespace {
 
-/// Pulls towards a point that its owner moves.
+/// A spring to an anchor that the caller moves.
 struct Spring {
   double stiffness;      ///< [N/m]
   phyxel::Vec3d anchor;  ///< [m]
@@ -22,8 +22,8 @@ phyxel::Vec3d centre_of(const std::vector<phyxel::Index>& phyxels, const phyxel:
   return sum / static_cast<double>(phyxels.size());
 }
 
-/// Adds the pressure on triangles of surfels, which follow the body: p A n, a third to each corner,
-/// shared among the phyxels that carry it. @returns their sum [N]
+/// Adds the forces of a pressure on triangles of surfels, which follow the body: p A n, a third for
+/// each corner, distributed over the phyxels that carry it. @returns the sum of the forces [N]
 phyxel::Vec3d add_pressure(double pressure, const std::vector<phyxel::Triangle>& face,
                            const phyxel::Model& model, const phyxel::SurfelState& surfels,
                            std::vector<phyxel::Vec3d>& force) {

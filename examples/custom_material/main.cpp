@@ -1,5 +1,5 @@
-/// phyxel as a library: a law of the caller's own. A block of Mooney and Rivlin's rubber is
-/// stretched by half its length, and the force that takes is compared with the law's own answer.
+/// phyxel as a library: a custom law. A block of Mooney-Rivlin rubber is stretched by half its
+/// length, and its force is compared with the law's exact answer.
 #include <cmath>
 #include <cstdio>
 #include <phyxel/physics/laws.hpp>
@@ -38,7 +38,7 @@ class MooneyRivlin final : public phyxel::CustomLaw {
   }
 
   double shear_modulus() const { return 2 * (c1_ + c2_); }
-  /// What `young` and `poisson` of the material are.
+  /// Young's modulus [Pa] and Poisson's ratio at rest, for the material.
   double young() const { return 9 * kappa_ * shear_modulus() / (3 * kappa_ + shear_modulus()); }
   double poisson() const { return young() / (2 * shear_modulus()) - 1; }
 
@@ -59,11 +59,11 @@ class MooneyRivlin final : public phyxel::CustomLaw {
   double c1_, c2_, kappa_;  ///< [Pa]
 };
 
-/// Stress along a bar that is stretched `stretch` times, and thins until its sides are free [Pa].
+/// Nominal stress of a bar with the given stretch and stress-free sides [Pa].
 double tension(const phyxel::CustomLaw& law, double stretch) {
   Mat3d grad_u;
   grad_u(0, 0) = stretch - 1;
-  double thin = -0.9, thick = 0;  // the sides pull where it is too thick
+  double thin = -0.9, thick = 0;  // bounds of the lateral strain; the sides pull if it is too thick
   for (int k = 0; k < 60; ++k) {
     const double middle = 0.5 * (thin + thick);
     grad_u(1, 1) = grad_u(2, 2) = middle;

@@ -1,8 +1,8 @@
-/// phyxel as a library on many ranks: a block of jelly, larger than one rank could hold if it must
-/// be, spins while it falls. Each rank builds and steps a share of it, on a GPU if all find one.
+/// phyxel as a library on many ranks: a block of jelly, which may be larger than the memory of one
+/// rank, spins while it falls. Each rank builds and steps a share of it, on a GPU if all find one.
 ///
 ///     large_body                          100,000 phyxels, 200 steps, one rank
-///     mpirun -n 4 large_body 5000000      four ranks, the same answer
+///     mpirun -n 4 large_body 5000000      five million phyxels on four ranks
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -14,7 +14,7 @@
 namespace {
 
 struct Options {
-  int phyxels = 100'000;  // about
+  int phyxels = 100'000;  // approximate number
   int steps = 200;
 };
 
@@ -42,7 +42,7 @@ phyxel::Scene falling_block(int phyxels) {
   block.name = "block";
   block.material = {.young = 1e5, .poisson = 0.3, .density = 1000};
   block.spin = {0, 1, 2};          // [rad/s]
-  block.source.phyxels = phyxels;  // made piece by piece, by all ranks
+  block.source.phyxels = phyxels;  // ranks make pieces of the lattice
   phyxel::ShapeRequest& shape = block.source.shape;
   shape.name = "block";
   shape.size = {1, 1, 1};
@@ -50,14 +50,14 @@ phyxel::Scene falling_block(int phyxels) {
   return scene;
 }
 
-/// Bytes that all ranks have sent for their ghosts so far.
+/// Number of bytes that all ranks have sent for ghosts.
 std::int64_t bytes_sent(const phyxel::Ranks& ranks, const phyxel::Backend& backend) {
-  const auto exchanges = backend.exchanges();  // none on one rank
+  const auto exchanges = backend.exchanges();  // unset on one rank
   return ranks.sum(exchanges ? exchanges->traffic.bytes_sent : std::int64_t{0});
 }
 
 int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
-  // What may fail on one rank is agreed on, so that all end together and one of them says why.
+  // An error of one rank ends all ranks with one message.
   const Options options = ranks.agreed([&] { return options_of(argc, argv); });
   const phyxel::Scene scene = ranks.agreed([&] { return falling_block(options.phyxels); });
   const phyxel::ChosenDevice device = phyxel::choose_device(ranks, "auto");
@@ -68,7 +68,7 @@ int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
   const double step = 0.8 * phyxel::step_limit(share, *backend).largest_step;
   phyxel::Solver solver(*backend, phyxel::initial_state(share, scene, step));
 
-  // From here on every rank steps its share, and the backend fetches what its ghosts need.
+  // Each rank steps its share, and the backend exchanges the values of ghosts.
   const phyxel::Diagnostics start = phyxel::diagnose(share, *backend, solver.steps(), step);
   const std::int64_t sent_before = bytes_sent(ranks, *backend);
   ranks.barrier();
@@ -80,7 +80,7 @@ int fall(const phyxel::Ranks& ranks, int argc, char** argv) {
   const std::int64_t sent = bytes_sent(ranks, *backend) - sent_before;
   const phyxel::Diagnostics end = phyxel::diagnose(share, *backend, solver.steps(), step);
 
-  // A sum over the whole body: every phyxel is one rank's own, and of ghosts a state says nothing.
+  // A sum over the whole body: each phyxel belongs to one rank, and values of ghosts are not valid.
   const phyxel::State state = solver.state();
   std::vector<double> terms;
   for (phyxel::Index i = 0; i < share.size(); ++i) {

@@ -1,5 +1,5 @@
-/// phyxel as a library: a closed surface from a file is filled with phyxels, held at its top, let
-/// go, and written as frames that ParaView opens.
+/// phyxel as a library: a closed surface from a file is filled with phyxels, fixed at its top,
+/// released, and written as frames for ParaView.
 ///
 ///     simulate_mesh examples/mesh/ring.obj out/ring
 #include <algorithm>

@@ -1,6 +1,6 @@
-/// phyxel as a library: a bar is pulled by a step loop of the caller's own, which reads forces,
-/// energies and, without a copy, the state after every step: a force-displacement curve, and the
-/// work done beside the energy that the bar has gained.
+/// phyxel as a library: a step loop of the caller's pulls a bar, and reads forces, energies and,
+/// without a copy, the state after each step. It compares the work with the energy that the bar has
+/// gained.
 #include <cstdio>
 #include <phyxel/phyxel.hpp>
 
@@ -33,7 +33,7 @@ int main() {
   const double dt = 0.8 * phyxel::step_limit(model).largest_step;
   const auto backend = phyxel::make_cpu_backend(model, phyxel::Precision::double_);
   backend->upload(phyxel::initial_state(model, scene, dt));
-  const phyxel::StateView state = *backend->view();  // shows what each step leaves
+  const phyxel::StateView state = *backend->view();  // a view of the state after each step
 
   const auto pulling_force = [&](const std::vector<phyxel::Vec3d>& force) {
     double sum = 0;
@@ -43,7 +43,7 @@ int main() {
   std::vector<phyxel::Vec3d> force;
   double work = 0, pulled = 0, pulling = 0;
   std::int64_t steps = 0;
-  // What `Solver::step` does, and what it leaves to its caller.
+  // The work of `Solver::step`, and of its caller.
   for (; static_cast<double>(steps) * dt < duration; ++steps) {
     backend->step(steps, dt);
     const double now_pulled = state.displacement(end[0]).x;
@@ -55,7 +55,7 @@ int main() {
   }
   const phyxel::Diagnostics now = phyxel::diagnose(model, *backend, steps, dt);
 
-  // Along the bar, in the strain measure of the material: Green's, with F = P A = E ε (1 + u') A.
+  // Theory along the bar with Green's strain: F = P A = E ε (1 + u') A.
   const double stretch = 1 + pulled / length, strain = (stretch * stretch - 1) / 2;
   const double theory = bar.material.young * strain * stretch * thickness * thickness;
   std::printf("%d phyxels, %lld steps to a pull of %.3f mm\n", model.size(),

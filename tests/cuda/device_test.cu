@@ -43,7 +43,7 @@ using DeviceErrorsDeathTest = DeviceErrors;
 TEST(Device, NoneIsExplained) {
   if (!cuda_devices().empty()) GTEST_SKIP() << "there is a CUDA device";
   EXPECT_THAT(message_of([] { use_cuda_device(0); }),
-              AllOf(HasSubstr("no "), HasSubstr("allowed is the CPU")));
+              AllOf(HasSubstr("no "), HasSubstr("allowed: the CPU")));
 }
 
 TEST_F(DeviceErrors, OutOfMemorySaysForWhatHowMuchAndWhatIsThere) {

@@ -1,4 +1,4 @@
-/// Checkpoints: a `State` on disk that lets a run go on as if it had never stopped.
+/// Checkpoints: a `State` on disk from which a run continues with the same bits.
 #pragma once
 
 #include <filesystem>
@@ -13,18 +13,18 @@
 
 namespace phyxel {
 
-/// What a checkpoint holds beside the state.
+/// The content of a checkpoint beside the state.
 struct CheckpointInfo {
-  int version = 0;      ///< Of the format; 2 has no parameters.
+  int version = 0;      ///< Version of the format; 2 has no parameters.
   std::string program;  ///< "phyxel 0.1.0 (commit)".
   Precision precision = Precision::single;
-  Method method = Method::verlet;  ///< Which tells when velocities are.
+  Method method = Method::verlet;  ///< Determines the time level of velocities.
   std::string scene_text;
-  std::uint64_t model_digest = 0;  ///< Of rest positions, masses and neighbour lists.
+  std::uint64_t model_digest = 0;  ///< Digest of rest positions, masses and neighbour lists.
   /// Values of the scene by name (`scene_parameters`), which a resumed run must have, too.
   std::vector<Parameter> parameters;
   double total_energy = 0;          ///< [J], for the drift of the continued run.
-  Watched watched;                  ///< Version 2 holds the start energy only.
+  Watched watched;                  ///< Values for the watch; version 2 has the start energy only.
   std::int64_t frames_written = 0;  ///< Frames on disk at that time.
 };
 
@@ -34,8 +34,8 @@ struct CheckpointInfo {
 /// @throws OutputError; earlier checkpoints stay intact.
 std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
                                        const CheckpointInfo& info);
-/// The same for a state of so many phyxels whose arrays are not all here, or not at once.
-/// @param state its arrays are not looked at
+/// Writes a checkpoint of a state whose arrays come from a source, chunk by chunk.
+/// @param state state without arrays
 std::filesystem::path write_checkpoint(const std::filesystem::path& directory, const State& state,
                                        const CheckpointInfo& info, Index phyxels,
                                        ChunkedSource& values);
@@ -48,19 +48,19 @@ struct Checkpoint {
 
 class Hdf5Reader;
 
-/// A checkpoint whose arrays are read a stretch at a time.
+/// A checkpoint whose arrays are read in chunks.
 class CheckpointReader {
  public:
-  /// Compares the digest, and reads all but the arrays.
+  /// Verifies the digest, and reads everything except the arrays.
   /// @throws InputError for a missing, truncated, altered or foreign file, or wrong content.
   explicit CheckpointReader(const std::filesystem::path& file);
   ~CheckpointReader();
   CheckpointReader(CheckpointReader&&) noexcept;
   CheckpointReader& operator=(CheckpointReader&&) noexcept;
 
-  /// What is beside the state.
+  /// The content beside the state.
   const CheckpointInfo& info() const { return info_; }
-  /// Phyxels of its state.
+  /// Number of phyxels of the state.
   Index phyxels() const { return phyxels_; }
   /// The state of phyxels `begin` to `end`. @throws InputError if a value is not finite.
   State state(Index begin, Index end) const;
@@ -68,15 +68,15 @@ class CheckpointReader {
  private:
   std::unique_ptr<const Hdf5Reader> file_;
   CheckpointInfo info_;
-  State state_;  // without arrays
+  State state_;  // has no arrays
   Index phyxels_ = 0;
 };
 
-/// Reads one checkpoint, whole. @throws InputError as `CheckpointReader`.
+/// Reads a whole checkpoint. @throws InputError as `CheckpointReader`
 Checkpoint read_checkpoint(const std::filesystem::path& file);
 
-/// The newest checkpoint in `directory` that can be read to its last value; one that cannot is
-/// skipped, and `warning` says so.
+/// The newest checkpoint in `directory` that can be read completely; those that cannot are skipped,
+/// and named in `warning`.
 std::optional<std::filesystem::path> latest_checkpoint(const std::filesystem::path& directory,
                                                        std::string* warning = nullptr);
 

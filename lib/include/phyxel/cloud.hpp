@@ -23,7 +23,7 @@ struct Surface {
 /// Rest points of one body, in the caller's order.
 struct Cloud {
   std::vector<Vec3d> position;  ///< Phyxel positions [m], shape [n_phyxels, 3].
-  std::vector<double> volume;   ///< Phyxel volumes [m^3], shape [n_phyxels]; empty: unknown.
+  std::vector<double> volume;   ///< Phyxel volumes [m^3], shape [n_phyxels]; empty if unknown.
   Surface surface;              ///< Surfels; may be empty.
   /// Named groups of phyxels (sorted indices) that scenes can select, e.g. "mouth".
   std::map<std::string, std::vector<Index>> regions;

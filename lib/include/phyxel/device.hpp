@@ -1,5 +1,5 @@
-/// The device that steps a model: a GPU, or the cores of a rank. No CUDA header is needed to
-/// include this, and a build without CUDA has it too: it then finds no GPU and says why.
+/// The device that steps a model: a GPU, or the cores of a rank. This header does not include
+/// CUDA's, and also exists in builds without CUDA, which find no GPU and give the reason.
 #pragma once
 
 #include <cstddef>
@@ -18,53 +18,54 @@ class Ranks;
 
 /// A GPU.
 struct Device {
-  int index = 0;             ///< As CUDA counts those that this program sees.
+  int index = 0;             ///< CUDA's index of the device in this process.
   std::string name;          ///< e.g. "NVIDIA H200".
   int major = 0, minor = 0;  ///< Compute capability.
   int multiprocessors = 0;
-  std::size_t memory = 0;        ///< Bytes in all.
-  std::string describe() const;  ///< "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
+  std::size_t memory = 0;  ///< Total memory [bytes].
+  /// Description, e.g. "NVIDIA H200 (compute capability 9.0, 132 SMs, 150.1 GB)".
+  std::string describe() const;
 };
 
-/// What a rank steps on.
+/// The device of a rank.
 struct ChosenDevice {
-  std::optional<Device> gpu;  ///< Nothing: the CPU.
-  std::string why_no_gpu;     ///< Where there is none.
+  std::optional<Device> gpu;  ///< The GPU; unset for the CPU.
+  std::string why_no_gpu;     ///< The reason if there is no GPU.
 };
 
-/// Whether it is "auto", "cpu", "cuda" or "cuda:<number>".
-/// @throws InputError naming `where` it was said
+/// Checks that a name is "auto", "cpu", "cuda" or "cuda:<number>".
+/// @throws InputError naming the option or key `where`
 void check_device_name(const std::string& name, const std::string& where);
 
-/// The device of that name, where "auto" is the first GPU, or the CPU if there is none or it cannot
-/// be used.
-/// @throws InputError for another name; DeviceError if a GPU is asked for and cannot be used
+/// The device of a name; "auto" is the first GPU, or the CPU if there is no usable one.
+/// @throws InputError for another name; DeviceError if the requested GPU cannot be used
 ChosenDevice choose_device(const std::string& name, const std::string& where = "device");
 
-/// The device of this rank: each rank of a host takes the next of its GPUs, unless one is named,
-/// and "auto" is GPUs only if all ranks find one. Collective. @throws Error as above, on every rank
+/// The device of this rank. Each rank of a host takes the next of its GPUs, unless one is named;
+/// "auto" chooses GPUs only if all ranks find one. Collective. @throws Error as above, on each rank
 ChosenDevice choose_device(const Ranks& ranks, const std::string& name,
                            const std::string& where = "device");
 
-/// The model of a scene, its neighbours sought on the device that will step it, so that lists of
-/// neighbours may never exist on the host.
+/// Builds the model of a scene, with a neighbour search on the device that will step it; the host
+/// may then have no neighbour lists.
 Model build_model(const Scene& scene, const ChosenDevice& device);
-/// The same from clouds already in place, one for each body of the scene.
+/// Builds the model from positioned clouds, one for each body of the scene.
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device);
 
-/// How the GPUs of ranks may exchange: "auto" (the first of the following that all can), "direct"
-/// (stores into each other's memory, on one host), "nccl", "mpi" (one that is CUDA-aware) and
-/// "host" (MPI through host memory).
+/// The transports between the ranks' GPUs: "auto" (the first of the following that all ranks
+/// support), "direct" (stores into each other's memory, on one host), "nccl", "mpi" (CUDA-aware)
+/// and "host" (MPI through host memory).
 const std::vector<std::string>& transport_names();
-/// @throws InputError for another name
+/// Checks the name of a transport. @throws InputError
 void check_transport_name(const std::string& name);
 
-/// The backend of a model, or of a rank's share, on that device. The model must outlive it.
-/// Of a share on a GPU: collective, and none is destroyed before all ranks have waited.
-/// @param threads of the CPU; 0: OpenMP's choice
-/// @param transport of ranks' GPUs
-/// @throws DeviceError of this rank's GPU; InputError for another transport; AgreedError, on all
-///   ranks, for one that cannot be had
+/// Makes the backend of a model, or of a rank's share, on a device. The model must outlive it. For
+/// a share on a GPU the call is collective, and all ranks must wait before one destroys its
+/// backend.
+/// @param threads number of CPU threads; 0 for OpenMP's choice
+/// @param transport transport between the ranks' GPUs
+/// @throws DeviceError of this rank's GPU; InputError for an unknown transport; AgreedError, on all
+///   ranks, for an unavailable one
 std::unique_ptr<Backend> make_backend(const Model& model, Precision precision,
                                       const ChosenDevice& device, int threads = 0,
                                       const std::string& transport = "auto");

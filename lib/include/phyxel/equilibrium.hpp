@@ -12,26 +12,27 @@ namespace phyxel {
 
 /// Progress of Newton's method.
 struct NewtonProgress {
-  int step = 0;          ///< Newton steps accepted so far.
-  int iteration = 0;     ///< Iteration of conjugate gradients within the present step; 0: none yet.
-  double residual = 0;   ///< Relative residual of the last accepted step.
-  double tolerance = 0;  ///< Relative residual at which the search ends.
+  int step = 0;               ///< Newton steps accepted so far.
+  int iteration = 0;          ///< Iteration of conjugate gradients within the present step, from 1.
+  double residual = 0;        ///< Relative residual of the last accepted step.
+  double tolerance = 0;       ///< Relative residual at which the search ends.
   double inner_residual = 1;  ///< Residual of the linear system over its initial residual.
   double energy = 0;  ///< Energy of the last accepted step [J]: deformation, loads, inertia.
 };
 
-/// Called after every evaluation of the forces, on all ranks at the same ones.
-/// @returns whether to go on; one rank's `false` stops all
+/// Callback after each evaluation of the forces, on all ranks alike. @returns true to continue;
+/// `false` of one rank stops all ranks
 using NewtonObserver = std::function<bool(const NewtonProgress&)>;
 
 /// Stopping criteria and start of a search for equilibrium.
 struct EquilibriumOptions {
-  /// Of the residual force over what is applied: loads, weight and reactions, all by their
-  /// Euclidean norms over all phyxels.
+  /// Tolerance of the residual force relative to the applied forces (loads, weight and reactions),
+  /// by their Euclidean norms over all phyxels.
   double tolerance = 1e-8;
-  int most_steps = 200;               ///< Newton's.
-  NewtonObserver observer = nullptr;  ///< Null: no observer.
-  /// Displacements [m] of an interrupted search, which goes on to the bit; null: at rest.
+  int most_steps = 200;               ///< Largest number of Newton steps.
+  NewtonObserver observer = nullptr;  ///< Observer; may be null.
+  /// Displacements of an interrupted search [m], which then continues with the same bits; null to
+  /// start at rest.
   const std::vector<Vec3d>* start = nullptr;
 };
 
@@ -43,16 +44,16 @@ struct Equilibrium {
   std::int64_t evaluations = 0;  ///< Evaluations of the forces of all phyxels.
 };
 
-/// A state in which forces cancel on every phyxel that is not held: under gravity, loads at their
-/// full size, and motions at their ends. Newton's method from the state at rest, its equations
-/// solved by conjugate gradients over differences of the backend's forces, so that every term
-/// counts and no matrix is made. Steps are cut where they would strain the body by much, or would
-/// raise its energy: of several equilibria it is a stable one near the way there.
-/// @param backend of the model, in double; its state is the one found
-/// @throws InputError if a motion never ends, or a body is not held against its loads;
-///   DivergedError, with the residual that is left, if none is found within `most_steps` or the
-///   search gets nowhere; InterruptedError if the observer asks for it: the backend's state is then
-///   that of the last accepted step
+/// Finds a state in which the forces on each free phyxel vanish, under gravity, full loads, and
+/// prescribed displacements at their ends. Newton's method starts at rest; its equations are solved
+/// by conjugate gradients with differences of the backend's forces, so that all terms are included
+/// and no matrix is formed. Steps are shortened if they would strain the body strongly or increase
+/// its energy, so that of several equilibria a stable one near the path is found.
+/// @param backend backend of the model in double; receives the state found
+/// @throws InputError if a motion has no end, or a body is not supported against its loads;
+///   DivergedError, with the residual, if no equilibrium is found within `most_steps` or the search
+///   stagnates; InterruptedError if the observer requests it: the backend then has the state of the
+///   last accepted step
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options = {});
 

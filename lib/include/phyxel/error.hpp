@@ -14,12 +14,12 @@ enum class ExitCode : int {
   success = 0,
   bad_input = 2,       ///< a file, key or option is wrong; nothing was computed or overwritten
   diverged = 3,        ///< NaN or runaway energy; the last good state is on disk
-  device_failed = 4,   ///< the GPU: none found, not one of ours, out of memory, or it failed
+  device_failed = 4,   ///< no usable GPU, not enough memory on it, or it failed
   output_failed = 74,  ///< writing failed during the run (disk full); earlier files are intact
-  stopped = 75,        ///< a signal ended the run; the checkpoint lets it go on
+  stopped = 75,        ///< a signal ended the run; it can continue from the checkpoint
 };
 
-/// Base of every error phyxel throws on purpose. `what()` is the whole message for the user.
+/// Base of phyxel's exceptions. `what()` is the complete message for the user.
 class Error : public std::runtime_error {
  public:
   /// @param message the complete message for the user
@@ -35,37 +35,37 @@ class Error : public std::runtime_error {
 /// element, the value found, and what is allowed.
 class InputError : public Error {
  public:
-  /// @param message what is wrong, where, and what is allowed
+  /// @param message the fault, its place, and what is allowed
   explicit InputError(const std::string& message) : Error(ExitCode::bad_input, message) {}
 };
 
-/// Writing a file failed while the simulation was under way.
+/// Writing a file failed during the simulation.
 class OutputError : public Error {
  public:
-  /// @param message the file, and what the system says
+  /// @param message the file, and the system's message
   explicit OutputError(const std::string& message) : Error(ExitCode::output_failed, message) {}
 };
 
 /// A GPU is missing, cannot run this program's kernels, has too little memory, or failed. The
-/// message names the device and what was asked of it.
+/// message names the device and the request.
 class DeviceError : public Error {
  public:
-  /// @param message the device, and what was asked of it
+  /// @param message the device, and the request
   explicit DeviceError(const std::string& message) : Error(ExitCode::device_failed, message) {}
 };
 
-/// An error that all ranks throw together: every rank has met it, or the ranks have agreed on the
-/// error of one of them.
+/// An error that all ranks throw: it occurred on each rank, or the ranks have agreed on the error
+/// of one of them.
 class AgreedError : public Error {
  public:
-  /// @param message the error, on whichever rank it occurred
+  /// @param message the error, with the rank on which it occurred
   using Error::Error;
 };
 
 /// An observer asked a search by Newton's method to stop; all ranks throw it alike.
 class InterruptedError : public AgreedError {
  public:
-  /// @param message what was under way
+  /// @param message the interrupted activity
   explicit InterruptedError(const std::string& message) : AgreedError(ExitCode::stopped, message) {}
 };
 
@@ -80,7 +80,7 @@ class DivergedError : public Error {
 /// (more than half of the longer word would have to change).
 std::string nearest_name(std::string_view word, const std::vector<std::string>& allowed);
 
-/// " (did you mean \"young\"?)", or "" if no name is close.
+/// The suggestion " (did you mean \"young\"?)"; "" if no name is close.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& allowed);
 
 }  // namespace phyxel

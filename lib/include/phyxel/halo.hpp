@@ -14,21 +14,22 @@ namespace phyxel {
 struct Records {
   std::byte* base = nullptr;
   std::size_t stride = 0, bytes = 0;
-  const Index* slot = nullptr;  ///< Null: phyxel i is in slot i.
+  const Index* slot = nullptr;  ///< Slot of each phyxel; null if phyxel i is in slot i.
 
-  /// Where the values of phyxel i begin.
+  /// The address of the values of phyxel i.
   std::byte* of(Index i) const {
     return base + static_cast<std::size_t>(slot ? slot[i] : i) * stride;
   }
 };
 
-/// What exchanges have cost a rank.
+/// Cost of a rank's exchanges.
 struct Traffic {
   std::int64_t bytes_sent = 0;
-  double seconds = 0;  ///< For packing, waiting and unpacking.
+  double seconds = 0;  ///< Time for packing, waiting and unpacking [s].
 };
 
-/// Which phyxels of a share other ranks have as ghosts, and which ghosts of it they own.
+/// Send and receive lists of a share: the phyxels that are ghosts of other ranks, and the share's
+/// ghosts.
 struct HaloPlan {
   /// Another rank that this one exchanges values with: if A is a peer of B, then B is one of A.
   struct Peer {
@@ -41,13 +42,13 @@ struct HaloPlan {
   std::vector<Peer> peers;  ///< In the order of ranks.
 };
 
-/// Carries values from the owners of phyxels to those that have them as ghosts. All ranks start and
-/// finish the same exchanges, in the same order; one is under way at a time.
+/// Transport of values from the owners of phyxels to the ranks that have them as ghosts. All ranks
+/// start and finish the same exchanges in the same order, one at a time.
 class HaloTransport {
  public:
   virtual ~HaloTransport() = default;
 
-  /// Bytes to or from each peer of the plan, in its order.
+  /// Packed values to or from each peer, in the order of the plan.
   using PeerBytes = std::vector<std::span<std::byte>>;
 
   /// Starts an exchange: packs the values of phyxels that other ranks have as ghosts and sends
@@ -55,9 +56,9 @@ class HaloTransport {
   virtual void start(const Records& records) = 0;
   /// Starts an exchange of packed values. Neither memory may be touched until `finish`.
   virtual void start(const PeerBytes& outgoing, const PeerBytes& incoming) = 0;
-  /// Lets messages under way advance; to be called now and then between `start` and `finish`.
+  /// Lets messages make progress, between `start` and `finish`.
   virtual void progress() = 0;
-  /// Waits for the exchange, and stores what has come in the records of ghosts.
+  /// Waits for the exchange, and stores the received values in the records of ghosts.
   virtual void finish() = 0;
 
   /// True if `outgoing` and `incoming` may be memory of a GPU.

@@ -16,31 +16,30 @@ namespace phyxel {
 ///   empty, malformed or non-finite file, or indices out of range.
 Surface read_mesh(const std::filesystem::path& file);
 
-/// Defects of a surface, by count and place.
+/// Numbers of defects of a surface, and the position of one.
 struct SurfaceDefects {
   Index open_edges = 0;            ///< Edges with one triangle: holes.
   Index crowded_edges = 0;         ///< Edges with more than two triangles.
-  Index flipped_edges = 0;         ///< Edges whose two triangles disagree on the outside.
+  Index flipped_edges = 0;         ///< Edges whose two triangles have opposite orientations.
   Index degenerate_triangles = 0;  ///< Triangles without area.
   Index unused_vertices = 0;
-  Index parts = 0;          ///< Connected parts.
-  bool inside_out = false;  ///< The enclosed volume is negative.
+  Index parts = 0;          ///< Number of connected parts.
+  bool inside_out = false;  ///< True if the enclosed volume is negative.
   Vec3d example;            ///< Midpoint of one defective edge or triangle [m].
   /// True if the surface has no defect other than unused vertices.
   bool clean() const;
-  std::string describe() const;  ///< One line for the user.
+  std::string describe() const;  ///< Description in one line.
 };
-/// Looks for defects; never throws.
+/// Finds the defects of a surface; never throws.
 SurfaceDefects inspect_surface(const Surface& surface);
 
 /// Parameters for filling a surface with phyxels.
 struct SampleRequest {
   Index phyxels = 0;       ///< Exact number of phyxels.
   std::uint64_t seed = 1;  ///< The same seed gives the same cloud on any number of threads.
-  int relaxations = 30;    ///< Sweeps of the relaxation (Lloyd); 0: none.
-  /// True puts phyxels on the surface, too, on its corners and along its sharp edges; false puts
-  /// all of them inside, each in the middle of its cell. Unset: on the surface wherever it allows
-  /// that.
+  int relaxations = 30;    ///< Sweeps of Lloyd's relaxation; 0 for none.
+  /// True to place phyxels also on the surface, its corners and its sharp edges; false to place all
+  /// inside, in the middle of their cells; unset for the surface if it allows that.
   std::optional<bool> on_surface;
 };
 
@@ -48,10 +47,10 @@ struct SampleRequest {
 struct SampleReport {
   SurfaceDefects defects;
   double volume = 0;             ///< Volume inside the surface [m^3].
-  double doubtful_fraction = 0;  ///< Share of inside tests with a winding number far from 0 and 1.
+  double doubtful_fraction = 0;  ///< Share of interior points with an ambiguous winding number.
   double spacing = 0;            ///< Mean distance to the nearest phyxel [m].
   double smallest_gap = 0;       ///< Smallest distance between two phyxels [m].
-  Index on_surface = 0;          ///< Phyxels that lie on the surface.
+  Index on_surface = 0;          ///< Number of phyxels on the surface.
   std::vector<std::string> warnings;
 };
 
@@ -59,8 +58,10 @@ struct SampleReport {
 /// enclosed volume. The surface's vertices become the surfels.
 /// Source of the inside test: Jacobson et al. 2013 (generalised winding number), with the fast
 /// summation of Barill et al. 2018.
-/// @throws InputError for a surface without volume, or so open that inside has no meaning; if some
-///   must lie on the surface, for one that is open or overlaps itself, and for too few phyxels.
+/// @throws InputError for a surface without volume, or so open that its inside is undefined; and,
+/// if
+///   phyxels on the surface are requested, for a surface that is open or overlaps itself, and for
+///   too few phyxels
 Cloud sample_surface(const Surface& surface, const SampleRequest& request,
                      SampleReport* report = nullptr);
 

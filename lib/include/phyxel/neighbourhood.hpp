@@ -36,35 +36,34 @@ Csr transpose(const Csr& csr, Index columns);
 struct NeighbourhoodRule {
   /// The scope of a support radius: a body or a phyxel.
   enum class Support {
-    uniform,   ///< One h for the body, from the median of that mean: symmetric lists, one list for
-               ///< both passes.
-    adaptive,  ///< Each phyxel its own h, as in the 2004 paper (factor 3 there).
+    uniform,  ///< One h for the body, from the median of the mean distances. Lists are symmetric,
+              ///< and serve both passes.
+    adaptive,  ///< A different h for each phyxel, as in the 2004 paper (with a factor of 3).
   };
   Support support = Support::uniform;
   int nearest = 10;
   double factor = 1.8;           ///< 1.8 gives about 32 neighbours in a uniform cloud.
-  std::optional<double> radius;  ///< [m]: h itself, instead of the rule.
+  std::optional<double> radius;  ///< h [m], in place of the rule.
   std::optional<int>
-      max_neighbours;  ///< The 2008 paper's maxNeighbors: keeps the nearest; makes lists one-sided.
+      max_neighbours;  ///< Limit to the nearest (maxNeighbors in the 2008 paper); one-sided lists.
 
   /// True if i may be a neighbour of j without j being a neighbour of i.
   bool one_sided() const { return max_neighbours || (!radius && support == Support::adaptive); }
 };
 
-/// Neighbour lists of all phyxels (a phyxel is no neighbour of itself): N(i) contains j if
-/// |x_j - x_i| < h_i. The lists are empty if the device that needs them finds them itself;
-/// `support` is always filled.
+/// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i. The lists are empty if
+/// the device finds them; `support` is always set.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
-  bool symmetric = true;        ///< N is its own inverse; `inverse()` then returns `neighbours`.
+  bool symmetric = true;        ///< True if N is its own inverse, which `inverse()` then returns.
   std::vector<double> support;  ///< h_i [m], shape [n_phyxels].
   /// The inverse lists, {j : i in N(j)}.
   const Csr& inverse() const { return symmetric ? neighbours : inverse_lists; }
 };
 
-/// Mean distance from each phyxel to its `nearest` nearest others [m], shape [n_phyxels].
-/// Fewer phyxels than that: the mean over all others (0 for a lone phyxel).
+/// Mean distance from each phyxel to the `nearest` nearest phyxels [m], shape [n_phyxels]; with
+/// fewer phyxels, to all others (0 for a single phyxel).
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 
 /// Neighbour search through the spatial hash of Teschner et al. 2003, in time linear in the number
@@ -72,8 +71,8 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule);
 
-/// For each point, the phyxels i with |x_i - point| < support[i]. A point outside every support
-/// gets the nearest phyxel. @param unreached receives the number of such points; may be null
+/// For each point, the phyxels i with |x_i - point| < support[i]. A point outside all supports gets
+/// the nearest phyxel. @param unreached receives the number of such points; may be null
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached = nullptr);
 

@@ -1,5 +1,5 @@
-/// Everything public, in one include. What `device`, `ranks` and `shared_model` declare is in the
-/// library phyxel::ranks, all else in phyxel::phyxel.
+/// All public headers. `device`, `ranks` and `shared_model` belong to the library phyxel::ranks,
+/// the others to phyxel::phyxel.
 #pragma once
 
 #include "phyxel/backend.hpp"

@@ -8,18 +8,18 @@ namespace phyxel {
 
 /// Callback for the progress of one stage of a set-up: `share` is 0 at the beginning of the stage,
 /// grows, and is 1 at its end. It is called on the thread that sets up. An exception that it throws
-/// abandons the set-up, and reaches whoever asked for that; ranks that set up a model together must
-/// all throw it, or none.
+/// ends the set-up and reaches its caller; of ranks that set up a model together, all must throw it
+/// or none.
 using StageObserver = std::function<void(std::string_view stage, double share)>;
 
 /// Registers an observer for its own lifetime; the observer is called for all stages of set-ups on
 /// this thread: meshes read and filled, neighbours, moments, closed gradients, shares of ranks, the
-/// arrays of a solver, the largest step. Other threads have observers of their own, so that they
-/// can set up models at the same time. The last observer made is the one that hears. Where there is
-/// none, a stage costs a comparison.
+/// arrays of a solver, the largest step. Each thread has its own observers, so that threads can set
+/// up models at the same time. The last observer constructed is called. Without an observer, a
+/// stage costs a comparison.
 class ObserveStages {
  public:
-  /// An empty observer: nobody hears.
+  /// @param observer an empty one turns reports off
   explicit ObserveStages(StageObserver observer);
   ~ObserveStages();
   ObserveStages(const ObserveStages&) = delete;

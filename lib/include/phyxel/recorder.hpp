@@ -19,20 +19,19 @@ namespace phyxel {
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
 struct Frame {
   const State* state = nullptr;
-  const SurfelState* surfels = nullptr;  ///< Null: no surface family.
+  const SurfelState* surfels = nullptr;  ///< Surfels; null without a surface family.
   Diagnostics diagnostics;
   std::vector<double> von_mises;     ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
   std::vector<double> volume_ratio;  ///< det F, shape [n] or empty.
 };
 
-/// All that this rank has of a quantity: of phyxels and surfels of its model, in the order they
-/// have there. Empty: nothing.
+/// This rank's values of a quantity, in the order of its model; empty if the frame lacks it.
 std::span<const double> values_of(const Model& model, const Frame& frame, Quantity quantity);
 
-/// A frame of a model that is whole here.
+/// A source of a frame's values for a model on one rank.
 class FrameSource : public ChunkedSource {
  public:
-  /// Both must outlive this.
+  /// @param model,frame must outlive the source
   FrameSource(const Model& model, const Frame& frame, Index length = usual_length)
       : ChunkedSource(length), model_(model), frame_(frame) {}
   bool has(Quantity quantity) const override;
@@ -44,64 +43,64 @@ class FrameSource : public ChunkedSource {
   const Frame& frame_;
 };
 
-/// One frame of a series: its file and its time [s].
+/// A frame of a series: its file and its time [s].
 struct SeriesEntry {
   std::filesystem::path file;
   double time = 0;
 };
 
-/// Makes sure that a run can write into `directory` before any time is spent: the folder is made if
-/// need be, it can be written, and no earlier trajectory in it would be lost.
-/// @param may_exist whether a trajectory may be there: the run replaces or continues it.
-/// @throws InputError.
+/// Checks in advance that a run can write into `directory`: creates the folder if necessary, and
+/// checks that it is writable and that no earlier trajectory would be lost.
+/// @param may_exist true if the run replaces or continues a trajectory in the folder
+/// @throws InputError
 void check_output_folder(const std::filesystem::path& directory, bool may_exist);
 
-/// A series file in the making: each frame is appended in one write, so that it is valid at any
-/// time.
+/// A series file to which each frame is appended in one write, so that it is always valid.
 class SeriesFile {
  public:
   /// Writes a new file with these entries.
   void create(const std::filesystem::path& file, const std::vector<SeriesEntry>& entries);
   /// Adds one entry at the end. @throws OutputError
   void append(const SeriesEntry& entry);
-  /// Where it is.
+  /// Path of the file.
   const std::filesystem::path& file() const { return file_; }
 
  private:
   std::filesystem::path file_;
-  std::size_t end_ = 0;  // where the closing brackets begin
+  std::size_t end_ = 0;  // offset of the closing brackets
   bool empty_ = true;
 };
 
-/// The point at which a trajectory is continued, as a checkpoint tells it.
+/// The point at which a trajectory is continued, from a checkpoint.
 struct Continuation {
-  std::int64_t frames = 0;  ///< Frames that were written up to it.
+  std::int64_t frames = 0;  ///< Number of frames written before.
   std::int64_t step = std::numeric_limits<std::int64_t>::max();  ///< Step of the checkpoint.
-  /// Total energy of the run's first state [J]; NaN: not compared.
+  /// Total energy of the run's first state [J]; not compared if NaN.
   double initial_energy = std::numeric_limits<double>::quiet_NaN();
-  /// The checkpoint. If it lies outside the output folder, that folder must hold no trajectory,
-  /// unless it may be replaced. Empty: in the output folder.
+  /// The checkpoint. If it is outside the output folder, that folder must have no trajectory,
+  /// unless it may be replaced. Empty for a checkpoint in the output folder.
   std::filesystem::path checkpoint = {};
 };
 
-/// True if a folder holds no more than the first frame of this very scene: a run that was ended
-/// before its first checkpoint, which may begin again.
+/// True if a folder has at most the first frame of this scene, from a run that was stopped before
+/// its first checkpoint and may begin again.
 /// @throws InputError if its log cannot be read
 bool holds_only_a_start(const std::filesystem::path& directory, const Scene& scene);
 
-/// Writes frames into a folder:
+/// Writer of a trajectory's folder:
 ///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
 ///   run.json                                   at the end, what `write_summary` is given
-/// Each frame is written to a temporary name, for which the disk must have room beforehand, and
-/// renamed. Metadata sit in the group `/phyxel`.
+/// Each frame is written atomically, after allocating its disk space. Metadata are in the group
+/// `/phyxel`.
 class Recorder {
  public:
-  /// Checks the folder and the free space, then removes what the run replaces.
-  /// @param model a rank's share of it will do, if all frames come in stretches
-  /// @param point where an earlier part of this run is continued: its frames are kept, later ones
-  ///   removed. Unset: a new run.
+  /// Checks the folder and the free space, and removes the files that the run replaces.
+  /// @param model may be a rank's share if frames come from a `ChunkedSource`
+  /// @param point point at which an earlier part of this run is continued: its frames are kept,
+  /// later
+  ///   ones removed; unset for a new run
   /// @throws InputError, with nothing changed, if the folder holds an earlier trajectory and
   ///   `overwrite` is false, if `point` belongs to another run than the folder's or frames or lines
   ///   of the log are missing, if the folder cannot be written, or if the disk has no room for the
@@ -109,26 +108,27 @@ class Recorder {
   Recorder(const Model& model, const Scene& scene, bool overwrite,
            const std::optional<Continuation>& point = std::nullopt);
 
-  /// @throws OutputError; frames already written stay intact.
+  /// Writes a frame. @throws OutputError; frames written before stay intact
   void write(const Frame& frame);
-  /// A frame whose values are not all here, or not at once. @throws likewise
+  /// Writes a frame whose values come from a source, chunk by chunk. @throws OutputError likewise
   void write(const Diagnostics& diagnostics, ChunkedSource& values);
 
-  /// Brings all frames written so far to the disk, as a checkpoint that counts them must find them
-  /// after a power cut. @throws OutputError
+  /// Flushes all frames to the disk, so that a checkpoint that counts them finds them after a power
+  /// cut.
+  /// @throws OutputError
   void sync();
 
-  /// What a program has to say of a run that is done, as run.json. @throws OutputError
+  /// Writes the summary of a finished run as run.json. @throws OutputError
   void write_summary(const std::string& text) const;
 
-  /// Including those of the earlier part of a resumed run.
+  /// Number of frames, including those of the earlier part of a resumed run.
   std::int64_t frames_written() const { return frames_; }
-  /// Where they go.
+  /// The output folder.
   const std::filesystem::path& directory() const { return directory_; }
   std::vector<std::filesystem::path> files() const;  ///< Series files and the log, for summaries.
 
  private:
-  void remove_unfinished() const;  ///< What a killed run has left.
+  void remove_unfinished() const;  ///< Removes temporary files of a killed run.
   void check_space(std::int64_t frames_before) const;
   void begin_anew();
   void create_files();
@@ -140,27 +140,27 @@ class Recorder {
   bool writes_phyxels_, writes_surface_;
   std::int64_t frames_ = 0;
   SeriesFile phyxels_, surface_;
-  std::vector<std::filesystem::path> unsynced_;  // frames
-  std::size_t log_size_ = 0;                     // bytes of energy.csv
+  std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
+  std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
 };
 
-/// What a single frame holds, read back.
+/// The content of a frame.
 struct FrameData {
   double time = 0;
   std::vector<Vec3d> point;        ///< Deformed positions [m].
-  std::vector<Triangle> triangle;  ///< Empty for phyxel frames.
-  std::vector<Vec3d> normal;       ///< Empty unless the frame has them.
-  std::vector<Index> body;         ///< Body of each point, or empty.
-  /// The other fields that the frame has, by the names of `OutputRequest::fields`, shape [n] or
-  /// [n, 3].
+  std::vector<Triangle> triangle;  ///< Triangles; empty for phyxel frames.
+  std::vector<Vec3d> normal;       ///< Normals; empty if the frame has none.
+  std::vector<Index> body;         ///< Body of each point; empty if the frame has none.
+  /// Other fields of the frame, by the names of `OutputRequest::fields`, shape [n] or [n, 3].
   std::map<std::string, std::vector<double>> field;
-  std::string program, title, scene;  ///< What wrote it, and the scene's title and text.
+  std::string program, title,
+      scene;  ///< Program that wrote the frame; title and text of the scene.
 };
-/// @param with_fields whether `field` and what follows it are filled @throws InputError.
+/// Reads a frame. @param with_fields true to read `field` and the following members
+/// @throws InputError
 FrameData read_frame(const std::filesystem::path& file, bool with_fields = false);
 
-/// The entries of a series file, paths resolved from its folder.
-/// @throws InputError.
+/// Reads a series file; paths are resolved from its folder. @throws InputError
 std::vector<SeriesEntry> read_series(const std::filesystem::path& file);
 
 /// Writes all frames of a series into one temporal VTKHDF 2.0 file (ParaView 5.12 and later).

@@ -16,10 +16,9 @@ namespace phyxel {
 /// phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
 /// et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
-  /// Where a lattice has its phyxels. `cells`: one in the middle of each cell. `nodes`: one at each
-  /// corner of cells, so on the body's faces, edges and corners too, with its share of the volume
-  /// around it: what the body does at its surface is then not taken from one side. Beam and block
-  /// only.
+  /// Placement of phyxels in a lattice. `cells`: in the middle of each cell. `nodes` (beam and
+  /// block only): at the corners of cells, also on faces, edges and corners of the body, each with
+  /// its share of the adjacent cells' volume, which is more accurate at the surface.
   enum class Placement { cells, nodes };
 
   std::string name;
@@ -29,15 +28,15 @@ struct ShapeRequest {
   double spacing = 0;  ///< Lattice spacing [m].
   double jitter = 0;   ///< Fraction of the spacing, 0 to 0.5.
   Placement placement = Placement::cells;
-  std::uint64_t seed = 1;  ///< Of the jitter; the same on any number of threads.
-  bool surface = true;     ///< Whether to make surfels.
+  std::uint64_t seed = 1;  ///< Seed of the jitter, which does not depend on the number of threads.
+  bool surface = true;     ///< True to make surfels.
   bool operator==(const ShapeRequest&) const = default;
 };
 
-/// Names `make_shape` knows.
+/// The names of the shapes.
 const std::vector<std::string>& shape_names();
 
-/// Whether the shape is one of the paper's three bodies, whose size and counts are fixed.
+/// True for the paper's three bodies, whose sizes and counts are fixed.
 bool is_paper_shape(const std::string& name);
 
 /// Lattice spacing [m] that fills the shape with about `phyxels` phyxels.

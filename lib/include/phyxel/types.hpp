@@ -2,8 +2,8 @@
 ///
 /// Everything here is a plain value templated on the scalar type `Real`, which may be `float`,
 /// `double`, or a SIMD pack of either (see lib/solver/pack.hpp): the physics in `phyxel/physics/`
-/// is written once against these types. Public headers hold no Eigen types on purpose: their
-/// alignment depends on the compiler flags of whoever includes them.
+/// is written once for these types. Public headers have no Eigen types, whose alignment depends on
+/// the compiler flags of the including program.
 #pragma once
 
 #include <array>
@@ -38,7 +38,7 @@ struct Sym3 {
   Real xx{}, xy{}, xz{}, yy{}, yz{}, zz{};
 };
 
-/// The same in another precision.
+/// Conversion to another precision.
 template <class To, class From>
 PHYXEL_HD Vec3<To> to(const Vec3<From>& v) {
   return {static_cast<To>(v.x), static_cast<To>(v.y), static_cast<To>(v.z)};
@@ -140,7 +140,7 @@ inline Vec3d normalised(Vec3d a) {
   const double length = norm(a);
   return length > 0 ? a / length : Vec3d{};
 }
-/// Whether no component is NaN or infinite.
+/// True if no component is NaN or infinite.
 inline bool is_finite(Vec3d a) {
   return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
 }
@@ -294,7 +294,7 @@ PHYXEL_HD R contract(const Sym3<R>& p, const Sym3<R>& q) {
   const R diagonal = fused(p.zz, q.zz, fused(p.yy, q.yy, p.xx * q.xx));
   return fused(R(2), off_diagonal, diagonal);
 }
-/// All nine entries of it.
+/// The nine entries as a `Mat3`.
 template <class R>
 PHYXEL_HD Mat3<R> full(const Sym3<R>& s) {
   Mat3<R> m;
