@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   phyxel::studies::add_pictures(program);
   phyxel::studies::add_setup(program);
   phyxel::studies::add_neighbour_search(program);
+  phyxel::studies::add_laws(program);
   phyxel::studies::add_problems(program);
   return phyxel::app::run_program(program, argc, argv, [] {
     if (phyxel::app::ranks().size() == 1) return;

@@ -9,6 +9,7 @@ void add_accuracy_studies(CLI::App& program);
 void add_pictures(CLI::App& program);
 void add_setup(CLI::App& program);
 void add_neighbour_search(CLI::App& program);
+void add_laws(CLI::App& program);
 void add_problems(CLI::App& program);
 
 }  // namespace phyxel::studies

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -62,6 +63,11 @@ class Accelerations {
     owned_.for_each([&](Index i) { found[i] = (1 / share) * (there[i] - here[i]); });
     return found;
   }
+  /// |to| / |from|, 0 if `from` is. Collective.
+  double growth(const Vectors& from, const Vectors& to) const {
+    const double length = owned_.product(from, from);
+    return length > 0 ? std::sqrt(owned_.product(to, to) / length) : 0;
+  }
 
  private:
   const Model& model_;
@@ -111,7 +117,12 @@ void Solver::change_step(std::int64_t steps, double dt) {
   const Vectors rates = accelerations.derivatives(state, before, v);
   const Vectors along_itself = accelerations.derivatives(state, before, before),
                 along_rates = accelerations.derivatives(state, before, rates);
-  const StepChange change = step_change(dt_, dt);
+  // ω²Δt²/4 of the fastest parts of the motion.
+  const double longest = std::max(dt_, dt);
+  const double fastest = 0.25 * longest * longest *
+                         std::max(accelerations.growth(before, along_itself),
+                                  accelerations.growth(rates, along_rates));
+  const StepChange change = fastest < 1 ? step_change(dt_, dt) : StepChange{};
   for_each([&](Index i, double) {
     state.displacement[i] += change.first * before[i] + change.displacement * along_itself[i];
     v[i] += change.velocity * along_rates[i] - change.first * rates[i];

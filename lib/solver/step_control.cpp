@@ -24,6 +24,9 @@ constexpr std::int64_t most_apart = 2048;
 /// Half-life of the peak rate of stiffening, as a multiple of the same.
 constexpr std::int64_t memory = 64;
 constexpr double same_share = 0.02;  // the accuracy of a limit that was found
+/// Between two looks that are the fewest steps apart, a shock stiffens a phyxel by more than this
+/// share.
+constexpr double shock = 0.5;
 /// Steps are doubled where the bound is below this, so that no small change halves them again.
 constexpr double calm_bound = 0.85;
 /// Steps are doubled where the limit found allows so much of the largest share, likewise.
@@ -55,9 +58,12 @@ int StepControl::look(Solver& solver, int halvings) {
   if (std::isfinite(now.ratio)) seen_ = {now, solver.time()};
   if (!std::isfinite(now.ratio)) diverge(solver, "the state is not finite");  // on all ranks
   int made = shorten(solver, now.ratio, halvings);
-  if (made == 0 && halvings > 0 && lengthens_ && lengthen(solver, now.ratio)) made = -1;
+  const bool calm = made == 0 && halvings > 0 && lengthens_ && is_calm(solver, now.ratio);
+  const bool even = solver.steps() % 2 == 0;
+  if (calm && even && lengthen(solver, now.ratio)) made = -1;
   if (halvings + made == 0) first_.reset();
   look_again(solver, solver.looks(), now.ratio);
+  if (calm && !even) solver.looks().next = solver.steps() + 1;
   return made;
 }
 
@@ -89,24 +95,28 @@ int StepControl::shorten(Solver& solver, double ratio, int halvings) {
   return made;
 }
 
-bool StepControl::lengthen(Solver& solver, double ratio) const {
+double StepControl::calm_share_of(double dt) const {
+  const double at_rest = dt / at_rest_.largest_step, allowed = allowed_share(dt);
+  return std::max(calm_share * allowed, (at_rest * at_rest + allowed) / 2);
+}
+
+bool StepControl::is_calm(Solver& solver, double ratio) const {
   Looks& looks = solver.looks();
   const std::int64_t step = solver.steps();
-  const double longer = 2 * solver.dt(), at_rest = longer / at_rest_.largest_step,
-               allowed = allowed_share(longer),
-               calm = std::max(calm_share * allowed, (at_rest * at_rest + allowed) / 2);
-  const bool is_calm = bound_of_share(longer, ratio) <= calm_bound;
-  if (!is_calm && (looks.measured < 0 || 4 * expected_share(looks, ratio) > calm) &&
-      step - looks.measured < most_apart) {
-    looks.too_long = step;
-  }
-  if (looks.too_long >= 0 && step - looks.too_long < patience()) return false;
-  if (step % 2 != 0) {
-    looks.next = step + 1;
-    return false;
-  }
-  if (!is_calm && !(4 * measure(solver, ratio) <= calm)) {
-    looks.too_long = step;
+  const double longer = 2 * solver.dt();
+  const bool is_likely =
+      bound_of_share(longer, ratio) <= calm_bound ||
+      (looks.measured >= 0 && 4 * expected_share(looks, ratio) <= calm_share_of(longer)) ||
+      step - looks.measured >= most_apart;
+  if (!is_likely) looks.too_long = step;
+  return looks.too_long < 0 || step - looks.too_long >= patience();
+}
+
+bool StepControl::lengthen(Solver& solver, double ratio) const {
+  const double longer = 2 * solver.dt();
+  if (bound_of_share(longer, ratio) > calm_bound &&
+      !(4 * measure(solver, ratio) <= calm_share_of(longer))) {
+    solver.looks().too_long = solver.steps();
     return false;
   }
   solver.double_step();
@@ -152,17 +162,21 @@ void StepControl::look_again(const Solver& solver, Looks& looks, double ratio) c
   const double most_ratio =
       ratio <= bounded ? bounded
                        : looks.measured_ratio * allowed_share(solver.dt()) / looks.measured_share;
-  std::int64_t wait = fewest_;
+  std::int64_t wait = 1, least = 1;
   if (looks.last >= 0 && step > looks.last) {
     const double since = static_cast<double>(step - looks.last);
     // Half the way there, and as fast back as forth; at most twice as long as before. The peak rate
     // fades slowly, because a body that swings stiffens fast again and again.
     const double faded = looks.change * std::exp2(-since / static_cast<double>(memory * fewest_));
-    looks.change = std::max(std::abs(ratio - looks.ratio) / since, faded);
+    const double rate = std::abs(ratio - looks.ratio) / since;
+    looks.change = std::max(rate, faded);
     const double until = looks.change > 0 ? (most_ratio - ratio) / looks.change / 2 : 2 * since;
     wait = static_cast<std::int64_t>(std::min(until, 2 * since));
+    // A shock stiffens phyxels where it is before it has crossed the body.
+    const bool is_shock = rate * static_cast<double>(fewest_) > shock * ratio;
+    least = is_shock ? 1 : std::min(fewest_, 2 * (step - looks.last));
   }
-  looks.next = step + std::clamp(wait / fewest_ * fewest_, fewest_, most());
+  looks.next = step + std::clamp(wait, least, most());
   looks.last = step;
   looks.ratio = ratio;
 }

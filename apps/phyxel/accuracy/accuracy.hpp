@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/scene.hpp"
 
 namespace phyxel::app {
@@ -17,6 +18,8 @@ const char* filling_name(Filling filling);
 
 /// The discretisation of a problem.
 struct Discretisation {
+  /// Of problems that name no other; at the strains of most it does not matter.
+  const char* law = StVenantKirchhoff<double>::name;
   Filling filling = Filling::nodes;
   double jitter = 0;     ///< Random displacement of lattice phyxels, in spacings.
   double factor = 1.8;   ///< Support factor.

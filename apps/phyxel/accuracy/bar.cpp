@@ -36,7 +36,8 @@ Scene bar(const Discretisation& d, double length, double side, double poisson) {
                        .jitter = d.jitter,
                        .placement = placement_of(d.filling),
                        .surface = d.closure > 0};
-  body.material = {.young = E, .poisson = poisson, .density = rho, .hourglass = d.hourglass};
+  body.material = {
+      .young = E, .poisson = poisson, .density = rho, .law = d.law, .hourglass = d.hourglass};
   body.neighbourhood.factor = d.factor;
   body.closure = d.closure;
   Scene scene;

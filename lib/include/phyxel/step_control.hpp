@@ -40,8 +40,8 @@ class StepControl {
   }
   /// Whether any law can stiffen.
   bool active() const { return active_; }
-  /// The fewest steps between two looks: half the number of steps in which a wave crosses the
-  /// smallest body, from 1 to 16.
+  /// The fewest steps between two looks, but at the start and in a shock: half the number of steps
+  /// in which a wave crosses the smallest body, from 1 to 16.
   std::int64_t fewest() const { return fewest_; }
   /// The most steps between two looks.
   std::int64_t most() const { return std::min<std::int64_t>(32 * fewest_, 128); }
@@ -67,7 +67,12 @@ class StepControl {
   double allowed_share(double dt) const;
   /// Halves the step as often as needed. @returns how often
   int shorten(Solver& solver, double ratio, int halvings);
-  /// Doubles the step if it has been right for long enough. @returns whether it did
+  /// The largest share at which steps are doubled: less than is allowed, so that no small change
+  /// halves them again.
+  double calm_share_of(double dt) const;
+  /// True if steps of twice the size have seemed right for as long as `patience`.
+  bool is_calm(Solver& solver, double ratio) const;
+  /// Doubles the step if the bound, or the limit, allows it. @returns whether it did
   bool lengthen(Solver& solver, double ratio) const;
   /// When to look again, after a look that found `ratio`.
   void look_again(const Solver& solver, Looks& looks, double ratio) const;

@@ -146,6 +146,22 @@ TEST(StepChange, GivesNoEnergyToABodyThatChangesItsStepAgainAndAgain) {
   EXPECT_NEAR(energy() / before, 1, 0.2);
 }
 
+/// Modes that a step makes unstable have no action to keep: their series would make them grow. The
+/// state stays, and its velocities move by the forces.
+TEST(StepChange, LeavesAloneWhatAStepDoesNotResolve) {
+  Scene scene = one_body();
+  scene.bodies[0].material.law = "small-strain";
+  const Model model = model_of(scene, lattice(4, 4, 4, 0.1, 0.2));
+  const auto backend = make_test_backend(model, Precision::double_, 1);
+  const double dt = 3 * step_limit(model, 1).largest_step;
+  State start = initial_state(model, scene, dt);
+  std::mt19937_64 engine(5);
+  for (Vec3d& u : start.displacement) u = uniform_vector(engine, 1e-3);
+  Solver solver(model, *backend, start, Method::verlet);
+  solver.halve_step();
+  EXPECT_TRUE(solver.state().displacement == start.displacement);
+}
+
 /// The trajectory beyond differs from that of whole steps as two step sizes do: by their square.
 TEST(StepChange, LosesNoOrderByChangesOfTheStep) {
   Scene scene = one_body();

@@ -265,6 +265,50 @@ TEST(StepControl, LengthensTheStepOfABodyThatComesBack) {
   EXPECT_LT(adaptive.drift, 1e-5);
 }
 
+/// A look may come after an odd number of steps, as in bodies so small that one step is enough
+/// between two looks; the step is doubled after the next one.
+TEST(StepControl, LengthensAfterAnEvenNumberOfSteps) {
+  const Model model = model_of(bouncing_scene(), lattice(2, 2, 8, 0.1));
+  const auto backend = make_test_backend(model, Precision::double_, 1);
+  StepPlan plan = plan_of(model);
+  plan.lengthens = true;
+  Solver solver(model, *backend, initial_state(model, bouncing_scene(), plan.dt), Method::verlet);
+  StepControl control(model, *backend, plan);
+  ASSERT_EQ(control.fewest(), 1);
+  solver.halve_step();
+  plan.halve(1);
+  solver.looks().next = 7;
+  while (solver.steps() < 7) solver.step();
+  EXPECT_EQ(control.look(solver, plan.halvings), 0);
+  EXPECT_EQ(solver.looks().next, 8);
+  solver.step();
+  plan.halve(control.look(solver, plan.halvings));
+  EXPECT_EQ(plan.halvings, 0);
+  EXPECT_EQ(solver.looks().doublings, 1);
+}
+
+/// A cube falls onto its foot faster than half the speed of its waves: within two steps its lowest
+/// phyxels are so stiff that looks a few steps apart would come too late.
+TEST(StepControl, LooksAtEachStepOfAShock) {
+  Material material = rubber();
+  material.law = "hencky";
+  material.young = 3e4;
+  material.hourglass = 0.1;
+  Scene scene = one_body(material);
+  scene.bodies[0].velocity = {0, 0, -4};
+  scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.03}}}});
+  const Model model = model_of(scene, lattice(9, 9, 9, 0.05));
+  const auto backend = make_test_backend(model, Precision::double_, 2);
+  StepPlan plan = plan_of(model);
+  plan.steps = 60;
+  const State start = initial_state(model, scene, plan.dt);
+  backend->upload(start);
+  StabilityWatch watch(model, diagnose(model, *backend, 0, plan.dt));
+  const State end = run(model, *backend, plan, start, true, nullptr, &watch);
+  EXPECT_GE(plan.halvings, 2);
+  EXPECT_EQ(diagnose(model, *backend, end.step, end.dt).inverted, 0);
+}
+
 /// A step that a scene gives is halved where it must be, and stays so.
 TEST(StepControl, KeepsStepsThatASceneGivesFromGrowing) {
   Scene scene = bouncing_scene();

@@ -59,7 +59,7 @@ PHYXEL_HD Vec3<Real> verlet_velocity_damped(Vec3<Real> velocity, Vec3<Real> acce
 /// to another that jumps, by an amount that depends on the phase, so that bodies which change their
 /// steps again and again gain energy. u⁺ = s u, v⁺ = v/s with s⁴ = (1 - x)/(1 - x⁺) keeps the
 /// action of the mode instead, whatever its phase. The coefficients give s and 1/s to second order
-/// in x.
+/// in x. Modes beyond x = 1, which a step makes unstable, have no action to keep.
 struct StepChange {
   double first = 0;         ///< [s²]
   double displacement = 0;  ///< [s⁴]
