@@ -304,7 +304,7 @@ class CpuArrays {
                   (displacement_.size() + velocity_.size()) * sizeof(StateReal)},
                  {"neighbour lists", lists_.bytes()}});
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
-    if (!applied_.empty()) list.push_back({"applied forces", applied_.size() * sizeof(Real)});
+    if (!applied_.empty()) list.push_back({"loads", applied_.size() * sizeof(Real)});
     if (!pull_.empty()) list.push_back({"hourglass control", pull_.size() * sizeof(Real)});
     if (!closing_.empty()) list.push_back({"closing vectors", closing_.size() * sizeof(Real)});
     if (!history_.empty()) {

@@ -68,6 +68,7 @@ density = 1000 # body.material.density => density = 1001
 law = 'st-venant-kirchhoff' # body.material.law => law = 'corotated'
 volume_stiffness = 10 # body.material.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.material.damping => damping = 2
+viscosity = 1 # body.material.viscosity => viscosity = 2
 hourglass = 0.1 # body.material.hourglass => hourglass = 0.2
 [body.neighbours]
 support = 'adaptive' # body.neighbours.support => support = 'uniform'
@@ -82,6 +83,7 @@ density = 1000 # body.inclusion.density => density = 1001
 law = 'st-venant-kirchhoff' # body.inclusion.law => law = 'neo-hookean'
 volume_stiffness = 10 # body.inclusion.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.inclusion.damping => damping = 2
+viscosity = 1 # body.inclusion.viscosity => viscosity = 2
 [[body.fixed]]
 indices = [1, 2] # selection.indices => indices = [1, 3]
 axes = 'x' # body.fixed.axes => axes = 'xz'
@@ -150,6 +152,54 @@ region = 'x-'
 c10 = 2e4 # body.inclusion.c10 => c10 = 3e4
 c01 = 2e3 # body.inclusion.c01 => c01 = 3e3
 bulk_modulus = 3e5 # body.inclusion.bulk_modulus => bulk_modulus = 4e5
+[[body]]
+name = 'sixth'
+cloud = 'c'
+[body.material]
+law = 'orthotropic'
+young1 = 1e5 # body.material.young1 => young1 = 2e5
+young2 = 1e5 # body.material.young2 => young2 = 2e5
+young3 = 1e5 # body.material.young3 => young3 = 2e5
+poisson12 = 0.3 # body.material.poisson12 => poisson12 = 0.2
+poisson13 = 0.3 # body.material.poisson13 => poisson13 = 0.2
+poisson23 = 0.3 # body.material.poisson23 => poisson23 = 0.2
+shear12 = 3e4 # body.material.shear12 => shear12 = 4e4
+shear13 = 3e4 # body.material.shear13 => shear13 = 4e4
+shear23 = 3e4 # body.material.shear23 => shear23 = 4e4
+axis1 = [1, 0, 0] # body.material.axis1 => axis1 = [1, 0, 1]
+axis2 = [0, 1, 0] # body.material.axis2 => axis2 = [0, 1, 1]
+density = 1000
+[[body.inclusion]]
+region = 'x-'
+young1 = 1e5 # body.inclusion.young1 => young1 = 2e5
+young2 = 1e5 # body.inclusion.young2 => young2 = 2e5
+young3 = 1e5 # body.inclusion.young3 => young3 = 2e5
+poisson12 = 0.3 # body.inclusion.poisson12 => poisson12 = 0.2
+poisson13 = 0.3 # body.inclusion.poisson13 => poisson13 = 0.2
+poisson23 = 0.3 # body.inclusion.poisson23 => poisson23 = 0.2
+shear12 = 3e4 # body.inclusion.shear12 => shear12 = 4e4
+shear13 = 3e4 # body.inclusion.shear13 => shear13 = 4e4
+shear23 = 3e4 # body.inclusion.shear23 => shear23 = 4e4
+axis1 = [1, 0, 0] # body.inclusion.axis1 => axis1 = [1, 0, 1]
+axis2 = [0, 1, 0] # body.inclusion.axis2 => axis2 = [0, 1, 1]
+[[body]]
+name = 'seventh'
+cloud = 'd'
+[body.material]
+law = 'j2'
+young = 1e5
+poisson = 0.3
+yield_stress = 1e3 # body.material.yield_stress => yield_stress = 2e3
+hardening = 1e2 # body.material.hardening => hardening = 2e2
+saturation_stress = 4e3 # body.material.saturation_stress => saturation_stress = 5e3
+saturation_rate = 3 # body.material.saturation_rate => saturation_rate = 4
+density = 1000
+[[body.inclusion]]
+region = 'x-'
+yield_stress = 1e3 # body.inclusion.yield_stress => yield_stress = 2e3
+hardening = 1e2 # body.inclusion.hardening => hardening = 2e2
+saturation_stress = 4e3 # body.inclusion.saturation_stress => saturation_stress = 5e3
+saturation_rate = 3 # body.inclusion.saturation_rate => saturation_rate = 4
 )";
 
 /// The text with the value of one key changed, or of none.
