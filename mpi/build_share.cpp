@@ -34,7 +34,10 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
   LocalModel local =
       in_stage("lists", [&] { return surroundings_of(setup, whole, std::move(own)); });
   in_stage("masses, moments, boundary, surfels", [&] { complete_model(setup, whole, local); });
-  return in_stage("share", [&] { return share_out_of(setup, whole, cut, local); });
+  BuiltShare share = in_stage("share", [&] { return share_out_of(setup, whole, cut, local); });
+  share.digest = model_digest(share.model);
+  share.digest_before_4 = model_digest_before_4(share.model);
+  return share;
 }
 
 /// Bodies begin on one rank after the other, so that small ones are not all the first one's.
@@ -47,6 +50,9 @@ Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
+  if (needs_whole(scene)) {
+    return share_of_whole(ranks, options, [&] { return build_model(scene); });
+  }
   // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
   Cloud rest;
@@ -76,6 +82,9 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
+  if (needs_whole(scene)) {
+    return share_of_whole(ranks, options, [&] { return build_model(scene, clouds); });
+  }
   return naming(scene, [&] {
     if (clouds.size() != scene.bodies.size()) {
       throw AgreedError(ExitCode::bad_input,

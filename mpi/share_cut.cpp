@@ -91,7 +91,12 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   }
   from_owners(made.model.mass);
   from_owners(made.model.volume);
-  return {model_of(std::move(made)), cut.partitioner, cut.quality, std::move(whole.surfaces)};
+  BuiltShare built;
+  built.model = model_of(std::move(made));
+  built.partitioner = cut.partitioner;
+  built.quality = cut.quality;
+  built.surfaces = std::move(whole.surfaces);
+  return built;
 }
 
 }  // namespace phyxel

@@ -106,6 +106,16 @@ void collect_ghost_neighbours(const ShareSetup& setup, const WholeBodies& whole,
   }
 }
 
+/// `check_masses` of own phyxels, by their numbers in the body.
+void check_own_masses(const BodyRequest& request, const LocalModel& local, const Part& part,
+                      const Masses& masses) {
+  for (Index i = part.begin; i < part.end; ++i) {
+    if (!owns(local, static_cast<std::size_t>(i))) continue;
+    const auto k = static_cast<std::size_t>(i - part.begin);
+    check_mass(request, local.phyxels[i].number, masses.mass[k], masses.volume[k]);
+  }
+}
+
 /// Of own phyxels. Others' follow from sums that only their owners have, if they are the
 /// kernel's.
 void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
@@ -122,6 +132,7 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   std::vector<ExactSum*> all;
   for (ExactSum& sum : sums) all.push_back(&sum);
   total(setup.ranks, all);
+  std::vector<Masses> made;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     const Part& part = m.parts[b];
     const double density = setup.scene.bodies[b].material.density;
@@ -131,6 +142,14 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
                             local.around[b].kernel_sum, sums[b].value() / whole.bodies[b].size,
                             density)
             : geometric_masses(values_of(local, part, &MigratingPhyxel::volume), density);
+    made.push_back(std::move(masses));
+  }
+  setup.ranks.collectively([&] {
+    for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+      check_own_masses(setup.scene.bodies[b], local, m.parts[b], made[b]);
+    }
+  });
+  for (Masses& masses : made) {
     extend(m.mass, std::move(masses.mass));
     extend(m.volume, std::move(masses.volume));
   }

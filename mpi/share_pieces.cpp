@@ -57,6 +57,14 @@ Index group_size(const ShareOptions& options, Index size) {
 
 }  // namespace
 
+void check_alike(const MpiCommunicator& ranks, std::uint64_t digest) {
+  const auto alike = static_cast<std::int64_t>(digest);
+  if (ranks.smallest(alike) == ranks.largest(alike)) return;
+  throw AgreedError(ExitCode::bad_input,
+                    "the ranks have different bodies: allowed are the same files for all, on a "
+                    "file system that all see");
+}
+
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole) {
   MigratingPhyxels own;
   whole.surfaces.resize(whole.bodies.size());
@@ -94,12 +102,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       for (std::string& warning : cloud.warnings) whole.warnings.push_back(std::move(warning));
     }
   });
-  const auto alike = static_cast<std::int64_t>(digest);
-  if (setup.ranks.smallest(alike) != setup.ranks.largest(alike)) {
-    throw AgreedError(ExitCode::bad_input,
-                      "the ranks have different bodies: allowed are the same files for all, on a "
-                      "file system that all see");
-  }
+  check_alike(setup.ranks, digest);
   setup.ranks.add(with_volumes);
   for (const Origin& origin : setup.ranks.gathered(std::span(std::as_const(origins)))) {
     whole.bodies[origin.body].origin = origin.at;
@@ -107,18 +110,6 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       check_terms(setup.scene.bodies[b]);
-      if (setup.scene.bodies[b].closure > 0) {
-        throw InputError(fmt::format(
-            "{}: body \"{}\" has closed gradients (closure = {:g}), which one rank has to find: "
-            "allowed are one rank, or closure = 0",
-            setup.scene.bodies[b].where, setup.scene.bodies[b].name,
-            setup.scene.bodies[b].closure));
-      }
-      if (!setup.scene.bodies[b].inclusions.empty()) {
-        throw InputError(fmt::format(
-            "{}: body \"{}\" has inclusions, which ranks cannot share: allowed is one rank",
-            setup.scene.bodies[b].inclusions[0].select.where, setup.scene.bodies[b].name));
-      }
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));

@@ -99,6 +99,19 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
 BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& cut,
                         LocalModel& local);
 
+/// Refuses digests that differ between ranks. Collective.
+/// @param digest of what each rank has made or read for itself
+/// @throws AgreedError
+void check_alike(const MpiCommunicator& ranks, std::uint64_t digest);
+
+/// True for scenes whose shares are taken out of whole models: a body has closed gradients, whose
+/// closing vectors one rank has to find, or inclusions.
+bool needs_whole(const Scene& scene);
+/// Takes this rank's share out of the model that each rank builds whole. Collective.
+/// @throws AgreedError for what `build` refuses, and for models that differ between ranks
+BuiltShare share_of_whole(const MpiCommunicator& ranks, const ShareOptions& options,
+                          const std::function<Model()>& build);
+
 /// Other ranks' phyxels within so many supports of own ones.
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
                                     const MigratingPhyxels& own, double supports);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "phyxel/error.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -107,6 +106,7 @@ class Maker {
     m.position = own_of(whole_.position);
     m.volume = own_of(whole_.volume);
     m.mass = own_of(whole_.mass);
+    if (!whole_.closing.empty()) m.closing = own_of(whole_.closing);
     hood.support = own_of(whole_.neighbourhood.support);
     if (!has_lists_) return;
     m.inverse_moment = own_of(whole_.inverse_moment);
@@ -146,13 +146,6 @@ class Maker {
 }  // namespace
 
 ModelShare share_of(const Model& whole, const PartHalo& plan, const std::vector<int>& part_of) {
-  if (!whole.closing.empty()) {
-    throw InputError(
-        "shares of a model with closed gradients are not made: allowed is closure = 0");
-  }
-  if (whole.has_inclusions()) {
-    throw InputError("shares of bodies of several materials are not made: allowed is one material");
-  }
   return Maker(whole, plan, part_of).make();
 }
 

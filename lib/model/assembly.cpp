@@ -143,14 +143,17 @@ Masses kernel_masses(const std::vector<double>& spacing, const std::vector<doubl
   return result;
 }
 
+void check_mass(const BodyRequest& request, Index i, double mass, double volume) {
+  if (mass > 0 && volume > 0 && std::isfinite(mass) && std::isfinite(volume)) return;
+  throw InputError(fmt::format(
+      "{}: phyxel {} of body \"{}\" has a mass of {:g} kg and a volume of {:g} m^3 (does it lie "
+      "where others lie?); allowed: both > 0, finite",
+      request.where, i, request.name, mass, volume));
+}
+
 void check_masses(const BodyRequest& request, const Masses& masses) {
   for (std::size_t i = 0; i < masses.mass.size(); ++i) {
-    const double m = masses.mass[i], v = masses.volume[i];
-    if (m > 0 && v > 0 && std::isfinite(m) && std::isfinite(v)) continue;
-    throw InputError(fmt::format(
-        "{}: phyxel {} of body \"{}\" has a mass of {:g} kg and a volume of {:g} m^3 (does it lie "
-        "where others lie?); allowed: both > 0, finite",
-        request.where, i, request.name, m, v));
+    check_mass(request, static_cast<Index>(i), masses.mass[i], masses.volume[i]);
   }
 }
 

@@ -54,6 +54,8 @@ Masses kernel_masses(const std::vector<double>& spacing, const std::vector<doubl
 /// Phyxels that lie all in one place have no volume by the kernel rule, and so no mass.
 /// @throws InputError with the first phyxel whose mass or volume is zero or not finite
 void check_masses(const BodyRequest& request, const Masses& masses);
+/// The same of phyxel i of a body alone. @param mass [kg] @param volume [m³]
+void check_mass(const BodyRequest& request, Index i, double mass, double volume);
 Masses geometric_masses(const std::vector<double>& volume, double density);
 
 /// "uniform support, 1.8 x the mean distance to the 10 nearest"

@@ -76,8 +76,8 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
   exchange_ = std::make_unique<const RowRedistribution>(all, here_);
   if (ranks_.leads()) triangles_ = triangles_of(built.surfaces);
   partitioner_ = partitioner_name(built.partitioner);
-  digest_ = model_digest(here_);
-  digest_before_4_ = model_digest_before_4(here_);
+  digest_ = built.digest;
+  digest_before_4_ = built.digest_before_4;
   std::int64_t own = 0;
   for (const Part& part : here_.parts) own += part.owned_end() - part.begin;
   const std::int64_t ghosts = here_.size() - own;

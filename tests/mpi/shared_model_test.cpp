@@ -94,6 +94,60 @@ TEST_F(ASharedModel, StepsAsOneRankWould) {
   EXPECT_GT(norm(whole.displacement[end]), 1e-3);
 }
 
+/// A bar of two materials with closed gradients, which falls and spins.
+Scene closed_bar(Precision precision) {
+  Scene scene = spinning_beam();
+  BodyRequest& bar = scene.bodies[0];
+  bar.source.shape.jitter = 0.2;
+  bar.closure = 1e-3;
+  Material stiff = bar.material;
+  stiff.young *= 5;
+  stiff.density *= 2;
+  bar.inclusions.push_back(
+      {.select = {.box = Selection::Box{{0.7, -1, -1}, {1.2, 1, 0.1}}}, .material = stiff});
+  bar.fixed.push_back({.select = {.region = "x-"}});
+  scene.solver.precision = precision;
+  return scene;
+}
+
+/// Each rank adds phyxels of both materials, and sums of all phyxels are exact.
+TEST_F(ASharedModel, OfTwoMaterialsWithClosedGradientsStepsAsOneRankWould) {
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    const Scene scene = closed_bar(precision);
+    const SharedModel shared(all_ranks(), scene, cpu);
+    const Ranks one;
+    const SharedModel alone(one, scene, cpu);
+    EXPECT_EQ(shared.digest(), alone.digest());
+    ASSERT_EQ(shared.here().parts.size(), 2u);
+    ASSERT_FALSE(shared.here().closing.empty());
+    const auto whole_backend = alone.make_backend(precision, 1),
+               backend = shared.make_backend(precision, 1);
+    const double dt = 0.5 * step_limit(alone.here(), *whole_backend).largest_step;
+    EXPECT_EQ(0.5 * step_limit(shared.here(), *backend).largest_step, dt);
+    Solver whole(*whole_backend, initial_state(alone.here(), scene, dt)),
+        solver(*backend, initial_state(shared.here(), scene, dt));
+    whole.step(40);
+    solver.step(40);
+    const State expected = whole.state(), state = solver.state();
+    Index different = 0;
+    double moved = 0;
+    for (Index i = 0; i < shared.here().size(); ++i) {
+      if (!shared.here().owns(i)) continue;
+      const Index n = shared.here().global_id(i);
+      different += !(state.displacement[i] == expected.displacement[n] &&
+                     state.velocity[i] == expected.velocity[n]);
+      moved = std::max(moved, norm(state.displacement[i]));
+    }
+    EXPECT_EQ(different, 0);
+    EXPECT_GT(all_ranks().largest(moved), 1e-3);
+    const Diagnostics d = diagnose(alone.here(), *whole_backend, 40, dt),
+                      e = diagnose(shared.here(), *backend, 40, dt);
+    EXPECT_EQ(d.kinetic_energy, e.kinetic_energy);
+    EXPECT_EQ(d.total_energy(), e.total_energy());
+    EXPECT_EQ(d.momentum, e.momentum);
+  }
+}
+
 TEST_F(ASharedModel, GoesOnFromACheckpoint) {
   const Scene scene = spinning_beam();
   const SharedModel shared(all_ranks(), scene, cpu);
