@@ -36,8 +36,8 @@ Csr transpose(const Csr& csr, Index columns);
 struct NeighbourhoodRule {
   /// The scope of a support radius: a body or a phyxel.
   enum class Support {
-    uniform,  ///< One h for the body, from the median of the mean distances. Lists are symmetric,
-              ///< and serve both passes.
+    uniform,   ///< One h for the body, from the median of the mean distances. Lists are symmetric,
+               ///< and serve both passes.
     adaptive,  ///< A different h for each phyxel, as in the 2004 paper (with a factor of 3).
   };
   Support support = Support::uniform;

@@ -311,8 +311,8 @@ TEST(Force, LawsButHookesResistUntilTheBodyIsInsideOut) {
       resists = resists && push < before;
       before = push;
     }
-    const bool in_green_strain = std::is_same_v<Law, StVenantKirchhoff<double>> ||
-                                 std::is_same_v<Law, Orthotropic<double>>;
+    const bool in_green_strain =
+        std::is_same_v<Law, StVenantKirchhoff<double>> || std::is_same_v<Law, Orthotropic<double>>;
     EXPECT_EQ(resists, !in_green_strain) << Law::name;
   });
 }
