@@ -228,7 +228,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
     }
     for (std::string& name : lines_of(in.text("/state/history_columns"))) {
       const std::string path = history_path(name);
-      if (const std::size_t other = in.shape(path.c_str()).rows; other != rows) {
+      if (const std::size_t other = in.shape(path).rows; other != rows) {
         in.refuse(fmt::format("{} has {} rows, /state/displacement {}", path, other, rows));
       }
       state_.history.push_back({std::move(name), {}});
