@@ -233,7 +233,7 @@ class Parameters : public SceneFiles {
 TEST_F(Parameters, EveryKeyIsComparedByNameOrFreeForAReason) {
   // Keys that become something else.
   const std::map<std::string, std::string> known_as = {
-      {"body.array.count", "bodies: 6 then, 7 now"},
+      {"body.array.count", "bodies: 8 then, 9 now"},
       {"body.array.spacing",
        "body.translation of body 3 (\"second 2\"): [5, 0, 0] then, "
        "[6, 0, 0] now"}};
