@@ -192,8 +192,8 @@ struct Gradients {
   Real* residuals = nullptr;  ///< What the gradients do not follow (`add_residual`); null: unasked.
 };
 
-/// What is done with the part of the neighbours' displacements that a linear fit leaves. Closing
-/// serves bodies with hourglass control, too.
+/// Pair term of pass 1: what is done with the part of the displacements that a linear fit leaves.
+/// Closing serves bodies with hourglass control, too.
 enum class PairTerm { none, hourglass, closing };
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
