@@ -3,10 +3,10 @@
 typed by hand.
 
     bench/make_pages.py                         all pages
-    bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, cpu, readme
+    bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, laws, cpu, readme
     bench/make_pages.py --check                 writes nothing; fails if a page is not up to date
 
-performance, scaling and accuracy are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
+performance, scaling, accuracy and laws are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
 README.md. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python alone: it
 compares the text, since charts differ from one version of matplotlib to the next.
 
@@ -19,6 +19,7 @@ The tables come from scripts/measure_gpu.sh, measure_accuracy.py and profile_gpu
       build/cpu/bin/phyxel_studies $study --csv docs/results/accuracy_$study.csv --force
     done
     build/cpu/bin/phyxel_studies pictures
+    build/cpu/bin/phyxel_studies laws --csv docs/results/laws.csv --force
     build/cpu/bin/phyxel_studies neighbour-search --csv docs/results/cpu_neighbours.csv --force
     build/cpu/bin/phyxel accuracy hard --long --csv docs/results/hard_cases_cpu.csv --force
 """
@@ -30,11 +31,11 @@ import sys
 import tempfile
 
 sys.dont_write_bytecode = True
-from pages import accuracy, charts, cpu, performance, scaling  # noqa: E402
+from pages import accuracy, charts, cpu, laws, performance, scaling  # noqa: E402
 from pages.tables import PageError, markdown_link  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "cpu": cpu}
+PAGES = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "laws": laws, "cpu": cpu}
 WRONG_INPUT = 2
 
 

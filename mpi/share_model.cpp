@@ -165,6 +165,7 @@ void describe_parts(const ShareSetup& setup, const WholeBodies& whole, LocalMode
     Part& part = m.parts[b];
     part.name = request.name;
     part.material = request.material;
+    part.material.law = law_of(request, request.material);
     part.material.hourglass = hourglass_of(request);
     part.neighbourhood = in_words(request.neighbourhood);
     part.kernel_volumes = whole.bodies[b].kernel_volumes;

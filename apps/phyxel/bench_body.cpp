@@ -44,7 +44,11 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   scene.gravity = {0, 0, -9.81};
   BodyRequest body;
   body.name = "cube";
-  body.material = {.young = 1e6, .poisson = 0.3, .density = 1000, .hourglass = 0};
+  body.material = {.young = 1e6,
+                   .poisson = 0.3,
+                   .density = 1000,
+                   .law = StVenantKirchhoff<double>::name,
+                   .hourglass = 0};
   for (const LawEntry& law : law_table()) {
     if (term_of(law) != terms) continue;
     body.material.law = law.name;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "phyxel/backend.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
 
@@ -11,8 +12,11 @@ namespace phyxel::app {
 inline constexpr double cantilever_length = 1;     ///< From the fixed to the loaded layer [m].
 inline constexpr double cantilever_height = 0.1;   ///< Height and width [m].
 inline constexpr double cantilever_shear = 0.025;  ///< Load [N]: deflects it by length / 1000.
-inline const Material cantilever_material{
-    .young = 1e6, .poisson = 0.3, .density = 1000, .hourglass = 0};
+inline const Material cantilever_material{.young = 1e6,
+                                          .poisson = 0.3,
+                                          .density = 1000,
+                                          .law = StVenantKirchhoff<double>::name,
+                                          .hourglass = 0};
 
 /// Relative change of the deflection from frame to frame at which the beam has settled.
 inline constexpr double cantilever_settled = 1e-6;

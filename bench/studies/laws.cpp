@@ -20,7 +20,8 @@ namespace {
 struct LawOptions {
   std::vector<std::string> meshes{"examples/mesh/ring.obj"};
   std::vector<std::string> laws;
-  double most_seconds = 120;  ///< Of one run.
+  std::vector<std::string> cases;  ///< Names of scenes; none: all, and speed and accuracy.
+  double most_seconds = 120;       ///< Of one run.
   app::TableOptions table;
 };
 
@@ -121,6 +122,10 @@ class LawTable {
 
 void run_scenes(const LawOptions& options, LawTable& table) {
   for (const FirstScene& first : first_scenes({options.meshes.begin(), options.meshes.end()})) {
+    const bool is_asked =
+        options.cases.empty() ||
+        std::find(options.cases.begin(), options.cases.end(), first.name) != options.cases.end();
+    if (!is_asked) continue;
     const std::vector<Cloud> clouds{make_cloud(first.scene.bodies[0])};
     for (const std::string& law : options.laws) {
       Scene scene = first.scene;
@@ -199,6 +204,7 @@ void measure_laws(LawOptions options) {
   }
   LawTable table(options.table);
   run_scenes(options, table);
+  if (!options.cases.empty()) return;
   measure_speed(options, table);
   measure_accuracy(options, table);
 }
@@ -213,6 +219,10 @@ void add_laws(CLI::App& program) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--law", options->laws, "Laws, comma separated (default: all of E and ν)")
+      ->delimiter(',');
+  command
+      ->add_option("--case", options->cases,
+                   "Scenes, comma separated, without speed and accuracy (default: all)")
       ->delimiter(',');
   command->add_option("--seconds", options->most_seconds, "The longest time of a run [s]")
       ->capture_default_str()

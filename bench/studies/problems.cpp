@@ -7,7 +7,9 @@
 #include "accuracy/hard_cases.hpp"
 #include "accuracy_studies.hpp"
 #include "cantilever.hpp"
+#include "law_scenes.hpp"
 #include "outside_text.hpp"
+#include "phyxel/law_table.hpp"
 #include "pictures.hpp"
 #include "studies.hpp"
 
@@ -21,7 +23,7 @@ double rounded(double value) { return std::stod(fmt::format("{:.6g}", value)); }
 
 Json problems() {
   Json cases = Json::array(), hard = Json::array(), studies = Json::array(),
-       pictures = Json::array();
+       pictures = Json::array(), first = Json::array();
   for (const app::AccuracyCase& c : app::accuracy_cases()) {
     cases.push_back({{"name", c.name}, {"what", c.what}, {"across", c.across}});
   }
@@ -34,6 +36,9 @@ Json problems() {
                        {"x", s.x},
                        {"x_label", s.x_label},
                        {"by_time", s.by_time}});
+  }
+  for (const FirstScene& s : first_scenes({})) {
+    first.push_back({{"name", s.name}, {"what", s.what}});
   }
   for (const AccuracyPicture& p : accuracy_pictures()) {
     pictures.push_back({{"file", p.file}, {"what", p.what}});
@@ -49,6 +54,8 @@ Json problems() {
           {"cases", cases},
           {"studies", studies},
           {"hard", hard},
+          {"default_law", usual_law},
+          {"first_scenes", first},
           {"pictures", pictures}};
 }
 

@@ -76,7 +76,11 @@ Scene body_scene(const std::string& name, int copies) {
     body.where = "phyxel paper";
     body.source.shape.name = name;
     body.rotation = hanging->rotation;
-    body.material = {.young = hanging->young, .poisson = poisson, .density = 1000, .hourglass = 0};
+    body.material = {.young = hanging->young,
+                     .poisson = poisson,
+                     .density = 1000,
+                     .law = StVenantKirchhoff<double>::name,
+                     .hourglass = 0};
     use_paper_rules(body);
     body.fixed.push_back({.select = {.region = hanging->region, .where = "phyxel paper"}});
     scene.bodies.push_back(body);

@@ -46,7 +46,8 @@ std::vector<LawEntry> make_table() {
   return table;
 }
 
-int index_of(const std::string& name) {
+int index_of(std::string name) {
+  if (name.empty()) name = usual_law;
   const std::span<const LawEntry> table = law_table();
   const auto at =
       std::find_if(table.begin(), table.end(), [&](const LawEntry& e) { return name == e.name; });
@@ -144,6 +145,7 @@ bool is_own_parameter(const LawParameter& parameter) {
 }
 
 bool has_parameter(std::string_view law, std::string_view parameter) {
+  if (law.empty()) law = usual_law;
   for (const LawEntry& entry : law_table()) {
     if (law != entry.name) continue;
     for (const LawParameter& p : entry.parameters) {

@@ -161,6 +161,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
             .kernel_volumes = kernel_volumes,
             .size = group.end - group.begin,
             .surfels = surfel_end - (first ? surfel_shift : surfel_end)};
+    part.material.law = law_of(request, group.material);
     part.material.hourglass = hourglass_of(request);
     if (shift < model.size()) part.origin = model.position[shift];
     BodySums sums;

@@ -166,8 +166,9 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
   material.parameters = std::move(parameters);
 }
 
-Material read_material(const SceneTable& table) {
+Material read_material(const SceneTable& table, const BodyRequest& body) {
   Material material;
+  material.law = default_law(body);
   read_law(table, material, false);
   table.read("density", material.density);
   table.read("volume_stiffness", material.volume_stiffness);
@@ -299,7 +300,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   naming(body, [&] { choose_placement(table, body); });
   table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
-  body.material = read_material(table.table("material"));
+  body.material = read_material(table.table("material"), body);
   if (!body.material.hourglass) body.material.hourglass = default_hourglass(body);
   for (const SceneTable& inclusion : table.tables("inclusion")) {
     body.inclusions.push_back(read_inclusion(inclusion, body.material));
@@ -365,6 +366,15 @@ std::vector<BodyRequest> copies(const BodyRequest& body, const SceneTable& array
 
 double default_hourglass(const BodyRequest& body) {
   return is_paper_shape(body.source.shape.name) || body.neighbourhood.one_sided() ? 0 : 0.1;
+}
+
+const char* default_law(const BodyRequest& body) {
+  return is_paper_shape(body.source.shape.name) ? StVenantKirchhoff<double>::name : usual_law;
+}
+
+std::string law_of(const BodyRequest& body, const Material& material) {
+  if (!material.law.empty()) return material.law;
+  return body.material.law.empty() ? default_law(body) : body.material.law;
 }
 
 std::vector<BodyRequest> body_requests(const SceneTable& table) {

@@ -44,6 +44,11 @@ std::string law_meanings() {
   return all;
 }
 
+std::string default_laws() {
+  return fmt::format("\"{}\"; \"{}\" for the paper's bodies", usual_law,
+                     StVenantKirchhoff<double>::name);
+}
+
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
 /// a parameter share its key.
 std::vector<SceneKey> law_keys(const std::string& section) {
@@ -293,7 +298,7 @@ std::vector<SceneKey> body_keys() {
       {.section = "body.material", .name = "density", .unit = "kg/m^3", .required = true,
        .range = between(1e-12, stiffest), .meaning = "Mass density at rest: water 1000."},
       {.section = "body.material", .name = "law", .type = KeyType::choice,
-       .fallback = "\"st-venant-kirchhoff\"", .words = law_names(), .meaning = law_meanings()},
+       .otherwise = default_laws(), .words = law_names(), .meaning = law_meanings()},
       {.section = "body.material", .name = "volume_stiffness", .unit = "Pa", .fallback = "0",
        .range = between(0, stiffest),
        .meaning = "Extra resistance to a change of volume (Müller et al. 2004); 0: none."},

@@ -79,11 +79,13 @@ void visit_source(const BodySource& source, Visit&& visit) {
 }
 
 template <class Visit>
-void visit_material(const char* section, const Material& m, Visit&& visit) {
-  if (m.custom_law || has_parameter(m.law, "young")) visit(section, "young", m.young);
-  if (m.custom_law || has_parameter(m.law, "poisson")) visit(section, "poisson", m.poisson);
+void visit_material(const char* section, const BodyRequest& body, const Material& m,
+                    Visit&& visit) {
+  const std::string law = law_of(body, m);
+  if (m.custom_law || has_parameter(law, "young")) visit(section, "young", m.young);
+  if (m.custom_law || has_parameter(law, "poisson")) visit(section, "poisson", m.poisson);
   visit(section, "density", m.density);
-  visit(section, "law", m.law);
+  visit(section, "law", law);
   for (const auto& [name, value] : m.parameters) {
     if (value.is_vector()) {
       visit(section, name.c_str(), value.vector());
@@ -119,7 +121,7 @@ void visit_body(const BodyRequest& body, Visit&& visit) {
   visit("body", "spin", body.spin);
   visit("body", "volumes", word(body.volume_rule));
   visit("body", "closure", body.closure);
-  visit_material("body.material", body.material, visit);
+  visit_material("body.material", body, body.material, visit);
   visit("body.material", "hourglass", body.material.hourglass.value_or(default_hourglass(body)));
   const NeighbourhoodRule& rule = body.neighbourhood;
   visit("body.neighbours", "support", word(rule.support));
@@ -138,8 +140,8 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
       visit(k + 1, name, list[k].select, [&](auto&& inner) { values(list[k], inner); });
     }
   };
-  each(body.inclusions, "inclusion", [](const InclusionRequest& inclusion, auto&& inner) {
-    visit_material("body.inclusion", inclusion.material, inner);
+  each(body.inclusions, "inclusion", [&](const InclusionRequest& inclusion, auto&& inner) {
+    visit_material("body.inclusion", body, inclusion.material, inner);
   });
   each(body.fixed, "fixed", [](const FixRequest& fix, auto&& inner) {
     inner("body.fixed", "axes", axes_in_words(fix.axes));

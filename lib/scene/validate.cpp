@@ -28,8 +28,10 @@ const SceneKey* key_of(std::string_view section, std::string_view name) {
 /// Checks that a material's law exists and has the parameters that are given.
 void check_law(const BodyRequest& body, const Material& material, const std::string& where) {
   if (material.custom_law) return;
+  Material complete = material;
+  complete.law = law_of(body, material);
   try {
-    chosen_law(material);
+    chosen_law(complete);
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}{}material of body \"{}\": {}", where,
                                  where.empty() ? "" : ": ", body.name, error.what()));

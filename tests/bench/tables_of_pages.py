@@ -46,5 +46,6 @@ def made_of(name):
                                   "gpu_cantilever", "gpu_terms", "gpu_setup", "gpu_profile"],
                   "scaling": ["gpu_ranks_", "cpu_ranks_", "gpu_sizes"],
                   "accuracy": ["accuracy", "hard_cases_", "cpu_terms", "gpu_terms"],
+                  "laws": ["laws"],
                   "cpu": ["cpu_step", "cpu_neighbours", "lammps_tlsph"]}[name]
     return sorted(f.name for f in RESULTS.glob("*.csv") if f.name.startswith(tuple(beginnings)))

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
 
@@ -36,7 +37,13 @@ inline Cloud lattice(int nx, int ny, int nz, double spacing, double jitter = 0,
   return cloud;
 }
 
-inline Material rubber() { return {.young = 1e5, .poisson = 0.3, .density = 1000, .hourglass = 0}; }
+inline Material rubber() {
+  return {.young = 1e5,
+          .poisson = 0.3,
+          .density = 1000,
+          .law = StVenantKirchhoff<double>::name,
+          .hourglass = 0};
+}
 
 /// A scene of one body named "body" without loads or gravity.
 inline Scene one_body(const Material& material = rubber(), const NeighbourhoodRule& rule = {}) {

@@ -197,7 +197,8 @@ Solution spinning(const Discretisation& d) {
                        .jitter = d.jitter,
                        .placement = placement_of(d.filling),
                        .surface = d.closure > 0};
-  body.material = {.young = E, .poisson = nu, .density = rho, .hourglass = d.hourglass};
+  body.material = {
+      .young = E, .poisson = nu, .density = rho, .law = d.law, .hourglass = d.hourglass};
   body.neighbourhood.factor = d.factor;
   body.closure = d.closure;
   body.spin = {0.5, 30, 1};
@@ -342,7 +343,8 @@ Solution l_block(const Discretisation& d) {
   BodyRequest body;
   body.name = "L";
   body.where = "phyxel accuracy";
-  body.material = {.young = 50046, .poisson = nu, .density = rho, .hourglass = d.hourglass};
+  body.material = {
+      .young = 50046, .poisson = nu, .density = rho, .law = d.law, .hourglass = d.hourglass};
   body.neighbourhood.factor = d.factor;
   body.closure = d.closure;
   Scene scene;

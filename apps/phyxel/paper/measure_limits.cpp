@@ -9,6 +9,7 @@
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/hooke.hpp"
+#include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/strain.hpp"
 #include "phyxel/solver.hpp"
 #include "stopwatch.hpp"
@@ -139,7 +140,11 @@ struct Spinning {
                          .jitter = 0.1,
                          .surface = false};
     body.spin = {0, spin, 0};
-    body.material = {.young = young, .poisson = 0.34, .density = density, .hourglass = 0};
+    body.material = {.young = young,
+                     .poisson = 0.34,
+                     .density = density,
+                     .law = StVenantKirchhoff<double>::name,
+                     .hourglass = 0};
     paper::use_paper_rules(body);
     scene.bodies.push_back(body);
     model = paper::paper_model(scene);

@@ -8,6 +8,7 @@
 #include "markdown.hpp"
 #include "outside_text.hpp"
 #include "paper/paper_model.hpp"
+#include "phyxel/physics/laws.hpp"
 
 namespace phyxel::app {
 
@@ -63,7 +64,11 @@ Model paper_block(Index n) {
   BodyRequest body;
   body.name = fmt::format("block of {}", n);
   body.where = "phyxel paper";
-  body.material = {.young = 1e5, .poisson = 0.34, .density = 1000, .hourglass = 0};
+  body.material = {.young = 1e5,
+                   .poisson = 0.34,
+                   .density = 1000,
+                   .law = StVenantKirchhoff<double>::name,
+                   .hourglass = 0};
   paper::use_paper_rules(body);
   scene.bodies.push_back(body);
   return paper::paper_model(scene, cloud);

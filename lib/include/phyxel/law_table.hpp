@@ -21,13 +21,17 @@ struct LawEntry {
   std::span<const HistoryNumber> history;    ///< History numbers of a phyxel.
 };
 
+/// The law of materials that name none: it wins on first scenes, speed and accuracy (docs/laws.md).
+/// The bodies of Farias et al. 2008 have another (`default_law`).
+inline constexpr const char* usual_law = NeoHookean<double>::name;
+
 /// All laws, in the order of `Laws`.
 std::span<const LawEntry> law_table();
 
 /// True for a parameter in `Material::parameters`: those other than `young` and `poisson`.
 bool is_own_parameter(const LawParameter& parameter);
 
-/// True if there is a law of this name and it has this parameter.
+/// True if there is a law of this name and it has this parameter; "" is `usual_law`.
 bool has_parameter(std::string_view law, std::string_view parameter);
 
 /// A material's law, ready for a kernel.
@@ -39,7 +43,8 @@ struct ChosenLaw {
   bool operator==(const ChosenLaw&) const = default;
 };
 
-/// The law of a material that has no `custom_law`, with its constants.
+/// The law of a material that has no `custom_law`, with its constants; `usual_law` if it names
+/// none.
 /// @throws InputError for a law that does not exist, and for parameters that it does not have,
 /// lacks
 ///   or does not allow

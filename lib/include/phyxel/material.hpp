@@ -43,8 +43,9 @@ struct Material {
   double young = 0;    ///< Young's modulus E [Pa], > 0, of laws that have one.
   double poisson = 0;  ///< Poisson's ratio, -1 < nu < 0.5, of laws that have one.
   double density = 0;  ///< [kg/m^3], > 0.
-  /// The name of the law, one of `law_table()` (phyxel/law_table.hpp).
-  std::string law = "st-venant-kirchhoff";
+  /// The name of the law, one of `law_table()` (phyxel/law_table.hpp). Empty: `default_law`, in
+  /// scene files and in code alike; the parts of a model have it set.
+  std::string law = {};
   /// The law's other parameters by name, in SI. `validate` refuses names that the law does not
   /// have.
   std::map<std::string, ParameterValue> parameters = {};

@@ -196,6 +196,13 @@ struct Scene {
 /// which cannot have hourglass control.
 double default_hourglass(const BodyRequest& body);
 
+/// Default law of a body: `usual_law` (phyxel/law_table.hpp); St Venant-Kirchhoff's for the bodies
+/// of Farias et al. 2008, which follow the paper.
+const char* default_law(const BodyRequest& body);
+
+/// The law of a material of a body: its own, or else that of the body.
+std::string law_of(const BodyRequest& body, const Material& material);
+
 /// Checks every value of a scene against the table of scene keys (docs/scenes.md): its range,
 /// chosen so that double precision suffices, its finiteness, the laws of materials and their
 /// parameters, and that each selection has exactly one member. `build_model` checks every scene,

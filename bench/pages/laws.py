@@ -1,0 +1,137 @@
+"""docs/laws.md: which law is the default, from the table of `phyxel_studies laws`."""
+from pages.page import Page, measured_by
+from pages.problems import problems
+from pages.tables import PageError, markdown_table, read_table
+
+HEAD = """# Laws: the default, and why
+
+Written by `bench/make_pages.py` from the table of `phyxel_studies laws` in `docs/results/laws.csv`. First scenes, as \
+somebody makes them who is new to phyxel: soft bodies under gravity, pressed, pulled, twisted and thrown ones, two seconds \
+each, in float on the CPU, with all that scenes have by default but the law. What is computed: [physics.md](physics.md)."""
+
+#: A scene is spoilt if it ends early, with more than this share of its phyxels inside out, or a phyxel this far away [m]:
+#: bodies are at most 1 m long.
+INSIDE_OUT, FAR = 0.05, 3
+
+
+def is_early(row):
+    return row.number("reached") < 1
+
+
+def is_inside_out(row):
+    return row.number("inverted") > INSIDE_OUT
+
+
+def is_apart(row):
+    return row.number("farthest_m") > FAR
+
+
+def is_spoilt(row):
+    return is_early(row) or is_inside_out(row) or is_apart(row)
+
+
+def percent(share):
+    return f"{100 * share:.2g}%" if share > 0 else "0"
+
+
+def times(value, reference):
+    return f"{value / reference:.2f}"
+
+
+def total(rows, column):
+    return sum(row.number(column) for row in rows)
+
+
+def time_of(rows):
+    return sum(row.positive("seconds") for row in rows)
+
+
+def best_law(table):
+    """The law that spoils the fewest scenes; of several, the one that is through with all of them first."""
+    laws = table.values("law", part="scene")
+    if not laws:
+        raise PageError(f"{table.file}: no row of part \"scene\"; allowed: a table of phyxel_studies laws")
+    rows = {law: table.where(part="scene", law=law) for law in laws}
+    return min(laws, key=lambda law: (sum(map(is_spoilt, rows[law])), time_of(rows[law])))
+
+
+def summary(page, table):
+    """Adds a row for each law: how its scenes end, and what they take."""
+    best, default = best_law(table), problems()["default_law"]
+    page.paragraph("## Side by side")
+    page.paragraph(
+        "*Early*: scenes that ended before their time. *Inside out*: scenes at whose end more than "
+        f"{percent(INSIDE_OUT)} of the phyxels have det F ≤ 0, and the largest such share. *Apart*: scenes in which a phyxel is "
+        f"more than {FAR} m from where it was. *Halvings* of the step in all scenes, and the *time* of all, by that of the default. "
+        "*Step*: time of one step of a strained cube, likewise. *Accuracy*: the largest error in the cases below.")
+    cells = []
+    of_default = table.where(part="scene", law=default)
+    for law in table.values("law", part="scene"):
+        rows = table.where(part="scene", law=law)
+        steps = []
+        for precision in ("float", "double"):
+            speed = table.find(part="speed", case=precision, law=law)
+            reference = table.find(part="speed", case=precision, law=default)
+            steps.append(times(speed.positive("seconds"), reference.positive("seconds")) if speed and reference else "–")
+        errors = [abs(row.number("error")) for row in table.where(part="accuracy", law=law)]
+        seconds = time_of(rows)
+        cells.append([f"**{law}**" if law == default else law, sum(map(is_early, rows)),
+                      f"{sum(map(is_inside_out, rows))}, {percent(max(row.number('inverted') for row in rows))}",
+                      sum(map(is_apart, rows)), f"{total(rows, 'halvings'):g}",
+                      times(seconds, time_of(of_default)) if of_default else "–", *steps,
+                      percent(max(errors)) if errors else "–"])
+    page.add(markdown_table(["law", "early", "inside out", "apart", "halvings", "time", "step, float", "step, double", "accuracy"],
+                            cells))
+    fewest = sum(map(is_spoilt, table.where(part="scene", law=best)))
+    page.paragraph(
+        f"The law that spoils the fewest scenes ({fewest} of {len(table.values('case', part='scene'))}), and of several such laws "
+        f"the one that takes the least time, is **{best}**. Scenes, code and Python that name no law have **{default}**; the "
+        "bodies of Farias et al. 2008 have st-venant-kirchhoff, as in the paper.")
+    page.paragraph(
+        "Hooke's law in Green's strain gives way under compression, and then holds a body that is inside out. Hencky's resists "
+        "compression best, but gives way under a pull: bodies are drawn out like threads. The corotated law is the fastest, since "
+        "it stiffens least, and turns inside out more often. Small strains resist rotation.")
+
+
+def scenes(page, table):
+    """Adds every scene with every law."""
+    what = {scene["name"]: scene["what"] for scene in problems()["first_scenes"]}
+    page.paragraph("## The scenes")
+    page.add("".join(f"- *{name}*: {text}\n" for name, text in what.items()))
+    page.paragraph("- Others: a mesh of `examples/`, made 1 m high, which stands on or hangs from a tenth of its height; E in Pa.")
+    page.paragraph("Inside out: the share of phyxels at the end, and the largest share of all frames. In bold: spoilt.")
+    cells = []
+    for row in table.where(part="scene"):
+        law = f"**{row['law']}**" if is_spoilt(row) else row["law"]
+        cells.append([row["case"], law, row["phyxels"], percent(row.number("inverted")), percent(row.number("ever_inverted")),
+                      row["farthest_m"], row["halvings"], row["doublings"], row["steps"], row["seconds"],
+                      row["message"].split(";")[0] if is_early(row) else ""])
+    page.add(markdown_table(["scene", "law", "phyxels", "inside out", "ever", "farthest [m]", "halved", "doubled", "steps", "s",
+                             "ended early"], cells))
+
+
+def accuracy(page, table):
+    """Adds the errors of the accuracy cases with every law."""
+    laws = table.values("law", part="accuracy")
+    if not laws:
+        return
+    page.paragraph("## Accuracy")
+    page.paragraph("Errors of cases of [accuracy.md](accuracy.md), six cells across, α = 0.1, closed. Strains are small, and "
+                   "references are of Hooke's law: differences between the laws are those of the laws.")
+    cells = []
+    for case in table.values("case", part="accuracy"):
+        errors = [table.find(part="accuracy", case=case, law=law) for law in laws]
+        cells.append([case, *(f"{100 * row.number('error'):+.3f}%" if row else "–" for row in errors)])
+    page.add(markdown_table(["", *laws], cells))
+
+
+def make(results, link):
+    """The page. Raises PageError if laws.csv is missing."""
+    table = read_table(results / "laws.csv")
+    page = Page(link)
+    page.paragraph(HEAD)
+    page.paragraph(f"Measured by {measured_by(table)}.")
+    summary(page, table)
+    scenes(page, table)
+    accuracy(page, table)
+    return page
