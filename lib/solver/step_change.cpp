@@ -38,11 +38,12 @@ class Accelerations {
   }
   /// Accelerations [m/s²] without damping at the displacements of a state, whose ghosts follow.
   /// Prescribed ones are zero. Collective.
-  Vectors at(State& state) const {
+  /// @param use `frozen`: of the elastic forces alone
+  Vectors at(State& state, HistoryUse use) const {
     owned_.refresh_ghosts(state.displacement);
     backend_.upload(state);
     Vectors all;
-    backend_.internal_forces(all);
+    backend_.internal_forces(all, use);
     const std::span<const Vec3d> external = backend_.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) all[i] += external[i];
     add_loads(model_, time_, all);
@@ -50,7 +51,8 @@ class Accelerations {
         [&](Index i) { all[i] = free(i, (1 / model_.mass[i]) * all[i] + model_.gravity); });
     return all;
   }
-  /// Derivatives of the accelerations, which are `here` at a state, along vectors w of any unit.
+  /// Derivatives of the elastic accelerations, which are `here` at a state, along vectors w of any
+  /// unit.
   /// Collective.
   Vectors derivatives(const State& state, const Vectors& here, const Vectors& w) const {
     Vectors found(here.size());
@@ -59,7 +61,7 @@ class Accelerations {
     const double share = compared_share * owned_.smallest_support() / largest;
     State moved = state;
     owned_.for_each([&](Index i) { moved.displacement[i] += share * w[i]; });
-    const Vectors there = at(moved);
+    const Vectors there = at(moved, HistoryUse::frozen);
     owned_.for_each([&](Index i) { found[i] = (1 / share) * (there[i] - here[i]); });
     return found;
   }
@@ -103,7 +105,8 @@ void Solver::change_step(std::int64_t steps, double dt) {
   }
   const Accelerations accelerations(*model_, backend_, time());
   State state = this->state();
-  const Vectors before = accelerations.at(state);
+  const Vectors before = accelerations.at(state, HistoryUse::trial),
+                elastic = accelerations.at(state, HistoryUse::frozen);
   Vectors v(before.size());  // at t
   const auto for_each = [&](auto&& each) {
     for (const Part& part : model_->parts) {
@@ -114,20 +117,20 @@ void Solver::change_step(std::int64_t steps, double dt) {
     const DampedFlow flow = damped_flow(damping, dt_ / 2);
     v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * before[i]);
   });
-  const Vectors rates = accelerations.derivatives(state, before, v);
-  const Vectors along_itself = accelerations.derivatives(state, before, before),
-                along_rates = accelerations.derivatives(state, before, rates);
+  const Vectors rates = accelerations.derivatives(state, elastic, v);
+  const Vectors along_itself = accelerations.derivatives(state, elastic, elastic),
+                along_rates = accelerations.derivatives(state, elastic, rates);
   // ω²Δt²/4 of the fastest parts of the motion.
   const double longest = std::max(dt_, dt);
   const double fastest = 0.25 * longest * longest *
-                         std::max(accelerations.growth(before, along_itself),
+                         std::max(accelerations.growth(elastic, along_itself),
                                   accelerations.growth(rates, along_rates));
   const StepChange change = fastest < 1 ? step_change(dt_, dt) : StepChange{};
   for_each([&](Index i, double) {
-    state.displacement[i] += change.first * before[i] + change.displacement * along_itself[i];
+    state.displacement[i] += change.first * elastic[i] + change.displacement * along_itself[i];
     v[i] += change.velocity * along_rates[i] - change.first * rates[i];
   });
-  const Vectors after = accelerations.at(state);
+  const Vectors after = accelerations.at(state, HistoryUse::trial);
   for_each([&](Index i, double damping) {
     // Prescribed velocities stay what they are.
     const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);

@@ -42,14 +42,17 @@ double wave_stiffness_of(const CustomLaw& law, const Mat3d& grad_u) {
   return largest;
 }
 
-double stiffening_of(const PartLaw& law, double volume_stiffness, const Mat3d& grad_u,
+double stiffening_of(const PartLaw& law, const Material& material, const Mat3d& grad_u,
                      const PrincipalStretches<double>& stretches, double at_rest) {
+  const double volume_stiffness = material.volume_stiffness;
   if (!law.custom()) {
     return stiffening(law.chosen().index, law.chosen().constants.data(), volume_stiffness,
                       stretches);
   }
   const VolumeConservation<double> volume{volume_stiffness};
-  return (wave_stiffness_of(*law.custom(), grad_u) + volume.wave_stiffness(stretches)) / at_rest;
+  const double stiffer =
+      (wave_stiffness_of(*law.custom(), grad_u) + volume.wave_stiffness(stretches)) / at_rest;
+  return material.viscosity > 0 ? std::max(stiffer, viscous_stiffening(stretches)) : stiffer;
 }
 
 /// Largest over the phyxels of this rank.
@@ -62,16 +65,12 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
     Stiffest own;
     for (const Part& part : model.parts) {
       const PartLaw law(part.material);
-      const double volume = part.material.volume_stiffness,
-                   at_rest = wave_stiffness_at_rest(part.material);
+      const double at_rest = wave_stiffness_at_rest(part.material);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         const PrincipalStretches<double> s = principal_stretches(gradient[i]);
-        // Viscosity acts on the rate of Green's strain: that of a wave grows as the stretch
-        // squared.
-        const double viscous = part.material.viscosity > 0 ? s.largest * s.largest : 0;
-        own.look_at(std::max(stiffening_of(law, volume, gradient[i], s, at_rest), viscous),
-                    s.largest, model.global_id(i));
+        own.look_at(stiffening_of(law, part.material, gradient[i], s, at_rest), s.largest,
+                    model.global_id(i));
       }
     }
 #pragma omp critical

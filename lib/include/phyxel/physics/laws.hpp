@@ -19,16 +19,30 @@ namespace phyxel {
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
                      Orthotropic, J2>;
 
-/// The factor by which a material is stiffer than at rest, at most: 1 at rest.
-/// @param law its index in `Laws`. @param volume_stiffness of volume conservation [Pa]; 0: none
+/// The factor by which viscosity is stronger than at rest, at most: it acts on the rate of Green's
+/// strain, and so grows as the stretch squared.
+template <class Real>
+PHYXEL_HD Real viscous_stiffening(const PrincipalStretches<Real>& stretches) {
+  return stretches.largest * stretches.largest;
+}
+
+/// The factor by which a material is stiffer than at rest, or more viscous, at most: 1 at rest.
+/// @param law its index in `Laws`
+/// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
+///   time of viscosity [s] (`ChosenLaw`)
+/// @param volume_stiffness of volume conservation [Pa]; 0: none
 template <class Real, class Constant>
 PHYXEL_HD Real stiffening(int law, const Constant* constants, Real volume_stiffness,
                           const PrincipalStretches<Real>& stretches) {
   const PrincipalStretches<Real> rest{Real(1), Real(1), Real(1)};
   const VolumeConservation<Real> volume{volume_stiffness};
   return Laws::with<Real>(law, constants, [&](const auto& elastic) {
-    return (elastic.wave_stiffness(stretches) + volume.wave_stiffness(stretches)) /
-           (elastic.wave_stiffness(rest) + volume_stiffness);
+    const Real stiffer = (elastic.wave_stiffness(stretches) + volume.wave_stiffness(stretches)) /
+                         (elastic.wave_stiffness(rest) + volume_stiffness);
+    using Elastic = std::decay_t<decltype(elastic)>;
+    const bool is_viscous = constants[constants_of_law<Elastic, Real> + 1] > Constant(0);
+    const Real viscous = is_viscous ? viscous_stiffening(stretches) : Real(0);
+    return stiffer < viscous ? viscous : stiffer;
   });
 }
 
