@@ -31,7 +31,9 @@ def is_spoilt(row):
 
 
 def percent(share):
-    return f"{100 * share:.2g}%" if share > 0 else "0"
+    if not share > 0:
+        return "0"
+    return f"{100 * share:.2g}%" if share < 0.095 else f"{100 * share:.0f}%"
 
 
 def times(value, reference):
@@ -89,8 +91,8 @@ def summary(page, table):
         "bodies of Farias et al. 2008 have st-venant-kirchhoff, as in the paper.")
     page.paragraph(
         "Hooke's law in Green's strain gives way under compression, and then holds a body that is inside out. Hencky's resists "
-        "compression best, but gives way under a pull: bodies are drawn out like threads. The corotated law is the fastest, since "
-        "it stiffens least, and turns inside out more often. Small strains resist rotation.")
+        "compression best, but gives way under a pull: bodies are drawn out like threads. The corotated law takes the fewest "
+        "steps, since it stiffens least, and turns inside out more often. The small-strain law is right for small rotations only.")
 
 
 def scenes(page, table):

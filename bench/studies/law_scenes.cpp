@@ -132,7 +132,7 @@ void add_scenes_of_mesh(const std::filesystem::path& file, std::vector<FirstScen
       scene.bodies[0].fixed.push_back(
           {.select = stands ? slab(low * scale - 1, low * scale + tenth)
                             : slab(high * scale - tenth, high * scale + 1)});
-      all.push_back({fmt::format("{} {}, E = {:g}", name, stands ? "stands" : "hangs", young),
+      all.push_back({fmt::format("{} {} at E = {:g}", name, stands ? "stands" : "hangs", young),
                      fmt::format("The mesh {}, 1 m high, E = {:g} Pa, {} a tenth of its height.",
                                  name, young, stands ? "stands on" : "hangs from"),
                      under_gravity(scene)});

@@ -136,8 +136,17 @@ def test_forces_are_the_gradient_of_the_energy():
     assert work == pytest.approx(-(energies[0] - energies[1]) / (2 * step), rel=1e-6)
 
 
+def test_a_body_that_names_no_law_is_neo_hookean():
+    def end(**law):
+        scene = simulation(body={"material": {**MATERIAL, **law}, "spin": (0, 0, 30)})
+        scene.step(50)
+        return scene.displacement.copy()
+    assert np.array_equal(end(), end(law="neo-hookean"))
+    assert not np.array_equal(end(), end(law="st-venant-kirchhoff"))
+
+
 def test_homogeneous_stretch_has_its_stress_and_volume():
-    s = simulation()
+    s = simulation(body={"material": {**MATERIAL, "law": "st-venant-kirchhoff"}})
     stretch = np.diag([0.01, 0, 0])
     s.set_state(displacement=s.rest @ stretch)
     assert np.allclose(s.gradients(), stretch, atol=1e-12)

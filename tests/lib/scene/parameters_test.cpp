@@ -468,5 +468,45 @@ TEST(Validate, CodeAndScenesHaveOneDefaultOfHourglassControl) {
   EXPECT_EQ(parse_scene(time_section + dino, "s.toml").bodies[0].material.hourglass, 0.0);
 }
 
+/// Bodies and inclusions that name no law have the usual one, the bodies of the paper that of the
+/// paper, in code and in scene files; checks and comparisons of scenes know it by name.
+TEST(Validate, CodeAndScenesHaveOneDefaultLaw) {
+  const Cloud cloud = testing::lattice(3, 3, 3, 0.1);
+  const std::string paper = StVenantKirchhoff<double>::name;
+  const auto laws = [&](auto&& change) {
+    Scene scene = testing::one_body();
+    BodyRequest& body = scene.bodies[0];
+    body.material.law.clear();
+    body.inclusions.push_back(
+        {.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.1}}}, .material = body.material});
+    change(body);
+    validate(scene);
+    const std::vector<Parameter> known = scene_parameters(scene);
+    std::vector<std::string> found;
+    for (const Part& part : testing::model_of(scene, cloud).parts) {
+      found.push_back(part.material.law);
+      const auto is_law = [&](const Parameter& p) {
+        return p.name.find(".law of body 1") != std::string::npos &&
+               p.value == '"' + part.material.law + '"';
+      };
+      EXPECT_TRUE(std::any_of(known.begin(), known.end(), is_law)) << part.material.law;
+    }
+    return found;
+  };
+  using Names = std::vector<std::string>;
+  EXPECT_EQ(laws([](BodyRequest&) {}), (Names{usual_law, usual_law}));
+  EXPECT_EQ(laws([](BodyRequest& b) { b.source.shape.name = "dino"; }), (Names{paper, paper}));
+  EXPECT_EQ(laws([](BodyRequest& b) { b.material.law = "hencky"; }), (Names{"hencky", "hencky"}));
+  EXPECT_EQ(laws([](BodyRequest& b) { b.inclusions[0].material.law = "corotated"; }),
+            (Names{usual_law, "corotated"}));
+  EXPECT_EQ(parse_scene(time_section + beam + material, "s.toml").bodies[0].material.law,
+            usual_law);
+  EXPECT_EQ(parse_scene(time_section + dino, "s.toml").bodies[0].material.law, paper);
+  // A material alone, too.
+  Material alone = testing::rubber();
+  alone.law.clear();
+  EXPECT_EQ(std::string(law_table()[chosen_law(alone).index].name), usual_law);
+}
+
 }  // namespace
 }  // namespace phyxel
