@@ -68,7 +68,7 @@ class BentLattice {
 
   void add(const BentBlock& block) {
     const auto [nx, ny, nz] = block.cells;
-    const auto node = [&](int i, int j, int k) {
+    const auto node = [&, nx = nx, ny = ny, nz = nz](int i, int j, int k) {
       return node_at(block.place(
           {static_cast<double>(i) / nx, static_cast<double>(j) / ny, static_cast<double>(k) / nz}));
     };

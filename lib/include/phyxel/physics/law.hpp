@@ -4,7 +4,7 @@
 ///
 ///   static constexpr const char* name, *meaning;    its word in scenes, and a sentence about it
 ///   static constexpr LawParameter parameters[];     the parameters that a user gives
-///   static std::array<double, N> constants(std::span<const double> parameters);
+///   static std::array<double, N> constants(std::span<const double> values);
 ///   its N constants [mostly Pa] as the only data members, each a `Real`
 ///   energy(grad_u)               the strain energy density ψ [J/m³ of the body at rest]
 ///   first_piola_stress(grad_u)   its derivative ∂ψ/∂∇u [Pa]
@@ -25,9 +25,9 @@
 /// in place of `energy` and `first_piola_stress` of ∇u alone. A law may have
 ///
 ///   static constexpr bool is_linear = true;         it never stiffens
-///   static double hourglass_modulus(std::span<const double> parameters);
+///   static double hourglass_modulus(std::span<const double> values);
 ///   what hourglass control is a share of [Pa], of a law without `young_modulus`
-///   static const char* unmet(std::span<const double> parameters);
+///   static const char* unmet(std::span<const double> values);
 ///   what parameters that are each in their range still have to fulfil together, in the words of a
 ///   refusal, e.g. "a > 2 b"; "" if they do
 ///

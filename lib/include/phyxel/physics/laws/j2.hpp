@@ -67,22 +67,21 @@ struct J2 {
   static constexpr bool many_registers = true;
 
   /// Voce's law may not soften.
-  static const char* unmet(std::span<const double> parameters) {
-    return parameters[4] == 0 || parameters[4] >= parameters[2]
+  static const char* unmet(std::span<const double> values) {
+    return values[4] == 0 || values[4] >= values[2]
                ? ""
                : "saturation_stress = 0, or saturation_stress >= yield_stress";
   }
   /// λ, μ, σ₀, H, σ_∞ [Pa] and δ.
-  static std::array<double, 6> constants(std::span<const double> parameters) {
-    const std::array<double, 2> lame = lame_constants(parameters);
-    const double yield = parameters[2], saturation = parameters[4];
-    return {lame[0],      lame[1], yield, parameters[3], saturation == 0 ? yield : saturation,
-            parameters[5]};
+  static std::array<double, 6> constants(std::span<const double> values) {
+    const std::array<double, 2> lame = lame_constants(values);
+    const double yield = values[2], saturation = values[4];
+    return {lame[0], lame[1], yield, values[3], saturation == 0 ? yield : saturation, values[5]};
   }
   /// The smaller of E and 10 σ₀ [Pa]: residuals go on growing while the material flows, and would
   /// hold shapes that the metal gives up.
-  static double hourglass_modulus(std::span<const double> parameters) {
-    return parameters[0] < 10 * parameters[2] ? parameters[0] : 10 * parameters[2];
+  static double hourglass_modulus(std::span<const double> values) {
+    return values[0] < 10 * values[2] ? values[0] : 10 * values[2];
   }
 
   static constexpr HistoryNumber history[] = {

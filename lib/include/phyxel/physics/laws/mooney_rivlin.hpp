@@ -43,17 +43,17 @@ struct MooneyRivlin {
 
   /// L > 0 is asked for: below zero the energy is not convex in J, and the bound of the waves does
   /// not hold.
-  static const char* unmet(std::span<const double> parameters) {
-    return constants(parameters)[2] > 0 ? "" : "bulk_modulus > 4/3 c01 - 2/3 c10";
+  static const char* unmet(std::span<const double> values) {
+    return constants(values)[2] > 0 ? "" : "bulk_modulus > 4/3 c01 - 2/3 c10";
   }
   /// c₁₀, c₀₁ and L [Pa].
-  static std::array<double, 3> constants(std::span<const double> parameters) {
-    const double c10 = parameters[0], c01 = parameters[1], bulk_modulus = parameters[2];
+  static std::array<double, 3> constants(std::span<const double> values) {
+    const double c10 = values[0], c01 = values[1], bulk_modulus = values[2];
     return {c10, c01, bulk_modulus + (2 * c10 - 4 * c01) / 3};
   }
   /// E [Pa] of λ and μ.
-  static double hourglass_modulus(std::span<const double> parameters) {
-    const double mu = 2 * (parameters[0] + parameters[1]), bulk_modulus = parameters[2];
+  static double hourglass_modulus(std::span<const double> values) {
+    const double mu = 2 * (values[0] + values[1]), bulk_modulus = values[2];
     return 9 * bulk_modulus * mu / (3 * bulk_modulus + mu);
   }
 

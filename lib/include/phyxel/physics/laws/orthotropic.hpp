@@ -96,31 +96,31 @@ struct Orthotropic {
       "without its isotropy";
 
  private:
-  static constexpr LawParameter modulus(const char* name, const char* meaning, double typical) {
-    return {.name = name,
+  static constexpr LawParameter modulus(const char* key, const char* about, double typical) {
+    return {.name = key,
             .unit = "Pa",
             .low = 1e-12,
             .high = 1e18,
             .open = false,
-            .meaning = meaning,
+            .meaning = about,
             .typical = typical};
   }
-  static constexpr LawParameter ratio(const char* name, const char* meaning, double typical) {
-    return {.name = name,
+  static constexpr LawParameter ratio(const char* key, const char* about, double typical) {
+    return {.name = key,
             .unit = "",
             .low = -1e3,
             .high = 1e3,
             .open = false,
-            .meaning = meaning,
+            .meaning = about,
             .typical = typical};
   }
-  static constexpr LawParameter axis(const char* name, const char* meaning, double x, double y) {
-    return {.name = name,
+  static constexpr LawParameter axis(const char* key, const char* about, double x, double y) {
+    return {.name = key,
             .unit = "",
             .low = -1e12,
             .high = 1e12,
             .open = false,
-            .meaning = meaning,
+            .meaning = about,
             .count = 3,
             .vector_fallback = {x, y, 0}};
   }
