@@ -15,72 +15,11 @@
 #include "phyxel/scene.hpp"
 #include "phyxel/step_control.hpp"
 #include "scene/scene_error.hpp"
+#include "scene_overrides.hpp"
 #include "stages.hpp"
 
 namespace phyxel::python {
 namespace {
-
-struct Overrides {
-  std::optional<std::string> device, precision, method;
-  std::optional<int> threads;
-  std::optional<double> step, end;
-  bool unsafe_step = false;
-};
-
-void check_positive(const char* name, double value) {
-  if (value > 0 && std::isfinite(value)) return;
-  throw InputError(fmt::format("{}: {} found; allowed: > 0 s", name, value));
-}
-
-Scene with_overrides(Scene scene, const Overrides& o) {
-  if (o.device) {
-    check_device_name(*o.device, "device");
-    scene.solver.device = *o.device;
-  }
-  if (o.method) {
-    const auto method = method_named(*o.method);
-    if (!method) {
-      throw InputError(
-          fmt::format("method: \"{}\" found; allowed: verlet, implicit, equilibrium", *o.method));
-    }
-    scene.solver.method = *method;
-    if (*method != Method::verlet) scene.solver.precision = Precision::double_;
-  }
-  if (o.precision) {
-    const auto precision = precision_named(*o.precision);
-    if (!precision) {
-      throw InputError(
-          fmt::format("precision: \"{}\" found; allowed: float, double, mixed", *o.precision));
-    }
-    scene.solver.precision = *precision;
-  }
-  if (scene.solver.method != Method::verlet && scene.solver.precision != Precision::double_) {
-    throw InputError(fmt::format("precision: \"{}\" found; allowed with method = \"{}\": double",
-                                 precision_name(scene.solver.precision),
-                                 method_name(scene.solver.method)));
-  }
-  if (o.threads) {
-    if (*o.threads < 1 || *o.threads > 4096) {
-      throw InputError(fmt::format("threads: {} found; allowed: 1 to 4096", *o.threads));
-    }
-    scene.solver.threads = *o.threads;
-  }
-  if (o.step) {
-    check_positive("step", *o.step);
-    scene.time.step = *o.step;
-  }
-  if (o.end) {
-    check_positive("end", *o.end);
-    scene.time.end = *o.end;
-  }
-  if (scene.solver.method != Method::equilibrium && !(scene.time.end > 0)) {
-    throw InputError(
-        fmt::format("end: missing, and so is the scene's [time]; needed with method = "
-                    "\"{}\"",
-                    method_name(scene.solver.method)));
-  }
-  return scene;
-}
 
 /// The live state of the CPU, as NumPy sees it.
 struct Live {
@@ -91,7 +30,7 @@ struct Live {
 class Simulation {
  public:
   Simulation(const Scene& scene, const std::map<std::string, Cloud>& clouds,
-             const Overrides& overrides)
+             const SceneOverrides& overrides)
       : scene_(with_overrides(scene, overrides)) {
     device_ = choose_device(scene_.solver.device, "device");
     model_ = build_model(scene_, make_clouds(scene_, clouds), device_);
@@ -377,7 +316,7 @@ py::dict energies_of(const Diagnostics& now) {
 std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>& file,
                                      const std::string& text,
                                      const std::map<std::string, Cloud>& clouds,
-                                     Overrides overrides, const py::object& progress) {
+                                     SceneOverrides overrides, const py::object& progress) {
   const ObserveStages observing = stages_for(progress);
   const py::gil_scoped_release others;
   return std::make_unique<Simulation>(file ? read_scene(*file) : parse_scene(text, ""), clouds,
