@@ -57,54 +57,44 @@ void refuse_inclusions(const BodyRequest& request, const char* why, const char* 
                                request.inclusions[0].select.where, request.name, why, allowed));
 }
 
-/// @param surveyor null: lists and moments are made here.
-void add_body(Model& model, const BodyRequest& request, const Cloud& given,
-              const Surveyor* surveyor) {
-  std::optional<SortedCloud> sorted;
-  if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
-  const Cloud& cloud = sorted ? sorted->cloud : given;
-  // The most that a phyxel takes at any time. With its neighbour lists and the CPU's arrays:
-  // measured while the time step is found, in `phyxel check` of a block of two million. Without:
-  // its cloud, its share of the model and of two states.
-  require_host_memory(
-      fmt::format("body \"{}\"", request.name),
-      static_cast<double>(model.size()) + static_cast<double>(cloud.position.size()),
-      surveyor ? 300 : 950);
-  const Index shift = model.size();
-  const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
-  check_terms(request);
-  check_cloud(request, cloud);
-  if (surveyor && request.closure > 0) {
+/// A surveyor's device finds neighbours within one support of unsorted phyxels, and no more.
+/// @throws InputError if a body needs lists on the host
+void check_surveyable(const BodyRequest& request) {
+  if (request.closure > 0) {
     throw InputError(fmt::format(
         "{}: body \"{}\" has closed gradients (closure = {:g}), which are found from lists of "
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
         request.where, request.name, request.closure));
   }
-  if (surveyor && sorted) {
+  if (!request.inclusions.empty()) {
     refuse_inclusions(request, "which are numbered on the host",
                       "a model built without a surveyor");
   }
-  const bool kernel_volumes =
-      wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
-  if (kernel_volumes && sorted) {
-    refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
-  }
-  Survey survey;
+}
+
+/// Adds the neighbour lists of a body, unless a surveyor leaves the lists to its device, and
+/// returns the neighbour summary. @param surveyor null: the host searches
+Survey add_neighbours(Model& model, const BodyRequest& request, const Cloud& cloud,
+                      const Surveyor* surveyor, bool kernel_volumes) {
+  const Index shift = model.size();
   if (surveyor) {
-    survey = in_stage("neighbours", [&] {
+    Survey survey = in_stage("neighbours", [&] {
       return (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
     });
     if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
     append(model.degenerate, survey.degenerate, shift);
-  } else {
-    Neighbourhood hood;
-    survey = survey_with_lists(cloud, request, kernel_volumes, hood);
-    append_lists(model.neighbourhood, hood, shift);
+    return survey;
   }
-  const std::vector<MaterialGroup> groups =
-      sorted ? sorted->groups
-             : std::vector<MaterialGroup>{
-                   {request.material, request.name, 0, static_cast<Index>(cloud.position.size())}};
+  Neighbourhood hood;
+  Survey survey = survey_with_lists(cloud, request, kernel_volumes, hood);
+  append_lists(model.neighbourhood, hood, shift);
+  return survey;
+}
+
+/// Masses and volumes of the phyxels of a body, by its volume rule and the densities of its
+/// materials.
+Masses masses_of(const BodyRequest& request, const Cloud& cloud, const Survey& survey,
+                 std::span<const MaterialGroup> groups, bool kernel_volumes) {
   const double density = request.material.density;
   ExactSum kernel_sum;
   for (const double w : survey.kernel_sum) kernel_sum.add(w);
@@ -119,17 +109,18 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     }
   }
   check_masses(request, masses);
-  append(model.neighbourhood.support, survey.support);
-  append(model.position, cloud.position);
-  append(model.mass, masses.mass);
-  append(model.volume, masses.volume);
+  return masses;
+}
 
-  Surfels& surfels = model.surfels;
+/// Adds the surfels of a body, and the phyxels that carry each. @param support of the body's
+/// phyxels [m]. @param shift the body's first phyxel in the model
+void add_surfels(Surfels& surfels, const Cloud& cloud, std::span<const double> support,
+                 Index shift) {
+  const auto surfel_shift = static_cast<Index>(surfels.position.size());
   Index unreached = 0;
   if (!cloud.surface.position.empty()) {
     append_rows(surfels.carriers,
-                phyxels_near(cloud.surface.position, cloud.position, survey.support, &unreached),
-                shift);
+                phyxels_near(cloud.surface.position, cloud.position, support, &unreached), shift);
   }
   surfels.unreached += unreached;
   append(surfels.position, cloud.surface.position);
@@ -137,20 +128,28 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   for (const Triangle& t : cloud.surface.triangle) {
     surfels.triangle.push_back({t[0] + surfel_shift, t[1] + surfel_shift, t[2] + surfel_shift});
   }
+}
+
+/// Adds a part for each material of a body whose phyxels, from `shift`, and surfels, from
+/// `surfel_shift`, are the model's last. The first part has the surfels.
+/// @returns the volume of the body [m³]
+double add_parts(Model& model, const BodyRequest& request, std::span<const MaterialGroup> groups,
+                 const Survey& survey, bool kernel_volumes, Index shift, Index surfel_shift) {
   BodySums whole;
   whole.add(model, shift, model.size());
-  Part body;  // all of it
+  Part body;  // of all materials
   whole.tell(body);
+  const double farthest = box_around(std::span(model.position).subspan(shift)).farthest();
   const Index number = model.parts.empty() ? 0 : model.parts.back().body + 1;
+  const auto surfel_end = static_cast<Index>(model.surfels.position.size());
   for (const MaterialGroup& group : groups) {
-    const bool first = group.begin == 0;
-    const auto surfel_end = static_cast<Index>(surfels.position.size());
+    const Index surfel_begin = group.begin == 0 ? surfel_shift : surfel_end;
     Part& part = model.parts.emplace_back();
     part = {.name = group.name,
             .body = number,
             .begin = shift + group.begin,
             .end = shift + group.end,
-            .surfel_begin = first ? surfel_shift : surfel_end,
+            .surfel_begin = surfel_begin,
             .surfel_end = surfel_end,
             .material = group.material,
             .neighbourhood = in_words(request.neighbourhood),
@@ -160,7 +159,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
             .closure = request.closure,
             .kernel_volumes = kernel_volumes,
             .size = group.end - group.begin,
-            .surfels = surfel_end - (first ? surfel_shift : surfel_end)};
+            .surfels = surfel_end - surfel_begin};
     part.material.law = law_of(request, group.material);
     part.material.hourglass = hourglass_of(request);
     if (shift < model.size()) part.origin = model.position[shift];
@@ -168,17 +167,62 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     sums.add(model, part.begin, part.end);
     sums.tell(part);
     part.centre = body.centre;
-    part.farthest = box_around(cloud.position).farthest();
+    part.farthest = farthest;
   }
-  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(body.volume));
+  return body.volume;
+}
 
+/// Adds the fixed, moved and loaded phyxels of a body, which its scene selects by the order of
+/// `given`. @param sorted the cloud in the model's order; null: that of `given`
+void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
+                  const SortedCloud* sorted, Index shift) {
   BoundaryChoice choice =
       choose_boundary(request, given, {}, static_cast<Index>(given.position.size()));
   if (sorted) choice.renumber(sorted->place);
   std::vector<double> loaded;
   for (const ExactSum& mass : choice.loaded_masses(model, shift)) loaded.push_back(mass.value());
-  choice.refuse_empty(request, choice.counts(), box_around(cloud.position));
+  choice.refuse_empty(request, choice.counts(), box_around(given.position));
   choice.add_to(model, request, shift, loaded);
+}
+
+/// @param surveyor null: lists and moments are made here.
+void add_body(Model& model, const BodyRequest& request, const Cloud& given,
+              const Surveyor* surveyor) {
+  std::optional<SortedCloud> sorted;
+  if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
+  const Cloud& cloud = sorted ? sorted->cloud : given;
+  // The most that a phyxel takes at any time. With its neighbour lists and the CPU's arrays:
+  // measured while the time step is found, in `phyxel check` of a block of two million. Without:
+  // its cloud, its share of the model and of two states.
+  require_host_memory(
+      fmt::format("body \"{}\"", request.name),
+      static_cast<double>(model.size()) + static_cast<double>(cloud.position.size()),
+      surveyor ? 300 : 950);
+  check_terms(request);
+  check_cloud(request, cloud);
+  if (surveyor) check_surveyable(request);
+  const bool kernel_volumes =
+      wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
+  if (kernel_volumes && sorted) {
+    refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
+  }
+  const Index shift = model.size();
+  const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
+  const Survey survey = add_neighbours(model, request, cloud, surveyor, kernel_volumes);
+  const std::vector<MaterialGroup> groups =
+      sorted ? sorted->groups
+             : std::vector<MaterialGroup>{
+                   {request.material, request.name, 0, static_cast<Index>(cloud.position.size())}};
+  const Masses masses = masses_of(request, cloud, survey, groups, kernel_volumes);
+  append(model.neighbourhood.support, survey.support);
+  append(model.position, cloud.position);
+  append(model.mass, masses.mass);
+  append(model.volume, masses.volume);
+  add_surfels(model.surfels, cloud, survey.support, shift);
+  const double volume =
+      add_parts(model, request, groups, survey, kernel_volumes, shift, surfel_shift);
+  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(volume));
+  add_boundary(model, request, given, sorted ? &*sorted : nullptr, shift);
 }
 
 }  // namespace
