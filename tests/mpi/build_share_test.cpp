@@ -11,10 +11,8 @@
 #include <map>
 
 #include "../partition/bodies.hpp"
-#include "model/assembly.hpp"
+#include "host_surveyor.hpp"
 #include "model/host_memory.hpp"
-#include "model/neighbour_search.hpp"
-#include "model/share_surveyor.hpp"
 #include "partition/share.hpp"
 #include "ranks.hpp"
 #include "setup/tiling.hpp"
@@ -166,38 +164,7 @@ const std::vector<BuildCase>& build_cases() {
   return cases;
 }
 
-/// A device that is the host: what `build_share` makes of its answers, without lists.
-class HostSurveyor final : public ShareSurveyor {
- public:
-  std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest,
-                                   double* farthest) const override {
-    return phyxel::mean_spacing(position, nearest, farthest);
-  }
-  Around around(std::span<const Vec3d> position, std::span<const double> support,
-                std::span<const double> spacing, std::span<const char> own,
-                bool one_sided) const override {
-    NeighbourhoodRule rule;
-    if (one_sided) rule.support = NeighbourhoodRule::Support::adaptive;
-    Model m;
-    m.position = {position.begin(), position.end()};
-    m.neighbourhood = neighbours_within(position, {support.begin(), support.end()}, rule);
-    find_moments(m);
-    Around around = around_by_lists(m.neighbourhood, 0, own);
-    if (!spacing.empty()) {
-      around.kernel_sum = kernel_sums(position, m.neighbourhood, {spacing.begin(), spacing.end()});
-    }
-    around.degenerate = m.degenerate;
-    const auto keep_own = [&](std::vector<Index>& phyxels) {
-      std::erase_if(phyxels, [&](Index i) { return !own[i]; });
-    };
-    keep_own(around.degenerate.isolated);
-    keep_own(around.degenerate.collinear);
-    keep_own(around.degenerate.coplanar);
-    keep_own(around.degenerate.coincident);
-    return around;
-  }
-};
-const HostSurveyor surveyor;
+const testing::HostSurveyor surveyor;
 
 struct Cut {
   const char* name;
