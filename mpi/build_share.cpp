@@ -93,6 +93,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
     }
     return built({ranks, scene, options}, [&](std::size_t b, std::uint64_t& digest) {
       digest = 31 * digest + cloud_digest(clouds[b]);
+      naming(scene.bodies[b], [&] { check_cloud(scene.bodies[b], clouds[b]); });
       CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));
       cut.cloud.warnings = clouds[b].warnings;
       return cut;

@@ -9,6 +9,7 @@
 #include "mesh/relaxation.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
+#include "model/cloud_check.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "stage.hpp"
@@ -71,20 +72,7 @@ void check_request(const Surface& surface, const SampleRequest& request) {
   }
   check_memory(request.phyxels);
   if (surface.triangle.empty()) throw InputError("the surface has no triangles");
-  for (std::size_t v = 0; v < surface.position.size(); ++v) {
-    const Vec3d p = surface.position[v];
-    if (!is_finite(p)) {
-      throw InputError(
-          fmt::format("vertex {} of the surface is at ({}, {}, {})", v, p.x, p.y, p.z));
-    }
-  }
-  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
-    for (const Index corner : surface.triangle[t]) {
-      if (corner >= 0 && static_cast<std::size_t>(corner) < surface.position.size()) continue;
-      throw InputError(fmt::format("triangle {} of the surface names vertex {}, but there are {}",
-                                   t, corner, surface.position.size()));
-    }
-  }
+  check_surface(surface);
 }
 
 /// Multiplies positions by 2^exponent, without rounding.

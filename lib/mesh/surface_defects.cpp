@@ -3,11 +3,13 @@
 #include <algorithm>
 
 #include "mesh/surface_topology.hpp"
+#include "model/cloud_check.hpp"
 #include "phyxel/mesh.hpp"
 
 namespace phyxel {
 
 SurfaceDefects inspect_surface(const Surface& surface) {
+  check_surface(surface);
   const SurfaceTopology topology = connect(surface);
   SurfaceDefects defects;
   defects.parts = topology.parts;

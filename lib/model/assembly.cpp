@@ -17,7 +17,6 @@ namespace phyxel {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr double longest_length = 1e12;  // [m], as lengths of scenes (scene/scene_keys.cpp)
 
 }  // namespace
 
@@ -62,35 +61,6 @@ void check_terms(const BodyRequest& request) {
   };
   refuse_if(hourglass_of(request), "hourglass control", "hourglass");
   refuse_if(request.closure, "closed gradients", "closure");
-}
-
-void check_cloud(const BodyRequest& request, const Cloud& cloud) {
-  const auto refuse = [&](std::size_t i, const std::string& problem) {
-    throw InputError(
-        fmt::format("{}: phyxel {} of body \"{}\" {}", request.where, i, request.name, problem));
-  };
-  if (cloud.position.empty()) {
-    throw InputError(fmt::format("{}: body \"{}\" has no phyxel; allowed: at least one",
-                                 request.where, request.name));
-  }
-  if (!cloud.volume.empty() && cloud.volume.size() != cloud.position.size()) {
-    throw InputError(
-        fmt::format("{}: body \"{}\" has {} volumes for {} phyxels; allowed: as many, or none",
-                    request.where, request.name, cloud.volume.size(), cloud.position.size()));
-  }
-  const auto within = [](double x) { return std::abs(x) <= longest_length; };
-  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
-    const Vec3d p = cloud.position[i];
-    if (!(within(p.x) && within(p.y) && within(p.z))) {
-      refuse(i,
-             fmt::format("lies at [{:g}, {:g}, {:g}] m; allowed: coordinates from {:g} to {:g} m",
-                         p.x, p.y, p.z, -longest_length, longest_length));
-    }
-    if (!cloud.volume.empty() && !(cloud.volume[i] > 0 && std::isfinite(cloud.volume[i]))) {
-      refuse(i, fmt::format("has a volume of {:g} m^3 (is the body flat?); allowed: > 0, finite",
-                            cloud.volume[i]));
-    }
-  }
 }
 
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {

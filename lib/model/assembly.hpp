@@ -8,6 +8,7 @@
 
 #include "exact_sum.hpp"
 #include "model/box.hpp"
+#include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
 #include "phyxel/model.hpp"
 
@@ -29,11 +30,6 @@ double hourglass_of(const BodyRequest& request);
 
 /// @throws InputError if a body asks for terms that do not go together
 void check_terms(const BodyRequest& request);
-
-/// Makes sure that a placed cloud can carry the physics: places that are finite and within the
-/// lengths of a scene, volumes that are finite and not zero. @throws InputError with the first
-/// phyxel that is not so
-void check_cloud(const BodyRequest& request, const Cloud& cloud);
 
 /// Whether the volumes of a body follow from the kernel.
 /// @throws InputError if it can have none as asked

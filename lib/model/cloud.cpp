@@ -4,6 +4,7 @@
 #include <numeric>
 
 #include "model/box.hpp"
+#include "model/cloud_check.hpp"
 
 namespace phyxel {
 namespace {
@@ -31,6 +32,7 @@ void permute(std::vector<T>& values, const std::vector<Index>& order) {
 
 std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
                                   const std::vector<Triangle>& triangle) {
+  check_triangles(triangle, position.size());
   std::vector<Vec3d> normal(position.size());
   for (const Triangle& t : triangle) {
     const Vec3d area = cross(position[t[1]] - position[t[0]], position[t[2]] - position[t[0]]);
@@ -41,6 +43,7 @@ std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
 }
 
 double enclosed_volume(const Surface& surface) {
+  check_triangles(surface.triangle, surface.position.size());
   // Taken about the first vertex, so that a body far from the origin loses no digits.
   const Vec3d origin = surface.position.empty() ? Vec3d{} : surface.position.front();
   double six_volumes = 0;
@@ -72,6 +75,7 @@ void order_along_curve(Cloud& cloud) {
 }
 
 void reorder(Cloud& cloud, const std::vector<Index>& order) {
+  check_order(cloud, order);
   std::vector<Index> place(order.size());
   for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Index>(k);
   permute(cloud.position, order);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "model/assembly.hpp"
@@ -72,6 +73,35 @@ void check_surveyable(const BodyRequest& request) {
   }
 }
 
+/// Checks that a surveyor has answered for each of n phyxels.
+/// @throws InputError naming the array, its value, and what is allowed
+void check_survey(const Survey& survey, Index n, bool kernel_volumes) {
+  const auto refuse = [](const std::string& fault) {
+    throw InputError("survey of a device: " + fault);
+  };
+  const auto check = [&](const char* name, const std::vector<double>& values, bool wanted) {
+    const auto size = static_cast<std::size_t>(wanted ? n : 0);
+    if (wanted && values.size() != size) {
+      refuse(fmt::format("{} has {} values for {} phyxels; allowed: one for each", name,
+                         values.size(), size));
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      if (values[i] >= 0 && std::isfinite(values[i])) continue;
+      refuse(fmt::format("{} of phyxel {} is {}; allowed: >= 0, finite", name, i, values[i]));
+    }
+  };
+  check("support", survey.support, true);
+  check("spacing", survey.spacing, kernel_volumes);
+  check("kernel_sum", survey.kernel_sum, kernel_volumes);
+  const Degenerate& found = survey.degenerate;
+  for (const auto* list : {&found.isolated, &found.collinear, &found.coplanar, &found.coincident}) {
+    for (const Index i : *list) {
+      if (i >= 0 && i < n) continue;
+      refuse(fmt::format("phyxel {} is degenerate; allowed: 0 to {}", i, n - 1));
+    }
+  }
+}
+
 /// Adds the neighbour lists of a body, unless a surveyor leaves the lists to its device, and
 /// returns the neighbour summary. @param surveyor null: the host searches
 Survey add_neighbours(Model& model, const BodyRequest& request, const Cloud& cloud,
@@ -81,6 +111,7 @@ Survey add_neighbours(Model& model, const BodyRequest& request, const Cloud& clo
     Survey survey = in_stage("neighbours", [&] {
       return (*surveyor)(cloud.position, request.neighbourhood, kernel_volumes);
     });
+    check_survey(survey, static_cast<Index>(cloud.position.size()), kernel_volumes);
     if (request.neighbourhood.one_sided()) model.neighbourhood.symmetric = false;
     append(model.degenerate, survey.degenerate, shift);
     return survey;
@@ -188,6 +219,8 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
 /// @param surveyor null: lists and moments are made here.
 void add_body(Model& model, const BodyRequest& request, const Cloud& given,
               const Surveyor* surveyor) {
+  check_terms(request);
+  check_cloud(request, given);
   std::optional<SortedCloud> sorted;
   if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
   const Cloud& cloud = sorted ? sorted->cloud : given;
@@ -198,8 +231,6 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
       fmt::format("body \"{}\"", request.name),
       static_cast<double>(model.size()) + static_cast<double>(cloud.position.size()),
       surveyor ? 300 : 950);
-  check_terms(request);
-  check_cloud(request, cloud);
   if (surveyor) check_surveyable(request);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());

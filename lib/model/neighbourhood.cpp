@@ -1,8 +1,10 @@
 #include "phyxel/neighbourhood.hpp"
 
+#include <fmt/format.h>
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -10,6 +12,7 @@
 #include "model/nearest_distances.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/spatial_hash.hpp"
+#include "phyxel/error.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -63,6 +66,30 @@ SpatialHash roomy_hash(std::span<const Vec3d> position) {
   }
 }
 
+/// @throws InputError if there is not one value for each phyxel, or with the first that is negative
+///   or not finite
+void check_lengths(const char* name, std::span<const double> values, std::size_t phyxels) {
+  if (values.size() != phyxels) {
+    throw InputError(fmt::format("{}: {} values for {} phyxels; allowed: one for each", name,
+                                 values.size(), phyxels));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] >= 0 && std::isfinite(values[i])) continue;
+    throw InputError(
+        fmt::format("{} of phyxel {} is {} m; allowed: >= 0, finite", name, i, values[i]));
+  }
+}
+
+/// @throws InputError with the first point that is not finite
+void check_points(const char* name, std::span<const Vec3d> points) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3d p = points[i];
+    if (is_finite(p)) continue;
+    throw InputError(fmt::format("{} {} is at [{:g}, {:g}, {:g}] m; allowed: finite numbers", name,
+                                 i, p.x, p.y, p.z));
+  }
+}
+
 }  // namespace
 
 double median_of(std::span<const double> values) {
@@ -73,6 +100,11 @@ double median_of(std::span<const double> values) {
 }
 
 Csr transpose(const Csr& csr, Index columns) {
+  for (std::size_t k = 0; k < csr.indices.size(); ++k) {
+    if (csr.indices[k] >= 0 && csr.indices[k] < columns) continue;
+    throw InputError(fmt::format("index {} of a pattern is {}; allowed: 0 to {}", k, csr.indices[k],
+                                 columns - 1));
+  }
   Csr result;
   result.offsets.assign(static_cast<std::size_t>(columns) + 1, 0);
   for (const Index j : csr.indices) ++result.offsets[j + 1];
@@ -97,6 +129,8 @@ std::vector<double> support_radii(std::span<const double> spacing, const Neighbo
 }
 
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest) {
+  if (nearest < 1) throw InputError(fmt::format("nearest = {}; allowed: >= 1", nearest));
+  check_points("phyxel", position);
   return mean_spacing(position, nearest, nullptr);
 }
 
@@ -132,6 +166,8 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, d
 
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule) {
+  check_points("phyxel", position);
+  check_lengths("spacing", spacing, position.size());
   return neighbours_within(
       position, support_radii(spacing, rule, spacing.empty() ? 0 : median_of(spacing)), rule);
 }
@@ -210,6 +246,9 @@ std::pair<double, Index> nearest_to(Vec3d point, std::span<const Vec3d> position
 
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached) {
+  check_points("point", point);
+  check_points("phyxel", position);
+  check_lengths("support", support, position.size());
   Csr reaching = phyxels_reaching(point, position, support);
   std::vector<Index> nearest(point.size(), -1);
   Index lost = 0;

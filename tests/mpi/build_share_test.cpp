@@ -420,6 +420,19 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
   const std::vector<Cloud> one{testing::lattice(5, 5, 5, 0.1)};
   EXPECT_EQ(words_of([&] { build_share(world(), plain(2), one, {}); }),
             words_of([&] { build_model(plain(2), one); }));
+  // Clouds that do not fit, before a rank takes its piece.
+  for (const auto change : {+[](Cloud& c) { c.volume.resize(3); },
+                            +[](Cloud& c) {
+                              c.regions["end"] = {3, 125};
+                            },
+                            +[](Cloud& c) { c.surface.position.resize(2); }}) {
+    Cloud wrong_cloud = one[0];
+    change(wrong_cloud);
+    const std::string expected = words_of([&] { build_model(plain(), std::vector{wrong_cloud}); });
+    EXPECT_THAT(expected, ::testing::HasSubstr("body \"body\""));
+    EXPECT_THAT(words_of([&] { build_share(world(), plain(), {wrong_cloud}, {}); }),
+                ::testing::HasSubstr(expected));
+  }
   if (world().size() == 1) return;
   // Not the same file for all.
   const std::vector<Cloud> own{testing::lattice(5 + world().rank(), 5, 5, 0.1)};

@@ -31,13 +31,17 @@ struct Cloud {
 };
 
 /// Area-weighted vertex normals of a triangulated surface, outward for outward triangles.
+/// @throws InputError for a triangle that names no vertex
 std::vector<Vec3d> vertex_normals(const std::vector<Vec3d>& position,
                                   const std::vector<Triangle>& triangle);
 
 /// Volume enclosed by a closed surface [m^3] (divergence theorem); negative if inside out.
+/// @throws InputError for a triangle that names no vertex
 double enclosed_volume(const Surface& surface);
 
 /// Permutes the phyxels: phyxel order[k] becomes phyxel k. Regions are renumbered.
+/// @throws InputError if `order` is not a permutation of the phyxels, and for a number of volumes
+/// or a region that does not fit them
 void reorder(Cloud& cloud, const std::vector<Index>& order);
 
 /// Reorders the phyxels along a Morton (Z-order) curve, so that neighbours in space are

@@ -30,7 +30,8 @@ struct SurfaceDefects {
   bool clean() const;
   std::string describe() const;  ///< Description in one line.
 };
-/// Finds the defects of a surface; never throws.
+/// Finds the defects of a surface.
+/// @throws InputError for a vertex that is not finite, and for a triangle that names no vertex
 SurfaceDefects inspect_surface(const Surface& surface);
 
 /// Parameters for filling a surface with phyxels.

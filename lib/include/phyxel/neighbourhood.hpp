@@ -28,7 +28,7 @@ struct Csr {
 };
 
 /// The transpose of a pattern: row i of the result contains j if row j of `csr` contains i. Takes
-/// linear time.
+/// linear time. @throws InputError for an index that is no column
 Csr transpose(const Csr& csr, Index columns);
 
 /// How the support radius h of each phyxel is chosen. Source: Mueller et al. 2004, section 4.2:
@@ -64,15 +64,18 @@ struct Neighbourhood {
 
 /// Mean distance from each phyxel to the `nearest` nearest phyxels [m], shape [n_phyxels]; with
 /// fewer phyxels, to all others (0 for a single phyxel).
+/// @throws InputError for a position that is not finite, or `nearest` < 1
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 
 /// Neighbour search through the spatial hash of Teschner et al. 2003, in time linear in the number
 /// of phyxels. @param spacing result of `mean_spacing`
+/// @throws InputError for a position or spacing that is not finite, or another number of spacings
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule);
 
 /// For each point, the phyxels i with |x_i - point| < support[i]. A point outside all supports gets
 /// the nearest phyxel. @param unreached receives the number of such points; may be null
+/// @throws InputError for values that are not finite, or another number of supports than positions
 Csr phyxels_near(std::span<const Vec3d> point, std::span<const Vec3d> position,
                  std::span<const double> support, Index* unreached = nullptr);
 

@@ -436,10 +436,10 @@ TEST(Sample, SurfacesWithoutInsideAreRefused) {
 
   Surface s = cube;
   s.position[3].y = std::nan("");
-  EXPECT_THAT(refusal(s), HasSubstr("vertex 3 of the surface is at (1, nan, 0)"));
+  EXPECT_THAT(refusal(s), HasSubstr("vertex 3 of the surface is at [1, nan, 0]; allowed: finite"));
   s = cube;
   s.triangle[7][1] = 8;
-  EXPECT_THAT(refusal(s), HasSubstr("triangle 7 of the surface names vertex 8, but there are 8"));
+  EXPECT_THAT(refusal(s), HasSubstr("triangle 7 of the surface names vertex 8; allowed: 0 to 7"));
 
   Surface sheet = cube;
   sheet.triangle.resize(2);
