@@ -66,8 +66,7 @@ class GpuBackend final : public PaperBackend {
   Index size() const override { return n_; }
   int threads() const override { return 0; }
 
-  void upload(const State& state) override {
-    check_sizes(state, n_);
+  void put(const State& state) override {
     wait();
     dt_ = state.dt;
     const std::vector<char> held = held_phyxels(model_);

@@ -58,8 +58,7 @@ class SequentialBackend final : public PaperBackend {
   Index size() const override { return model_.size(); }
   int threads() const override { return 1; }
 
-  void upload(const State& state) override {
-    check_sizes(state, size());
+  void put(const State& state) override {
     dt_ = state.dt;
     for (Index i = 0; i < size(); ++i) {
       displacement_[i] = to<Real>(state.displacement[i]);

@@ -19,6 +19,7 @@ std::unique_ptr<Backend> make_double_backend(const Model& model, int device, Cud
 
 std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precision, int device,
                                            CudaPath path, Transport transport) {
+  check_model(model);
   if (model.share && model.share->place.size() != static_cast<std::size_t>(model.size())) {
     throw InputError("a GPU steps shares that are cut between tiles");
   }

@@ -44,8 +44,7 @@ class CudaBackend final : public Backend {
   Index size() const override { return m_.size(); }
   int threads() const override { return 0; }
 
-  void upload(const State& state) override {
-    check_sizes(state, size());
+  void put(const State& state) override {
     leave_steps();
     m_.put(state);
     history_interval_ = state.history.empty() ? 0 : state.history_interval;
@@ -59,7 +58,7 @@ class CudaBackend final : public Backend {
   }
 
   void set_external_forces(std::span<const Vec3d> force) override {
-    check_external_forces(force, size());
+    check_external_forces(force, m_.model());
     m_.use_device();
     m_.wait();  // steps under way may read the forces that were set before
     const bool had_loads = m_.fields().load;
@@ -107,6 +106,7 @@ class CudaBackend final : public Backend {
   }
 
   void put_displacements(std::span<const Vec3d> displacement) override {
+    check_displacements(displacement, size());
     leave_steps();
     m_.put_displacements(displacement);
   }

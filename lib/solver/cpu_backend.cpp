@@ -43,10 +43,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
   Index size() const override { return model_.size(); }
 
-  void upload(const State& state) override {
-    check_sizes(state, model_.size());
-    this->put_state(state);
-  }
+  void put(const State& state) override { this->put_state(state); }
   void download(State& state) const override { this->get_state(state); }
 
   std::optional<StateView> view() const override {
@@ -59,7 +56,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   void set_external_forces(std::span<const Vec3d> force) override {
-    check_external_forces(force, model_.size());
+    check_external_forces(force, model_);
     external_force_.assign(force.begin(), force.end());
     applied_.clear();
     if (!force.empty() || !model_.loads.empty()) {
@@ -81,6 +78,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   void put_displacements(std::span<const Vec3d> displacement) override {
+    check_displacements(displacement, model_.size());
     for (Index i = 0; i < model_.size(); ++i) {
       this->set_state(i, displacement[i], this->get3(velocity_, layout_.slot(i)));
     }
@@ -239,6 +237,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
 }  // namespace
 
 std::unique_ptr<Backend> make_cpu_backend(const Model& model, Precision precision, int threads) {
+  check_model(model);
   switch (precision) {
     case Precision::single:
       return std::make_unique<CpuBackend<float, float>>(model, threads);

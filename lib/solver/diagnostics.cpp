@@ -45,6 +45,7 @@ double pressure_wave_speed(const Material& m) {
 }
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
+  check_fits(model, backend);
   if (auto summed = backend.diagnostics(now)) {
     summed->step = now.step;
     summed->time = now.time;
@@ -149,6 +150,7 @@ std::string describe_phyxel(const Model& model, Index global_id) {
 
 void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
                    std::vector<double>* volume_ratio) {
+  check_fits(model, backend);
   std::vector<Mat3d> gradient;
   backend.displacement_gradients(gradient);
   const std::vector<std::string> columns = history_columns(model);

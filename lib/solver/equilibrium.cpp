@@ -109,6 +109,7 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
 
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
+  check_fits(model, backend);
   Newton newton(model, backend, options.most_steps);
   newton.observe(options.observer);
   const OwnedVectors& vectors = newton.vectors();
@@ -119,6 +120,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   backend.download(found.state);
   found.state.displacement = options.start ? *options.start : vectors.make();
   found.state.velocity = vectors.make();
+  check_state(found.state, model.size());  // of the caller's start
   NewtonReport report;
   const int stages = stages_of(model);
   const int first =
@@ -132,7 +134,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     found.evaluations += report.evaluations;
     if (report.found) continue;
     vectors.refresh_ghosts(found.state.displacement);
-    backend.upload(found.state);
+    backend.put(found.state);
     if (report.interrupted) {
       throw InterruptedError(
           fmt::format("the search for rest was stopped after {} steps of Newton's method, at a "
@@ -143,7 +145,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   }
   found.residual = report.residual;
   vectors.refresh_ghosts(found.state.displacement);
-  backend.upload(found.state);
+  backend.put(found.state);
   backend.commit_history();
   State committed;
   backend.download(committed);

@@ -17,6 +17,12 @@ namespace phyxel {
 State initial_state(const Model& model, const Scene& scene, double dt) {
   // Verlet's velocity is that of half a step earlier, from which half a step under a(0) and damping
   // leads to v(0). At rest there are no internal forces.
+  if (!model.parts.empty() && model.parts.back().body >= static_cast<Index>(scene.bodies.size())) {
+    throw InputError(
+        fmt::format("a model of {} bodies and a scene of {}: allowed is the scene that "
+                    "the model was built from",
+                    model.parts.back().body + 1, scene.bodies.size()));
+  }
   const double lag = scene.solver.method == Method::verlet ? dt / 2 : 0;
   State state;
   state.dt = dt;
@@ -46,20 +52,13 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
 
 namespace {
 
-/// @throws InputError with the first phyxel whose state is not finite, and its values
-void check_finite(const State& state) {
-  const auto check = [](const char* name, const std::vector<Vec3d>& values) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const Vec3d& v = values[i];
-      if (is_finite(v)) continue;
-      throw InputError(fmt::format("{} of phyxel {} is ({}, {}, {}); allowed: finite numbers", name,
-                                   i, v.x, v.y, v.z));
-    }
-  };
-  check("displacement [m]", state.displacement);
-  check("velocity [m/s]", state.velocity);
+/// @throws InputError if the steps or the step size of a state are none
+void check_times(const State& state) {
   if (!(state.dt > 0) || !std::isfinite(state.dt)) {
     throw InputError(fmt::format("dt = {} s of a state; allowed: dt > 0, finite", state.dt));
+  }
+  if (state.step < 0) {
+    throw InputError(fmt::format("step = {} of a state; allowed: >= 0", state.step));
   }
 }
 
@@ -71,12 +70,13 @@ Solver::Solver(Backend& backend, const State& start)
       first_step_(start.step),
       dt_(start.dt),
       looks_(start.looks) {
-  check_finite(start);
+  check_times(start);
   backend_.upload(start);
 }
 
 Solver::Solver(const Model& model, Backend& backend, const State& start, Method method)
     : Solver(backend, start) {
+  check_fits(model, backend);
   model_ = &model;
   method_ = method;
   if (method == Method::equilibrium && start.step == 0) {
@@ -127,10 +127,10 @@ void Solver::step_by_newton() {
       try {
         implicit_->take(implicit_state_);
       } catch (...) {
-        backend_.upload(implicit_state_);  // of the last whole step
+        backend_.put(implicit_state_);  // of the last whole step
         throw;
       }
-      backend_.upload(implicit_state_);
+      backend_.put(implicit_state_);
       break;
     case Method::equilibrium: {
       const State start = begun_ ? state() : State{};

@@ -41,7 +41,7 @@ class Accelerations {
   /// @param use `frozen`: of the elastic forces alone
   Vectors at(State& state, HistoryUse use) const {
     owned_.refresh_ghosts(state.displacement);
-    backend_.upload(state);
+    backend_.put(state);
     Vectors all;
     backend_.internal_forces(all, use);
     const std::span<const Vec3d> external = backend_.external_forces();
@@ -139,7 +139,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
   first_step_ += steps - steps_;  // as many have been taken as before
   state.step = steps_ = steps;
   state.dt = dt_ = dt;
-  backend_.upload(state);
+  backend_.put(state);
 }
 
 void Solver::halve_step() {

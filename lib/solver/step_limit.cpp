@@ -210,6 +210,7 @@ StepLimit step_limit(const Model& model, int threads) {
 }
 
 StepLimit step_limit(const Model& model, Backend& backend) {
+  check_fits(model, backend);
   const std::unique_ptr<Vibration> vibration = backend.vibration();
   if (!vibration) return step_limit(model, backend.threads());
   Stage stage(stage_name);

@@ -87,6 +87,7 @@ bool stiffens(const Material& material) {
 }
 
 Stiffening find_stiffening(const Model& model, Backend& backend) {
+  check_fits(model, backend);
   Stiffest found;
   if (const auto on_device = backend.stiffening()) {
     found = Stiffest{*on_device};

@@ -164,7 +164,7 @@ TEST_P(CudaBackend, EnergiesAndMomentaEqualTheHosts) {
 
   State broken = state;
   broken.displacement[1234].y = std::nan("");
-  gpu->upload(broken);
+  gpu->put(broken);
   const Diagnostics bad = diagnose(model, *gpu, 150, dt);
   ASSERT_GE(bad.bad_phyxel, 0);  // it, or a neighbour that its NaN has reached
   EXPECT_LT(norm(model.position[bad.bad_phyxel] - model.position[1234]), 1);

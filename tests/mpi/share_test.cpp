@@ -381,7 +381,7 @@ TEST_P(Shares, TellWhichPhyxelOfTheWholeIsBad) {
   for (Index i = 0; i < model_.size(); ++i) {
     if (model_.global_id(i) == broken) state.displacement[i].x = std::nan("");
   }
-  here->upload(state);
+  here->put(state);
   const Diagnostics d = diagnose(model_, *here, 0, state.dt);
   world().barrier();
   ASSERT_GE(d.bad_phyxel, 0);  // it, or a neighbour that its NaN has reached

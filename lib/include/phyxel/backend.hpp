@@ -86,7 +86,10 @@ class Backend {
   /// is the virgin material.
   /// @throws InputError for another number of phyxels, a value that is not finite, or a history of
   ///   other laws
-  virtual void upload(const State& state) = 0;
+  void upload(const State& state);
+  /// Copies a state in without checking displacements and velocities: for states that the library's
+  /// own methods have computed. The history is checked as in `upload`.
+  virtual void put(const State& state) = 0;
   /// Copies the present displacements, velocities and history out, in that order.
   virtual void download(State& state) const = 0;
   /// The state where it is; nothing where that is no memory of the CPU.
@@ -97,8 +100,8 @@ class Backend {
   /// it out, and a `StabilityWatch` knows nothing of them.
   /// @param force [N], shape [n], copied; of a share's ghosts it is not looked at. Empty: none, and
   ///   then they cost nothing.
-  /// @throws InputError if there are neither n nor none, or this backend takes none (those of the
-  ///   2008 program)
+  /// @throws InputError if there are neither n nor none, if one is not finite, or if this backend
+  ///   takes none (those of the 2008 program)
   virtual void set_external_forces(std::span<const Vec3d> force);
   /// Those that act [N], shape [n] or empty.
   virtual std::span<const Vec3d> external_forces() const { return {}; }
@@ -119,7 +122,8 @@ class Backend {
   virtual void wait() const {}
 
   /// Puts phyxels elsewhere for evaluations, and leaves velocities and history as they are.
-  /// @param displacement [m], shape [n], of a share with its ghosts'
+  /// @param displacement [m], shape [n], of a share with its ghosts'; values are not checked
+  /// @throws InputError for another number of phyxels
   virtual void put_displacements(std::span<const Vec3d> displacement);
   /// Sets the time from the history to the present displacements [s], over which evaluations take
   /// rates, for methods that find displacements by themselves.
@@ -170,13 +174,21 @@ class Backend {
   virtual std::size_t step_traffic() const = 0;
 };
 
-/// Makes sure that a state has a displacement and a velocity for each phyxel; every backend asks
-/// this of what is uploaded. @throws InputError with both counts and the one that is allowed
-void check_sizes(const State& state, Index phyxels);
+/// Checks that a state has a finite displacement and velocity for each phyxel.
+/// @throws InputError with the counts, or the first value that is not finite, and what is allowed
+void check_state(const State& state, Index phyxels);
 
-/// Makes sure that there is one external force for each phyxel, or none.
-/// @throws InputError with both counts and those that are allowed
-void check_external_forces(std::span<const Vec3d> force, Index phyxels);
+/// Checks that a backend can be the one of a model: that both have as many phyxels.
+/// @throws InputError with both counts
+void check_fits(const Model& model, const Backend& backend);
+
+/// Checks that there is one displacement for each phyxel.
+/// @throws InputError with both counts and the one that is allowed
+void check_displacements(std::span<const Vec3d> displacement, Index phyxels);
+
+/// Checks that there is a finite external force for each phyxel that this rank owns, or none.
+/// @throws InputError with the counts, or the first force that is not finite, and what is allowed
+void check_external_forces(std::span<const Vec3d> force, const Model& model);
 
 /// The CPU backend: OpenMP over SIMD packs of phyxels. The model must outlive it.
 /// @param threads 0: OpenMP's choice.

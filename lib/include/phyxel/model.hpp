@@ -153,6 +153,12 @@ struct Model {
   Offset pairs() const;
 };
 
+/// Checks that the arrays of a model fit together: their sizes, that indices name phyxels or
+/// surfels that there are, neighbours those of the same body, and that values are finite. Every
+/// backend asks this of its model, once.
+/// @throws InputError naming the array, the value found, and what is allowed
+void check_model(const Model& model);
+
 /// Whether each phyxel is held in place along all axes by a motion that stands still, shape [n].
 std::vector<char> held_phyxels(const Model& model);
 

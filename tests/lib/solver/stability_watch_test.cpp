@@ -93,7 +93,7 @@ TEST(Watch, BlamesTheFastestOfTheLastGoodStateNotTheFirstPhyxel) {
   backend->upload(state);
   StabilityWatch watch(model, diagnose(model, *backend, 0, state.dt));
   for (Vec3d& u : state.displacement) u = {std::nan(""), 0, 0};
-  backend->upload(state);
+  backend->put(state);
   try {
     watch.check(diagnose(model, *backend, 1, state.dt));
     FAIL();

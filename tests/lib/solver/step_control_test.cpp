@@ -398,7 +398,7 @@ TEST(StepControl, NamesWhereItBeganWhenNoStepIsShortEnough) {
     Solver solver(model, *backend, state, Method::verlet);
     if (looked_before) control.see(solver);
     state.displacement[pulled] = {far, 0, 0};
-    backend->upload(state);
+    backend->put(state);
     try {
       control.look(solver, 0);
     } catch (const DivergedError& error) {
