@@ -8,6 +8,7 @@
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
+#include "model/cloud_check.hpp"
 #include "phyxel/error.hpp"
 #include "sort_unique.hpp"
 #include "version.hpp"
@@ -61,6 +62,7 @@ Surface read_surface(const Hdf5Reader& in) {
 }  // namespace
 
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite) {
+  check_cloud(cloud, file.string() + ": ", "");
   check_output_file(file, overwrite, Output::file);
   make_writable_folder(file.has_parent_path() ? file.parent_path() : ".");
   Hdf5Writer out;

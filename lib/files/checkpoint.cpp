@@ -109,6 +109,17 @@ std::vector<std::string> lines_of(const std::string& text) {
 
 fs::path write_checkpoint(const fs::path& directory, const State& state,
                           const CheckpointInfo& info) {
+  const auto check = [&](const std::string& name, std::size_t found) {
+    if (found == state.displacement.size()) return;
+    throw InputError(
+        fmt::format("state of a checkpoint: {} has {} entries; allowed: {}, as many as "
+                    "displacements",
+                    name, found, state.displacement.size()));
+  };
+  check("velocity", state.velocity.size());
+  for (const HistoryColumn& column : state.history) {
+    check(fmt::format("history \"{}\"", column.name), column.values.size());
+  }
   const Model none;
   Frame frame;
   frame.state = &state;

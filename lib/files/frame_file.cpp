@@ -72,8 +72,12 @@ Hdf5Writer::Fill<T> rows_of(const FileArray& array, ChunkedSource& values) {
   return [array, &values](std::size_t first, std::span<T> rows) {
     const auto begin = static_cast<Index>(first);
     const Index end = begin + static_cast<Index>(rows.size() / width_of(array.terms[0]));
-    const std::vector<double> sum =
-        sum_of_terms(array, [&](Quantity term) { return values.values(term, begin, end); });
+    const std::vector<double> sum = sum_of_terms(array, [&](Quantity term) {
+      const std::span<const double> found = values.values(term, begin, end);
+      if (found.size() == rows.size()) return found;
+      throw InputError(fmt::format("{}: the source has {} numbers for rows {} to {}; allowed: {}",
+                                   array.path, found.size(), begin, end, rows.size()));
+    });
     std::transform(sum.begin(), sum.end(), rows.begin(),
                    [](double value) { return static_cast<T>(value); });
   };

@@ -10,6 +10,7 @@
 #include "files/frame_file.hpp"
 #include "files/trajectory_folder.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/history.hpp"
 
 namespace phyxel {
 namespace {
@@ -30,6 +31,33 @@ std::string log_line(const Diagnostics& now) {
     line += fmt::format(",{:.17g}", column.value(now));
   }
   return line + "\n";
+}
+
+/// @throws InputError if an array of a frame does not fit the model
+void check_frame(const Model& model, const Frame& frame) {
+  if (!frame.state) throw InputError("frame: state is null; allowed: the state of the model");
+  const auto check = [](const std::string& name, std::size_t found, Index wanted, bool may_lack) {
+    if (found == static_cast<std::size_t>(wanted) || (may_lack && found == 0)) return;
+    throw InputError(fmt::format("frame: {} has {} entries; allowed: {}{}", name, found, wanted,
+                                 may_lack ? " or none" : ""));
+  };
+  const State& state = *frame.state;
+  check("displacement", state.displacement.size(), model.size(), false);
+  check("velocity", state.velocity.size(), model.size(), false);
+  for (const HistoryColumn& column : state.history) {
+    check(fmt::format("history \"{}\"", column.name), column.values.size(), model.size(), false);
+  }
+  const std::size_t columns = history_columns(model).size();
+  if (!state.history.empty() && state.history.size() != columns) {
+    throw InputError(fmt::format("frame: {} columns of history; allowed: {} or none",
+                                 state.history.size(), columns));
+  }
+  check("von_mises", frame.von_mises.size(), model.size(), true);
+  check("volume_ratio", frame.volume_ratio.size(), model.size(), true);
+  if (!frame.surfels) return;
+  const auto surfels = static_cast<Index>(model.surfels.position.size());
+  check("surfels.position", frame.surfels->position.size(), surfels, false);
+  check("surfels.normal", frame.surfels->normal.size(), surfels, false);
 }
 
 std::string size_in_words(double bytes) {
@@ -79,9 +107,14 @@ bool FrameSource::has(Quantity quantity) const {
 
 std::span<const double> FrameSource::values(Quantity quantity, Index begin, Index end) {
   const std::size_t width = width_of(quantity);
-  return values_of(model_, frame_, quantity)
-      .subspan(width * static_cast<std::size_t>(begin),
-               width * static_cast<std::size_t>(end - begin));
+  const std::span<const double> all = values_of(model_, frame_, quantity);
+  if (begin < 0 || end < begin || width * static_cast<std::size_t>(end) > all.size()) {
+    throw InputError(
+        fmt::format("frame: rows {} to {} of an array of {} asked for; allowed: 0 to {}", begin,
+                    end, all.size() / width, all.size() / width));
+  }
+  return all.subspan(width * static_cast<std::size_t>(begin),
+                     width * static_cast<std::size_t>(end - begin));
 }
 
 Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
@@ -197,6 +230,7 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
 }
 
 void Recorder::write(const Frame& frame) {
+  check_frame(model_, frame);
   FrameSource values(model_, frame);
   write(frame.diagnostics, values);
 }

@@ -8,8 +8,8 @@
 namespace phyxel {
 
 /// Writes a cloud (phyxels, volumes, surfels, regions) atomically.
-/// @throws InputError if `file` exists and `overwrite` is false, or if its folder cannot be
-/// written;
+/// @throws InputError for a cloud whose arrays do not fit together or are not finite, if `file`
+/// exists and `overwrite` is false, or if its folder cannot be written;
 ///   OutputError if writing fails
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite);
 

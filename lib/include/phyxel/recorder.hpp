@@ -108,7 +108,8 @@ class Recorder {
   Recorder(const Model& model, const Scene& scene, bool overwrite,
            const std::optional<Continuation>& point = std::nullopt);
 
-  /// Writes a frame. @throws OutputError; frames written before stay intact
+  /// Writes a frame. @throws InputError for an array that does not fit the model; OutputError if
+  ///   writing fails: earlier frames stay intact
   void write(const Frame& frame);
   /// Writes a frame whose values come from a source, chunk by chunk. @throws OutputError likewise
   void write(const Diagnostics& diagnostics, ChunkedSource& values);
