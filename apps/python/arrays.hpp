@@ -106,13 +106,26 @@ inline std::vector<Vec3d> vectors_from(const py::handle& object, const char* wha
   const auto values = array.unchecked<2>();
   for (py::ssize_t i = 0; i < array.shape(0); ++i) {
     const Vec3d v{values(i, 0), values(i, 1), values(i, 2)};
-    if (!std::isfinite(v.x + v.y + v.z)) {
+    if (!is_finite(v)) {
       throw InputError(fmt::format("{}: [{}, {}, {}] found in row {}; allowed: finite numbers",
                                    what, v.x, v.y, v.z, i));
     }
     vectors[static_cast<std::size_t>(i)] = v;
   }
   return vectors;
+}
+
+/// Numbers from an array of shape (rows,). @throws InputError naming `what`
+inline std::vector<double> numbers_from(const py::handle& object, const std::string& what,
+                                        py::ssize_t rows) {
+  const auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+  if (!array || array.ndim() != 1 || array.shape(0) != rows) {
+    PyErr_Clear();
+    throw InputError(fmt::format("{}: {} found; allowed: shape ({},)", what,
+                                 array ? "shape " + shape_words(array) : "no array of numbers",
+                                 rows));
+  }
+  return {array.data(), array.data() + rows};
 }
 
 void add_clouds(py::module_& module);

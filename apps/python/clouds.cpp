@@ -60,18 +60,11 @@ Cloud cloud_from(const py::object& position, const py::object& volume, const py:
   const auto n = static_cast<py::ssize_t>(cloud.position.size());
   if (n == 0) throw InputError("position: no phyxel; allowed: at least one");
   if (!volume.is_none()) {
-    const auto array = py::array_t<double, py::array::forcecast>::ensure(volume);
-    if (!array || array.ndim() != 1 || array.shape(0) != n) {
-      PyErr_Clear();
-      throw InputError(fmt::format("volume: {} found; allowed: shape ({},)",
-                                   array ? "shape " + shape_words(array) : "no array", n));
-    }
-    for (py::ssize_t i = 0; i < n; ++i) {
-      const double v = array.at(i);
-      if (!(v > 0 && std::isfinite(v))) {
-        throw InputError(fmt::format("volume: {} found in row {}; allowed: > 0 m^3", v, i));
-      }
-      cloud.volume.push_back(v);
+    cloud.volume = numbers_from(volume, "volume", n);
+    for (std::size_t i = 0; i < cloud.volume.size(); ++i) {
+      const double v = cloud.volume[i];
+      if (v > 0 && std::isfinite(v)) continue;
+      throw InputError(fmt::format("volume: {} found in row {}; allowed: > 0 m^3", v, i));
     }
   }
   if (!surface.is_none()) {

@@ -21,6 +21,24 @@
 namespace phyxel::python {
 namespace {
 
+/// Columns of history from a dict of arrays. @throws InputError naming what is not so
+std::vector<HistoryColumn> history_from(const py::object& history, py::ssize_t rows) {
+  if (!py::isinstance<py::dict>(history)) {
+    throw InputError(fmt::format("history: {} found; allowed: a dict of arrays",
+                                 py::repr(history).cast<std::string>()));
+  }
+  std::vector<HistoryColumn> columns;
+  for (const auto& [key, values] : history.cast<py::dict>()) {
+    if (!py::isinstance<py::str>(key)) {
+      throw InputError(fmt::format("history: the key {} found; allowed: names of columns",
+                                   py::repr(key).cast<std::string>()));
+    }
+    const auto name = key.cast<std::string>();
+    columns.push_back({name, numbers_from(values, "history, " + name, rows)});
+  }
+  return columns;
+}
+
 /// The live state of the CPU, as NumPy sees it.
 struct Live {
   py::array displacement, velocity;  // (packs, 3, lanes)
@@ -108,10 +126,7 @@ class Simulation {
     }
     if (!velocity.is_none()) state.velocity = vectors_from(velocity, "velocity", n);
     if (!history.is_none()) {
-      state.history.clear();
-      for (const auto& [name, values] : history.cast<py::dict>()) {
-        state.history.push_back({name.cast<std::string>(), values.cast<std::vector<double>>()});
-      }
+      state.history = history_from(history, n);
       checked_history(state, history_columns(model_), model_.size());
     }
     const py::gil_scoped_release others;

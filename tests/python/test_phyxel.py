@@ -134,6 +134,30 @@ def test_equilibrium_of_a_pulled_bar_is_hookes():
     assert s.residual < 1e-8
 
 
+def test_states_that_do_not_fit_are_refused():
+    s = simulation(body={"material": {**MATERIAL, "law": "j2", "yield_stress": 1e3}})
+    n = len(s)
+    fits = {name: np.zeros(n) for name in s.history}
+    assert len(fits) == 7
+    last = list(fits)[-1]
+    for change, words in [
+        (dict(displacement=np.zeros((n - 1, 3))), rf"displacement: shape \({n - 1}, 3\) found"),
+        (dict(velocity=[[0, 0, np.nan]] * n), "velocity: .* row 0; allowed: finite numbers"),
+        (dict(history=5), "history: 5 found; allowed: a dict of arrays"),
+        (dict(history={3: np.zeros(n)}), "history: the key 3 found; allowed: names"),
+        (dict(history={**fits, last: "many"}), f"history, {last}: no array of numbers found"),
+        (dict(history={**fits, last: np.zeros(n + 1)}), rf"shape \({n + 1},\) found"),
+        (dict(history={**fits, last: np.full(n, np.inf)}), "not finite at phyxel 0"),
+        (dict(history={"strain": np.zeros(n)}), "column \"strain\" found"),
+        (dict(history={last: np.zeros(n)}), "is missing"),
+    ]:
+        with pytest.raises(phyxel.InputError, match=words):
+            s.set_state(**change)
+    s.set_state(displacement=np.zeros((n, 3)), velocity=np.zeros((n, 3)), history=fits)
+    s.external_forces = np.full((n, 3), 1e308)  # finite, though sums of it are not
+    assert s.external_forces.min() == 1e308
+
+
 def test_precisions_agree():
     tips = {}
     for precision in ("float", "mixed", "double"):
