@@ -119,62 +119,223 @@ __device__ void walk_pairs(const Pair<Real>* pairs, int length, SlotImage image,
   }
 }
 
+// --- parts of the kernel ------------------------------------------------------------------------
+
+// Some of these functions take values that a thread keeps in registers by value, others by
+// reference. The kernels then have the same instructions as if they were written in one piece, but
+// for the order of some sums' components (scripts/kernel_table.py); other signatures move loads and
+// change the number of instructions.
+
+/// True for a block without a slice, after its part in the barriers of its cluster.
+template <class Channel, class Real>
+__device__ __forceinline__ bool stands_by(int number) {
+  if constexpr (std::is_same_v<Channel, ClusterChannel<Real>>) {
+    if (number < 0) {
+      Channel::stand_by();
+      return true;
+    }
+  }
+  return false;
+}
+
+/// The weights that a block without closed gradients keeps.
+__device__ __forceinline__ KeptWeights weights_kept(bool hourglass) {
+  return hourglass ? KeptWeights::first_pass : KeptWeights::none;
+}
+
+/// Lets the next launch begin, and waits until the last one has written the state.
+__device__ __forceinline__ void follow_last_launch() {
+  let_next_launch_begin();
+  wait_for_last_launch();
+}
+
+/// Starts to copy the pairs of a slice, and the weights that its block keeps, into shared memory.
+/// @param weighted whether weights of the first pass are kept
+template <bool closed, class Real>
+__device__ __forceinline__ void fetch_tables(const ResidentView<Real>& r, const Slice& slice,
+                                             const ResidentMemory<Real>& memory, bool weighted) {
+  fetch_pairs(r, slice.rows[0], memory.pairs);
+  if (weighted) fetch_weights(r, slice.rows[0], memory.weights);
+  if (r.longest[1]) {
+    fetch_pairs(r, slice.rows[1], memory.second_pairs);
+    if constexpr (closed) fetch_weights(r, slice.rows[1], memory.second_weights);
+  }
+}
+
+/// Number of entries in the rows of a thread's warp; 0 for a thread without a phyxel.
+__device__ __forceinline__ int length_of(const Slice& slice, int pass, int thread) {
+  return thread < slice_size ? slice.rows[pass].length[thread / warp_size] : 0;
+}
+
+/// Loads the inverse moment and the volume of a phyxel. @param c its first constant
+template <class Real>
+__device__ __forceinline__ void fetch_moment(const Real* c, std::size_t places,
+                                             Sym3<Real>& inverse_moment, Real& volume) {
+  inverse_moment = {c[0], c[places], c[2 * places], c[3 * places], c[4 * places], c[5 * places]};
+  volume = c[6 * places];
+}
+
+/// The displacement of a phyxel in the precision of the state. @param u that of its point
+template <class Real, class StateReal>
+__device__ __forceinline__ Vec3<StateReal> displacement_at(const Fields<Real, StateReal>& f,
+                                                           std::size_t place, const Vec3<Real>& u) {
+  if constexpr (std::is_same_v<Real, StateReal>) {
+    return u;
+  } else {
+    return column3(f.displacement, f.places, place);
+  }
+}
+
+/// Stores the state of a phyxel in global memory.
+template <class Real, class StateReal>
+__device__ __forceinline__ void store_state(const Fields<Real, StateReal>& f, std::size_t place,
+                                            typename Points<Real>::Value point,
+                                            Vec3<StateReal> velocity,
+                                            Vec3<StateReal> displacement) {
+  f.points.set(place, point);
+  set_column3(f.velocity, f.places, place, velocity);
+  if constexpr (!std::is_same_v<Real, StateReal>) {
+    set_column3(f.displacement, f.places, place, displacement);
+  }
+}
+
+/// Sends the displacements of a slice to the slices that need them, and receives theirs.
+template <class Channel, class Real>
+__device__ __forceinline__ void exchange_displacements(Channel& channel, SlotImage image,
+                                                       std::size_t place, bool somebody,
+                                                       Vec3<Real> u) {
+  constexpr int packets = displacement_packets<Real>;
+  const Real numbers[] = {u.x, u.y, u.z};
+  channel.template send<packets>(0, image, place, somebody, numbers);
+  channel.template receive<packets>(0, image);
+}
+
+/// Sends other numbers of a slice likewise. @param half of the step: 0 or 1
+template <int packets, class Channel, class Real>
+__device__ __forceinline__ void exchange(Channel& channel, int half, SlotImage image,
+                                         std::size_t place, bool somebody, const Real* numbers) {
+  channel.template send<packets>(half, image, place, somebody, numbers);
+  channel.template receive<packets>(half, image);
+}
+
+/// Gathers the sums of a thread's phyxel over its neighbours in the first pass.
+/// @param sum receives Σ w u xᵀ. @param pull receives Σ w u, if `weighted`
+template <class Real>
+__device__ __forceinline__ void gather_gradient(const ResidentMemory<Real>& memory, int thread,
+                                                int length,
+                                                const typename Points<Real>::Value& point,
+                                                bool weighted, Mat3<Real>& sum, Vec3<Real>& pull) {
+  walk_pairs<Real, displacement_packets<Real>>(
+      memory.pairs + thread, length, memory.displacements,
+      [&](const Real* u_j, Vec3<Real> wx, [[maybe_unused]] int entry) {
+        const Vec3<Real> u_ij = Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u;
+        add_gradient_term(sum, u_ij, wx);
+        if (weighted) add_pull(pull, u_ij, memory.weights[entry * slice_size + thread]);
+      });
+}
+
+/// The displacement gradient that the material feels: closed, if bodies have closed gradients.
+/// @param fit linear fit to the displacements. @param pull sum of `gather_gradient`
+template <bool closed, class Real>
+__device__ __forceinline__ Mat3<Real> gradient_of_material(Mat3<Real> fit, Vec3<Real> pull,
+                                                           Vec3<Real> moment_offset,
+                                                           Vec3<Real> closing) {
+  if constexpr (closed) {
+    return closed_gradient(fit, pull, moment_offset, closing);
+  } else {
+    return fit;
+  }
+}
+
+/// Adds the terms of closed gradients to the pair stress q. @param t receives the closing stress
+template <bool closed, class Real>
+__device__ __forceinline__ void add_closing(Mat3<Real>& q, Vec3<Real>& t, Real volume,
+                                            Mat3<Real> stress, Vec3<Real> closing,
+                                            Vec3<Real> moment_offset, Sym3<Real> inverse_moment) {
+  if constexpr (closed) {
+    t = closing_stress(volume, stress, closing);
+    q = closed_pair_stress(q, t, moment_offset, inverse_moment);
+  }
+}
+
+/// Adds hourglass control to the pair stress q. @param pull sum of `gather_gradient`, which becomes
+/// the hourglass force
+template <class Real>
+__device__ __forceinline__ void add_hourglass(Mat3<Real>& q, Vec3<Real>& pull, Real strength,
+                                              const Mat3<Real>& fit) {
+  q = with_hourglass(q, strength, fit);
+  pull = pull_force(strength, pull);
+}
+
+/// Gathers the internal force on a thread's phyxel, without the hourglass force.
+template <bool closed, class Real>
+__device__ __forceinline__ Vec3<Real> find_force(const ResidentMemory<Real>& memory, int thread,
+                                                 int length, Vec3<Real> moment_offset, Mat3<Real> q,
+                                                 Vec3<Real> t) {
+  Vec3<Real> sum;
+  walk_pairs<Real, stress_packets<Real, closed>>(
+      memory.second_pairs + thread, length, memory.stresses,
+      [&](const Real* n, Vec3<Real> wx, [[maybe_unused]] int entry) {
+        const Mat3<Real> q_j{{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, {n[6], n[7], n[8]}}};
+        add_neighbour_force(sum, q_j, wx);
+        if constexpr (closed) {
+          add_closing_force(sum, t, {n[9], n[10], n[11]},
+                            memory.second_weights[entry * slice_size + thread]);
+        }
+      });
+  sum += own_force(q, moment_offset);
+  return sum;
+}
+
+/// The velocity half a step after the present displacements.
+template <class Real, class StateReal>
+__device__ __forceinline__ Vec3<StateReal> velocity_after(
+    Vec3<StateReal> velocity, Vec3<Real> force, Real inverse_mass, const Fields<Real, StateReal>& f,
+    StateReal dt, const TileConstants<Real, StateReal>& body) {
+  return body.damped ? next_velocity<Real, StateReal, true>(velocity, force, inverse_mass,
+                                                            f.gravity, dt, body)
+                     : next_velocity<Real, StateReal, false>(velocity, force, inverse_mass,
+                                                             f.gravity, dt, body);
+}
+
+// --- the kernel ---------------------------------------------------------------------------------
+
+/// Takes steps. With a trail, half a step more finds the gradients of the last displacements.
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
-/// @tparam Law that of all bodies, `AnyLaw` or `AnyLawWithHistory`. @tparam controlled some bodies
-/// may have hourglass
-///   control. @tparam closed some bodies have closed gradients
+/// @tparam Law that of all bodies, `AnyLaw` or `AnyLawWithHistory`
+/// @tparam controlled some bodies may have hourglass control
+/// @tparam closed some bodies have closed gradients
 template <class Real, class StateReal, class Channel, class Law, bool controlled, bool closed>
 __global__ void __launch_bounds__(Channel::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
                    Trail<Real, StateReal> trail, unsigned first_tag) {
-  constexpr int u_packets = displacement_packets<Real>, q_packets = stress_packets<Real, closed>;
   extern __shared__ __align__(16) char shared[];
   const int number = r.slice_of_block[blockIdx.x];
-  if constexpr (std::is_same_v<Channel, ClusterChannel<Real>>) {
-    if (number < 0) {
-      Channel::stand_by();
-      return;
-    }
-  }
+  if (stands_by<Channel, Real>(number)) return;
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
   const bool hourglass = controlled && (closed ? f.pull != nullptr : r.weights != nullptr);
-  const ResidentMemory<Real> memory(shared, r, q_packets,
-                                    closed      ? KeptWeights::both_passes
-                                    : hourglass ? KeptWeights::first_pass
-                                                : KeptWeights::none);
+  const ResidentMemory<Real> memory(shared, r, stress_packets<Real, closed>,
+                                    closed ? KeptWeights::both_passes : weights_kept(hourglass));
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
-  fetch_pairs(r, slice.rows[0], memory.pairs);
-  if (closed || hourglass) fetch_weights(r, slice.rows[0], memory.weights);
-  if (r.longest[1]) {
-    fetch_pairs(r, slice.rows[1], memory.second_pairs);
-    if constexpr (closed) fetch_weights(r, slice.rows[1], memory.second_weights);
-  }
+  fetch_tables<closed>(r, slice, memory, closed || hourglass);
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
   Sym3<Real> inverse_moment;
-  Vec3<Real> moment_offset;
-  [[maybe_unused]] Vec3<Real> closing;
+  Vec3<Real> moment_offset, closing;
   Real volume{}, inverse_mass{};
   if (owner) {
-    const Real* c = f.moment_constants + place;
-    inverse_moment = {
-        c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
-    volume = c[6 * f.places];
+    fetch_moment(f.moment_constants + place, f.places, inverse_moment, volume);
     moment_offset = column3(f.force_constants, f.places, place);
     if constexpr (closed) closing = column3(f.closing, f.places, place);
     inverse_mass = f.force_constants[3 * f.places + place];
   }
   const bool somebody = owner && inverse_mass != Real(0);
-  const int warp = thread / warp_size;
-  const int length = owner ? slice.rows[0].length[warp] : 0;
-  const int second_length = owner ? slice.rows[1].length[warp] : 0;
+  const int length = length_of(slice, 0, thread), second_length = length_of(slice, 1, thread);
   wait_for_copies();
   Channel channel(r, slice, memory, f.places, first_tag);  // all threads meet
-
-  let_next_launch_begin();
-  wait_for_last_launch();
+  follow_last_launch();
   typename Points<Real>::Value point{};
   Vec3<StateReal> velocity, displacement;
   Vec3<Real> load;
@@ -183,93 +344,49 @@ __global__ void __launch_bounds__(Channel::threads)
   if (owner) {
     point = f.points.get(place);
     velocity = column3(f.velocity, f.places, place);
-    if constexpr (std::is_same_v<Real, StateReal>) {
-      displacement = point.u;
-    } else {
-      displacement = column3(f.displacement, f.places, place);
-    }
+    displacement = displacement_at(f, place, point.u);
     if (f.load) load = column3(f.load, f.places, place);
     history.fetch(history_columns, f.history_numbers);
   }
-  // Half a step more for the gradients of the last displacements.
   for (int step = 0; step < steps + (trail.gradients ? 1 : 0); ++step) {
-    const Real u[] = {point.u.x, point.u.y, point.u.z};
-    channel.template send<u_packets>(0, memory.displacements, place, somebody, u);
-    channel.template receive<u_packets>(0, memory.displacements);
+    exchange_displacements(channel, memory.displacements, place, somebody, point.u);
     Mat3<Real> q;
-    [[maybe_unused]] Vec3<Real> pull, t;
+    Vec3<Real> pull, t;
     if (owner) {
       Mat3<Real> sum;
-      walk_pairs<Real, u_packets>(
-          memory.pairs + thread, length, memory.displacements,
-          [&](const Real* u_j, Vec3<Real> wx, [[maybe_unused]] int entry) {
-            const Vec3<Real> u_ij = Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u;
-            add_gradient_term(sum, u_ij, wx);
-            if (closed || hourglass) {
-              add_pull(pull, u_ij, memory.weights[entry * slice_size + thread]);
-            }
-          });
+      gather_gradient<Real>(memory, thread, length, point, closed || hourglass, sum, pull);
       const Mat3<Real> fit = displacement_gradient(sum, inverse_moment);
-      Mat3<Real> grad_u = fit;
-      if constexpr (closed) grad_u = closed_gradient(fit, pull, moment_offset, closing);
+      const Mat3<Real> grad_u = gradient_of_material<closed>(fit, pull, moment_offset, closing);
       if (trail.gradients && step > 0) {
         const auto before = static_cast<std::size_t>(step - 1) * f.places;
-        for (int e = 0; e < 9; ++e) {
+        for (int e = 0; e < 9; ++e)
           trail.gradients[9 * before + e * f.places + place] = grad_u(e / 3, e % 3);
-        }
         set_column3(trail.displacements + 3 * before, f.places, place, displacement);
       }
       const HistoryUse use = step == steps ? HistoryUse::trial : HistoryUse::commit;
-      const Mat3<Real> stress =
-          stress_of_material<Law>(body, grad_u, history, use, static_cast<Real>(dt));
+      const Mat3<Real> stress = stress_of_material<Law>(body, grad_u, history, use, Real(dt));
       q = pair_stress(volume, stress, inverse_moment);
-      if constexpr (closed) {
-        t = closing_stress(volume, stress, closing);
-        q = closed_pair_stress(q, t, moment_offset, inverse_moment);
-      }
-      if (hourglass) {
-        q = with_hourglass(q, body.hourglass, fit);
-        pull = pull_force(body.hourglass, pull);
-      }
+      add_closing<closed>(q, t, volume, stress, closing, moment_offset, inverse_moment);
+      if (hourglass) add_hourglass(q, pull, body.hourglass, fit);
     }
     if (step == steps) break;
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1), q(1, 2),
                             q(2, 0), q(2, 1), q(2, 2), t.x,     t.y,     t.z};
-    channel.template send<q_packets>(1, memory.stresses, place, somebody, numbers);
-    channel.template receive<q_packets>(1, memory.stresses);
+    exchange<stress_packets<Real, closed>>(channel, 1, memory.stresses, place, somebody, numbers);
     if (owner) {
-      Vec3<Real> sum;
-      walk_pairs<Real, q_packets>(
-          memory.second_pairs + thread, second_length, memory.stresses,
-          [&](const Real* n, Vec3<Real> wx, [[maybe_unused]] int entry) {
-            const Mat3<Real> q_j{{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, {n[6], n[7], n[8]}}};
-            add_neighbour_force(sum, q_j, wx);
-            if constexpr (closed) {
-              add_closing_force(sum, t, {n[9], n[10], n[11]},
-                                memory.second_weights[entry * slice_size + thread]);
-            }
-          });
-      sum += own_force(q, moment_offset);
+      Vec3<Real> sum = find_force<closed>(memory, thread, second_length, moment_offset, q, t);
       if (inverse_mass > Real(0)) {
         if (hourglass) sum += pull;
         if (f.load) sum += load;
-        velocity = body.damped ? next_velocity<Real, StateReal, true>(velocity, sum, inverse_mass,
-                                                                      f.gravity, dt, body)
-                               : next_velocity<Real, StateReal, false>(velocity, sum, inverse_mass,
-                                                                       f.gravity, dt, body);
+        velocity = velocity_after(velocity, sum, inverse_mass, f, dt, body);
         displacement = fused(dt, velocity, displacement);
         point.u = to<Real>(displacement);
       }
     }
   }
-
   channel.finish();
   if (!somebody) return;
-  f.points.set(place, point);
-  set_column3(f.velocity, f.places, place, velocity);
-  if constexpr (!std::is_same_v<Real, StateReal>) {
-    set_column3(f.displacement, f.places, place, displacement);
-  }
+  store_state(f, place, point, velocity, displacement);
   history.put(history_columns, f.history_numbers);
 }
 
