@@ -1,16 +1,16 @@
 /// Closed gradients, which satisfy the integration constraint (variational consistency). A
 /// moving-least-squares gradient is exact for affine motions, yet the weights of one phyxel in the
-/// gradients of its neighbours do not cancel inside a body: a uniform stress leaves
-/// forces Σ_i v_i P ∂∇u_i/∂u_j that grow with the irregularity of the cloud. Each gradient gets a
-/// share of the residual of its fit (see hourglass.hpp),
+/// gradients of its neighbours do not cancel inside a body: a uniform stress leaves forces Σ_i v_i
+/// P ∂∇u_i/∂u_j that grow with the irregularity of the cloud. Each gradient is corrected by the
+/// residual of its fit (hourglass.hpp),
 ///   ∇u_i = ∇⁰u_i + r_i ĉ_iᵀ,   r_i = Σ_j w_ij (u_j - u_i - ∇⁰u_i x_ij),
-/// with a closing vector ĉ_i [1/m] for each phyxel, found once for the cloud so that
+/// with a closing vector ĉ_i [1/m] for each phyxel, solved for once when the cloud is built so that
 ///   Σ_i v_i ∂∇u_i/∂u_j = S_j,
 /// the outward area of the surface that phyxel j carries (model/closure.hpp). r is zero for affine
-/// motions, so ∇u stays exact; and a uniform stress is now at rest under the tractions on S. The
+/// motions, so ∇u stays exact; and a uniform stress is in balance with its tractions on S. The
 /// condition is the integration constraint of Chen, Wu, Yoon and You 2001 (A stabilized conforming
-/// nodal integration), and this form of it is symmetric: forces are still those of an energy.
-/// With b_i = Σ_j w_ij x_ij and T_i = v_i P_i, that energy's derivative is
+/// nodal integration), and this form of it is symmetric: forces are still those of an energy. With
+/// b_i = Σ_j w_ij x_ij and T_i = v_i P_i, that energy's derivative is
 ///   f_j = Σ_k w_jk ((Q_j + Q_k) x_jk + t_j - t_k),   t = T ĉ,   Q = (T - t bᵀ) A⁻¹.
 #pragma once
 
@@ -18,21 +18,22 @@
 
 namespace phyxel {
 
-/// ∇⁰u + r ĉᵀ. @param pull Σ_j w_ij (u_j - u_i) (`add_pull`)
+/// The closed gradient ∇⁰u + r ĉᵀ of a phyxel, without unit. @param grad_u the fit ∇⁰u. @param pull
+/// Σ_j w_ij (u_j - u_i) [m] (`add_pull`). @param moment_offset b [m]. @param closing ĉ [1/m]
 template <class Real>
 PHYXEL_HD Mat3<Real> closed_gradient(const Mat3<Real>& grad_u, Vec3<Real> pull,
                                      Vec3<Real> moment_offset, Vec3<Real> closing) {
   return fused_outer(pull - grad_u * moment_offset, closing, grad_u);
 }
 
-/// t = v P ĉ [N/m].
+/// The closing stress t = v P ĉ [N] of a phyxel.
 template <class Real>
 PHYXEL_HD Vec3<Real> closing_stress(Real volume, const Mat3<Real>& first_piola_stress,
                                     Vec3<Real> closing) {
   return volume * (first_piola_stress * closing);
 }
 
-/// Q = (v P - t bᵀ) A⁻¹. @param pair_stress v P A⁻¹
+/// The pair stress with closed gradients, Q = (v P - t bᵀ) A⁻¹ [N/m]. @param pair_stress v P A⁻¹
 template <class Real>
 PHYXEL_HD Mat3<Real> closed_pair_stress(const Mat3<Real>& pair_stress, Vec3<Real> t,
                                         Vec3<Real> moment_offset,

@@ -1,6 +1,6 @@
-/// Forces from stresses. The forces of a phyxel on all its neighbours follow from one matrix, its
-/// pair stress Q_i = v_i P_i A_i⁻¹ [N/m per m]; it follows from differentiating the energy Σ_i v_i
-/// ψ(F_i), so momentum is conserved exactly:
+/// Forces from stresses. One matrix, the pair stress Q_i = v_i P_i A_i⁻¹ [N/m], gives the forces of
+/// a phyxel on all its neighbours. Forces are the derivative of the energy Σ_i v_i ψ(F_i), so
+/// momentum is conserved exactly:
 ///   f_i = Q_i Σ_{j in N(i)} w_ij x_ij  +  Σ_{j : i in N(j)} w_ji Q_j x_ij.
 /// The first sum is a constant of the cloud (`Model::moment_offset`), the second runs over the
 /// inverse neighbourhood and replaces the n×n force matrix of Farias et al. 2008, section 5.2.
@@ -10,7 +10,7 @@
 
 namespace phyxel {
 
-/// Q_i = v_i P_i A_i⁻¹.
+/// The pair stress Q_i = v_i P_i A_i⁻¹ [N/m] of a phyxel.
 template <class Real>
 PHYXEL_HD Mat3<Real> pair_stress(Real volume, const Mat3<Real>& first_piola_stress,
                                  const Sym3<Real>& inverse_moment) {
@@ -24,8 +24,8 @@ PHYXEL_HD Vec3<Real> own_force(const Mat3<Real>& q_i, Vec3<Real> moment_offset) 
 }
 
 /// Adds to `force` the force on phyxel i from the stress of phyxel j, which has i as a neighbour
-/// [N]. Products enter the sum one by one, so that each can be fused with it. @param wx w_ji x_ij
-/// [m]
+/// [N]. Each product is added to the sum on its own, so that it compiles to a fused multiply-add.
+/// @param wx w_ji x_ij [m]
 template <class Real>
 PHYXEL_HD void add_neighbour_force(Vec3<Real>& force, const Mat3<Real>& q_j, Vec3<Real> wx) {
   force.x = fused(q_j(0, 0), wx.x, force.x);

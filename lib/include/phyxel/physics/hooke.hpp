@@ -5,13 +5,13 @@
 
 namespace phyxel {
 
-/// Isotropic Hooke, S = C ε = λ tr(ε) I + 2 μ ε [Pa]: equations (4) and (5) of Farias et al. 2008
-/// (whose shear entries 1 - 2ν multiply the tensor shear strain).
+/// Isotropic Hooke's law, S = C ε = λ tr(ε) I + 2 μ ε [Pa]: equations (4) and (5) of Farias et al.
+/// 2008 (whose shear entries 1 - 2ν multiply the tensor shear strain).
 template <class Real>
 struct Hooke {
   Real lambda, mu;  ///< Lamé's parameters [Pa].
 
-  /// S [Pa] of a strain.
+  /// The stress S [Pa] of a strain.
   PHYXEL_HD Sym3<Real> stress(const Sym3<Real>& strain) const {
     const Real pressure = lambda * trace(strain);
     const Real two_mu = Real(2) * mu;
@@ -19,7 +19,7 @@ struct Hooke {
         fused(two_mu, strain.xx, pressure), two_mu * strain.xy, two_mu * strain.xz,
         fused(two_mu, strain.yy, pressure), two_mu * strain.yz, fused(two_mu, strain.zz, pressure)};
   }
-  /// ½ ε : S [J/m³].
+  /// The energy density ½ ε : S [J/m³] of a strain.
   PHYXEL_HD Real energy(const Sym3<Real>& strain) const {
     return Real(0.5) * contract(strain, stress(strain));
   }

@@ -1,21 +1,23 @@
 /// Hourglass control: an energy of the displacements that a phyxel's linear fit does not follow,
 ///   Σ_i ½ κ Σ_j w_ij |r_ij|²,   r_ij = u_j - u_i - ∇u_i x_ij,
-/// which resists motions that ∇u does not see (hourglass modes). Affine motions have no such
-/// energy, and rotations turn r without stretching it: both momenta are conserved. Sources: the
-/// energy is that of Ganzenmüller 2015 (An hourglass control algorithm for Lagrangian smooth
-/// particle hydrodynamics) with the weights of the moment matrix in place of w / r². With these,
-/// Σ_j w_ij r_ij x_ijᵀ = 0, since ∇u_i is the fit that makes phyxel i's share smallest; its
-/// derivative by ∇u_i vanishes, and with symmetric lists and weights
+/// which resists motions that ∇u does not see (hourglass modes). The energy is zero in affine
+/// motions, and a rotation turns r without changing its length: linear and angular momentum are
+/// conserved. Sources: the energy is that of Ganzenmüller 2015 (An hourglass control algorithm for
+/// Lagrangian smooth particle hydrodynamics) with the weights of the moment matrix in place of w /
+/// r². With these weights Σ_j w_ij r_ij x_ijᵀ = 0, since ∇u_i is the fit that minimises the energy
+/// of phyxel i; the derivative of that energy by ∇u_i vanishes, and with symmetric lists and
+/// weights
 ///   f_i = 2 κ Σ_j w_ij (u_j - u_i)  -  κ Σ_j w_ij (∇u_i + ∇u_j) x_ij.
-/// The second part is that of a pair stress -κ ∇u (see force.hpp): the second pass does not change.
+/// The second sum is the force of a pair stress -κ ∇u (force.hpp), so the second pass needs no code
+/// for it.
 #pragma once
 
 #include "phyxel/types.hpp"
 
 namespace phyxel {
 
-/// κ [N/m] = α E v / tr A of a phyxel amid a uniform cloud: a residual of a tenth of the distance
-/// then costs α times what a strain of a tenth costs a rod of modulus E. tr A is that of a
+/// κ [N/m] = α E v / tr A of a phyxel inside a uniform cloud: residuals of a tenth of the distance
+/// then have α times the energy of a rod of modulus E under a strain of a tenth. tr A is taken of a
 /// continuum, 4π h⁵/v ∫ (1 - t²)³ t⁴ dt from 0 to 1.
 /// @param strength α, without unit
 /// @param volume v of a phyxel [m³]
@@ -28,26 +30,26 @@ inline double hourglass_stiffness(double strength, double young, double volume, 
          (sphere * integral * support * support * support);
 }
 
-/// Adds one neighbour's share of Σ_j w_ij (u_j - u_i).
+/// Adds one neighbour's term to Σ_j w_ij (u_j - u_i) [m].
 template <class Real>
 PHYXEL_HD void add_pull(Vec3<Real>& sum, Vec3<Real> u_ij, Real w) {
   sum = fused(w, u_ij, sum);
 }
 
-/// 2 κ Σ_j w_ij (u_j - u_i) [N]. @param pull the sum
+/// The force 2 κ Σ_j w_ij (u_j - u_i) [N] of hourglass control. @param pull the sum [m]
 template <class Real>
 PHYXEL_HD Vec3<Real> pull_force(Real kappa, Vec3<Real> pull) {
   return (Real(2) * kappa) * pull;
 }
 
-/// The pair stress with the share of hourglass control, Q - κ ∇u.
+/// The pair stress with hourglass control, Q - κ ∇u [N/m].
 template <class Real>
 PHYXEL_HD Mat3<Real> with_hourglass(const Mat3<Real>& pair_stress, Real kappa,
                                     const Mat3<Real>& grad_u) {
   return fused(-kappa, grad_u, pair_stress);
 }
 
-/// Adds one neighbour's share of Σ_j w_ij |r_ij|² [m²].
+/// Adds one neighbour's term to Σ_j w_ij |r_ij|² [m²].
 template <class Real>
 PHYXEL_HD void add_residual(Real& sum, Vec3<Real> u_ij, const Mat3<Real>& grad_u, Vec3<Real> x_ij,
                             Real w) {

@@ -1,42 +1,42 @@
-/// The parts that every constitutive law is made of. A law is a struct in a file of its own under
+/// The interface of a constitutive law. A law is a struct in a file of its own under
 /// `physics/laws/`, a template on the scalar (`float`, `double` or a SIMD pack), named once in the
 /// list of `physics/laws.hpp`. It has
 ///
-///   static constexpr const char* name, *meaning;    its word in scenes, and a sentence about it
+///   static constexpr const char* name, *meaning;    its name in scenes, and one sentence for users
 ///   static constexpr LawParameter parameters[];     the parameters that a user gives
 ///   static std::array<double, N> constants(std::span<const double> values);
 ///   its N constants [mostly Pa] as the only data members, each a `Real`
 ///   energy(grad_u)               the strain energy density ψ [J/m³ of the body at rest]
 ///   first_piola_stress(grad_u)   its derivative ∂ψ/∂∇u [Pa]
 ///   wave_stiffness(stretches)    an upper bound of ρc² over all plane waves [Pa]
-///   at_rest(volume_stiffness)    the linear law that it is at small displacements
+///   at_rest(volume_stiffness)    its linearisation at rest
 ///
-/// of which all but `constants` run on GPUs too. A law that remembers (plasticity) has a history:
+/// All but `constants` run on GPUs too. A law whose stress depends on the past (plasticity) has a
+/// history:
 ///
-///   struct State                 its numbers, each a `Real`; all zero: the virgin material
+///   struct State                 the numbers of one phyxel, each a `Real`; all zero if virgin
 ///   static constexpr HistoryNumber history[];       their names, in the order of the members
 ///   energy(grad_u, state)        the energy density that is stored [J/m³]
-///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] at the end of a step of dt
-///   [s];
-///                                `state` becomes that of its end
-///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] while the history stays
+///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] after a step of dt [s];
+///                                updates `state`
+///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] at a fixed history
 ///   plastic_work(state)          work turned into heat since the virgin state [J/m³]
 ///
 /// in place of `energy` and `first_piola_stress` of ∇u alone. A law may have
 ///
-///   static constexpr bool is_linear = true;         it never stiffens
+///   static constexpr bool is_linear = true;         its stiffness never changes
 ///   static double hourglass_modulus(std::span<const double> values);
-///   what hourglass control is a share of [Pa], of a law without `young_modulus`
+///   the modulus [Pa] that scales hourglass control; without it, the parameter `young_modulus`
 ///   static const char* unmet(std::span<const double> values);
-///   what parameters that are each in their range still have to fulfil together, in the words of a
-///   refusal, e.g. "a > 2 b"; "" if they do
+///   the condition that parameters, each within its range, violate together, as the error message
+///   states it, e.g. "a > 2 b"; "" if there is none
 ///
 /// On `wave_stiffness`: a plane wave of direction b (at rest) and polarisation a has the
-/// displacement gradient a bᵀ and sees the stiffness a bᵀ : ∂P/∂F : a bᵀ, the quadratic form of the
-/// acoustic tensor; geometric stress is part of it. On a lattice of phyxels the fastest mode is
-/// such a wave, so the largest eigenvalue of M⁻¹K grows as the largest stiffness of all waves does.
-/// (The largest eigenvalue of ∂P/∂F itself would not do: at rest it belongs to a change of volume,
-/// 3λ + 2μ, and grows less.)
+/// displacement gradient a bᵀ and the stiffness a bᵀ : ∂P/∂F : a bᵀ, the quadratic form of the
+/// acoustic tensor, geometric stiffness included. On a lattice of phyxels the fastest mode is such
+/// a wave, so the largest eigenvalue of M⁻¹K grows in proportion to the largest stiffness of all
+/// waves. (The largest eigenvalue of ∂P/∂F itself does not serve: at rest it is 3λ + 2μ, of a
+/// change of volume, and grows more slowly.)
 #pragma once
 
 #include <array>
@@ -50,8 +50,8 @@
 
 namespace phyxel {
 
-/// One parameter of a law, as users give it: the entry behind the key of a scene, the keyword in
-/// Python, the reference page and the digest.
+/// One parameter of a law as users give it. The entry defines the key in scenes, the keyword in
+/// Python, the line on the reference page and a part of the digest.
 struct LawParameter {
   const char* name;     ///< The key in scenes, e.g. "yield_stress".
   const char* unit;     ///< In SI, e.g. "Pa"; "" for a pure number.
@@ -62,8 +62,9 @@ struct LawParameter {
   double fallback = std::numeric_limits<double>::quiet_NaN();
   /// A required parameter's value in measurements of speed, where E = 1e6 Pa, and in tests.
   double typical = 0;
-  /// 1: a number; 3: a vector, each component of which is in the range. `constants` takes the
-  /// components one after the other. A vector has no fallback but this one, and no typical value.
+  /// 1 for a number, 3 for a vector whose components are each within the range. `constants` takes
+  /// the components one after the other. A vector uses `vector_fallback` in place of `fallback` and
+  /// `typical`.
   int count = 1;
   double vector_fallback[3] = {0, 0, 0};
 
@@ -71,17 +72,17 @@ struct LawParameter {
   constexpr bool required() const { return count == 1 && fallback != fallback; }
 };
 
-/// One number of a law's history, as checkpoints, frames and NumPy know it. Laws whose numbers have
-/// the same name mean the same.
+/// One number of a law's history, as named in checkpoints, frames and NumPy. Numbers of the same
+/// name have the same meaning in all laws.
 struct HistoryNumber {
   const char* name;  ///< E.g. "equivalent_plastic_strain".
   const char* unit;  ///< In SI; "" for a pure number.
 };
 
-/// Young's modulus, which most laws have.
+/// Young's modulus, a parameter of most laws.
 inline constexpr LawParameter young_modulus{
     "young", "Pa", 1e-12, 1e18, false, "Young's modulus E: rubber 1e6, jelly 1e4."};
-/// Poisson's ratio, which most laws have.
+/// Poisson's ratio, a parameter of most laws.
 inline constexpr LawParameter poisson_ratio{
     "poisson", "",   -1,
     0.5,       true, "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."};
@@ -90,8 +91,8 @@ inline constexpr LawParameter poisson_ratio{
 template <class Law, class Real>
 inline constexpr int constants_of_law = static_cast<int>(sizeof(Law) / sizeof(Real));
 
-/// The law whose constants stand at `constants`, in the order of its members. `Real` is the scalar
-/// of the law.
+/// Makes a law from its constants, given in the order of its members. `Real` is the scalar of the
+/// law.
 template <class Law, class Real, class Constant>
 PHYXEL_HD Law make_law(const Constant* constants) {
   static_assert(std::is_trivially_copyable_v<Law> && sizeof(Law) % sizeof(Real) == 0);
@@ -102,15 +103,15 @@ PHYXEL_HD Law make_law(const Constant* constants) {
   return law;
 }
 
-/// True for a law whose stress takes so many registers of a GPU's thread that fewer blocks share a
-/// multiprocessor: it then says `static constexpr bool many_registers = true`.
+/// True for a law whose stress needs so many registers that register pressure limits the occupancy
+/// of a GPU's multiprocessor. Such a law declares `static constexpr bool many_registers = true`.
 template <class Law>
 inline constexpr bool needs_many_registers = [] {
   if constexpr (requires { Law::many_registers; }) return Law::many_registers;
   return false;
 }();
 
-/// The history of a law that has none: empty, so that it takes no argument, array, load or store.
+/// The history of a law without one: an empty type, which costs no argument, array, load or store.
 struct NoHistory {};
 
 namespace detail {
@@ -139,15 +140,15 @@ inline constexpr int history_numbers = has_history<Law>
                                            ? static_cast<int>(sizeof(HistoryOf<Law>) / sizeof(Real))
                                            : 0;
 
-/// What an evaluation of stresses does with histories.
+/// How an evaluation of stresses treats histories.
 enum class HistoryUse {
-  commit,  ///< As at the end of a step, and the history becomes that of its end.
-  trial,   ///< As at the end of a step; the history stays what it was.
-  frozen   ///< The history stays, and the material responds elastically: ∂ψ/∂∇u.
+  commit,  ///< The stress at the end of a step; the history is advanced to it.
+  trial,   ///< The stress at the end of a step; the history is not changed.
+  frozen   ///< The elastic stress ∂ψ/∂∇u at the present history, which is not changed.
 };
 
 /// First Piola stress [Pa] of a law with or without a history, at the end of a step of `dt` [s].
-/// @param history at the step's start; becomes that of its end
+/// @param history at the start of the step; advanced to its end
 template <class Law, class Real>
 PHYXEL_HD Mat3<Real> stress_after_step(const Law& law, const Mat3<Real>& grad_u,
                                        [[maybe_unused]] HistoryOf<Law>& history,
@@ -158,7 +159,7 @@ PHYXEL_HD Mat3<Real> stress_after_step(const Law& law, const Mat3<Real>& grad_u,
     return law.first_piola_stress(grad_u);
   }
 }
-/// ∂ψ/∂∇u [Pa] of a law with or without a history, while the history stays.
+/// The elastic stress ∂ψ/∂∇u [Pa] of a law with or without a history, at a fixed history.
 template <class Law, class Real>
 PHYXEL_HD Mat3<Real> elastic_stress(const Law& law, const Mat3<Real>& grad_u,
                                     [[maybe_unused]] const HistoryOf<Law>& history) {
@@ -168,7 +169,7 @@ PHYXEL_HD Mat3<Real> elastic_stress(const Law& law, const Mat3<Real>& grad_u,
     return law.first_piola_stress(grad_u);
   }
 }
-/// Energy density that is stored [J/m³].
+/// The stored energy density [J/m³] of a law with or without a history.
 template <class Law, class Real>
 PHYXEL_HD Real stored_energy(const Law& law, const Mat3<Real>& grad_u,
                              [[maybe_unused]] const HistoryOf<Law>& history) {
@@ -178,7 +179,7 @@ PHYXEL_HD Real stored_energy(const Law& law, const Mat3<Real>& grad_u,
     return law.energy(grad_u);
   }
 }
-/// Plastic work since the virgin state [J/m³]; 0 for a law without any.
+/// Plastic work since the virgin state [J/m³]; 0 for a law without plasticity.
 template <class Real, class Law>
 PHYXEL_HD Real plastic_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
   if constexpr (requires { law.plastic_work(history); }) {
@@ -187,7 +188,7 @@ PHYXEL_HD Real plastic_work(const Law& law, [[maybe_unused]] const HistoryOf<Law
     return Real(0);
   }
 }
-/// Work of viscosity since the start [J/m³]; 0 for a law without any.
+/// Work of viscosity since the start [J/m³]; 0 for a law without viscosity.
 template <class Real, class Law>
 PHYXEL_HD Real viscous_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
   if constexpr (requires { law.viscous_work(history); }) {
@@ -227,7 +228,7 @@ struct SumOf {
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u, State& state, Real dt) const {
     return first.first_piola_stress(grad_u, state, dt) + second.first_piola_stress(grad_u);
   }
-  /// ∂ψ/∂∇u of both [Pa] while the history stays.
+  /// ∂ψ/∂∇u of both [Pa] at a fixed history.
   template <class Real>
   PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u, const State& state) const {
     return first.elastic_stress(grad_u, state) + second.first_piola_stress(grad_u);
@@ -237,7 +238,7 @@ struct SumOf {
     law.plastic_work(state);
   }
   { return first.plastic_work(state); }
-  /// The linear law that both are at small displacements; the second is `VolumeConservation`.
+  /// The linearisation of both laws at rest; the second is `VolumeConservation`.
   PHYXEL_HD auto at_rest() const { return first.at_rest(second.stiffness); }
   /// An upper bound of ρc² [Pa].
   template <class Real>
@@ -246,8 +247,8 @@ struct SumOf {
   }
 };
 
-/// A list of laws, from which the dispatch of every device follows. A law goes by its index here
-/// wherever it is chosen at run time.
+/// A list of laws, which defines the dispatch of every device. A law chosen at run time is
+/// identified by its index in the list.
 template <template <class> class... Law>
 struct LawList {
   static constexpr int size = sizeof...(Law);
@@ -258,7 +259,7 @@ struct LawList {
     ((found = std::is_same_v<Law<double>, Wanted<double>> ? index : found, ++index), ...);
     return found;
   }();
-  /// The number of constants of the law that has the most.
+  /// The largest number of constants of any law.
   static constexpr int most_constants = [] {
     int most = 0;
     ((most = most < constants_of_law<Law<double>, double> ? constants_of_law<Law<double>, double>
@@ -267,12 +268,12 @@ struct LawList {
     return most;
   }();
 
-  /// Calls apply(law) with the law of an index, made of `constants`.
+  /// Calls apply(law) with the law at an index, made from `constants`.
   template <class Real, class Constant, class Apply>
   PHYXEL_HD static auto with(int index, const Constant* constants, Apply&& apply) {
     return with_from<0, Real, Law...>(index, constants, apply);
   }
-  /// Calls apply(std::type_identity<Law<Real>>) with the type of an index.
+  /// Calls apply(std::type_identity<Law<Real>>) with the type of the law at an index.
   template <class Real, class Apply>
   static auto with_type(int index, Apply&& apply) {
     return with_type_from<0, Real, Law...>(index, apply);

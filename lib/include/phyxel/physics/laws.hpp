@@ -1,5 +1,5 @@
-/// The list of all laws: a law that is named here is known to every device, to scenes, to Python,
-/// to checkpoints and to the reference of scenes.
+/// The list of all laws: a law named here is available on every device, in scenes, in Python, in
+/// checkpoints and in the reference of scenes.
 #pragma once
 
 #include "phyxel/physics/laws/corotated.hpp"
@@ -19,14 +19,15 @@ namespace phyxel {
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
                      Orthotropic, J2>;
 
-/// The factor by which viscosity is stronger than at rest, at most: it acts on the rate of Green's
-/// strain, and so grows as the stretch squared.
+/// An upper bound of the factor by which viscosity exceeds that at rest: it acts on the rate of
+/// Green's strain, and so grows as the stretch squared.
 template <class Real>
 PHYXEL_HD Real viscous_stiffening(const PrincipalStretches<Real>& stretches) {
   return stretches.largest * stretches.largest;
 }
 
-/// The factor by which a material is stiffer than at rest, or more viscous, at most: 1 at rest.
+/// An upper bound of the factor by which the stiffness or viscosity of a material exceeds that at
+/// rest; 1 at rest.
 /// @param law its index in `Laws`
 /// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
 ///   time of viscosity [s] (`ChosenLaw`)
@@ -46,7 +47,7 @@ PHYXEL_HD Real stiffening(int law, const Constant* constants, Real volume_stiffn
   });
 }
 
-/// How the material of a phyxel responds at the end of a step.
+/// The response of a phyxel's material at the end of a step.
 template <class Real>
 struct PointResponse {
   Mat3<Real> first_piola_stress;          ///< P of law, volume conservation and viscosity [Pa].

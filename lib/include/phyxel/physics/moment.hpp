@@ -5,12 +5,12 @@
 
 namespace phyxel {
 
-/// Eigenvalues of a moment matrix below this share of the largest count as zero: a neighbourhood
-/// whose extent in some direction is under a thousandth of its extent in the widest is taken as a
-/// sheet (rank 2) or a thread (rank 1). A cloud with volume stays above 0.05.
+/// Eigenvalues of a moment matrix below this fraction of the largest count as zero: a neighbourhood
+/// thinner in some direction than a thousandth of its largest extent is treated as a sheet (rank 2)
+/// or a thread (rank 1). In a cloud with volume the fraction is above 0.05.
 inline constexpr double moment_cutoff = 1e-6;
 
-/// One neighbour's share of A_i = Σ_j w_ij x_ij x_ijᵀ.
+/// One neighbour's term of A_i = Σ_j w_ij x_ij x_ijᵀ.
 template <class Real>
 PHYXEL_HD Sym3<Real> moment_term(Vec3<Real> x, Real w) {
   const Vec3<Real> wx = w * x;
@@ -26,7 +26,7 @@ struct PseudoInverse {
 
 namespace detail {
 
-/// One Jacobi rotation in the (p, q) plane: zeroes m(p, q), keeps `vectors` as the eigenbasis.
+/// One Jacobi rotation in the (p, q) plane: zeroes m(p, q) and applies the rotation to `vectors`.
 template <class Real>
 PHYXEL_HD void jacobi_rotate(Mat3<Real>& m, Mat3<Real>& vectors, int p, int q) {
   using std::abs;

@@ -1,6 +1,6 @@
 /// The update of one phyxel in a step: from the sums over its neighbours to its pair stress, and
-/// from its force to its displacement. All devices take it from here; they supply neighbours and
-/// storage only.
+/// from its force to its displacement. Devices share this code and supply only neighbours and
+/// storage.
 #pragma once
 
 #include "phyxel/physics/closing.hpp"
@@ -12,13 +12,13 @@
 
 namespace phyxel {
 
-/// What the first pass sums over a phyxel's neighbours.
+/// Sums of the first pass over the neighbours of a phyxel.
 template <class Real>
 struct NeighbourSums {
   Mat3<Real> gradient;  ///< Σ_j w_ij u_ij x_ijᵀ (`add_gradient_term`).
-  Vec3<Real> pull;      ///< Σ_j w_ij u_ij (`add_pull`), of terms that need it.
+  Vec3<Real> pull;      ///< Σ_j w_ij u_ij (`add_pull`); zero unless a term needs it.
 
-  /// Adds a neighbour. @tparam pulls whether a term needs `pull`
+  /// Adds a neighbour. @tparam pulls true if a term needs `pull`
   template <bool pulls>
   PHYXEL_HD void add(Vec3<Real> x_ij, Vec3<Real> u_ij, Real w_ij) {
     add_gradient_term(gradient, u_ij, w_ij * x_ij);
@@ -26,24 +26,24 @@ struct NeighbourSums {
   }
 };
 
-/// What a phyxel's stress is made of beside its displacement gradient.
+/// Constants of a phyxel that its stress depends on.
 template <class Real>
 struct PointConstants {
   Real volume;                            ///< v [m³]
   Sym3<Real> inverse_moment;              ///< A⁻¹ [1/m²]
-  Real hourglass{};                       ///< κ [N/m], of hourglass control.
-  Vec3<Real> moment_offset{}, closing{};  ///< b [m] and ĉ [1/m], of closed gradients.
+  Real hourglass{};                       ///< κ [N/m] of hourglass control.
+  Vec3<Real> moment_offset{}, closing{};  ///< b [m] and ĉ [1/m] of closed gradients.
 };
 
-/// What a phyxel's stress does to itself and its neighbours.
+/// Stresses of a phyxel, from which the second pass computes forces on it and its neighbours.
 template <class Real>
 struct PointStress {
-  Mat3<Real> pair_stress;      ///< Q
-  Vec3<Real> hourglass_force;  ///< [N], of hourglass control.
-  Vec3<Real> closing_stress;   ///< t [N/m], of closed gradients.
+  Mat3<Real> pair_stress;      ///< Q [N/m]
+  Vec3<Real> hourglass_force;  ///< Own force of hourglass control [N].
+  Vec3<Real> closing_stress;   ///< t [N] of closed gradients.
 };
 
-/// ∇u of a phyxel as its stress sees it.
+/// The displacement gradient ∇u from which the stress of a phyxel is computed.
 /// @param fit the linear fit of its neighbours' displacements
 template <bool closed, class Real>
 PHYXEL_HD Mat3<Real> seen_gradient(const Mat3<Real>& fit, Vec3<Real> pull,
@@ -56,8 +56,8 @@ PHYXEL_HD Mat3<Real> seen_gradient(const Mat3<Real>& fit, Vec3<Real> pull,
 }
 
 /// The stress of a phyxel.
-/// @tparam controlled with hourglass control. @tparam closed with closed gradients
-/// @param stress_of P [Pa] of ∇u: the law, with its history
+/// @tparam controlled true with hourglass control. @tparam closed true with closed gradients
+/// @param stress_of function that returns P [Pa] of ∇u by the law and its history
 template <bool controlled, bool closed, class Real, class StressOf>
 PHYXEL_HD PointStress<Real> point_stress(const NeighbourSums<Real>& sums,
                                          const PointConstants<Real>& point, StressOf&& stress_of) {
@@ -77,14 +77,15 @@ PHYXEL_HD PointStress<Real> point_stress(const NeighbourSums<Real>& sums,
   return result;
 }
 
-/// Velocity and displacement of a phyxel.
+/// Velocity [m/s] and displacement [m] of a phyxel.
 template <class Real>
 struct PointMotion {
   Vec3<Real> velocity, displacement;
 };
 
-/// One step of Verlet's method of a free phyxel.
-/// @param acceleration by all forces [m/s²]. @param keep, gain of damping (`damped_flow`)
+/// Takes one step of Verlet's method for a free phyxel.
+/// @param acceleration by all forces [m/s²]. @param dt [s]. @param keep, gain damping factors
+/// (`damped_flow`)
 template <bool damped, class Real>
 PHYXEL_HD PointMotion<Real> moved(PointMotion<Real> point, Vec3<Real> acceleration, Real dt,
                                   [[maybe_unused]] Real keep, [[maybe_unused]] Real gain) {

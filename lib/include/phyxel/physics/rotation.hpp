@@ -1,12 +1,13 @@
-/// The rotation nearest to a deformation gradient: of all rotations R the one with the largest
-/// R : F. For det F > 0 it is that of the polar decomposition F = R S; where a body is turned
-/// inside out it is still a rotation, and the smallest stretch of S is then negative.
+/// The rotation nearest to a deformation gradient: the rotation R with the largest R : F. For det F
+/// > 0 it is the factor R of the polar decomposition F = R S. For det F < 0 (inversion) it is still
+/// a rotation, and the smallest stretch of S is negative.
 ///
 /// R : F = qᵀ K q for the unit quaternion q of R and Davenport's matrix K, linear in F, so q is the
 /// eigenvector of K's largest eigenvalue (B. K. P. Horn 1987, Closed-form solution of absolute
 /// orientation using unit quaternions). That eigenvalue, the trace of S, is found by Laguerre's
-/// method on K's characteristic polynomial, whose roots are all real; q qᵀ is the adjugate of
-/// K minus it, up to its length. Everything is written in ∇u: what is small keeps its digits.
+/// method on K's characteristic polynomial, whose roots are all real; q qᵀ is the adjugate of K
+/// minus it, up to its length. All formulas are written in ∇u, so that small strains keep their
+/// digits.
 #pragma once
 
 #include <cmath>
@@ -24,7 +25,7 @@ struct NearestRotation {
 
 namespace detail {
 
-/// Of no particular length.
+/// A quaternion, not normalised.
 template <class Real>
 struct Quaternion {
   Real w;
@@ -94,7 +95,8 @@ struct Davenport {
 
 }  // namespace detail
 
-/// @param grad_u ∇u = F - I. Where two rotations are equally near (as for F = 0), something finite.
+/// Computes the rotation nearest to F. Where two rotations are equally near (as for F = 0), the
+/// result is finite but arbitrary. @param grad_u ∇u = F - I
 template <class Real>
 PHYXEL_HD NearestRotation<Real> nearest_rotation(const Mat3<Real>& grad_u) {
   using std::sqrt;
@@ -105,8 +107,8 @@ PHYXEL_HD NearestRotation<Real> nearest_rotation(const Mat3<Real>& grad_u) {
     b = fused(cof(e / 3, e % 3), cof(e / 3, e % 3), b);
   }
   const Real d = f(0, 0) * cof(0, 0) + f(0, 1) * cof(0, 1) + f(0, 2) * cof(0, 2);
-  // λ⁴ - 2 a λ² - 8 d λ + a² - 4 b, from above its roots. Six steps: three for small strains, the
-  // others where bodies are flattened or inside out and two roots come near each other.
+  // λ⁴ - 2 a λ² - 8 d λ + a² - 4 b, from above its roots. Six steps: three suffice for small
+  // strains; flattened or inverted bodies, where two roots lie close together, need the others.
   const Real least(1e-30F);
   const Real constant = a * a - Real(4) * b;
   Real root = sqrt(Real(3) * a);
@@ -115,7 +117,7 @@ PHYXEL_HD NearestRotation<Real> nearest_rotation(const Mat3<Real>& grad_u) {
     const Real value = (square - Real(2) * a) * square - Real(8) * d * root + constant;
     const Real slope = Real(4) * root * (square - a) - Real(8) * d;
     const Real bend = Real(12) * square - Real(4) * a;
-    // Rounding may make what is not negative so.
+    // The exact value is not negative; rounding may make it so.
     const Real inside = Real(9) * slope * slope - Real(12) * value * bend;
     const Real bent = sqrt(where_larger(inside, Real(0), inside, Real(0)));
     root = root - Real(4) * value / (slope + bent + least);

@@ -6,7 +6,7 @@
 
 namespace phyxel {
 
-/// Adds one neighbour's share of Σ_j (u_j - u_i) (w_ij x_ij)ᵀ. `wx` is w_ij x_ij.
+/// Adds one neighbour's term to Σ_j (u_j - u_i) (w_ij x_ij)ᵀ [m²]. `wx` is w_ij x_ij.
 template <class Real>
 PHYXEL_HD void add_gradient_term(Mat3<Real>& sum, Vec3<Real> u_ij, Vec3<Real> wx) {
   sum = fused_outer(u_ij, wx, sum);
@@ -50,7 +50,7 @@ PHYXEL_HD Real minors(const Mat3<Real>& g) {
   return minor(g(0, 0), g(1, 1), g(0, 1), g(1, 0)) + minor(g(0, 0), g(2, 2), g(0, 2), g(2, 0)) +
          minor(g(1, 1), g(2, 2), g(1, 2), g(2, 1));
 }
-/// Σ g(a, b)².
+/// The squared Frobenius norm, Σ g(a, b)².
 template <class Real>
 PHYXEL_HD Real squares(const Mat3<Real>& g) {
   Real sum = g(0, 0) * g(0, 0);

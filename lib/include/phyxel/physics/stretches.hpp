@@ -15,8 +15,8 @@ struct PrincipalStretches {
 };
 
 /// The principal stretches of a displacement gradient.
-/// @param grad_u ∇u = F - I. Stretches are found from Green's strain, so that small strains keep
-///   their digits.
+/// @param grad_u ∇u = F - I. Stretches are computed from Green's strain, so that small strains keep
+/// their digits.
 template <class Real>
 PHYXEL_HD PrincipalStretches<Real> principal_stretches(const Mat3<Real>& grad_u) {
   using std::acos;
@@ -37,8 +37,8 @@ PHYXEL_HD PrincipalStretches<Real> principal_stretches(const Mat3<Real>& grad_u)
     high = mean + Real(2) * p * cos(angle);
     low = mean + Real(2) * p * cos(angle + Real(2.0943951023931953));  // a third of a turn
   }
-  // FᵀF = I + 2 E; rounding may make its smallest eigenvalue negative. What is not a number stays
-  // so, which fmax would hide.
+  // FᵀF = I + 2 E; rounding may make its smallest eigenvalue negative. The comparison keeps NaN,
+  // which fmax would hide.
   const auto stretch = [](Real strain) {
     const Real square = Real(1) + Real(2) * strain;
     return square < Real(0) ? Real(0) : sqrt(square);

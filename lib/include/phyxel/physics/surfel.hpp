@@ -16,15 +16,15 @@ struct SurfelBlend {
   PHYXEL_HD void add(Real w, Vec3<Real> u_i, const Mat3<Real>& grad_u_i, Vec3<Real> x_is) {
     add(w, u_i + grad_u_i * x_is, grad_u_i);
   }
-  /// @param motion u_i + ∇u_i (x - x_i), at one point x for all phyxels [m]
+  /// Adds phyxel i. @param motion u_i + ∇u_i (x - x_i), at one point x for all phyxels [m]
   PHYXEL_HD void add(Real w, Vec3<Real> motion, const Mat3<Real>& grad_u_i) {
     displacement = fused(w, motion, displacement);
     gradient = fused(w, grad_u_i, gradient);
     weight = weight + w;
   }
-  /// u_s [m]
+  /// The displacement u_s [m].
   PHYXEL_HD Vec3<Real> surfel_displacement() const { return displacement / weight; }
-  /// u_s [m], where the motions were taken at x_s - `offset`.
+  /// The displacement u_s [m] if motions were added at the point x_s - `offset`.
   PHYXEL_HD Vec3<Real> surfel_displacement(Vec3<Real> offset) const {
     return (displacement + gradient * offset) / weight;
   }

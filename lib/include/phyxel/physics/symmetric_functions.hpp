@@ -20,7 +20,7 @@ namespace phyxel {
 
 namespace detail {
 
-/// The scalar type of a pack's lane; a scalar is its own.
+/// The scalar type of a pack's lane; of a scalar, its own type.
 template <class Real>
 struct LaneOf {
   using type = Real;
@@ -29,7 +29,7 @@ template <template <class, int> class Pack, class Lane, int width>
 struct LaneOf<Pack<Lane, width>> {
   using type = Lane;
 };
-/// Whether numbers have 24 bits: shorter series are then exact to rounding.
+/// True for a mantissa of 24 bits, for which shorter series are exact to rounding.
 template <class Real>
 inline constexpr bool single_precision = std::is_same_v<typename LaneOf<Real>::type, float>;
 
@@ -119,16 +119,17 @@ PHYXEL_HD Real exp_minus_one(Real y) {
   return sum;
 }
 
-/// Eigenvalues of a traceless symmetric tensor: `isolated` is farther from both others than they
-/// are from each other, `far` is the one of the two that is farther from it.
+/// Eigenvalues of a traceless symmetric tensor: `isolated` is farther from the other two than they
+/// are from each other; of those two, `far` is the one farther from `isolated`.
 template <class Real>
 struct TracelessEigenvalues {
   Real isolated, near, far;
 };
 
-/// @param d a symmetric tensor of trace zero. The roots of its characteristic polynomial are
-///   2 p cos(φ + 2πk/3) with p² = tr(d²)/6 and cos 3φ = det(d/p)/2 (Smith 1961); z = cos φ of
-///   |cos 3φ| is a smooth function that a cubic and Newton's method give without trigonometry.
+/// Computes the eigenvalues of d, a symmetric tensor of trace zero. The roots of its characteristic
+/// polynomial are
+///   2 p cos(φ + 2πk/3) with p² = tr(d²)/6 and cos 3φ = det(d/p)/2 (Smith 1961). z = cos φ is a
+///   smooth function of |cos 3φ|, which a cubic and Newton's method evaluate without trigonometry.
 template <class Real>
 PHYXEL_HD TracelessEigenvalues<Real> traceless_eigenvalues(const Sym3<Real>& d) {
   using std::sqrt;
@@ -177,9 +178,9 @@ PHYXEL_HD Sym3<Real> square(const Sym3<Real>& s) {
           sum(s.xy, s.xz, s.yy, s.yz, s.yz, s.zz), sum(s.xz, s.xz, s.yz, s.yz, s.zz, s.zz)};
 }
 
-/// exp(a) - I of a traceless symmetric tensor, small or not (relative error of a few roundings up
-/// to |a| = 2): a³ = j2 a + j3 I (Cayley and Hamilton) makes Taylor's series of a/8 and its three
-/// squarings a recurrence of three numbers.
+/// exp(a) - I of a traceless symmetric tensor, with a relative error of a few roundings up to |a| =
+/// 2: a³ = j2 a + j3 I (Cayley and Hamilton) makes Taylor's series of a/8 and its three squarings a
+/// recurrence of three numbers.
 /// @param a the tensor
 /// @param j2 ½ tr a²
 /// @param j3 det a
@@ -187,8 +188,8 @@ template <class Real>
 PHYXEL_HD Sym3<Real> exp_minus_identity(const Sym3<Real>& a, Real j2, Real j3) {
   constexpr int terms = detail::single_precision<Real> ? 7 : 11;
   j2 = Real(1.0 / 64) * j2, j3 = Real(1.0 / 512) * j3;
-  Real unit{}, first(1), second{};                 // of the sum
-  Real term_unit{}, term_first(1), term_second{};  // of (a/8)ᵏ/k!
+  Real unit{}, first(1), second{};                 // coefficients of the sum
+  Real term_unit{}, term_first(1), term_second{};  // coefficients of (a/8)ᵏ/k!
   for (int k = 2; k <= terms; ++k) {
     const Real share = Real(1.0 / k), old = term_second;
     term_second = share * term_first;

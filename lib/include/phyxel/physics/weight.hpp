@@ -5,10 +5,10 @@
 
 namespace phyxel {
 
-/// Shape of the weight, (1 - r²/h²)³, without unit: the full weight is
-/// w(r, h) = 315 / (64 π h³) (1 - r²/h²)³. The constant cancels in every gradient (it stands in
-/// the moment matrix and in the sum), and h⁹ would leave the range of float for small bodies,
-/// so the step uses the shape alone. For r < h only: lists hold no other neighbours.
+/// Shape of the weight, (1 - r²/h²)³, without unit: the full weight is w(r, h) = 315 / (64 π h³) (1
+/// - r²/h²)³. The constant cancels in every gradient (it stands in the moment matrix and in the
+/// sum), and h⁹ would leave the range of float for small bodies, so the step uses the shape alone.
+/// Valid for r < h only: lists hold no other neighbours.
 template <class Real>
 PHYXEL_HD Real weight_shape(Real r_squared, Real inverse_h_squared) {
   const Real t = fused(-r_squared, inverse_h_squared, Real(1));

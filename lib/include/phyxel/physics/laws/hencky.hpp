@@ -2,15 +2,15 @@
 ///
 /// ψ = μ Σ εₐ² + ½ λ (Σ εₐ)²,  εₐ = L(sₐ) = ln sₐ, with the principal stretches sₐ (Hencky 1928;
 /// Anand 1979, On H. Hencky's approximate strain-energy function for moderate deformations).
-/// Principal Kirchhoff stresses are 2 μ εₐ + λ Σ ε: a bar under uniaxial stress carries E ln s. A
-/// logarithm has no value at stretches <= 0, so that below s₀ = 0.1 it goes on as its tangent, L(s)
-/// = ln s₀ + (s - s₀)/s₀ (Stomakhin et al. 2012, Energetically consistent invertible elasticity,
-/// section 4): a body that is flattened or turned inside out (det F <= 0: the smallest stretch is
-/// negative) has a finite energy and stress, and is pushed back.
+/// Principal Kirchhoff stresses are 2 μ εₐ + λ Σ ε: a bar under uniaxial stress carries E ln s. The
+/// logarithm is not defined for stretches <= 0, so L continues it below s₀ = 0.1 by its tangent,
+/// L(s) = ln s₀ + (s - s₀)/s₀ (Stomakhin et al. 2012, Energetically consistent invertible
+/// elasticity, section 4): a body that is flattened or inverted (det F <= 0: the smallest stretch
+/// is negative) has a finite energy and stress, and is pushed back.
 ///
-/// Stretches are those of S in F = R S (nearest_rotation) and not the roots of those of FᵀF: the
-/// sign of the smallest one is known, and its error grows with the ratio of stretches, not with the
-/// square.
+/// Stretches are the eigenvalues of S in F = R S (nearest_rotation) rather than the roots of those
+/// of FᵀF: the sign of the smallest one is known, and its error grows with the ratio of stretches,
+/// not with its square.
 #pragma once
 
 #include <cmath>
@@ -26,7 +26,7 @@ namespace phyxel {
 /// L of one principal stretch s = 1 + x, and its derivative.
 template <class Real>
 struct LogarithmicStrain {
-  static constexpr double least_stretch = 0.1;  ///< s₀: L is a tangent below.
+  static constexpr double least_stretch = 0.1;  ///< s₀: L is the tangent below it.
 
   Real biot;      ///< x = s - 1
   Real clipped;   ///< max(x, s₀ - 1)
@@ -54,7 +54,7 @@ struct LogarithmicSlope {
   PHYXEL_HD LogarithmicSlope(const LogarithmicStrain<Real>& a, const LogarithmicStrain<Real>& b) {
     const Real gap = a.biot - b.biot;
     const Real inverse = detail::safe_inverse(gap);
-    // The share of the gap that lies above s₀: 1 but for crushed bodies.
+    // The part of the gap that lies above s₀: all of it except in crushed bodies.
     const Real below = (a.biot - a.clipped) - (b.biot - b.clipped);
     const Real share = Real(1) - below * inverse;
     const Real by_sum = Real(1) / (Real(2) + a.clipped + b.clipped);
@@ -67,8 +67,8 @@ struct LogarithmicSlope {
   }
 };
 
-/// The logarithmic strain of an elastic deformation in its principal frame, and what turns
-/// functions of it into tensors: stress, strain.
+/// The logarithmic strain of an elastic deformation in its principal frame, and the tensors of
+/// functions of it (stress, strain).
 template <class Real>
 struct HenckyStrain {
   Mat3<Real> turn;                              ///< R - I
@@ -99,13 +99,13 @@ struct HenckyStrain {
 
   /// θ, the trace of the logarithmic strain: ln det F.
   PHYXEL_HD Real trace() const { return isolated.value + near.value + far.value; }
-  /// Σ (εₐ - θ/3)², the squared length of its deviator.
+  /// Σ (εₐ - θ/3)², the squared length of the deviator.
   PHYXEL_HD Real deviator_squared() const {
     const Real mean = Real(1.0 / 3) * trace();
     const Real a = isolated.value - mean, b = near.value - mean, c = far.value - mean;
     return fused(c, c, fused(b, b, a * a));
   }
-  /// Π (εₐ - θ/3), the determinant of its deviator.
+  /// Π (εₐ - θ/3), the determinant of the deviator.
   PHYXEL_HD Real deviator_determinant() const {
     const Real mean = Real(1.0 / 3) * trace();
     return (isolated.value - mean) * (near.value - mean) * (far.value - mean);
@@ -116,7 +116,7 @@ struct HenckyStrain {
     return interpolate(near.value, close.of_value, apart.of_value);
   }
   /// First Piola stress R Σ tₐ nₐ nₐᵀ, tₐ = (2 μ εₐ + λ θ) L'(sₐ).
-  /// @param lambda, mu Lamé's parameters [Pa]; a secant of them while a body flows
+  /// @param lambda, mu Lamé's parameters [Pa], or their secant values during plastic flow
   PHYXEL_HD Mat3<Real> first_piola_stress(Real lambda, Real mu) const {
     const LogarithmicSlope<Real> close(near, far), apart(isolated, near);
     const Real two_mu = Real(2) * mu, mean = lambda * trace();
@@ -151,25 +151,25 @@ struct HenckyStrain {
 /// Kirchhoff stresses are 2 μ εₐ + λ Σ ε. With x = Rᵀa, in the principal frame (Ogden 1984,
 /// Non-linear elastic deformations, 6.1.4), the stiffness of a bᵀ is
 ///   Σₐ dₐ wₐ² + 2 Σₐ﹤ᵦ nₐᵦ wₐ wᵦ + Σₐ﹤ᵦ kₐᵦ (xₐ² bᵦ² + xᵦ² bₐ²),   wₐ = xₐ bₐ,  Σ |w| <= 1,
-/// at most the largest of all k, all d, and the largest k plus the largest |n|: λ + 2μ at rest.
-/// Stretches that are not numbers have a bound that is none.
+/// at most the largest of all k, all d, and the largest k plus the largest |n|: λ + 2μ at rest. The
+/// bound of NaN stretches is NaN.
 template <class Real>
 struct WaveBound {
   Real diagonal{}, mixed{}, shear{};  ///< The largest d, |n| and k so far [Pa]; k >= 0.
 
-  /// d of one principal direction.
+  /// Adds d of one principal direction.
   PHYXEL_HD void add_diagonal(Real d) { diagonal = larger(diagonal, d); }
-  /// n and k of two.
+  /// Adds n and k of a pair of principal directions.
   PHYXEL_HD void add_pair(Real n, Real k) {
     mixed = larger(mixed, larger(-n, n));
     shear = larger(shear, k);
   }
-  /// [Pa]
+  /// The bound [Pa].
   PHYXEL_HD Real value() const { return larger(diagonal, shear + mixed); }
 };
 
-/// Hencky's law. It softens in tension: Kirchhoff stress grows with the logarithm of stretch, force
-/// falls beyond a stretch of e.
+/// Hencky's law. The law softens in tension: Kirchhoff stress grows with the logarithm of stretch,
+/// and the force of a bar falls beyond a stretch of e.
 template <class Real>
 struct Hencky {
   static constexpr const char* name = "hencky";
@@ -187,7 +187,7 @@ struct Hencky {
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
     return energy(HenckyStrain<Real>::of(grad_u));
   }
-  /// ψ of a strain that is known [J/m³].
+  /// ψ [J/m³] of a given logarithmic strain.
   PHYXEL_HD Real energy(const HenckyStrain<Real>& strain) const {
     const Real a = strain.isolated.value, b = strain.near.value, c = strain.far.value;
     const Real trace = strain.trace();
@@ -197,7 +197,7 @@ struct Hencky {
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return HenckyStrain<Real>::of(grad_u).first_piola_stress(lambda, mu);
   }
-  /// Hooke's law in Cauchy's strain.
+  /// The linearisation at rest, Hooke's law in Cauchy's strain.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{{lambda, mu}}.at_rest(volume_stiffness);
   }
@@ -218,9 +218,9 @@ struct Hencky {
         const LogarithmicStrain<Real>& b = strains[j];
         const LogarithmicSlope<Real> slope(a, b);
         const Real sides = fused(stress, slope.of_gradient, two_mu * slope.of_value * b.gradient);
-        // (t_a + t_b)/(s_a + s_b) of the turning part ½ (x_a b_b - x_b b_a)²; where it softens
-        // (inside out), it is left out. Where two stretches cancel, the rotation jumps: no step
-        // resolves that.
+        // The rotational part ½ (x_a b_b - x_b b_a)² has the stiffness (t_a + t_b)/(s_a + s_b),
+        // left out where negative (inverted bodies). Where two stretches cancel, the rotation
+        // jumps, which no step resolves.
         const Real stresses = fused(fused(two_mu, b.value, mean), b.gradient, stress * a.gradient);
         const Real turning =
             larger(Real(0), stresses) / larger(Real(0.01), Real(2) + a.biot + b.biot);

@@ -6,13 +6,13 @@
 /// multiplicative plasticity; de Souza Neto, Perić and Owen 2008, Computational methods for
 /// plasticity, box 14.3):
 ///   q - 3 μ Δε̄ = σ_y(ε̄ + Δε̄),   σ_y = σ₀ + H ε̄ + (σ_∞ - σ₀)(1 - exp(-δ ε̄))      (Voce 1955)
-/// with the equivalent plastic strain ε̄. The return is implicit: a step of any size ends on the
-/// yield surface, and turning the body between two steps does nothing.
+/// with the equivalent plastic strain ε̄. The return mapping is implicit: a step of any size ends
+/// on the yield surface, and a rotation of the body between two steps has no effect.
 ///
 /// The history holds L, the lower triangular factor of C_p⁻¹ = L Lᵀ, rather than C_p⁻¹ itself: F_e
 /// is F L up to a rotation of the body at rest, which an isotropic law does not see, and rounding
 /// grows with the plastic stretch instead of with its square. With S the stretch of the trial F L,
-/// flow turns L into the triangular factor of L exp(-Δε_p): no inverse of F is taken.
+/// flow replaces L by the triangular factor of L exp(-Δε_p), without an inverse of F.
 #pragma once
 
 #include <array>
@@ -66,7 +66,7 @@ struct J2 {
        .fallback = 0}};
   static constexpr bool many_registers = true;
 
-  /// Voce's law may not soften.
+  /// Rejects parameters for which Voce's law softens.
   static const char* unmet(std::span<const double> values) {
     return values[4] == 0 || values[4] >= values[2]
                ? ""
@@ -78,8 +78,8 @@ struct J2 {
     const double yield = values[2], saturation = values[4];
     return {lame[0], lame[1], yield, values[3], saturation == 0 ? yield : saturation, values[5]};
   }
-  /// The smaller of E and 10 σ₀ [Pa]: residuals go on growing while the material flows, and would
-  /// hold shapes that the metal gives up.
+  /// The smaller of E and 10 σ₀ [Pa]: hourglass residuals keep growing while the material flows,
+  /// and with E alone their forces would exceed the flow stress.
   static double hourglass_modulus(std::span<const double> values) {
     return values[0] < 10 * values[2] ? values[0] : 10 * values[2];
   }
@@ -99,15 +99,15 @@ struct J2 {
   Real lambda, mu;         ///< Lamé's parameters [Pa].
   Real yield_stress;       ///< σ₀ [Pa]
   Real hardening;          ///< H [Pa]
-  Real saturation_stress;  ///< σ_∞ [Pa]; σ₀: no saturation
+  Real saturation_stress;  ///< σ_∞ [Pa]; equal to σ₀ without saturation
   Real saturation_rate;    ///< δ
 
-  /// σ_y(ε̄) [Pa].
+  /// The flow stress σ_y(ε̄) [Pa].
   PHYXEL_HD Real flow_stress(Real equivalent_plastic_strain) const {
     return fused(hardening, equivalent_plastic_strain, yield_stress) -
            saturates() * exp_minus_one(saturation_rate * equivalent_plastic_strain);
   }
-  /// Elastic energy that is stored [J/m³]: Hencky's, of F L.
+  /// The stored elastic energy [J/m³]: Hencky's of F L.
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u, const State& state) const {
     return Hencky<Real>{lambda, mu}.energy(elastic_gradient(grad_u, state));
   }
@@ -119,27 +119,26 @@ struct J2 {
     const Real late = e + exp_minus_one(rate * e) / rate;
     return linear + where_larger(saturation_rate, Real(0), saturates() * late, Real(0));
   }
-  /// Hencky's stress [Pa] of F L, seen from F: ∂ψ/∂∇u while the history stays.
+  /// The elastic stress ∂ψ/∂∇u [Pa] at a fixed history: Hencky's of F L, pulled back to F.
   PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u, const State& state) const {
     const Hencky<Real> elastic{lambda, mu};
     return times_transpose(elastic.first_piola_stress(elastic_gradient(grad_u, state)), state);
   }
-  /// Hencky's law at rest.
+  /// The linearisation at rest, that of Hencky's law.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return Hencky<Real>{lambda, mu}.at_rest(volume_stiffness);
   }
-  /// First Piola stress [Pa] at the end of a step. Does not depend on the rate: dt is not looked
-  /// at.
+  /// First Piola stress [Pa] at the end of a step, whose length does not matter.
   /// @param grad_u F - I at the end of the step
-  /// @param state history at its start; becomes that at its end
+  /// @param state history at the start of the step; advanced to its end
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u, State& state,
                                           Real /*dt*/) const {
     using std::sqrt;
     const HenckyStrain<Real> trial = HenckyStrain<Real>::of(elastic_gradient(grad_u, state));
     const Real before = state.equivalent_plastic_strain;
     const Real von_mises = mu * sqrt(Real(6) * trial.deviator_squared());
-    // A body that is crushed or inside out (below s₀ of Hencky's law) does not flow: flow would
-    // stretch a negative stretch. It is pushed back as an elastic body.
+    // Crushed or inverted material (a stretch below s₀ of Hencky's law) does not flow, since flow
+    // would enlarge a negative stretch; it recovers elastically.
     const Real least = smaller(smaller(trial.isolated.biot, trial.near.biot), trial.far.biot);
     const Real excess = where_larger(least, Real(LogarithmicStrain<Real>::least_stretch - 1),
                                      von_mises - flow_stress(before), Real(0));
@@ -147,8 +146,8 @@ struct J2 {
     State after = state;
     if (may_be_positive(excess)) {
       const Real increment = plastic_increment(excess, before);
-      const Real lost = Real(3) * mu * increment / von_mises;  // share of the trial's deviator
-      // The mean stress stays: λ + ⅔ μ does.
+      const Real lost = Real(3) * mu * increment / von_mises;  // fraction of the trial deviator
+      // Flow keeps the bulk modulus λ + ⅔ μ, and so the mean stress.
       const Real softer = mu * lost;
       secant = where_larger(excess, Real(0), mu - softer, mu);
       lambda_secant = where_larger(excess, Real(0), fused(Real(2.0 / 3), softer, lambda), lambda);
@@ -164,10 +163,10 @@ struct J2 {
     commit(state.equivalent_plastic_strain, after.equivalent_plastic_strain);
     return p;
   }
-  /// An upper bound of the stiffness of plane waves [Pa] (stiffening.hpp), whatever the history,
-  /// for flow stresses up to that at ε̄ = 10: elastic unloading about elastic stretches that the
-  /// flow stress keeps close to each other, seen through the total F: 1/s² of the smallest stretch
-  /// (0.01 at least).
+  /// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp), whatever the history,
+  /// for flow stresses up to that at ε̄ = 10. It is the stiffness of elastic unloading, at elastic
+  /// stretches whose ratios the flow stress limits, times 1/s² of the smallest total stretch (at
+  /// least 0.01).
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const Real q = flow_stress(Real(10));
     // (ln s_a - ln s_b) between elastic principal stretches is at most q/(√3 μ).
@@ -187,7 +186,7 @@ struct J2 {
   /// σ_∞ - σ₀ [Pa].
   PHYXEL_HD Real saturates() const { return saturation_stress - yield_stress; }
 
-  /// Whether a branch may be worth taking: on scalars, if the number is positive; always on packs.
+  /// False if a branch can be skipped: of a scalar, whether it is positive; of a pack, always true.
   PHYXEL_HD static bool may_be_positive([[maybe_unused]] Real value) {
     if constexpr (std::is_floating_point_v<Real>) {
       return value > Real(0);
@@ -220,9 +219,9 @@ struct J2 {
     return m;
   }
 
-  /// Δε̄ >= 0 of excess = 3 μ Δε̄ + σ_y(ε̄ + Δε̄) - σ_y(ε̄). The flow stress is concave, so that
-  /// Newton's method comes from below and never passes the root: six steps are exact to rounding
-  /// where δ (σ_∞ - σ₀) <= 3 μ, as in metals, or where δ Δε̄ <= 1.
+  /// Solves for Δε̄ >= 0 in excess = 3 μ Δε̄ + σ_y(ε̄ + Δε̄) - σ_y(ε̄). The flow stress is concave,
+  /// so Newton's method approaches the root from below and never passes it: six steps are exact to
+  /// rounding where δ (σ_∞ - σ₀) <= 3 μ, as in metals, or where δ Δε̄ <= 1.
   PHYXEL_HD Real plastic_increment(Real excess, Real before) const {
     const Real slope = fused(Real(3), mu, hardening), rise = saturates();
     const Real linear = excess / slope;
@@ -251,7 +250,7 @@ struct J2 {
     const Real squared = lost * lost;
     const Sym3<Real> d = exp_minus_identity(e, Real(0.5) * squared * trial.deviator_squared(),
                                             -(squared * lost * trial.deviator_determinant()));
-    // The rows of L + L d, less I.
+    // The rows of L + L d - I.
     Vec3<Real> x{fused(l.xx, d.xx, d.xx) + l.xx, fused(l.xx, d.xy, d.xy), fused(l.xx, d.xz, d.xz)};
     Vec3<Real> y{fused(l.yy, d.xy, fused(l.yx, d.xx, d.xy)) + l.yx,
                  fused(l.yy, d.yy, fused(l.yx, d.xy, d.yy)) + l.yy,
@@ -259,8 +258,8 @@ struct J2 {
     Vec3<Real> z{fused(l.zz, d.xz, fused(l.zy, d.xy, fused(l.zx, d.xx, d.xz))) + l.zx,
                  fused(l.zz, d.yz, fused(l.zy, d.yy, fused(l.zx, d.xy, d.yz))) + l.zy,
                  fused(l.zz, d.zz, fused(l.zy, d.yz, fused(l.zx, d.xz, d.zz))) + l.zz};
-    // Givens' rotations from the right take the entries above the diagonal away. One that turns a
-    // column (p, q) by the angle of (1 + a, b) to (r, 0) adds r - 1 - a = b²/(r + 1 + a).
+    // Givens rotations from the right eliminate the entries above the diagonal. The rotation of (1
+    // + a, b) to (r, 0) adds r - 1 - a = b²/(r + 1 + a) to the diagonal.
     struct Turn {
       Real sine, cosine_less;  ///< sin, 1 - cos
       PHYXEL_HD Turn(Real& a, Real& b) {
@@ -270,7 +269,7 @@ struct J2 {
         sine = b * inverse, cosine_less = more * inverse;
         a = a + more, b = Real(0);
       }
-      /// (p, q) where q - 1 is stored if `diagonal`.
+      /// Rotates (p, q); if `diagonal` is 1, q - 1 is stored in place of q.
       PHYXEL_HD void apply(Real& p, Real& q, Real diagonal) const {
         const Real first = p, second = q + diagonal;
         p = p + fused(sine, second, -(cosine_less * first));
@@ -283,7 +282,7 @@ struct J2 {
     xz.apply(y.x, y.z, Real(0)), xz.apply(z.x, z.z, Real(1));
     const Turn yz(y.y, y.z);
     yz.apply(z.y, z.z, Real(1));
-    // Rounding must not add up to a change of volume: det L - 1 is taken away.
+    // Removes det L - 1, so that rounding does not add up to a change of volume.
     const Real area = fused(x.x, y.y, x.x + y.y);
     const Real third = Real(-1.0 / 3) * fused(area, z.z, area + z.z);
     l.xx = fused(third, x.x, third) + x.x;

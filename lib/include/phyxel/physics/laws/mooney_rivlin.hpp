@@ -1,4 +1,4 @@
-/// A law for rubber with a share of the areas of faces beside that of the lengths of sides.
+/// A law for rubber with terms in both the first and the second invariant.
 #pragma once
 
 #include "phyxel/physics/laws/small_strain.hpp"
@@ -7,11 +7,11 @@ namespace phyxel {
 
 /// A compressible Mooney–Rivlin law:
 ///   ψ = c₁₀ (I₁ - 3) + c₀₁ (I₂ - 3) - 2 (c₁₀ + 2 c₀₁)(J - 1) + ½ L (J - 1)²,   J = det F,
-/// with I₁ = F:F, I₂ = cof F : cof F and L = λ + 2 c₁₀. At small strains it is Hooke's law of
-/// μ = 2 (c₁₀ + c₀₁) and λ = K - 2/3 μ. A sum of convex functions of F, cof F and det F:
-/// polyconvex, as in Ciarlet 1988 (Mathematical Elasticity I, section 4.10), with a Γ(J) that is
-/// defined for every F, so that a body turned inside out is pushed back, too. Written in G = ∇u, so
-/// that small strains keep their digits; zero at rest.
+/// with I₁ = F:F, I₂ = cof F : cof F and L = λ + 2 c₁₀. At small strains it is Hooke's law of μ = 2
+/// (c₁₀ + c₀₁) and λ = K - 2/3 μ. ψ is polyconvex, a sum of convex functions of F, cof F and det F,
+/// as in Ciarlet 1988 (Mathematical Elasticity I, section 4.10), with a Γ(J) that is defined for
+/// every F, so that an inverted body is pushed back, too. Formulas are written in G = ∇u, so that
+/// small strains keep their digits; ψ is zero at rest.
 template <class Real>
 struct MooneyRivlin {
   static constexpr const char* name = "mooney-rivlin";
@@ -41,8 +41,8 @@ struct MooneyRivlin {
        .meaning = "Bulk modulus K at small strains; more than 4/3 c01 - 2/3 c10.",
        .typical = 8.5e5}};
 
-  /// L > 0 is asked for: below zero the energy is not convex in J, and the bound of the waves does
-  /// not hold.
+  /// Requires L > 0: for a negative L the energy is not convex in J, and the bound of
+  /// `wave_stiffness` does not hold.
   static const char* unmet(std::span<const double> values) {
     return constants(values)[2] > 0 ? "" : "bulk_modulus > 4/3 c01 - 2/3 c10";
   }
@@ -51,7 +51,7 @@ struct MooneyRivlin {
     const double c10 = values[0], c01 = values[1], bulk_modulus = values[2];
     return {c10, c01, bulk_modulus + (2 * c10 - 4 * c01) / 3};
   }
-  /// E [Pa] of λ and μ.
+  /// Young's modulus E [Pa] of λ and μ.
   static double hourglass_modulus(std::span<const double> values) {
     const double mu = 2 * (values[0] + values[1]), bulk_modulus = values[2];
     return 9 * bulk_modulus * mu / (3 * bulk_modulus + mu);
@@ -78,15 +78,15 @@ struct MooneyRivlin {
     const Mat3<Real> shear = fused(-two * c10, beyond, (two * c01) * tensor_cross(beyond, f));
     return fused(volume * volume_change(grad_u), cofactor(f), shear);
   }
-  /// 2 c₁₀ + 2 c₀₁ |F × a bᵀ|² + L (a · cof F b)² [Pa], as cof F and det F are linear along a bᵀ.
-  /// F × a bᵀ has the size of F between the planes across a and b, at most that of the two largest
-  /// stretches; both terms are largest for a and b along the smallest.
+  /// An upper bound of 2 c₁₀ + 2 c₀₁ |F × a bᵀ|² + L (a · cof F b)² [Pa], as cof F and det F are
+  /// linear along a bᵀ. F × a bᵀ has the size of F between the planes across a and b, at most that
+  /// of the two largest stretches; both terms are largest for a and b along the smallest.
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const Real squares = fused(s.largest, s.largest, s.middle * s.middle);
     const Real area = s.largest * s.middle;
     return fused(Real(2), fused(c01, squares, c10), volume * area * area);
   }
-  /// Hooke's law in Cauchy's strain.
+  /// The linearisation at rest, Hooke's law in Cauchy's strain.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     const Hooke<Real> hooke{volume - Real(2) * c10, Real(2) * (c10 + c01)};
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);

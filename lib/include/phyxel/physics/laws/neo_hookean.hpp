@@ -11,8 +11,8 @@ namespace phyxel {
 /// equations 13 and 14):
 ///   ψ = μ' / 2 (I - 3) + λ' / 2 (J - α)² - μ' / 2 log(I + 1),   I = F:F, J = det F,
 /// with μ' = 4/3 μ, λ' = λ + 5/6 μ and α = 1 + 3/4 μ'/λ', which is Hooke's law of λ and μ at small
-/// strains. Defined for every F: it pushes back where a body is flattened or turned inside out.
-/// Written in ∇u, so that small strains keep their digits; zero at rest.
+/// strains. ψ is defined for every F, so that flattened and inverted bodies are pushed back.
+/// Formulas are written in ∇u, so that small strains keep their digits; ψ is zero at rest.
 template <class Real>
 struct NeoHookean {
   static constexpr const char* name = "neo-hookean";
@@ -37,7 +37,7 @@ struct NeoHookean {
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     const Mat3<Real> f = identity<Real>() + grad_u, cof = cofactor(grad_u);
     const Real trace = grad_u(0, 0) + grad_u(1, 1) + grad_u(2, 2), i = excess(grad_u);
-    // F - cof F, and of what 1 - 1/(I + 1) is beyond 3/4.
+    // F - cof F, and the excess of 1 - 1/(I + 1) over 3/4.
     const Real beyond = Real(0.25) * (i / (Real(4) + i));
     Mat3<Real> p;
     for (int a = 0; a < 3; ++a) {
@@ -49,8 +49,8 @@ struct NeoHookean {
     }
     return fused(bulk() * volume_change(grad_u), cofactor(f), p);
   }
-  /// μ' (1 - 1/(I + 1)) + 2 μ' (a · F b)² / (I + 1)² + λ' (a · cof F b)² [Pa], each term at its own
-  /// largest.
+  /// An upper bound of μ' (1 - 1/(I + 1)) + 2 μ' (a · F b)² / (I + 1)² + λ' (a · cof F b)² [Pa],
+  /// the sum of the largest values of its terms.
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const Real square = s.largest * s.largest, area = s.largest * s.middle;
     const Real inverse =
@@ -58,7 +58,7 @@ struct NeoHookean {
     return shear() * (Real(1) - inverse + Real(2) * square * inverse * inverse) +
            bulk() * area * area;
   }
-  /// Hooke's law in Cauchy's strain.
+  /// The linearisation at rest, Hooke's law in Cauchy's strain.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }

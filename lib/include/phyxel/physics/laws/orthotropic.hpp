@@ -1,4 +1,4 @@
-/// Wood, layers, bone: three axes of symmetry.
+/// An orthotropic law (wood, layers, bone), with three axes of symmetry.
 ///
 /// S = C : E with Green's strain E (St Venant–Kirchhoff), and nine constants C in the material's
 /// axes (Lekhnitskii 1963, Theory of elasticity of an anisotropic elastic body, section 5).
@@ -14,20 +14,20 @@
 
 namespace phyxel {
 
-/// Nine constants of a stiffness tensor and the axes that they are measured along.
+/// Nine constants of a stiffness tensor and the material's axes.
 template <class Real>
 struct OrthotropicStiffness {
-  Real c11, c22, c33;  ///< [Pa] S_ii of E_ii, in the material's axes.
-  Real c12, c13, c23;  ///< [Pa] S_ii of E_jj.
-  Real g12, g13, g23;  ///< [Pa] half of S_ij of E_ij: shear moduli.
+  Real c11, c22, c33;  ///< S_ii per E_ii, in the material's axes [Pa].
+  Real c12, c13, c23;  ///< S_ii per E_jj [Pa].
+  Real g12, g13, g23;  ///< Shear moduli, half of S_ij per E_ij [Pa].
   Real axes[3][3];     ///< Column i: the i-th axis of the material in the body at rest.
 
-  /// ½ e : C : e [J/m³].
+  /// The energy density ½ e : C : e [J/m³].
   PHYXEL_HD Real energy(const Sym3<Real>& strain) const {
     const Sym3<Real> e = in_axes(strain);
     return Real(0.5) * contract(e, stress_in_axes(e));
   }
-  /// C : e [Pa].
+  /// The stress C : e [Pa].
   PHYXEL_HD Mat3<Real> stress(const Sym3<Real>& strain) const {
     const Mat3<Real> r = frame();
     return r * full(stress_in_axes(in_axes(strain))) * transpose(r);
@@ -39,7 +39,7 @@ struct OrthotropicStiffness {
     bound.add_pair(c12 + g12, g12), bound.add_pair(c13 + g13, g13), bound.add_pair(c23 + g23, g23);
     return bound.value();
   }
-  /// The same with a stiffness [Pa] of the volume beside it.
+  /// The tensor with the stiffness of volume conservation [Pa] added.
   PHYXEL_HD OrthotropicStiffness with_volume(Real volume_stiffness) const {
     OrthotropicStiffness both = *this;
     for (Real* c : {&both.c11, &both.c22, &both.c33, &both.c12, &both.c13, &both.c23}) {
@@ -54,7 +54,7 @@ struct OrthotropicStiffness {
     for (int e = 0; e < 9; ++e) r(e / 3, e % 3) = axes[e / 3][e % 3];
     return r;
   }
-  /// Rᵀ e R.
+  /// The components Rᵀ e R of a tensor in the material's axes.
   PHYXEL_HD Sym3<Real> in_axes(const Sym3<Real>& e) const {
     const Mat3<Real> r = frame(), m = transpose(r) * full(e) * r;
     return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
@@ -70,8 +70,8 @@ struct OrthotropicStiffness {
   }
 };
 
-/// The linear law with nine constants, P = C : ε with Cauchy's strain: what `Orthotropic` is at
-/// small displacements.
+/// The linear law with nine constants, P = C : ε with Cauchy's strain: the linearisation of
+/// `Orthotropic` at rest.
 template <class Real>
 struct SmallStrainOrthotropic {
   OrthotropicStiffness<Real> stiffness;
@@ -86,7 +86,7 @@ struct SmallStrainOrthotropic {
   }
 };
 
-/// St Venant–Kirchhoff with nine constants in the material's axes.
+/// The St Venant–Kirchhoff law with nine constants in the material's axes.
 template <class Real>
 struct Orthotropic {
   static constexpr const char* name = "orthotropic";
@@ -211,15 +211,16 @@ struct Orthotropic {
     const Mat3<Real> s = stiffness.stress(green_strain(grad_u));
     return fused(grad_u, s, s);
   }
-  /// The same constants in Cauchy's strain.
+  /// The linearisation at rest, with the same constants in Cauchy's strain.
   PHYXEL_HD SmallStrainOrthotropic<Real> at_rest(Real volume_stiffness) const {
     return {stiffness.with_volume(volume_stiffness)};
   }
   /// An upper bound of the stiffness of plane waves [Pa], whatever their direction in the
-  /// material's axes (physics/law.hpp). That of a bᵀ is (w bᵀ) : C : (w bᵀ) + b·S b with w = Fᵀa.
-  /// The first term is at most that of rest times the square of the largest stretch. The second is
+  /// material's axes (physics/law.hpp). The stiffness of a bᵀ is (w bᵀ) : C : (w bᵀ) + b·S b with w
+  /// = Fᵀa. The first term is at most its value at rest times the square of the largest stretch.
+  /// The second is
   ///   e₁ (b bᵀ) : C : I - Σ (e₁ - e_k) (b bᵀ) : C : (n_k n_kᵀ)
-  /// of principal strains e_k, the largest e₁, and directions n_k.
+  /// with the principal strains e_k, e₁ the largest, and their directions n_k.
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const OrthotropicStiffness<Real>& c = stiffness;
     const auto strain = [](Real stretch) { return Real(0.5) * (stretch * stretch - Real(1)); };
@@ -227,8 +228,8 @@ struct Orthotropic {
     const Real behind = (most - strain(s.middle)) + (most - strain(s.smallest));
     const Real r1 = c.c11 + c.c12 + c.c13, r2 = c.c12 + c.c22 + c.c23, r3 = c.c13 + c.c23 + c.c33;
     const Real together = larger(larger(most * r1, most * r2), most * r3);
-    // (b bᵀ) : C : (n nᵀ) >= the smallest entry of C with 2 g taken from its diagonal, less 4/3 of
-    // what shear moduli differ from g by.
+    // (b bᵀ) : C : (n nᵀ) >= the smallest entry of C with 2 g subtracted from its diagonal, less
+    // 4/3 of the largest difference of a shear modulus from g.
     const Real high = larger(larger(c.g12, c.g13), c.g23),
                low = smaller(smaller(c.g12, c.g13), c.g23);
     const Real diagonal = smaller(smaller(c.c11, c.c22), c.c33) - (high + low);

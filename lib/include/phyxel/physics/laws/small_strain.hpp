@@ -13,8 +13,8 @@ inline std::array<double, 2> lame_constants(std::span<const double> parameters) 
 }
 
 /// Linear elasticity: P = λ tr(ε) I + 2 μ ε with Cauchy's strain ε, equations (3), (4) and (5) of
-/// Farias et al. 2008. Right for small rotations only, since a turned body has strain; loses torque
-/// beyond.
+/// Farias et al. 2008. Valid for small rotations only: a rotated body has strain, and forces then
+/// have a torque.
 template <class Real>
 struct SmallStrain {
   static constexpr const char* name = "small-strain";

@@ -6,8 +6,8 @@
 namespace phyxel {
 
 /// St Venant–Kirchhoff: P = F S with S = λ tr(E) I + 2 μ E and Green's strain E, equations (2), (4)
-/// and (5) of Farias et al. 2008. Exact under rotation; softens under compression and no longer
-/// resists beyond half the length.
+/// and (5) of Farias et al. 2008. The law is exact under rotation; it softens under compression and
+/// no longer resists below about half the length.
 template <class Real>
 struct StVenantKirchhoff {
   static constexpr const char* name = "st-venant-kirchhoff";
@@ -36,7 +36,7 @@ struct StVenantKirchhoff {
     const Real stress = hooke.lambda * all + Real(2) * hooke.mu * strain(s.largest);
     return (hooke.lambda + Real(2) * hooke.mu) * s.largest * s.largest + stress;
   }
-  /// Hooke's law in Cauchy's strain.
+  /// The linearisation at rest, Hooke's law in Cauchy's strain.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
     return SmallStrain<Real>{hooke}.at_rest(volume_stiffness);
   }

@@ -1,4 +1,4 @@
-/// Extra resistance to a change of volume, beside any law.
+/// Extra resistance to a change of volume, for any law.
 #pragma once
 
 #include "phyxel/physics/strain.hpp"
@@ -20,7 +20,7 @@ struct VolumeConservation {
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u) const {
     return (stiffness * volume_change(grad_u)) * cofactor(identity<Real>() + grad_u);
   }
-  /// k_v (a · cof F b)² [Pa], as det F is linear along a bᵀ.
+  /// An upper bound of k_v (a · cof F b)² [Pa], as det F is linear along a bᵀ.
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
     const Real area = s.largest * s.middle;
     return stiffness * area * area;
