@@ -31,7 +31,7 @@ TEST_F(Program, RunsASceneAndWritesWhatItSays) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("phyxel-steps/s"));
   EXPECT_THAT(outcome.out, HasSubstr("omega_max"));
-  EXPECT_THAT(outcome.out, HasSubstr("st-venant-kirchhoff"));
+  EXPECT_THAT(outcome.out, HasSubstr("neo-hookean"));
   const auto series = read_series(folder_ / "out" / "phyxels.hdf.series");
   ASSERT_EQ(series.size(), 11u);  // 0.2 s at 50 a second, first and last included
   EXPECT_NEAR(series.back().time, 0.2, 1e-12);

@@ -405,7 +405,7 @@ TEST_F(Trajectory, WrongInputIsNamedAndLeavesNothing) {
     return message_of([&] { render(input, out, request, false); });
   };
   EXPECT_THAT(refused(folder_ / "absent", request_), HasSubstr("absent: no such file or folder"));
-  EXPECT_THAT(refused(folder_, request_), HasSubstr("holds no trajectory"));
+  EXPECT_THAT(refused(folder_, request_), HasSubstr("has no trajectory"));
   PictureRequest late = request_, flat = request_, balls = request_;
   late.choice.frames = {3};
   flat.width = 0;

@@ -94,7 +94,7 @@ TEST_F(Resuming, TheLogsFirstEnergyTellsRunsApart) {
   const auto before = files_of("out");
   const Outcome outcome = run({"run", "beam.toml", "--resume", "auto", "--until", "0.2"});
   EXPECT_EQ(outcome.code, 2) << outcome.out;
-  EXPECT_THAT(outcome.err, HasSubstr("another run's"));
+  EXPECT_THAT(outcome.err, HasSubstr("it belongs to another run"));
   EXPECT_TRUE(files_of("out") == before);
 }
 

@@ -19,8 +19,11 @@ class CustomLaw;
 class ParameterValue {
  public:
   ParameterValue() = default;
-  ParameterValue(double number) : numbers_{number, 0, 0} {}  // NOLINT: a number is a value
-  ParameterValue(Vec3d vector) : numbers_{vector.x, vector.y, vector.z}, count_(3) {}  // NOLINT
+  /// A number converts to a value.
+  ParameterValue(double number) : numbers_{number, 0, 0} {}  // NOLINT: implicit on purpose
+  /// A vector converts to a value.
+  ParameterValue(Vec3d vector)
+      : numbers_{vector.x, vector.y, vector.z}, count_(3) {}  // NOLINT: implicit on purpose
 
   /// Its numbers, shape [1] or [3].
   std::span<const double> numbers() const { return {numbers_.data(), count_}; }
@@ -28,6 +31,7 @@ class ParameterValue {
   double number() const { return numbers_[0]; }
   /// The vector, of a parameter that is one.
   Vec3d vector() const { return {numbers_[0], numbers_[1], numbers_[2]}; }
+  /// The value has three numbers.
   bool is_vector() const { return count_ == 3; }
   /// "0.3" or "[1, 0, 0]".
   std::string text() const;

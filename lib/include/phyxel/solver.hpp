@@ -135,6 +135,7 @@ class Solver {
   double dt() const { return dt_; }  ///< [s]
   /// The record of a `StepControl`.
   Looks& looks() { return looks_; }
+  /// The same record, read-only.
   const Looks& looks() const { return looks_; }
   /// When the present state is, for `diagnose`.
   Instant now() const;

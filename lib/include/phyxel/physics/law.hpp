@@ -203,6 +203,7 @@ PHYXEL_HD Real viscous_work(const Law& law, [[maybe_unused]] const HistoryOf<Law
 template <class First, class Second>
 struct SumOf {
   static constexpr bool many_registers = needs_many_registers<First>;
+  /// The history of the first law.
   using State = HistoryOf<First>;
 
   First first;
