@@ -22,8 +22,8 @@ struct Launch {
 };
 
 /// Checks, right after a launch, that CUDA has accepted it. With PHYXEL_CUDA_SYNC=1 in the
-/// environment it waits for the kernel, so that a fault is attributed to its launch. @throws
-/// DeviceError
+/// environment, the check waits for the kernel, so that a fault is attributed to its launch.
+/// @throws DeviceError
 void check_launch(const Launch& launch);
 /// True if `check_launch` waits, which is not possible while launches are recorded into a graph.
 bool launches_are_waited_for();

@@ -20,7 +20,7 @@
 
 namespace phyxel {
 
-/// The message where std::bad_alloc ends a program.
+/// The message for a std::bad_alloc that ends a program.
 inline constexpr const char* out_of_memory =
     "out of memory: fewer phyxels, or a machine with more memory, are needed";
 
@@ -46,7 +46,7 @@ class MpiCommunicator final : public Communicator {
  public:
   /// Constructs a communicator of one rank, without MPI.
   MpiCommunicator() = default;
-  /// Duplicates MPI_COMM_WORLD. Starts MPI unless it runs.
+  /// Duplicates MPI_COMM_WORLD. Starts MPI if it does not run yet.
   /// @throws Error if MPI does not start, if its thread level is too low, or if there are several
   ///   ranks in a build without MPI
   MpiCommunicator(int& argc, char**& argv);
@@ -66,7 +66,7 @@ class MpiCommunicator final : public Communicator {
   int size() const override { return size_; }
   /// Number of ranks on this host, by which a GPU is chosen.
   int host_size() const { return host_size_; }
-  int host_rank() const { return host_rank_; }  ///< Number of this rank among them.
+  int host_rank() const { return host_rank_; }  ///< Index of this rank among them.
   /// A number of the rank's host, which ranks of one host share.
   int host_of(int rank) const { return hosts_[rank]; }
 

@@ -52,7 +52,7 @@ MpiHaloTransport::MpiHaloTransport(const MpiCommunicator& ranks,
 
 namespace {
 
-/// Adds the time until it ends.
+/// Adds the time of its scope to a total.
 class Timed {
  public:
   explicit Timed(double& seconds) : seconds_(seconds) {}

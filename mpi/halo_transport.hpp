@@ -1,4 +1,4 @@
-/// The halo exchange over MPI: the plan that ranks make together, and its transport.
+/// The halo exchange over MPI: the plan and its transport.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,14 @@
 
 namespace phyxel {
 
-/// The halo plan of a share: asks the owners of its ghosts, which learn whom to send them to.
-/// Collective.
+/// Makes the halo plan of a share: requests the ghosts from their owners, which thus learn the
+/// ranks to send them to. Collective.
 /// @param owner the rank that owns each phyxel of the share, shape [n]
 /// @param global_id of each phyxel of the share, shape [n]
 HaloPlan make_halo_plan(const MpiCommunicator& ranks, const std::vector<int>& owner,
                         const std::vector<Index>& global_id);
 
-/// Carries values by MPI, from memory of the host or, if MPI takes it, of a GPU.
+/// Sends values by MPI, from memory of the host or, with a CUDA-aware MPI, of a GPU.
 class MpiHaloTransport final : public HaloTransport {
  public:
   MpiHaloTransport(const MpiCommunicator& ranks, std::shared_ptr<const HaloPlan> plan);
@@ -35,7 +35,7 @@ class MpiHaloTransport final : public HaloTransport {
   };
   std::shared_ptr<const HaloPlan> plan_;
   std::shared_ptr<Packed> packed_ = std::make_shared<Packed>();
-  Records under_way_;  // to be unpacked; none if their base is null
+  Records under_way_;  // records to unpack; none if their base is null
   Traffic traffic_;
   Transfers transfers_;
 };

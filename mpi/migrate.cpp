@@ -18,13 +18,14 @@
 namespace phyxel {
 namespace {
 
-/// A phyxel's place in the order of all.
+/// A phyxel's key in the global order.
 struct Key {
   Index body = 0;
-  std::uint64_t key = 0;  ///< Of the curve.
+  std::uint64_t key = 0;  ///< Position along the curve.
   Index number = 0;
 };
-/// What is sorted in its stead: phyxels of one place have their numbers looked up.
+/// Key and index of a phyxel, which are sorted in place of the phyxel. Numbers are compared only
+/// for equal keys.
 struct Keyed {
   std::uint64_t key;
   Index body;
@@ -32,7 +33,7 @@ struct Keyed {
 };
 using KeyedPhyxels = Bulk<Keyed>;
 
-/// Which is the first that is not before a key.
+/// Returns the index of the first phyxel that is not before a key.
 std::ptrdiff_t first_from(const MigratingPhyxels& phyxels, const KeyedPhyxels& sorted,
                           const Key& key) {
   const auto before = [&](const Keyed& a, const Key& b) {
@@ -41,7 +42,7 @@ std::ptrdiff_t first_from(const MigratingPhyxels& phyxels, const KeyedPhyxels& s
   return std::lower_bound(sorted.begin(), sorted.end(), key, before) - sorted.begin();
 }
 
-/// The start of the stretch of each rank but the first: nothing before it belongs there.
+/// Finds the first key of each rank's range, except that of the first rank.
 std::vector<Key> find_splitters(const MpiCommunicator& ranks, const MigratingPhyxels& phyxels,
                                 const KeyedPhyxels& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
@@ -75,7 +76,8 @@ std::vector<Key> find_splitters(const MpiCommunicator& ranks, const MigratingPhy
   return splitters;
 }
 
-/// Cells of a grid over each body, wide enough that what is within reach is in the next one.
+/// Cells of a grid over each body, wide enough that all phyxels within reach are in neighbouring
+/// cells.
 class Cells {
  public:
   using Name = std::uint64_t;
@@ -85,14 +87,15 @@ class Cells {
       inverse_edge_.push_back(edge > 0 ? 1 / edge : 0);
     }
   }
-  /// @param log_edge of blocks of so many cells a side, instead of a cell
+  /// Returns the name of a phyxel's cell. @param log_edge if positive, names blocks with 2^log_edge
+  /// cells per side instead
   Name name_of(const MigratingPhyxel& p, int log_edge = 0) const {
     const auto b = static_cast<std::size_t>(p.body);
     const Vec3d at = inverse_edge_[b] * (p.position - boxes_[b].low);
     const auto along = [&](double x) { return (static_cast<Name>(x) >> log_edge) + 1; };
     return name(b, along(at.x), along(at.y), along(at.z));
   }
-  /// Whether any(name) is true of a cell or one of those next to it.
+  /// True if any(name) is true for a cell or one of its neighbours.
   template <class Any>
   static bool any_around(Name cell, Any&& any) {
     for (Name z = 0; z < 3; ++z) {
@@ -106,7 +109,7 @@ class Cells {
   }
 
  private:
-  static constexpr double most = 4096;  ///< Cells along a side.
+  static constexpr double most = 4096;  ///< Most cells along a side.
   static constexpr int bits = 14;
   static Name name(std::size_t body, Name x, Name y, Name z) {
     return static_cast<Name>(body) << (3 * bits) | z << (2 * bits) | y << bits | x;
@@ -116,13 +119,13 @@ class Cells {
 };
 using Names = std::vector<Cells::Name>;
 
-/// Where a rank has phyxels.
+/// A cell in which a rank has phyxels.
 struct Occupied {
   Cells::Name name;
   int rank;
   friend auto operator<=>(const Occupied&, const Occupied&) = default;
 };
-/// Cells of other ranks, in their order. @param own of this rank
+/// Returns the occupied cells of other ranks, sorted. @param own occupied cells of this rank
 Bulk<Occupied> of_other_ranks(const MpiCommunicator& ranks, const Names& own) {
   const std::vector<Names> from_each =
       ranks.alltoallv(std::vector<Names>(static_cast<std::size_t>(ranks.size()), own));
@@ -134,7 +137,7 @@ Bulk<Occupied> of_other_ranks(const MpiCommunicator& ranks, const Names& own) {
   parallel_sort(all);
   return all;
 }
-/// Of one cell.
+/// Returns the entries of one cell.
 std::span<const Occupied> at_cell(const Bulk<Occupied>& all, Cells::Name name) {
   const auto first = std::lower_bound(all.begin(), all.end(), Occupied{name, 0});
   auto last = first;
@@ -142,7 +145,8 @@ std::span<const Occupied> at_cell(const Bulk<Occupied>& all, Cells::Name name) {
   return {first, last};
 }
 
-/// Own phyxels in blocks of cells next to which another rank has some: few, if the body is large.
+/// Returns own phyxels in blocks of cells that have, or whose neighbours have, phyxels of another
+/// rank: few of a large body.
 std::vector<Index> near_others(const MpiCommunicator& ranks, const MigratingPhyxels& own,
                                const Cells& cells) {
   constexpr int log_edge = 3;
@@ -152,7 +156,7 @@ std::vector<Index> near_others(const MpiCommunicator& ranks, const MigratingPhyx
   Names blocks;
 #pragma omp parallel
   {
-    Names mine;  // neighbours along a curve or a lattice are in one, mostly
+    Names mine;  // consecutive phyxels are mostly in the same cell
     Cells::Name last = ~Cells::Name{0};
 #pragma omp for schedule(static) nowait
     for (Index i = 0; i < n; ++i) {
@@ -223,7 +227,7 @@ MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyx
   const auto groups_of = [&](Index size) { return (std::int64_t{size} + group - 1) / group; };
   std::int64_t groups = 0;
   for (const Index size : sizes) groups += groups_of(size);
-  // Body and place along the curve where each rank's stretch begins.
+  // Body and index along the curve of the start of each rank's range.
   std::vector<std::pair<Index, Index>> starts;
   for (int r = 0; r < parts; ++r) {
     std::int64_t at = groups * r / parts;
@@ -273,12 +277,12 @@ std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(const Migratin
 
 namespace {
 
-/// The order of all phyxels: by body, then by number.
+/// Key of the order by body, then by number.
 std::uint64_t numbered(const MigratingPhyxel& p) {
   return static_cast<std::uint64_t>(p.body) << 32 | static_cast<std::uint64_t>(p.number);
 }
 
-/// Which one is first, second, ... in that order.
+/// Returns the indices of phyxels in that order.
 Bulk<Index> order_by_number(const MigratingPhyxels& phyxels) {
   using Numbered = std::pair<std::uint64_t, Index>;
   auto keys = in_bulk(phyxels.size(), [&](std::size_t i) {
@@ -288,10 +292,10 @@ Bulk<Index> order_by_number(const MigratingPhyxels& phyxels) {
   return in_bulk(keys.size(), [&](std::size_t k) { return keys[k].second; });
 }
 
-/// Phyxels go where `owner` says, in the order in which they are.
+/// Groups phyxels by owner and keeps their order.
 ByRank<MigratingPhyxel> by_owner(const MigratingPhyxels& own, const Bulk<int>& owner, int ranks) {
   const auto parts = static_cast<std::size_t>(ranks);
-  // Threads take stretches; where each begins among what a rank gets.
+  // Each thread handles a contiguous range; `at` has its offset among the phyxels for a rank.
   const auto threads = static_cast<std::size_t>(omp_get_max_threads());
   const auto begin_of = [&](std::size_t stretch) { return own.size() * stretch / threads; };
   std::vector<std::vector<std::size_t>> at(threads, std::vector<std::size_t>(parts, 0));
@@ -342,7 +346,7 @@ RemotePhyxels remote_phyxels_around(const MpiCommunicator& ranks, const Migratin
   });
   parallel_sort(here);
   Names occupied;
-  std::vector<std::size_t> begin;  // of their cells, in `here`
+  std::vector<std::size_t> begin;  // first phyxel of each cell in `here`
   for (std::size_t k = 0; k < here.size(); ++k) {
     if (k > 0 && here[k].first == here[k - 1].first) continue;
     occupied.push_back(here[k].first);
@@ -393,7 +397,7 @@ RemotePhyxels remote_phyxels_around(const MpiCommunicator& ranks, const Migratin
 
 Surrounded surrounded(const MpiCommunicator& ranks, const MigratingPhyxels& own,
                       const RemotePhyxels& others) {
-  // Each knows how many of the other kind come before it.
+  // The position of a phyxel is its own index plus the number of the other kind before it.
   const auto before = [](const MigratingPhyxels& phyxels, const MigratingPhyxel& p) {
     const std::uint64_t at = numbered(p);
     const auto first = std::partition_point(
@@ -417,14 +421,14 @@ Surrounded surrounded(const MpiCommunicator& ranks, const MigratingPhyxels& own,
 }
 
 std::vector<double> medians_of(const MpiCommunicator& ranks, std::span<const Bulk<double>> values) {
-  // Bits of numbers that are not negative are in the order of the numbers: digit by digit, those
-  // are counted that begin as the median does.
+  // Bits of non-negative numbers have the order of the numbers. A radix selection counts, digit by
+  // digit, the numbers with the leading digits of the median.
   constexpr int digit_bits = 8, digits = 1 << digit_bits;
   std::vector<std::uint64_t> medians(values.size(), 0);
   std::vector<std::int64_t> sizes;
   for (const Bulk<double>& list : values) sizes.push_back(static_cast<std::int64_t>(list.size()));
   ranks.add(sizes);
-  std::vector<std::int64_t> before;  // of those that are left, how many come before the median
+  std::vector<std::int64_t> before;  // numbers before the median among the remaining ones
   for (const std::int64_t size : sizes) before.push_back(size / 2);
   for (int shift = 64 - digit_bits; shift >= 0; shift -= digit_bits) {
     std::vector<std::int64_t> counts(values.size() * digits, 0);

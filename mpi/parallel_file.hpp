@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-/// True if HDF5 is parallel. HDF5, which calls MPI, is then initialised unless it was before.
+/// Returns true if HDF5 is parallel, and then initialises HDF5, which calls MPI.
 bool can_write_collectively();
 
 /// Returns the rows that this rank writes next, row by row, from the range of each rank.

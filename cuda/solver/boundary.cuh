@@ -1,11 +1,11 @@
-/// Phyxels that follow a path, and loads: what a step adds for scenes that have them.
+/// Prescribed motions and loads on the GPU.
 #pragma once
 
 #include "solver/device_model.cuh"
 
 namespace phyxel::cuda {
 
-/// offset + slope x, of a place x that is counted from its body's origin.
+/// The affine field offset + slope x of positions x relative to the body's origin [m].
 template <class T>
 struct AffineField {
   Vec3<T> offset;
@@ -13,7 +13,8 @@ struct AffineField {
   __device__ Vec3<T> at(Vec3<T> x) const { return offset + slope * x; }
 };
 
-/// Phyxels that are set along some axes after each step.
+/// Sets displacements and velocities of phyxels with a prescribed motion, along its axes, after
+/// each step. One thread per phyxel.
 template <class Real, class StateReal>
 __global__ void follow(Fields<Real, StateReal> f, const Index* place, int count, Axes axes,
                        AffineField<StateReal> displacements, AffineField<StateReal> velocities) {
@@ -43,7 +44,8 @@ __global__ void follow(Fields<Real, StateReal> f, const Index* place, int count,
   f.points.set(at, point);
 }
 
-/// load[place] += scale · force; every place once.
+/// Adds scale · force to the load of each listed tile slot. One thread per slot; slots must be
+/// distinct.
 template <class Real>
 __global__ void add_load(Real* load, std::size_t places, const Index* place,
                          const Vec3<Real>* force, int count, Real scale) {
@@ -60,19 +62,19 @@ class Boundary {
     make_loads();
   }
 
-  /// Whether anything but the state changes from step to step.
+  /// True if motions or growing loads change from step to step.
   bool changes() const {
     return !paths_.empty() ||
            std::any_of(loads_.begin(), loads_.end(), [](const auto& l) { return l.of->ramp > 0; });
   }
-  /// Sets the caller's own forces [N], shape [3, places]; none: an empty list. They act from the
+  /// Sets the caller's forces [N], shape [3, places]; an empty list clears them. They act from the
   /// next launch on.
   void set_external(const std::vector<Real>& force) {
     m_.set_external(force);
     load_scales_ = -1;
     sum_loads(time_);
   }
-  /// Sets the applied forces of a time [s]; again only while a load still grows.
+  /// Sums the applied forces at a time [s]. Repeated calls sum again only while a load still grows.
   void sum_loads(double time) {
     time_ = time;
     if (!m_.loads()) return;
@@ -94,7 +96,7 @@ class Boundary {
                      static_cast<Real>(load.of->scale_at(time)));
     }
   }
-  /// Moves phyxels to where their paths are after a step from `time` [s].
+  /// Moves phyxels to their prescribed positions after a step from `time` [s].
   void follow_paths(double time, double dt) const {
     for (const Moved& path : paths_) {
       const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
@@ -104,17 +106,17 @@ class Boundary {
            to_real((1 / dt) * (after.turn - before.turn))});
     }
   }
-  /// Held phyxels stay where their motion says, at rest, wherever a state has put them.
+  /// Returns fixed phyxels to their prescribed positions, at rest, whatever an uploaded state says.
   void put_held_at_rest() const {
     if (held_.size() > 0) set(held_, {}, {}, {});
   }
-  /// Along which axes phyxels follow a path (`Axes::bits`), shape [places]; null where none does.
+  /// The prescribed axes of each phyxel (`Axes::bits`), shape [places]; null if there are none.
   const char* moved() const { return moved_.data(); }
 
  private:
   struct Moved {
     const Motion* of;
-    Vec3d origin;  ///< Of their body.
+    Vec3d origin;  ///< Origin of their body.
     DeviceArray<Index> places;
   };
   struct Loading {
@@ -177,7 +179,7 @@ class Boundary {
   DeviceModel<Real, StateReal>& m_;
   std::vector<Moved> paths_;
   std::vector<Loading> loads_;
-  double load_scales_ = -1, time_ = 0;  // of the last sum
+  double load_scales_ = -1, time_ = 0;  // scale and time [s] of the last sum
   DeviceArray<Index> held_;
   DeviceArray<char> moved_;
 };

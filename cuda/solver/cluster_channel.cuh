@@ -1,18 +1,19 @@
-/// The way between blocks of a cluster.
+/// The channel between blocks of a cluster.
 #pragma once
 
 #include "solver/resident_memory.cuh"
 
 namespace phyxel::cuda {
 
-// Clusters came with compute capability 9; `fits_clusters` asks for it.
+// Clusters need compute capability 9; `fits_clusters` checks for it.
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 900
 #define PHYXEL_CLUSTER_ASM(...) __trap()
 #else
 #define PHYXEL_CLUSTER_ASM(...) asm volatile(__VA_ARGS__)
 #endif
 
-/// Straight into the shared memory of the other blocks of a cluster, which is a body.
+/// Sends directly into the shared memory of the other blocks of a cluster. A cluster steps one
+/// body.
 template <class Real>
 struct ClusterChannel {
   static constexpr int threads = slice_size;
@@ -24,15 +25,15 @@ struct ClusterChannel {
 
   static constexpr int near = 8;  ///< Destinations that a thread keeps in registers.
 
-  /// A slot of another block's image of displacements, and that block's barriers; 0: none.
+  /// A slot of another block's displacement image, and that block's barriers; 0 if there is none.
   struct Destination {
     unsigned slot, bells;
   };
   Destination destination[near];
-  const std::uint32_t* more;  ///< The rest, in shared memory.
+  const std::uint32_t* more;  ///< The remaining destinations, in shared memory.
   int more_count, halo;
-  unsigned image;     ///< Of this block's displacements, in shared memory.
-  unsigned barriers;  ///< Two.
+  unsigned image;     ///< This block's displacement image, in shared memory.
+  unsigned barriers;  ///< This block's two barriers.
   unsigned parity = 0;
 
   __device__ static unsigned address(const void* shared) {
@@ -138,9 +139,9 @@ struct ClusterChannel {
           : "r"(barrier), "r"(parity)
           : "memory");
     } while (!done);
-    if (kind == 1) parity ^= 1;  // each barrier is waited for once a step
+    if (kind == 1) parity ^= 1;  // the block waits for each barrier once a step
   }
-  /// Nobody leaves while others may still write to them.
+  /// Keeps blocks from leaving while others may still write to their memory.
   __device__ void finish() { meet_cluster(); }
   /// A block of the cluster without a slice.
   __device__ static void stand_by() {

@@ -7,7 +7,7 @@
 namespace phyxel {
 namespace cuda {
 
-// Each in a file of its own.
+// Each precision is compiled in a file of its own.
 std::unique_ptr<Backend> make_float_backend(const Model& model, int device, CudaPath path,
                                             Transport transport);
 std::unique_ptr<Backend> make_mixed_backend(const Model& model, int device, CudaPath path,
@@ -21,13 +21,13 @@ std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precisi
                                            CudaPath path, Transport transport) {
   check_model(model);
   if (model.share && model.share->place.size() != static_cast<std::size_t>(model.size())) {
-    throw InputError("a GPU steps shares that are cut between tiles");
+    throw InputError("the GPU backend needs shares that are cut between tiles");
   }
   for (const Part& part : model.parts) {
     if (!part.material.custom_law) continue;
     throw InputError("body \"" + part.name + "\" has a law of the caller's own, \"" +
                      part.material.custom_law->name() +
-                     "\", which no GPU knows: allowed is the CPU");
+                     "\", which cannot run on a GPU: allowed is the CPU");
   }
   switch (precision) {
     case Precision::single:

@@ -60,7 +60,7 @@ class CudaBackend final : public Backend {
   void set_external_forces(std::span<const Vec3d> force) override {
     check_external_forces(force, m_.model());
     m_.use_device();
-    m_.wait();  // steps under way may read the forces that were set before
+    m_.wait();  // steps in progress may read the previous forces
     const bool had_loads = m_.fields().load;
     std::vector<Real> values(force.empty() ? 0 : 3 * m_.places(), Real(0));
     for (Index i = 0; i < static_cast<Index>(force.size()); ++i) {
@@ -73,7 +73,7 @@ class CudaBackend final : public Backend {
     external_force_.assign(force.begin(), force.end());
     boundary_.set_external(values);
     if (had_loads == static_cast<bool>(m_.fields().load)) return;
-    // Kernels that add applied forces take the place of others, or the other way round.
+    // The choice of kernels depends on whether there are applied forces.
     passes_ = std::make_unique<Passes<Real, StateReal>>(m_, halo_.get());
     for (StepGraph& graph : graphs_) graph.forget();
   }
@@ -112,7 +112,7 @@ class CudaBackend final : public Backend {
   }
   void set_history_interval(double interval) override { history_interval_ = interval; }
   void commit_history() override {
-    if (!m_.has_history()) return;  // of all ranks alike
+    if (!m_.has_history()) return;  // the same on all ranks
     m_.use_device();
     passes_->commit(history_interval_);
     history_interval_ = 0;
@@ -146,7 +146,7 @@ class CudaBackend final : public Backend {
   std::optional<Stiffening> stiffening() override {
     m_.use_device();
     const Index tiles = m_.tiles();
-    // Kept for small bodies, for which an allocation costs as much as many steps.
+    // The array is kept for small bodies, for which an allocation costs as much as many steps.
     DeviceArray<Real> gradients = std::move(stiffening_gradients_);
     if (gradients.size() == 0) gradients = DeviceArray<Real>(9 * m_.places(), gradients_name());
     if (stiffest_.size() == 0 && tiles > 0) {
@@ -174,8 +174,8 @@ class CudaBackend final : public Backend {
     m_.use_device();
     const DeviceArray<Real> forces = passes_->forces(use, history_interval_);
     wait();
-    // The next stresses of another rank may differ from these, and must not come before these are
-    // read everywhere.
+    // Another rank's next stresses may differ from these, and must not arrive before all ranks have
+    // read these.
     if (m_.share() && m_.has_history()) m_.share()->communicator->largest(0);
     const std::vector<Real> values = fetched(forces);
     force.resize(static_cast<std::size_t>(size()));
@@ -258,25 +258,25 @@ class CudaBackend final : public Backend {
   }
 
  private:
-  /// Tile slots of which gradients stay allocated between two looks at how stiff they are.
+  /// Most tile slots for which gradients stay allocated between two looks at stiffening.
   static constexpr std::size_t most_kept = 1'000'000;
   std::string gradients_name() const { return "displacement gradients of " + m_.subject(); }
   using Advection = SurfelAdvection<Real, StateReal>;
 
-  /// Before phyxels are put elsewhere: steps under way end, on all ranks.
+  /// Waits until steps in progress have ended on all ranks, before displacements are replaced.
   void leave_steps() {
     m_.use_device();
     passes_->receive_displacements();
     m_.wait();
-    if (m_.share()) m_.share()->communicator->largest(0);  // the others have come as far
+    if (m_.share()) m_.share()->communicator->largest(0);  // a barrier of the ranks
     fresh_ = true;
   }
-  /// Launches the next steps that go together, at most `left`, from a time [s].
-  /// @param surfels to be moved after each step, or null
+  /// Launches the next steps that can be launched together, at most `left`, from a time [s].
+  /// @param surfels surfels to move after each step, or null
   /// @returns the number of steps
   int launch_steps(double time, int left, const Advection* surfels) {
-    // The first step after an upload sees held phyxels where they were put, and then sets them; and
-    // the first of another size takes rates over a step of the size before.
+    // The first step after an upload uses the uploaded positions of fixed phyxels, and then resets
+    // them. The first step of another size takes strain rates over a step of the previous size.
     const bool alike = !fresh_ && (!m_.has_history() || history_interval_ == m_.dt());
     if (alike && path_.residence) {
       const int steps = std::min(left, surfels ? steps_together : path_.residence->most_steps);
@@ -294,11 +294,11 @@ class CudaBackend final : public Backend {
     launch_step(time, surfels);
     return 1;
   }
-  /// True if the next steps may be those of a graph.
+  /// True if a graph can do the next steps.
   bool graph_serves(const Advection* surfels) const {
     if (!path_.recorded || launches_are_waited_for()) return false;
-    if (surfels && m_.share()) return false;  // the host brings surfels of a share together
-    // A graph begins as it ends: with displacements on their way.
+    if (surfels && m_.share()) return false;  // the host combines the surfels of shares
+    // A graph begins as it ends: with displacements in transit.
     return !halo_ || halo_->is_under_way(Sent::displacements);
   }
   /// Launches one step of the present size from a time [s].
@@ -317,14 +317,14 @@ class CudaBackend final : public Backend {
     fresh_ = false;
     if (surfels) surfels->launch(*passes_);
   }
-  /// The surfels, which are brought to the device when they are first asked for.
+  /// Returns the surfels, which are uploaded on the first call.
   Advection& surfels_of_model() {
     if (!surfels_) surfels_.emplace(m_, path_.residence ? steps_together : 0);
     return *surfels_;
   }
 
-  /// Lets the host run ahead by some ten milliseconds of steps, not by the hundreds that the queue
-  /// takes: a signal would wait for them all.
+  /// Lets the host run ahead of the GPU by some ten milliseconds of steps rather than the hundreds
+  /// that the queue can hold, since a run that is stopped by a signal must wait for all of them.
   void bound_queue(int steps) {
     const int most = path_.residence ? 2 * path_.residence->most_steps : 128;
     const auto ahead = static_cast<int>(std::clamp<std::size_t>(
@@ -333,23 +333,23 @@ class CudaBackend final : public Backend {
     steps_since_mark_ = 0;
     const Phase phase("ahead of the GPU");
     const Event& mark = marks_[batches_++ % 2];
-    PHYXEL_CUDA(cudaEventSynchronize(mark.get()));  // of the last batch but one; at once if none
+    PHYXEL_CUDA(cudaEventSynchronize(mark.get()));  // returns at once without an earlier batch
     PHYXEL_CUDA(cudaEventRecord(mark.get(), m_.stream()));
   }
 
   DeviceModel<Real, StateReal> m_;
-  std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // of a share
+  std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // null if the model is whole
   Boundary<Real, StateReal> boundary_;
   std::unique_ptr<Passes<Real, StateReal>> passes_;
   LaunchPath<Real, StateReal> path_;
   std::vector<Vec3d> external_force_;
-  std::optional<Advection> surfels_;        // once they have been asked for
-  bool has_surfels_;                        // this or another rank
-  bool fresh_ = true;                       // no step has been taken since the last upload
-  double history_interval_ = 0;             // from what laws remember to the displacements [s]
-  StepGraph graphs_[2];                     // without surfels, and with
-  DeviceArray<Real> stiffening_gradients_;  // of small bodies, once they have been looked at
-  DeviceArray<TileStiffening> stiffest_;    // of each tile, likewise
+  std::optional<Advection> surfels_;        // created on first use
+  bool has_surfels_;                        // on any rank
+  bool fresh_ = true;                       // true if no step has been taken since the last upload
+  double history_interval_ = 0;             // time from the histories to the displacements [s]
+  StepGraph graphs_[2];                     // without surfels, and with surfels
+  DeviceArray<Real> stiffening_gradients_;  // of small bodies, created by the first look
+  DeviceArray<TileStiffening> stiffest_;    // per tile, likewise
   Event marks_[2];
   int steps_since_mark_ = 0;
   unsigned batches_ = 0;

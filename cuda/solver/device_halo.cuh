@@ -1,16 +1,16 @@
-/// What GPUs send each other: values of phyxels, from the ranks that own them to those that have
-/// them as ghosts.
+/// The halo exchange between GPUs: sends values of phyxels from the ranks that own them to those
+/// that have them as ghosts.
 ///
-/// Two ways. *Direct*: kernels store the records where the other ranks' kernels read them and raise
-/// a flag there, for which those wait (fused_halo.cuh); the passes of a step do so themselves. The
-/// host takes no part. *Packed*: a kernel packs, and NCCL, an MPI that takes the device's memory,
-/// or the host and MPI carry, for which each time `begin` and `finish` only queue what the device
-/// does, so that what is launched in between overlaps.
+/// There are two transports. *Direct*: the kernels of a step store records in the memory of other
+/// ranks' GPUs and raise a flag there, for which the kernels of those ranks wait (fused_halo.cuh);
+/// the host takes no part. *Packed*: a kernel packs records, which NCCL, a CUDA-aware MPI, or MPI
+/// from host memory transfers. `begin` and `finish` only queue work of the device, so that kernels
+/// launched in between overlap with the transfer.
 ///
-/// Nothing says that an array may be written again, because the order of a step says it: who sends
-/// stresses has received displacements, which their owner sends after it has read the stresses of
-/// the step before; and the other way round. Whoever leaves that order (`upload`) has to meet the
-/// others on the host first.
+/// No acknowledgement is needed before a receive buffer is reused: a rank sends stresses only after
+/// it has received displacements, which their owner sends after it has read the stresses of the
+/// previous step, and likewise for displacements. Functions that leave this order (`upload`) need a
+/// barrier on the host first.
 #pragma once
 
 #include <array>
@@ -28,13 +28,14 @@
 
 namespace phyxel::cuda {
 
-/// The exchanges of one share.
+/// The halo exchanges of one share.
 template <class Real, class StateReal>
 class DeviceHalo {
   using Model = DeviceModel<Real, StateReal>;
 
  public:
-  /// Collective. @throws DeviceError on all ranks if `wanted` cannot be had on one
+  /// Opens a transport. Collective. @throws DeviceError on all ranks if `wanted` is not available
+  /// on one
   DeviceHalo(const Model& model, Transport wanted)
       : m_(model),
         send_(m_.share()->halo->peers, &HaloPlan::Peer::send, model.tiling().place),
@@ -49,25 +50,27 @@ class DeviceHalo {
   }
   DeviceHalo(const DeviceHalo&) = delete;
   DeviceHalo& operator=(const DeviceHalo&) = delete;
-  /// Collective, unless an error is on its way, which may be of this rank alone.
+  /// Collective, unless an exception is in flight, which may concern this rank alone.
   ~DeviceHalo() {
     if (std::uncaught_exceptions() == 0) close();
   }
 
-  /// What follows on the device may be launched at once, except for what changes what is sent.
+  /// Begins to send values. Kernels may be launched at once, except those that change the sent
+  /// values.
   void begin(Sent what) const {
     under_way_[static_cast<int>(what)] = true;
     if (direct_) return direct_->begin(what);
     with_records(what, [&](const auto& records) { packed_.begin(records); });
   }
-  /// What is launched from now on sees ghosts' values. Nothing happens if nothing is under way.
+  /// Makes kernels launched from now on see the values of ghosts. Does nothing if no exchange is in
+  /// progress.
   void finish(Sent what) const {
     if (!std::exchange(under_way_[static_cast<int>(what)], false)) return;
     if (direct_) return direct_->finish(what);
     with_records(what, [&](const auto& records) { packed_.finish(records); });
   }
-  /// The exchange of passes that take in one kind of value and send the other by themselves; null
-  /// if passes leave the exchange to `begin` and `finish`.
+  /// The exchange for passes that receive one kind of value and send the other themselves; null if
+  /// passes leave the exchange to `begin` and `finish`.
   const DirectExchange<Real, StateReal>* fused() const {
     return direct_ && direct_->can_fuse() ? direct_.get() : nullptr;
   }
@@ -77,7 +80,7 @@ class DeviceHalo {
     return std::exchange(under_way_[static_cast<int>(awaited)], false);
   }
   bool is_under_way(Sent what) const { return under_way_[static_cast<int>(what)]; }
-  /// Other values, at once.
+  /// Exchanges other values, and waits for them.
   template <class Records>
   void exchange(const Records& records) const {
     packed_.begin(records);
@@ -85,7 +88,7 @@ class DeviceHalo {
   }
 
   bool is_direct() const { return direct_ != nullptr; }
-  /// For `traffic`: graphs pass `begin` by.
+  /// Counts steps of graphs, which do not call `begin`, for `traffic`.
   void count_steps(int steps) const {
     bytes_sent_ +=
         static_cast<std::int64_t>(send_.places.size()) * steps *
@@ -103,7 +106,7 @@ class DeviceHalo {
   }
 
  private:
-  /// Calls visit(records) with what an exchange sends.
+  /// Calls visit(records) with the records that an exchange sends.
   template <class Visit>
   void with_records(Sent what, Visit&& visit) const {
     if (what == Sent::displacements) {
@@ -116,7 +119,7 @@ class DeviceHalo {
   }
   const Communicator& ranks() const { return *m_.share()->communicator; }
   HaloTransport& halo() const { return *m_.share()->transport; }
-  /// Memory is freed when nobody has it open.
+  /// Waits until no rank has memory open, so that it can be freed.
   void close() {
     if (direct_) direct_->close();
     ranks().largest(0);
@@ -126,13 +129,13 @@ class DeviceHalo {
     const std::vector<HaloPlan::Peer>& peers = m_.share()->halo->peers;
     bool one_host = true;
     for (const HaloPlan::Peer& peer : peers) one_host = one_host && peer.same_host;
-    // All ranks take the same way.
+    // All ranks use the same transport.
     if (ranks().smallest(one_host) > 0) {
       try {
         direct_ = std::make_unique<DirectExchange<Real, StateReal>>(m_, receive_);
       } catch (const DeviceError& error) {
         trouble = error.what();
-        cudaGetLastError();  // it is told of below
+        cudaGetLastError();  // clears the error, which is reported below
       }
     } else {
       trouble = "ranks of several hosts";
@@ -144,13 +147,13 @@ class DeviceHalo {
     if (trouble.empty()) trouble = "another rank's memory cannot be opened";
     refuse("direct", trouble, "nccl, mpi, host, auto");
   }
-  /// All ranks know, though maybe one of them alone knows why.
+  /// Throws on all ranks, of which perhaps one alone has the reason.
   [[noreturn]] static void refuse(const char* transport, const std::string& why,
                                   const char* allowed) {
     throw AgreedError(ExitCode::device_failed, std::string("transport ") + transport + ": " + why +
                                                    "; allowed here: " + allowed);
   }
-  /// Collective.
+  /// True if every rank has a GPU of its own. Collective.
   bool gpus_differ() const {
     cudaDeviceProp properties;
     PHYXEL_CUDA(cudaGetDeviceProperties(&properties, m_.device().index));
@@ -172,7 +175,8 @@ class DeviceHalo {
       refuse("mpi", "this MPI is not CUDA-aware", "direct, nccl, host, auto");
     }
   }
-  /// One rank names the ranks, for all. @returns whether exchanges go by it
+  /// Connects the ranks by NCCL, with a name that one rank makes. @returns true if exchanges use
+  /// NCCL
   bool open_nccl(bool insist) {
     std::string trouble;
     NcclRanks::Name name{};
@@ -185,7 +189,7 @@ class DeviceHalo {
       }
       return agree(trouble.empty());
     };
-    // Where ranks share a GPU, NCCL may wait for ever.
+    // NCCL may hang if ranks share a GPU.
     const bool apart = gpus_differ();
     const bool named = attempt([&] {
       if (!has_nccl()) throw DeviceError(nccl_version());
@@ -201,7 +205,7 @@ class DeviceHalo {
         packed_.send_by(std::move(transport));
         return true;
       }
-      transport.release();  // to end it would be collective, and not all ranks have it
+      transport.release();  // leaked: ending it is collective, and not all ranks have it
     }
     if (!insist) return false;
     if (trouble.empty()) trouble = "another rank cannot use NCCL";

@@ -1,4 +1,4 @@
-/// What the laws of a model remember, in device memory.
+/// The histories of a model's laws, in device memory.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,12 @@
 
 namespace phyxel::cuda {
 
-/// Rows of numbers by tile slot: row k has number k of each phyxel's law, in the law's order. There
-/// are as many rows as the law that remembers most has numbers; none, where no law remembers
-/// anything.
+/// Rows of numbers by tile slot: row k has number k of each phyxel's law, in the law's order. The
+/// number of rows is that of the law with the longest history; 0 if no law has one.
 template <class Real>
 class DeviceHistory {
  public:
-  /// Of the virgin material. Model and tiling must outlive it.
+  /// Allocates histories of the virgin material. Model and tiling must outlive this object.
   DeviceHistory(const Model& model, const DeviceTiling& tiling)
       : model_(model), tiling_(tiling), names_(history_columns(model)) {
     if (names_.empty()) return;
@@ -35,7 +34,7 @@ class DeviceHistory {
   Real* data() const { return values_.data(); }  ///< [rows, places], or null.
   std::size_t bytes() const { return values_.bytes(); }
 
-  /// Takes the history of a state; without one, the virgin material's.
+  /// Uploads the history of a state, or that of the virgin material if the state has none.
   /// @throws InputError for a history of other laws
   void put(const State& state) const {
     const std::vector<const HistoryColumn*> history = checked_history(state, names_, model_.size());
@@ -46,7 +45,7 @@ class DeviceHistory {
     });
     values_.upload(values.data());
   }
-  /// Sets the history of a state.
+  /// Downloads the history into a state.
   void take(State& state) const {
     state.history = virgin_history(model_);
     if (names_.empty()) return;
@@ -58,8 +57,8 @@ class DeviceHistory {
 
  private:
   std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
-  /// Calls visit(phyxel, column, where it is in `values_`) for each number that a phyxel of this
-  /// rank remembers.
+  /// Calls visit(phyxel, column, index in `values_`) for each history number of this rank's
+  /// phyxels.
   template <class Visit>
   void for_each(Visit&& visit) const {
     for (std::size_t p = 0; p < columns_of_part_.size(); ++p) {
@@ -76,7 +75,7 @@ class DeviceHistory {
   const Model& model_;
   const DeviceTiling& tiling_;
   std::vector<std::string> names_;
-  std::vector<std::vector<std::size_t>> columns_of_part_;  // of the numbers of its law
+  std::vector<std::vector<std::size_t>> columns_of_part_;  // history columns of each part's law
   std::size_t rows_ = 0;
   DeviceArray<Real> values_;
 };

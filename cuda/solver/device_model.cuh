@@ -1,4 +1,4 @@
-/// A model in device memory: what stays and the state, by place.
+/// A model in device memory: its constants and its state, by tile slot.
 #pragma once
 
 #include <algorithm>
@@ -41,7 +41,8 @@ class DeviceModel {
   using BodyConstants = TileConstants<Real, StateReal>;
   using AllFields = Fields<Real, StateReal>;
 
-  /// @throws DeviceError; InputError if a tile does not fit what one block may have
+  /// Uploads a model. @throws DeviceError; InputError if a tile does not fit the shared memory of a
+  /// block
   DeviceModel(const Model& model, int device)
       : model_(model),
         device_(use_cuda_device(device)),
@@ -66,25 +67,25 @@ class DeviceModel {
   const Model& model() const { return model_; }
   const Device& device() const { return device_; }
   const DeviceTiling& tiling() const { return tiling_; }
-  /// Null: the model is whole.
+  /// The share; null if the model is whole.
   const Share* share() const { return model_.share.get(); }
   Index size() const { return model_.size(); }
-  /// Of a share, with ghosts', which come after all that is stepped here.
+  /// Number of tile slots. Those of ghosts come after all slots that this rank steps.
   std::size_t places() const { return static_cast<std::size_t>(tiling_.places()); }
-  Index tiles() const { return tiling_.own_tiles; }  ///< That are stepped here.
-  /// Of those, the first ones, which reach ghosts or are ghosts elsewhere.
+  Index tiles() const { return tiling_.own_tiles; }  ///< Tiles that this rank steps.
+  /// Number of boundary tiles, which come first: those that reach ghosts or are ghosts elsewhere.
   Index boundary_tiles() const { return tiling_.boundary_tiles; }
   const std::string& subject() const { return subject_; }  ///< For messages: "575 phyxels".
   bool own_supports() const { return own_supports_; }
-  /// True if a law remembers anything, here or elsewhere.
+  /// True if a law of any rank has a history.
   bool has_history() const { return history_.columns() > 0; }
-  bool closed() const { return closed_; }  ///< True if a body's gradients are, here or elsewhere.
-  int most_shared_memory() const { return most_shared_memory_; }  ///< Of one block, in bytes.
+  bool closed() const { return closed_; }  ///< True with closed gradients on any rank.
+  int most_shared_memory() const { return most_shared_memory_; }  ///< Limit for one block [bytes].
 
   const AllFields& fields() const { return fields_; }
   const DeviceLists& lists() const { return lists_; }
   const DeviceLists& second_lists() const { return second_lists_; }
-  /// What sums need of each tile's body. @param lag of the velocities, as `Instant` [s]
+  /// Constants of each tile's body for sums. @param lag lag of the velocities, as in `Instant` [s]
   const TileMaterial* materials(double lag) {
     if (lag == materials_lag_) return materials_.data();
     const std::vector<TileMaterial> materials = for_tiles<TileMaterial>([&](const Part& part) {
@@ -103,30 +104,29 @@ class DeviceModel {
     materials_lag_ = lag;
     return materials_.data();
   }
-  /// Of each place, the number of its phyxel in the whole model; -1: nobody.
+  /// The global id of the phyxel in each tile slot; -1 if the slot is empty.
   const Index* number_at() const { return share() ? number_at_.data() : tiling_.phyxel_at.data(); }
-  /// Pair stresses and closing stresses, of a closed model.
+  /// Pair stresses and closing stresses of a model with closed gradients.
   ClosedStresses<Real> closed_stresses() const {
     return {fields_.stresses, fields_.closing_stresses};
   }
-  /// What `Fields::points`, `stresses` and `closing_stresses` lie in (see `Points::in`).
+  /// The memory behind `Fields::points`, `stresses` and `closing_stresses` (`Points::in`).
   void* points_memory() const { return points_.data(); }
   void* stresses_memory() const { return stresses_.data(); }
   void* closing_stresses_memory() const { return closing_stresses_.data(); }
 
-  /// Positions are taken from the body's first phyxel, so that a body far from the origin keeps its
-  /// digits in float.
+  /// The origin of a body's positions, its first phyxel, so that a body far from the origin keeps
+  /// its digits in float.
   Vec3d origin_of(Index part) const { return model_.parts[part].origin; }
 
-  /// The step size that the constants are for [s].
+  /// The step that the damping factors belong to [s].
   double dt() const { return dt_; }
   void send_constants(double dt) {
     dt_ = dt;
     tiles_.upload(
         for_tiles<BodyConstants>([&](const Part& part) { return constants_of(part, dt); }).data());
   }
-  /// The constants of the linear law that each tile's law is at small displacements, volume
-  /// conservation included.
+  /// The constants of the linearisation of each tile's law at rest, volume conservation included.
   DeviceArray<BodyConstants> rest_constants() const {
     return sent(for_tiles<BodyConstants>([&](const Part& part) {
                   BodyConstants constants = constants_of(part, 0);
@@ -141,14 +141,14 @@ class DeviceModel {
                 }),
                 "tiles of " + subject_);
   }
-  /// Makes room for applied forces. They are not set.
+  /// Allocates applied forces, initially undefined.
   void make_loads() {
     if (load_.size()) return;
     load_ = {3 * places(), "loads of " + subject_};
     fields_.load = load_.data();
   }
-  /// The caller's forces [N] as they are in `loads`, shape [3, places], whose energy is not
-  /// counted; none: an empty list. Without loads of the scene's own, `loads` is empty then, too.
+  /// Sets the caller's forces [N], shape [3, places], which `loads` includes and whose energy is
+  /// not counted. An empty list clears them, and `loads` too if the scene has no loads.
   void set_external(const std::vector<Real>& force) {
     external_ = {};
     if (force.empty()) {
@@ -162,7 +162,7 @@ class DeviceModel {
   }
   Real* loads() const { return load_.data(); }  ///< [3, places], or null.
 
-  /// @throws InputError for a history of other laws
+  /// Uploads a state. @throws InputError for a history of other laws
   void put(const State& state) {
     history_.put(state);
     const DeviceArray<Vec3d> u = sent(state.displacement, "displacements of " + subject_),
@@ -171,7 +171,7 @@ class DeviceModel {
                   u.data(), v.data());
     wait();
   }
-  /// Puts phyxels elsewhere; velocities and history stay.
+  /// Replaces the displacements; velocities and history do not change.
   void put_displacements(std::span<const Vec3d> displacement) {
     const DeviceArray<Vec3d> u = sent(std::vector<Vec3d>(displacement.begin(), displacement.end()),
                                       "displacements of " + subject_);
@@ -194,33 +194,33 @@ class DeviceModel {
 
   void use_device() const { PHYXEL_CUDA(cudaSetDevice(device_.index)); }
   cudaStream_t stream() const { return stream_.get(); }
-  /// To be called right after a launch.
+  /// Checks a launch. Call right after it.
   void launched(const char* kernel, unsigned blocks, unsigned threads) const {
     last_launch_.kernel = kernel;
     last_launch_.blocks = blocks;
     last_launch_.threads = threads;
     check_launch(last_launch_);
   }
-  /// A thread for each place of what is stepped here.
+  /// Launches a thread for each tile slot that this rank steps.
   template <class... Parameters, class... Arguments>
   void launch_tiles(const char* name, void (*kernel)(Parameters...), Arguments... arguments) const {
     launch(name, kernel, static_cast<unsigned>(tiles()), arguments...);
   }
-  /// A thread for each place, with ghosts'.
+  /// Launches a thread for each tile slot, ghosts included.
   template <class... Parameters, class... Arguments>
   void launch_places(const char* name, void (*kernel)(Parameters...),
                      Arguments... arguments) const {
     launch(name, kernel, static_cast<unsigned>(tiling_.tiles()), arguments...);
   }
-  /// A thread each of `count`.
+  /// Launches `count` threads.
   template <class... Parameters, class... Arguments>
   void launch_each(const char* name, void (*kernel)(Parameters...), int count,
                    Arguments... arguments) const {
     launch(name, kernel, blocks_for(count), arguments...);
   }
-  /// Blocks of a tile's size with shared memory of their own choice.
-  /// @param overlapping the kernel may begin while the launch before it ends: it waits inside
-  ///   (`wait_for_last_launch`)
+  /// Launches blocks of a tile's size with the given shared memory.
+  /// @param overlapping true if the kernel may begin before the previous launch has ended; it then
+  /// waits inside (`wait_for_last_launch`)
   template <class... Parameters, class... Arguments>
   void launch_blocks(const char* name, void (*kernel)(Parameters...), dim3 blocks, int shared_bytes,
                      bool overlapping, Arguments... arguments) const {
@@ -244,15 +244,15 @@ class DeviceModel {
     return overlap;
   }
   void wait() const { wait_for_device(last_launch_); }
-  /// Beyond 48 KiB a kernel has to ask. It asks for all there is: the answer is the kernel's, not
-  /// this object's, and other models may need more.
+  /// Allows a kernel more than 48 KiB of shared memory: all there is, because the setting belongs
+  /// to the kernel, not to this object, and other models may need more.
   void allow_shared_memory(const void* kernel) const {
     if (std::find(allowed_.begin(), allowed_.end(), kernel) != allowed_.end()) return;
     PHYXEL_CUDA(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                      most_shared_memory_));
     allowed_.push_back(kernel);
   }
-  /// Shared memory of a block of pass 2, which takes more than pass 1.
+  /// Shared memory [bytes] of a block of pass 2, which needs more than pass 1.
   int pass_2_bytes(int slots) const {
     return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0) +
             (closed() ? ClosingStresses<Real>::bytes : 0)) *
@@ -330,7 +330,7 @@ class DeviceModel {
 
   void make_fields() {
     const std::string of = " of " + subject_;
-    // What other ranks may open is shared by whole pages, and never empty.
+    // Memory that other ranks may open is shared by whole pages, and never empty.
     const std::size_t more = share() ? shared_page : 0;
     points_ = {Points<Real>::bytes * places() + more, "points" + of};
     fields_.points = Points<Real>::in(points_.data(), places());
@@ -375,7 +375,7 @@ class DeviceModel {
     if constexpr (mixed) displacement_.clear();
   }
 
-  /// ĉ as rows [3, places], zero where a rank has none.
+  /// ĉ as rows [3, places]; zero if this rank has no closed gradients.
   std::vector<Real> closing_by_place() const {
     std::vector<Real> values(3 * places());
     for (Index i = 0; i < static_cast<Index>(model_.closing.size()); ++i) {
@@ -429,7 +429,7 @@ class DeviceModel {
     tile.law_index = law.index;
     return tile;
   }
-  /// make(part) of each tile's part.
+  /// Returns make(part) for each tile's part.
   template <class Tile, class Make>
   std::vector<Tile> for_tiles(Make&& make) const {
     std::vector<Tile> parts, tiles;
@@ -457,9 +457,9 @@ class DeviceModel {
   DeviceHistory<Real> history_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;
-  DeviceArray<TileMaterial> materials_;  // with the damped flow over that lag [s]
+  DeviceArray<TileMaterial> materials_;  // with the damped flow over the lag
   double materials_lag_ = -1;
-  DeviceArray<Index> number_at_;  // of shares
+  DeviceArray<Index> number_at_;  // of shares only
 };
 
 }  // namespace phyxel::cuda

@@ -1,6 +1,6 @@
-/// Energies, momenta and finiteness, summed where the state is. Sums run in double over a tile in a
-/// fixed tree, and over tiles without rounding, so that they depend on nothing but the model: not
-/// on the order of tiles, nor on which rank has which.
+/// Diagnostics on the GPU: energies, momenta and finiteness. Sums run in double over a tile in a
+/// fixed tree, and over tiles without rounding, so that they depend neither on the order of tiles
+/// nor on their distribution over ranks.
 #pragma once
 
 #include <cstdint>
@@ -12,25 +12,25 @@
 
 namespace phyxel::cuda {
 
-/// What the sums need of a tile's body.
+/// Constants of a tile's body for the sums.
 struct TileMaterial {
-  double law[law_numbers];  ///< As `ChosenLaw::constants`.
-  int law_index;            ///< In `Laws`.
+  double law[law_numbers];  ///< As in `ChosenLaw::constants`.
+  int law_index;            ///< Index in `Laws`.
   double volume_stiffness, hourglass;
   DampedFlow flow;      ///< From the time of the velocities to that of the displacements.
-  Vec3<double> origin;  ///< What positions are taken from [m].
+  Vec3<double> origin;  ///< Origin of positions [m].
 };
 
-/// The sums of a tile: `Sums`, then the number of phyxels that are inside out.
+/// Indices of the sums of a tile: `Sums`, then the number of inverted phyxels.
 inline constexpr int inverted = Sums::count, sums = inverted + 1;
 
 inline constexpr Index no_phyxel = INT32_MAX;
 
-/// Sums and extremes of phyxels of one tile. Phyxels go by their numbers in the whole model.
+/// Sums and extremes of phyxels of one tile. Phyxels are identified by global ids.
 struct TileTotals {
   double sum[sums];
   double largest_displacement, largest_speed;
-  Index fastest, first_bad;  ///< `no_phyxel` if there is none. Of equals the first.
+  Index fastest, first_bad;  ///< `no_phyxel` if there is none; the smallest id on ties.
 };
 
 __device__ inline TileTotals combined(const TileTotals& a, const TileTotals& b) {
@@ -44,7 +44,7 @@ __device__ inline TileTotals combined(const TileTotals& a, const TileTotals& b) 
   return t;
 }
 
-/// The block's totals in thread 0, by halving.
+/// Reduces the totals of a block in a fixed tree; thread 0 gets the result.
 __device__ inline TileTotals of_block(TileTotals mine, TileTotals* shared) {
   shared[threadIdx.x] = mine;
   for (unsigned half = blockDim.x / 2; half > 0; half /= 2) {
@@ -56,10 +56,10 @@ __device__ inline TileTotals of_block(TileTotals mine, TileTotals* shared) {
   return shared[0];
 }
 
-/// Sums without rounding (`ExactSum`), and extremes as what atomic operations compare.
+/// Sums without rounding (`ExactSum`), and extremes as integers for atomic operations.
 struct ExactTotals {
   unsigned long long word[sums][ExactSum::words];
-  unsigned long long displacement_bits, speed_bits;  ///< Of doubles that are not negative.
+  unsigned long long displacement_bits, speed_bits;  ///< Bits of non-negative doubles.
   Index fastest, first_bad;
 };
 
@@ -71,11 +71,11 @@ __device__ inline void add_exactly(unsigned long long* words, double value) {
 
 inline constexpr int diagnose_threads = 128;
 
-/// @param force,gradient of the present displacements; with hourglass control, row 9 of `gradient`
-///   has the residuals
-/// @param history_interval time from what laws remember to the displacements [s]
-/// @param moved along which axes phyxels follow a path (`Axes::bits`), or null
-/// @param number_at of each place: its phyxel's number
+/// Sums the totals of each tile. @param force,gradient forces and gradients at the present
+/// displacements; with hourglass control, row 9 of `gradient` has the residuals
+/// @param history_interval time from the histories to the displacements [s]
+/// @param moved prescribed axes of each phyxel (`Axes::bits`), or null
+/// @param number_at global id of the phyxel in each tile slot
 template <class Real, class StateReal>
 __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f,
                                const TileMaterial* materials, double history_interval,
@@ -89,7 +89,7 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
     const Real inverse_mass = f.force_constants[3 * f.places + place];
     TileTotals t{};
     t.fastest = t.first_bad = no_phyxel;
-    if (inverse_mass != Real(0)) {  // somebody is there
+    if (inverse_mass != Real(0)) {  // the slot has a phyxel
       const TileMaterial m = materials[blockIdx.x];
       const auto column = [&](const auto* array) {
         return array ? to<double>(column3(array, f.places, place)) : Vec3<double>{};
@@ -130,7 +130,7 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
   if (threadIdx.x == 0) totals[blockIdx.x] = all;
 }
 
-/// A thread a tile: adds it to `all`.
+/// Adds the totals of tiles to `all`. One thread per tile.
 static __global__ void add_tiles(const TileTotals* tiles, int count, ExactTotals* all) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
@@ -143,7 +143,7 @@ static __global__ void add_tiles(const TileTotals* tiles, int count, ExactTotals
   atomicMax(&all->speed_bits, bits(t.largest_speed));
   atomicMin(&all->first_bad, t.first_bad);
 }
-/// After `add_tiles`: who is the fastest.
+/// Finds the id of the fastest phyxel. Runs after `add_tiles`.
 static __global__ void find_fastest(const TileTotals* tiles, int count, ExactTotals* all) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
@@ -152,7 +152,7 @@ static __global__ void find_fastest(const TileTotals* tiles, int count, ExactTot
   }
 }
 
-/// On the host.
+/// Converts the totals on the host.
 inline Totals totals_of(const ExactTotals& device) {
   Totals t;
   int s = 0;

@@ -13,7 +13,7 @@
 
 namespace phyxel::cuda {
 
-/// Memory of another rank, opened here.
+/// Memory of another rank, opened by CUDA IPC.
 class OpenedMemory {
  public:
   explicit OpenedMemory(const cudaIpcMemHandle_t& handle) {
@@ -37,7 +37,7 @@ class DirectExchange {
 
  public:
   /// Collective. @throws DeviceError if memory cannot be shared or opened; on this rank alone, and
-  ///   after all that is collective
+  /// after all collective calls
   DirectExchange(const Model& model, const PeerLists& receive) : m_(model) {
     const std::size_t count = m_.share()->halo->peers.size();
     std::vector<std::vector<std::byte>> words(count);
@@ -67,8 +67,8 @@ class DirectExchange {
     wait_for_peers<<<1, warp_size, 0, m_.stream()>>>(signals_[static_cast<int>(what)]);
     m_.launched("wait_for_peers", 1, warp_size);
   }
-  /// The exchange of pass 1 where passes exchange by themselves (`can_fuse`).
-  /// @tparam Records what is sent: `Stresses`, or `ClosedStresses` of a closed model
+  /// The halo exchange inside pass 1, if passes do the exchange (`can_fuse`).
+  /// @tparam Records the records to send: `Stresses`, or `ClosedStresses` with closed gradients
   template <class Records>
   FusedHalo<Records> of_pass_1(bool waits) const {
     if constexpr (std::is_same_v<Records, ClosedStresses<Real>>) {
@@ -78,18 +78,19 @@ class DirectExchange {
       return fused(Sent::displacements, Sent::stresses, m_.fields().stresses, stresses_, waits);
     }
   }
-  /// That of pass 2.
+  /// The halo exchange inside pass 2.
   FusedHalo<Points<Real>> of_pass_2(bool waits) const {
     return fused(Sent::stresses, Sent::displacements, m_.fields().points, points_, waits);
   }
-  /// True if there is a block to tell the peers, and none that waits keeps another rank's from
-  /// running: MPS lets kernels of several ranks share the GPU at once, without turns.
+  /// True if a pass can do the exchange: it must have a block that signals the peers, and its
+  /// waiting blocks must not keep another rank's kernels from running, which they may where MPS
+  /// runs kernels of several ranks on one GPU at once.
   bool can_fuse() const {
     int shared_at_once = 0;
     PHYXEL_CUDA(cudaDeviceGetAttribute(&shared_at_once, cudaDevAttrMpsEnabled, m_.device().index));
     return m_.boundary_tiles() > 0 && shared_at_once == 0;
   }
-  /// Other ranks' memory is no longer used here, and may be freed once all have done this.
+  /// Closes the memory of other ranks, which they may free once all ranks have called this.
   void close() { opened_.clear(); }
   double waited_seconds() const {
     m_.wait();
@@ -115,22 +116,22 @@ class DirectExchange {
             peers.data(),
             waits};
   }
-  /// What a peer needs to store here; then the places of what it sends.
+  /// Data that a peer needs to store records here. The tile slots of these records follow it.
   struct Invitation {
-    cudaIpcMemHandle_t points, stresses, closing_stresses, flags;  ///< The third of closed models.
+    cudaIpcMemHandle_t points, stresses, closing_stresses, flags;  ///< Third: if closed.
     std::uint64_t places;
-    std::int32_t flag, of_flags;  ///< Its own among those of a kind, and how many those are.
+    std::int32_t flag, of_flags;  ///< Index of the peer's flag within a kind, and flags per kind.
   };
 
   void make_flags(std::size_t count) {
-    // A whole page of the device, as all memory that is shared: CUDA shares no less.
+    // CUDA shares memory by whole pages.
     flags_ = {shared_page / sizeof(unsigned) + kinds_sent * count, "flags of ranks"};
     counters_ = {3 * kinds_sent, "counts of exchanges"};
     waited_ = {kinds_sent, "waiting times"};
     flags_.clear();
     counters_.clear();
     waited_.clear();
-    PHYXEL_CUDA(cudaDeviceSynchronize());  // before anyone may raise a flag
+    PHYXEL_CUDA(cudaDeviceSynchronize());  // before any peer raises a flag
   }
   std::vector<std::vector<std::byte>> invitations(const PeerLists& receive,
                                                   std::size_t count) const {
@@ -220,7 +221,7 @@ class DirectExchange {
                         waited_.data() + kind};
     }
   }
-  /// Keeps the copies by place, so that each tile knows its own.
+  /// Stores the copies in the order of tile slots, so that those of a tile are contiguous.
   void put_copies(std::vector<RemoteCopy> copies) {
     std::stable_sort(copies.begin(), copies.end(),
                      [](const RemoteCopy& a, const RemoteCopy& b) { return a.here < b.here; });
@@ -248,10 +249,10 @@ class DirectExchange {
   DeviceArray<unsigned> flags_, counters_;
   DeviceArray<unsigned long long> waited_;
   DeviceArray<RemoteCopy> copies_;
-  DeviceArray<Index> first_;  // of each boundary tile
+  DeviceArray<Index> first_;  // first copy of each boundary tile
   DeviceArray<Points<Real>> points_;
   DeviceArray<Stresses<Real>> stresses_;
-  DeviceArray<ClosedStresses<Real>> closed_stresses_;  // of closed models
+  DeviceArray<ClosedStresses<Real>> closed_stresses_;  // with closed gradients
   DeviceArray<unsigned*> their_flags_[kinds_sent];
   Signals signals_[kinds_sent]{};
   std::vector<OpenedMemory> opened_;

@@ -1,20 +1,20 @@
-/// Records stored where the kernels of other ranks read them, in memory that CUDA IPC has opened,
-/// and the flags that tell of them.
+/// The halo exchange inside the passes: stores of records into the memory of other ranks' GPUs,
+/// opened by CUDA IPC, and flags that announce them.
 ///
-/// A rank's tiles that reach ghosts, or are ghosts elsewhere, come first in a launch. Their blocks
-/// wait for the ghosts, and store what they have found with the peers at once; the last of them
-/// raises the flags. Values travel while the other tiles run.
+/// The boundary tiles of a rank come first in a launch. Their blocks wait for the ghosts, and store
+/// their results in the memory of the peers at once; the last of them raises the flags. The
+/// transfer overlaps with the work on the other tiles.
 #pragma once
 
 #include "solver/records.cuh"
 
 namespace phyxel::cuda {
 
-/// What a step sends, in this order.
+/// The values that a step sends, in this order.
 enum class Sent : int { stresses, displacements };
 inline constexpr int kinds_sent = 2;
 
-/// The copy of one record from a place here to a place of a peer.
+/// A copy of one record from a tile slot of this rank to one of a peer.
 struct RemoteCopy {
   Index here, there;
   int peer;
@@ -32,14 +32,14 @@ __device__ inline unsigned read_flag(const unsigned* flag) {
 /// Flags and counters of one kind of exchange.
 struct Signals {
   unsigned* const* there;  ///< The flag of this rank in each peer's memory.
-  unsigned* here;          ///< Those of the peers, in this rank's.
+  unsigned* here;          ///< The flags of the peers in this rank's memory.
   int peers;
-  unsigned *sent, *received, *blocks_done;  ///< Exchanges so far; blocks of the one under way.
-  unsigned long long* waited;               ///< [ns]
+  unsigned *sent, *received, *blocks_done;  ///< Exchanges; finished blocks of the present one.
+  unsigned long long* waited;               ///< Time waited for peers [ns].
 };
 
-/// All threads of a block wait until every peer has told of the next exchange. One block of many
-/// measures the time.
+/// Makes all threads of a block wait until every peer has signalled the next exchange. @param
+/// measures true in the one block that measures the time
 __device__ inline void wait_for_flags(const Signals& signals, bool measures) {
   const unsigned next = *signals.received + 1;
   unsigned long long start = 0, end = 0;
@@ -53,10 +53,10 @@ __device__ inline void wait_for_flags(const Signals& signals, bool measures) {
   asm volatile("mov.u64 %0, %globaltimer;" : "=l"(end));
   *signals.waited += end - start;
 }
-/// By one thread, when all blocks that wait for the exchange have.
+/// Counts an exchange as received. Called by one thread when all waiting blocks have passed.
 __device__ inline void mark_received(const Signals& signals) { ++*signals.received; }
 
-/// All threads of a block store records with the peers.
+/// Stores records in the memory of the peers, with all threads of a block.
 template <class Records>
 __device__ void store(const Records& records, const Records* peers, const RemoteCopy* copies,
                       int begin, int end, int stride) {
@@ -66,16 +66,16 @@ __device__ void store(const Records& records, const Records* peers, const Remote
                       records.get(static_cast<std::size_t>(c.here)));
   }
 }
-/// Of `blocks` blocks that have stored records, the last one to come here tells the peers.
-/// @returns to its threads whether it is that one
+/// Signals the peers from the last of `blocks` blocks that have stored records. @returns true to
+/// the threads of that block
 __device__ inline bool tell_if_last(const Signals& signals, unsigned blocks) {
   __syncthreads();
   bool last = false;
   if (threadIdx.x == 0) {
-    __threadfence_system();  // for all of this block, which the barrier has brought together
+    __threadfence_system();  // for all stores of this block, which precede the barrier
     last = atomicAdd(signals.blocks_done, 1U) == blocks - 1;
   }
-  // Through no static shared memory: a block may need all there is.
+  // Without static shared memory, since a block may need all there is.
   if (__syncthreads_or(last) == 0) return false;
   const unsigned exchanges = *signals.sent + 1;
   __threadfence_system();
@@ -99,33 +99,34 @@ __global__ void store_at_peers(const __grid_constant__ Records records, const Re
         static_cast<int>(gridDim.x * blockDim.x));
   tell_if_last(signals, gridDim.x);
 }
-/// One block.
+/// Waits for the peers. One block.
 static __global__ void wait_for_peers(const __grid_constant__ Signals signals) {
   wait_for_flags(signals, true);
   if (threadIdx.x == 0) mark_received(signals);
 }
 
-/// A pass that has no ghosts, or whose ghosts are there.
+/// The exchange of a pass without ghosts, or whose ghosts have arrived.
 struct NoHalo {
   static __device__ void before(Index /*tile*/) {}
   static __device__ void after(Index /*tile*/) {}
 };
 
-/// A pass of which the first tiles wait for ghosts and store `Records` with the peers.
+/// The exchange of a pass whose boundary tiles wait for ghosts and store `Records` in the memory of
+/// the peers.
 template <class Records>
 struct FusedHalo {
   Signals awaited, told;
   Index tiles;         ///< Boundary tiles, at least one.
-  const Index* first;  ///< The first copy of each of them, shape [tiles + 1].
+  const Index* first;  ///< The first copy of each boundary tile, shape [tiles + 1].
   const RemoteCopy* copies;
   Records own;
   const Records* peers;
-  bool waits;  ///< Or the ghosts are there.
+  bool waits;  ///< False if the ghosts have arrived.
 
   __device__ void before(Index tile) const {
     if (tile < tiles && waits) wait_for_flags(awaited, tile == 0);
   }
-  /// To be called by all threads of a block.
+  /// Stores the records of a tile and signals the peers. Call from all threads of a block.
   __device__ void after(Index tile) const {
     if (tile >= tiles) return;
     __syncthreads();  // before records of other threads are read

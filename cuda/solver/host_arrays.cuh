@@ -1,4 +1,4 @@
-/// Copies between the host's arrays, by phyxel and in double, and the fields, by place.
+/// Copies between arrays of the host, by phyxel and in double, and the fields, by tile slot.
 #pragma once
 
 #include "phyxel/types.hpp"
@@ -6,19 +6,19 @@
 
 namespace phyxel::cuda {
 
-/// A model's constants by phyxel, and by place what was found there.
+/// Constants of a model: those of the host by phyxel, those computed on the GPU by tile slot.
 struct Constants {
-  const Index* phyxel_at;  ///< [places], -1: nobody
+  const Index* phyxel_at;  ///< [places]; -1 if the slot is empty
   const Vec3d* position;   ///< [n]
   const double *volume, *mass, *support;
-  const char* held;             ///< [n], or null where nobody is held.
+  const char* held;             ///< [n], or null if no phyxel is fixed.
   const Sym3d* inverse_moment;  ///< [places]
   const Vec3d* moment_offset;   ///< [places]
-  const Vec3d* origin;          ///< [tiles], what positions are taken from
+  const Vec3d* origin;          ///< [tiles], origin of positions [m]
 };
 
-/// Sets all that stays: rest positions, moments, volumes, masses, supports; displacements to zero.
-/// One thread a place.
+/// Sets the constants (rest positions, moments, volumes, masses, supports), and displacements to
+/// zero. One thread per tile slot.
 template <class Real, class StateReal>
 __global__ void put_constants(Fields<Real, StateReal> f, Constants c, Real* moment_constants,
                               Real* force_constants, Real* inverse_h_squared) {
@@ -46,7 +46,7 @@ __global__ void put_constants(Fields<Real, StateReal> f, Constants c, Real* mome
   f.points.set(place, point);
 }
 
-/// Displacements and velocities by phyxel, into the fields.
+/// Copies displacements and velocities by phyxel into the fields.
 template <class Real, class StateReal>
 __global__ void put_state(Fields<Real, StateReal> f, const Index* phyxel_at,
                           const Vec3d* displacement, const Vec3d* velocity) {
@@ -62,7 +62,7 @@ __global__ void put_state(Fields<Real, StateReal> f, const Index* phyxel_at,
   f.points.set(place, point);
 }
 
-/// Displacements by phyxel, into the fields.
+/// Copies displacements by phyxel into the fields.
 template <class Real, class StateReal>
 __global__ void set_displacements(Fields<Real, StateReal> f, const Index* phyxel_at,
                                   const Vec3d* displacement) {
@@ -77,7 +77,7 @@ __global__ void set_displacements(Fields<Real, StateReal> f, const Index* phyxel
   f.points.set(place, point);
 }
 
-/// Displacements and velocities by phyxel, out of the fields.
+/// Copies displacements and velocities from the fields to arrays by phyxel.
 template <class Real, class StateReal>
 __global__ void take_state(Fields<Real, StateReal> f, const Index* phyxel_at, Vec3d* displacement,
                            Vec3d* velocity) {

@@ -1,11 +1,11 @@
-/// The two passes of a step over tiles, one block a tile, one thread a phyxel.
+/// The two passes of a step over tiles, with one block per tile and one thread per phyxel.
 ///
 /// A block copies the records of its tile and halo into shared memory, then every lane walks its
 /// list there (see tiling.hpp for its order). Per phyxel and step, float, about 32 neighbours, one
 /// list: pass 1 moves 24 bytes a point into shared memory (about three points a phyxel, two of them
 /// from the second-level cache) and 64 of list, reads 28, writes 48; pass 2 moves 48 a point and 64
-/// of list, reads 52 and writes 36. What limits it is the loads from shared memory in pass 2 and
-/// the issue of instructions in pass 1.
+/// of list, reads 52 and writes 36. Loads from shared memory limit pass 2, and the issue of
+/// instructions limits pass 1.
 #pragma once
 
 #include "phyxel/physics/closing.hpp"
@@ -20,15 +20,15 @@
 
 namespace phyxel::cuda {
 
-/// What the scene says of a tile's body, in the working precision.
+/// Constants of a tile's body, in the working precision.
 template <class Real, class StateReal>
 struct TileConstants {
-  Real law[law_numbers];   ///< As `ChosenLaw::constants`.
-  Real hourglass;          ///< κ [N/m], 0: none.
-  Real inverse_h_squared;  ///< [1/m²], where the body has one support.
-  StateReal keep, gain;    ///< Damped Verlet's factors; gain is the step where undamped.
-  bool damped;             ///< For kernels that serve damped bodies and others.
-  int law_index;           ///< In `Laws`, for kernels that serve bodies of any law.
+  Real law[law_numbers];   ///< As in `ChosenLaw::constants`.
+  Real hourglass;          ///< κ [N/m]; 0 without hourglass control.
+  Real inverse_h_squared;  ///< [1/m²], if the body has one support.
+  StateReal keep, gain;    ///< Factors of `damped_flow`; gain is the step without damping.
+  bool damped;             ///< For kernels that serve damped and undamped bodies.
+  int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
 };
 
 /// `TileLists` in device memory.
@@ -39,31 +39,31 @@ struct DeviceLists {
   const uint4* entries;
 };
 
-/// All that the kernels see of a model and its state.
+/// A model and its state as the kernels access them.
 template <class Real, class StateReal>
 struct Fields {
   Points<Real> points;
   Stresses<Real> stresses;
-  const Real* inverse_h_squared;  ///< [places], or null where each body has one support.
+  const Real* inverse_h_squared;  ///< [places], or null if each body has one support.
   const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
-  const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m: held; 0: nobody.
+  const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m if fixed, 0 if empty.
   const Real* load;               ///< Applied forces, [3, places], or null.
-  Real* pull;                     ///< Of hourglass control: [3, places], or null.
+  Real* pull;                     ///< Force of hourglass control, [3, places], or null.
   const Real* closing;            ///< ĉ of closed gradients [1/m]: [3, places], or null.
   ClosingStresses<Real> closing_stresses;
   StateReal* velocity;      ///< [3, places]
-  StateReal* displacement;  ///< [3, places] where StateReal is not Real, or null.
+  StateReal* displacement;  ///< [3, places] if StateReal is not Real, else null.
   const TileConstants<Real, StateReal>* tiles;
   Vec3<StateReal> gravity;
   std::size_t places;
-  const Real* external;    ///< The caller's share of `load`, [3, places], or null.
-  Real* history;           ///< What laws remember, [history_numbers, places], or null.
-  int history_numbers;     ///< Of the phyxels that remember most.
-  HistoryUse history_use;  ///< What stresses do with it,
-  Real history_interval;   ///< and the time from it to the displacements [s].
+  const Real* external;    ///< The caller's part of `load`, [3, places], or null.
+  Real* history;           ///< Histories, [history_numbers, places], or null.
+  int history_numbers;     ///< Largest number of history values of a phyxel.
+  HistoryUse history_use;  ///< How stresses treat the history,
+  Real history_interval;   ///< and the time from the history to the displacements [s].
 };
 
-/// The velocity after a step. `force` is all but gravity; damping by the body's factors.
+/// Returns the velocity after a step [m/s]. @param force all forces but gravity [N]
 template <class Real, class StateReal, bool damped, class Constants>
 __device__ Vec3<StateReal> next_velocity(Vec3<StateReal> velocity, Vec3<Real> force,
                                          Real inverse_mass, Vec3<StateReal> gravity, StateReal dt,
@@ -87,7 +87,7 @@ __device__ void set_column3(T* array, std::size_t places, std::size_t place, Vec
   array[2 * places + place] = v.z;
 }
 
-/// The place of this thread's phyxel, and of its warp's first.
+/// The tile slot of this thread's phyxel.
 __device__ inline unsigned place_of(Index tile) {
   return static_cast<unsigned>(tile) * tile_size + threadIdx.x;
 }
@@ -95,9 +95,9 @@ __device__ inline unsigned warp_place_of(Index tile) {
   return static_cast<unsigned>(tile) * tile_size + (threadIdx.x & ~(warp_size - 1U));
 }
 
-/// Brings a warp's share of `rows` rows of an array, `row_elements` apart, into the second-level
-/// cache, so that it is near when the walk is done. `first` is what the warp's first lane will
-/// read.
+/// Prefetches a warp's part of `rows` rows of an array, `row_elements` apart, into the second-level
+/// cache, so that it is there when the neighbour loop ends. `first` is the element that the warp's
+/// first lane will read.
 template <class T>
 __device__ void prefetch_rows(const T* first, std::size_t row_elements, unsigned rows) {
   constexpr unsigned lines = warp_size * sizeof(T) / 128;
@@ -108,11 +108,11 @@ __device__ void prefetch_rows(const T* first, std::size_t row_elements, unsigned
   }
 }
 
-/// Copies a tile and its halo into the image, fills the far slots; ends with all copies under way.
+/// Starts the copies of a tile and its halo into the image, and fills the null slots.
 template <class Records>
 __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Index tile,
                            char* image) {
-  constexpr int batch = 3;  // indices under way at once
+  constexpr int batch = 3;  // indices loaded at once
   const int thread = static_cast<int>(threadIdx.x);
   const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride + thread;
   records.fetch(image, lists.slots, thread, static_cast<Index>(place_of(tile)));
@@ -134,7 +134,7 @@ __device__ void fetch_tile(const Records& records, const DeviceLists& lists, Ind
   if (thread < far_slots) Records::set_far(image, lists.slots, tile_size + thread);
 }
 
-/// Where this lane's list begins.
+/// The start of this lane's list.
 __device__ inline const uint4* list_of(const DeviceLists& lists, TileLists::Row row) {
   return lists.entries + static_cast<std::size_t>(row.chunk) * warp_size + threadIdx.x % warp_size;
 }
@@ -172,8 +172,8 @@ __device__ inline uint4 first_entries(const DeviceLists& lists, TileLists::Row r
   return row.length > 0 ? __ldcs(list_of(lists, row)) : uint4{0, 0, 0, 0};
 }
 
-/// Blocks of a multiprocessor that share its registers: more of them hide more latency, but leave a
-/// thread 40 registers in float, which some laws would spill.
+/// Blocks of pass 1 per multiprocessor: more of them hide more latency, but leave a thread 40
+/// registers in float, which would make some laws spill.
 template <class Real, class Law>
 constexpr int pass_1_blocks = needs_many_registers<Law> ? (sizeof(Real) == 4 ? 4 : 2)
                                                         : (sizeof(Real) == 4 ? 6 : 3);
@@ -182,22 +182,21 @@ constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
 template <class Real>
 constexpr int pass_2_blocks_closed = sizeof(Real) == 4 ? 4 : 2;
 
-/// Where displacement gradients go, those of all tiles or of some: entry e of thread t of block b
-/// to values[e * stride + b * tile_size + t].
+/// Output of the gradient-only variant of pass 1: entry e of thread t of block b is stored in
+/// values[e * stride + b * tile_size + t].
 template <class Real>
 struct Gradients {
   Real* values;
   std::size_t stride;
-  const Index* tile_of_block;  ///< Null: all.
-  Real* residuals = nullptr;  ///< What the gradients do not follow (`add_residual`); null: unasked.
+  const Index* tile_of_block;  ///< Null for all tiles.
+  Real* residuals = nullptr;   ///< Residuals of the fits (`add_residual`), or null.
 };
 
-/// Pair term of pass 1: what is done with the part of the displacements that a linear fit leaves.
-/// Closing serves bodies with hourglass control, too.
+/// Term of pass 1 in the residual of the linear fit. `closing` includes hourglass control.
 enum class PairTerm { none, hourglass, closing };
 
-/// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`
-/// the gradients are stored, and nothing else is written.
+/// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`,
+/// only the gradients are written.
 /// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
 template <class Real, class StateReal, class Law, PairTerm term, bool only_gradient,
           class Halo = NoHalo>
@@ -253,7 +252,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
       const auto p = Points<Real>::at(image, lists.slots, offset);
       const Vec3<Real> x = p.x - own.x;
       const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
-      // Nobody is far away: their distance alone would leave the range of float.
+      // Null slots are skipped: the squares of their distances leave the range of float.
       if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
@@ -281,9 +280,9 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
   }
 }
 
-/// Pass 2: gathers Q into forces and takes one step. With `only_force` the internal forces go to
-/// `force`, shape [3, places], and nothing else is written. With `extra_forces`, what the scene has
-/// of loads and pulls is added; with `closed` what closing stresses do.
+/// Pass 2: gathers Q into forces and takes one step. With `only_force`, only the internal forces
+/// are written, to `force`, shape [3, places]. With `extra_forces`, loads and the forces of
+/// hourglass control are added; with `closed`, those of closing stresses.
 template <class Real, class StateReal, bool own_supports, bool damped, bool extra_forces,
           bool only_force, class Halo = NoHalo, bool closed = false>
 __global__ void __launch_bounds__(tile_size,
@@ -297,7 +296,7 @@ __global__ void __launch_bounds__(tile_size,
   const TileLists::Row row = lists.rows[place / warp_size];
   exchange.before(tile);
   fetch_tile(f.stresses, lists, tile, image);
-  // Behind the records: closing stresses, then a support of each point.
+  // The records are followed by closing stresses, then by the support of each point.
   char* closings = image + Stresses<Real>::bytes * lists.slots;
   if constexpr (closed) fetch_tile(f.closing_stresses, lists, tile, closings);
   Real* supports =

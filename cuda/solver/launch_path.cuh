@@ -10,29 +10,29 @@
 
 namespace phyxel::cuda {
 
-/// Steps of a graph, and of a launch of resident steps that leaves a trail for surfels.
+/// Steps per graph, and per launch of resident steps that records a trail for surfels.
 inline constexpr int steps_together = 16;
 
-/// How steps are launched: resident, by graphs, or else two launches a step. All give the same
-/// bits.
+/// The way in which steps are launched: resident, by graphs, or with two launches per step. All
+/// give the same bits.
 template <class Real, class StateReal>
 struct LaunchPath {
-  std::unique_ptr<Residence<Real, StateReal>> residence;  ///< Null: steps are not resident.
+  std::unique_ptr<Residence<Real, StateReal>> residence;  ///< Null if steps are not resident.
   bool recorded = false;  ///< True if `steps_together` steps are one graph.
-  std::string reason;     ///< Of this choice, in words.
+  std::string reason;     ///< Reason of the choice, for messages.
 };
 
-/// Chooses how steps are launched: resident in shared memory where the model allows it, else by
-/// graphs where launches would count, else two launches a step. Of a share: collective.
-/// @param halo of a share, or null
+/// Chooses how steps are launched: resident in shared memory if the model allows it, else by graphs
+/// if launches would cost time, else with two launches per step. Collective on a share.
+/// @param halo halo of a share, or null
 template <class Real, class StateReal>
 LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& model,
                                         const DeviceHalo<Real, StateReal>* halo,
                                         const Boundary<Real, StateReal>& boundary,
                                         CudaPath wanted) {
-  constexpr Index most_recorded = 4'000'000;  // a step of more takes longer than its launches
+  constexpr Index most_recorded = 4'000'000;  // larger models: a step outlasts its launches
   LaunchPath<Real, StateReal> path;
-  std::string launches;  // why there is no graph; empty: there is one
+  std::string launches;  // reason against a graph; empty if there is none
   if (wanted == CudaPath::launches) {
     launches = "as asked";
   } else if (boundary.changes()) {
@@ -43,7 +43,7 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
     launches = "the host takes part in the exchange between ranks";
   }
   if (model.share()) {
-    // Ranks launch alike, or one would wait for what another has not launched yet.
+    // All ranks choose alike, or one would wait for kernels that another has not launched yet.
     path.recorded = model.share()->communicator->smallest(launches.empty()) > 0;
     path.reason = path.recorded      ? "ranks exchange ghosts in every step"
                   : launches.empty() ? "another rank cannot record its steps"

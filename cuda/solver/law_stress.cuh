@@ -1,5 +1,5 @@
-/// Stresses of a tile's material: of a law that a kernel is compiled for or that each tile chooses,
-/// with volume conservation, viscosity and what phyxels remember.
+/// Stresses of a tile's material: those of a law that a kernel is compiled for or that each tile
+/// chooses, with volume conservation, viscosity and histories.
 #pragma once
 
 #include <algorithm>
@@ -10,18 +10,18 @@
 
 namespace phyxel::cuda {
 
-/// The constants of any law, the stiffness of volume conservation and the relaxation time of
-/// viscosity: as `ChosenLaw::constants`.
+/// Number of constants in `ChosenLaw::constants`: those of any law, the stiffness of volume
+/// conservation and the relaxation time of viscosity.
 inline constexpr int law_numbers = Laws::most_constants + 2;
 
-/// A law that is chosen at run time, tile by tile, among those that remember nothing: for resident
-/// kernels that serve bodies of several laws.
+/// A law chosen at run time, per tile, among those without a history: for resident kernels that
+/// serve bodies of several laws.
 struct AnyLaw {};
-/// The same among all laws, each with viscosity.
+/// A law chosen likewise among all laws, with viscosity.
 struct AnyViscousLaw {
   static constexpr bool many_registers = true;
 };
-/// The same among all laws, with viscosity or without.
+/// A law chosen likewise among all laws, with or without viscosity.
 struct AnyLawWithHistory {
   static constexpr bool many_registers = true;
 };
@@ -42,14 +42,15 @@ struct MostHistory<Real, LawList<Law...>> {
 };
 }  // namespace detail
 
-/// The most numbers that a phyxel remembers in a kernel for a law; 0: the kernel knows no history.
+/// The largest number of history values of a phyxel in a kernel for a law; 0 if the kernel has no
+/// history.
 template <class Law, class Real>
 inline constexpr int kept_numbers =
     std::is_same_v<Law, AnyViscousLaw> || std::is_same_v<Law, AnyLawWithHistory>
         ? detail::MostHistory<Real, Laws>::value
         : history_numbers<Law, Real>;
 
-/// What a phyxel remembers, in global memory: number k is at values[k * places + place].
+/// The history of a phyxel in global memory: number k is values[k * places + place].
 template <class Real>
 struct HistoryColumns {
   Real* values;
@@ -73,12 +74,12 @@ struct HistoryColumns {
   }
 };
 
-/// What a phyxel remembers, in registers.
+/// The history of a phyxel in registers.
 template <class Real, int most>
 struct HistoryRegisters {
   Real values[most]{};
 
-  /// Takes `numbers` numbers from global memory, or puts them back.
+  /// Loads `numbers` numbers from global memory; `put` stores them.
   __device__ void fetch(const HistoryColumns<Real>& columns, int numbers) {
 #pragma unroll
     for (int k = 0; k < most; ++k) {
@@ -109,8 +110,8 @@ struct HistoryRegisters<Real, 0> {
   __device__ void put(const HistoryColumns<Real>&, int) const {}
 };
 
-/// P of a law [Pa].
-/// @param history of the phyxel, which becomes what `use` says
+/// Returns P of a law [Pa].
+/// @param history history of the phyxel, treated as `use` says
 /// @param interval time from the history to the present displacements [s]
 template <class Law, class Real, class History>
 __device__ Mat3<Real> stress_of_law(const Law& law, const Mat3<Real>& grad_u,
@@ -128,8 +129,9 @@ __device__ Mat3<Real> stress_of_law(const Law& law, const Mat3<Real>& grad_u,
   }
 }
 
-/// P of a tile's material [Pa]: its law and, where it has them, volume conservation and viscosity.
-/// @tparam Law one of `Laws`, of which viscosity is left out, or one chosen at run time
+/// Returns P of a tile's material [Pa]: its law, with volume conservation and viscosity if it has
+/// them.
+/// @tparam Law one of `Laws`, then without viscosity, or a law chosen at run time
 template <class Law, class Real, class Constants, class History>
 __device__ Mat3<Real> stress_of_material(const Constants& body, const Mat3<Real>& grad_u,
                                          History&& history, HistoryUse use, Real interval) {

@@ -1,11 +1,11 @@
-/// The way between blocks through global memory.
+/// The channel between blocks through global memory.
 #pragma once
 
 #include "solver/resident_memory.cuh"
 
 namespace phyxel::cuda {
 
-/// Through global memory. All threads fetch, the first `slice_size` compute.
+/// Sends through mailboxes in global memory. All threads fetch; the first `slice_size` compute.
 template <class Real>
 struct MailboxChannel {
   static constexpr int threads = 128;
@@ -31,8 +31,7 @@ struct MailboxChannel {
     __syncthreads();
   }
 
-  /// Writes a phyxel's numbers where all that need them find them. `kind` 0: displacements, 1:
-  /// stresses.
+  /// Writes a phyxel's numbers to its mailbox. @param kind 0 for displacements, 1 for stresses
   template <int packets>
   __device__ void send(int kind, SlotImage image, std::size_t place, bool somebody,
                        const Real* numbers) {
@@ -44,7 +43,7 @@ struct MailboxChannel {
       image.packets[k * image.slots + threadIdx.x] = packet;
     }
   }
-  /// Ends when all slots of the image are filled. Each thread asks for several packets at once.
+  /// Fills all slots of the image, with several loads of packets in flight per thread.
   template <int packets>
   __device__ void receive(int kind, SlotImage image) {
     constexpr int batch = packets >= 9 ? 1 : packets >= 3 ? 3 : 4;  // slots

@@ -13,9 +13,9 @@
 namespace phyxel::cuda {
 namespace {
 
-/// The functions of the library that is installed.
+/// The functions of the installed library.
 struct Nccl {
-  std::string trouble;  ///< Empty: it is there.
+  std::string trouble;  ///< Reason why NCCL is not available; empty if it is.
   decltype(&ncclGetVersion) get_version = nullptr;
   decltype(&ncclGetUniqueId) get_unique_id = nullptr;
   decltype(&ncclCommInitRank) init_rank = nullptr;
@@ -92,7 +92,7 @@ NcclRanks::NcclRanks(const Name& name, int rank, int count) {
 }
 
 NcclRanks::~NcclRanks() {
-  // It waits for the other ranks, who do not come if this one is about to end them all.
+  // `destroy` waits for the other ranks, which does not end if an error is about to end all ranks.
   if (std::uncaught_exceptions() == 0) nccl().destroy(ranks_);
 }
 

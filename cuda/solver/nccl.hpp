@@ -1,5 +1,5 @@
 /// NVIDIA's NCCL: messages between GPUs in the order of a stream, within a host and between hosts.
-/// Loaded when it is first asked for, so that the program starts where it is not installed.
+/// The library is loaded on first use, so that the program starts where it is not installed.
 #pragma once
 
 #include <array>
@@ -13,20 +13,21 @@ struct CUstream_st;
 
 namespace phyxel::cuda {
 
-/// "2.28.9", or "no NCCL: " and why.
+/// The version of NCCL, e.g. "2.28.9"; without it "no NCCL: " and the reason.
 std::string nccl_version();
-/// Whether it can be used here.
+/// True if NCCL can be used.
 bool has_nccl();
 
-/// Ranks that have a GPU each and send each other messages.
+/// An NCCL communicator of ranks with one GPU each.
 class NcclRanks {
  public:
-  /// The same on all ranks; one of them makes it.
+  /// The id of a communicator, which one rank makes for all.
   using Name = std::array<std::int64_t, 16>;
-  /// @throws DeviceError
+  /// Makes an id. @throws DeviceError
   static Name make_name();
 
-  /// For the current device. Collective. @throws DeviceError, above all where ranks share a GPU
+  /// Connects the current device. Collective. @throws DeviceError, in particular if ranks share a
+  /// GPU
   NcclRanks(const Name& name, int rank, int count);
   NcclRanks(const NcclRanks&) = delete;
   NcclRanks& operator=(const NcclRanks&) = delete;
@@ -36,7 +37,7 @@ class NcclRanks {
     int rank;
     std::span<std::byte> bytes;  ///< In device memory.
   };
-  /// Queues messages to and from other ranks, who queue theirs.
+  /// Queues messages to and from other ranks, which must queue the matching ones.
   void exchange(std::span<const Message> outgoing, std::span<const Message> incoming,
                 CUstream_st* stream) const;
 

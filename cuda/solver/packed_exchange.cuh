@@ -1,4 +1,4 @@
-/// Exchanges of records that kernels pack and unpack.
+/// The halo exchange with records that kernels pack and unpack.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ __global__ void unpack(const __grid_constant__ Records records, const Index* pla
   if (k < count) records.set(static_cast<std::size_t>(place[k]), packed[k]);
 }
 
-/// Exchanges of records that are packed here and unpacked there.
+/// Packs the records of a share for its peers, and unpacks those of ghosts.
 template <class Model>
 class PackedExchange {
  public:
@@ -33,7 +33,7 @@ class PackedExchange {
         receive_(receive),
         transport_(std::make_unique<HostTransport>(*model.share()->transport, send, receive)) {}
 
-  /// From now on, between exchanges.
+  /// Sets the transport. Call between exchanges.
   void send_by(std::unique_ptr<PackedTransport> transport) {
     transport_ = std::move(transport);
     bytes_each_ = 0;
@@ -44,7 +44,7 @@ class PackedExchange {
     reserve(sizeof(Value));
     m_.launch_each("pack", pack<Records>, send_.count(), records, send_.on_device.data(),
                    send_.count(), reinterpret_cast<Value*>(packed_.data()));
-    // What carries has a queue of its own; it begins when all before has been packed.
+    // The transport has a stream of its own, which begins after all records have been packed.
     PHYXEL_CUDA(cudaEventRecord(packed_now_.get(), m_.stream()));
     PHYXEL_CUDA(cudaStreamWaitEvent(transport_->queue(), packed_now_.get()));
     transport_->begin(packed_.data(), arrived_.data(), sizeof(Value));
@@ -62,7 +62,7 @@ class PackedExchange {
   std::size_t bytes() const { return packed_.bytes() + arrived_.bytes(); }
 
  private:
-  /// Only between exchanges: nothing is under way.
+  /// Allocates the buffers. Call between exchanges.
   void reserve(std::size_t bytes_each) {
     if (bytes_each <= bytes_each_) return;
     m_.wait();

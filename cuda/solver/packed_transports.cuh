@@ -1,5 +1,4 @@
-/// The ways in which packed records travel between ranks: through host memory and MPI, by an MPI
-/// that takes the device's memory, or by NCCL.
+/// Transports of packed records between ranks: MPI from host memory, CUDA-aware MPI, and NCCL.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +15,7 @@
 
 namespace phyxel::cuda {
 
-/// Host memory that copies to and from the device need not stage.
+/// Page-locked host memory, which copies to and from the device need not stage.
 class PinnedBytes {
  public:
   PinnedBytes() = default;
@@ -42,7 +41,7 @@ class PinnedBytes {
   std::size_t size_ = 0;
 };
 
-/// Where each peer's records are, one peer after the other.
+/// The tile slots of each peer's records, one peer after the other.
 class PeerLists {
  public:
   PeerLists(const std::vector<HaloPlan::Peer>& peers, std::vector<Index> HaloPlan::Peer::*list,
@@ -69,14 +68,14 @@ class PeerLists {
   DeviceArray<Index> on_device;
 };
 
-/// Brings packed records to other ranks and theirs here, in a queue of its own.
+/// Exchanges packed records with other ranks, in a stream of its own.
 class PackedTransport {
  public:
   virtual ~PackedTransport() = default;
   virtual void reserve(std::size_t outgoing, std::size_t incoming) = 0;
-  /// @param bytes_each of a record
+  /// Starts an exchange. @param bytes_each size of a record [bytes]
   virtual void begin(std::byte* packed, std::byte* arrived, std::size_t bytes_each) = 0;
-  /// What is queued from now on finds `arrived` filled.
+  /// Makes work queued from now on see `arrived` filled.
   virtual void finish(std::byte* arrived, std::size_t bytes_each) = 0;
   virtual std::string describe() const = 0;
   cudaStream_t queue() const { return queue_.get(); }
@@ -85,7 +84,7 @@ class PackedTransport {
   Stream queue_;
 };
 
-/// Through host memory, by MPI.
+/// Transport by MPI through host memory.
 class HostTransport final : public PackedTransport {
  public:
   HostTransport(HaloTransport& halo, const PeerLists& send, const PeerLists& receive)
@@ -116,7 +115,7 @@ class HostTransport final : public PackedTransport {
   PinnedBytes outgoing_, incoming_;
 };
 
-/// By MPI, which gets the device's memory itself.
+/// Transport by CUDA-aware MPI, from device memory.
 class MpiTransport final : public PackedTransport {
  public:
   MpiTransport(HaloTransport& halo, const PeerLists& send, const PeerLists& receive)
@@ -137,10 +136,10 @@ class MpiTransport final : public PackedTransport {
   std::byte* packed_ = nullptr;
 };
 
-/// By NCCL; the host only queues.
+/// Transport by NCCL; the host only queues.
 class NcclTransport final : public PackedTransport {
  public:
-  /// Collective. @throws DeviceError
+  /// Connects the ranks. Collective. @throws DeviceError
   NcclTransport(const Share& share, const NcclRanks::Name& name, const PeerLists& send,
                 const PeerLists& receive)
       : plan_(*share.halo),

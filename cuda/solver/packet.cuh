@@ -1,4 +1,5 @@
-/// Packets: 16 bytes of numbers that arrive whole, as blocks of one launch send them to each other.
+/// Packets of 16 bytes, which the blocks of one launch send each other and which are written and
+/// read atomically.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -28,13 +29,13 @@ __device__ inline Packet load_packet(const Packet* from) {
   return packet;
 }
 
-/// How numbers fill packets.
+/// The layout of numbers in packets.
 template <class Real>
 struct Packing;
 
 template <>
 struct Packing<float> {
-  static constexpr int numbers = 3;  ///< Of one packet.
+  static constexpr int numbers = 3;  ///< Numbers of one packet.
   __device__ static Packet packed(const float* v, unsigned tag) {
     return {static_cast<unsigned long long>(__float_as_uint(v[1])) << 32 | __float_as_uint(v[0]),
             static_cast<unsigned long long>(tag) << 32 | __float_as_uint(v[2])};
@@ -62,7 +63,7 @@ struct Packing<double> {
 /// Packets of a phyxel's displacement.
 template <class Real>
 inline constexpr int displacement_packets = 3 / Packing<Real>::numbers;
-/// Packets of a phyxel's pair stress, and of its closing stress where gradients are closed.
+/// Packets of a phyxel's pair stress, and of its closing stress with closed gradients.
 template <class Real, bool closed>
 inline constexpr int stress_packets = (closed ? 12 : 9) / Packing<Real>::numbers;
 

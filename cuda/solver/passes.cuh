@@ -1,5 +1,5 @@
-/// The two passes of a step as launches: one for all tiles of bodies of one law side by side. Of a
-/// share, with the exchanges that they need.
+/// The launches of the two passes of a step, one for each run of consecutive tiles with one law,
+/// and the halo exchanges of a share.
 #pragma once
 
 #include "solver/device_halo.cuh"
@@ -18,7 +18,7 @@ class Passes {
   using Fused2 = FusedHalo<Points<Real>>;
 
  public:
-  /// @param halo of a share, or null
+  /// @param halo halo of a share, or null
   Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo)
       : m_(model),
         halo_(halo),
@@ -31,9 +31,10 @@ class Passes {
                                      [&](const Material& m) { return linear_pass_1_of(m); });
   }
 
-  /// What ghosts are not needed for is launched before they are waited for.
-  /// @param use what becomes of what laws remember. @param interval time from that to the present
-  ///   displacements [s]
+  /// Launches pass 1. Interior tiles, which need no ghosts, are launched before the wait for
+  /// ghosts.
+  /// @param use treatment of histories. @param interval time from the histories to the present
+  /// displacements [s]
   void stress(HistoryUse use, double interval) const {
     AllFields fields = m_.fields();
     fields.history_use = use;
@@ -52,7 +53,8 @@ class Passes {
     boundary_.stress(fields, {});
     send(Sent::stresses);
   }
-  /// Displacements may still change before other ranks get theirs (`send_displacements`).
+  /// Launches pass 2. Displacements may still change before they are sent to other ranks
+  /// (`send_displacements`).
   void advance(double dt) const {
     interior_.advance(dt, {});
     receive(Sent::stresses);
@@ -71,19 +73,19 @@ class Passes {
     advance(dt);
     send_displacements();
   }
-  /// After displacements have changed: other ranks get theirs.
+  /// Sends changed displacements to other ranks.
   void send_displacements() const { send(Sent::displacements); }
-  /// Ghosts' displacements are there for what is launched from now on.
+  /// Makes later launches see the displacements of ghosts.
   void receive_displacements() const { receive(Sent::displacements); }
 
-  /// Values of phyxels, to those who have them as ghosts, through the host. Of shares only.
+  /// Sends values of phyxels to the ranks that have them as ghosts. Of shares only.
   template <class Records>
   void exchange(const Records& records) const {
     halo_->exchange(records);
   }
 
-  /// Pass 1 of every body by the linear law that it has at rest, which volume conservation is part
-  /// of. @param constants of `DeviceModel::rest_constants`
+  /// Launches pass 1 with the linearisation of every law at rest, volume conservation included.
+  /// @param constants result of `DeviceModel::rest_constants`
   void linear_stress(const TileConstants<Real, StateReal>* constants) const {
     AllFields fields = m_.fields();
     fields.tiles = constants;
@@ -91,18 +93,19 @@ class Passes {
     for (const auto& run : linear_) launch_pass_1<NoHalo>(fields, run, {}, {});
     send(Sent::stresses);
   }
-  /// Internal forces by the stresses that pass 1 has left, into an array of shape [3, places].
+  /// Computes internal forces [N] from the stresses of pass 1. @param forces receives them, shape
+  /// [3, places]
   void gather(Real* forces) const {
     receive(Sent::stresses);
     launch_pass_2<NoHalo>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
                           StateReal(0), forces, {});
   }
-  /// Commits what laws remember: it becomes that of the present displacements.
+  /// Advances histories to the present displacements.
   void commit(double interval) const {
     stress(HistoryUse::commit, interval);
     receive(Sent::stresses);
   }
-  /// Of ghosts: zero.
+  /// Returns the internal forces [N], shape [3, places]; zero for ghosts.
   DeviceArray<Real> forces(HistoryUse use, double interval) const {
     DeviceArray<Real> forces = without_ghosts(3, "forces of ");
     stress(use, interval);
@@ -114,16 +117,17 @@ class Passes {
     put_gradients({gradients.data(), m_.places(), nullptr}, m_.tiles());
     return gradients;
   }
-  /// And, in row 9, what they do not follow of the neighbours' displacements (`add_residual`).
+  /// Returns the displacement gradients and, in row 9, the residuals of their fits
+  /// (`add_residual`), shape [10, places].
   DeviceArray<Real> gradients_and_residuals() const {
     DeviceArray<Real> rows = without_ghosts(10, "displacement gradients of ");
     put_gradients({rows.data(), m_.places(), nullptr, rows.data() + 9 * m_.places()}, m_.tiles());
     return rows;
   }
-  /// Those of `tiles` tiles.
+  /// Computes the gradients of the first `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    using Any = StVenantKirchhoff<Real>;  // gradients know no law
+    using Any = StVenantKirchhoff<Real>;  // gradients do not depend on the law
     launch_pass_1<NoHalo>(m_.fields(),
                           {m_.closed() ? pass_1<Real, StateReal, Any, PairTerm::closing, true>
                                        : pass_1<Real, StateReal, Any, PairTerm::none, true>,
@@ -132,14 +136,14 @@ class Passes {
   }
 
  private:
-  /// Tiles side by side that one launch serves.
+  /// Consecutive tiles of one launch.
   template <class Kernel>
   struct Run {
     Kernel kernel;
     Index first_tile, tiles;
   };
-  /// The launches that serve tiles [begin, end), with the kernel that `kernel_of` gives for each
-  /// part's material.
+  /// Returns the launches for tiles [begin, end). @param kernel_of returns the kernel of a part's
+  /// material
   template <class Kernel, class KernelOf>
   std::vector<Run<Kernel>> runs_of(Index begin, Index end, KernelOf&& kernel_of) const {
     std::vector<Kernel> of_part;
@@ -155,7 +159,7 @@ class Passes {
     }
     return runs;
   }
-  /// The launches of a step that serve tiles side by side.
+  /// The launches of a step for consecutive tiles.
   template <class Halo1, class Halo2>
   struct Runs {
     Runs(Index begin, Index end, const Passes& passes)
@@ -194,7 +198,7 @@ class Passes {
     return array;
   }
 
-  /// Terms chosen at run time become kernels: the one place.
+  /// Returns the kernel of a material: the one place where terms chosen at run time select kernels.
   template <class Halo>
   Pass1<Halo> pass_1_of(const Material& m) const {
     if constexpr (std::is_same_v<Halo, FusedClosed1>) {
@@ -217,7 +221,7 @@ class Passes {
                  : cuda::pass_1<Real, StateReal, Law, term, false, Halo>;
     });
   }
-  /// Pass 1 by the linear law that a material has at rest.
+  /// Returns the kernel of pass 1 with the linearisation of a law at rest.
   Pass1<NoHalo> linear_pass_1_of(const Material& m) const {
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using Linear = decltype(std::declval<Law>().at_rest(Real()));
@@ -272,7 +276,7 @@ class Passes {
   const DirectExchange<Real, StateReal>* direct_;
   Runs<NoHalo, NoHalo> interior_, boundary_;
   std::vector<Run<Pass1<NoHalo>>> linear_;  // all tiles, by the laws at rest
-  // All tiles, where passes exchange by themselves.
+  // All tiles, with the halo exchange inside the passes.
   Runs<Fused1, Fused2> fused_;
   Runs<FusedClosed1, Fused2> fused_closed_;
 };

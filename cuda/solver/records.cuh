@@ -1,6 +1,6 @@
-/// What the two passes know of a phyxel, in global memory and as images in shared memory. Whole
-/// 16-byte words, so that one load fetches four floats or two doubles; each word of all slots lies
-/// together, so that word k of slot s stands in 16-byte column s mod 8.
+/// Records of a phyxel for the two passes, in global memory and as images in shared memory. They
+/// consist of 16-byte words, so that one load fetches four floats or two doubles. In an image, word
+/// k of all slots is contiguous, so that word k of slot s is in 16-byte column s mod 8.
 #pragma once
 
 #include <cuda_runtime.h>
@@ -12,7 +12,8 @@
 
 namespace phyxel::cuda {
 
-/// Coordinates of a far point: its weight is zero for every support, its square fits float.
+/// Coordinates of a null slot: its weight is zero for every support, and the square of its distance
+/// fits a float.
 inline constexpr float far_away = 1e15F;
 
 template <int bytes>
@@ -26,21 +27,21 @@ __device__ void copy_async(void* shared, const void* global) {
 }
 __device__ inline void wait_for_copies() { asm volatile("cp.async.wait_all;" ::: "memory"); }
 
-/// Waits until all that was written before this launch is there. A launch that may begin while the
-/// one before it ends (`overlap_attribute`) reads what never changes sooner.
+/// Waits until all writes before this launch are visible. A launch that may begin before the
+/// previous one has ended (`overlap_attribute`) may read only constants before this call.
 __device__ inline void wait_for_last_launch() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.wait;" ::: "memory");
 #endif
 }
-/// Lets the next launch begin, if it may, once all blocks have come here.
+/// Lets the next launch begin, if it is allowed to overlap, once all blocks have called this.
 __device__ inline void let_next_launch_begin() {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
   asm volatile("griddepcontrol.launch_dependents;");
 #endif
 }
 
-/// Position and displacement of each place.
+/// Position and displacement of each tile slot.
 template <class Real>
 struct Points;
 
@@ -62,7 +63,7 @@ struct Points<float> {
     x_u[place] = {v.x.x, v.x.y, v.x.z, v.u.x};
     u[place] = {v.u.y, v.u.z};
   }
-  /// Starts to copy a place into a slot of an image of `slots` slots.
+  /// Starts to copy a tile slot into a slot of an image of `slots` slots.
   __device__ void fetch(char* image, int slots, int slot, Index place) const {
     copy_async<16>(image + 16 * slot, x_u + place);
     copy_async<8>(image + 16 * slots + 8 * slot, u + place);
@@ -71,7 +72,7 @@ struct Points<float> {
     reinterpret_cast<float4*>(image)[slot] = {far_away, far_away, far_away, 0};
     reinterpret_cast<float2*>(image + 16 * slots)[slot] = {0, 0};
   }
-  /// @param offset 16 × slot
+  /// Reads a slot of an image. @param offset 16 × slot
   __device__ static Value at(const char* image, int slots, unsigned offset) {
     return value(*reinterpret_cast<const float4*>(image + offset),
                  *reinterpret_cast<const float2*>(image + 16 * slots + offset / 2));
@@ -123,7 +124,7 @@ struct Points<double> {
   }
 };
 
-/// Position and pair stress Q of each place.
+/// Position and pair stress Q of each tile slot.
 template <class Real>
 struct Stresses;
 
@@ -235,7 +236,7 @@ struct Stresses<double> {
   }
 };
 
-/// Closing stress t of each place, where gradients are closed (phyxel/physics/closing.hpp).
+/// Closing stress t of each tile slot, with closed gradients (phyxel/physics/closing.hpp).
 template <class Real>
 struct ClosingStresses {
   using Word = std::conditional_t<sizeof(Real) == 4, float4, double2>;
@@ -282,8 +283,8 @@ struct ClosingStresses {
   }
 };
 
-/// The stresses of each place where gradients are closed, as they travel between ranks: what
-/// `Stresses` holds, and the closing stress.
+/// Stresses of each tile slot with closed gradients, as sent between ranks: those of `Stresses` and
+/// the closing stress.
 template <class Real>
 struct ClosedStresses {
   static constexpr int bytes = Stresses<Real>::bytes + ClosingStresses<Real>::bytes;

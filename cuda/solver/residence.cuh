@@ -1,4 +1,4 @@
-/// Bodies that stay in the shared memory of multiprocessors for many steps a launch.
+/// Resident bodies, which stay in the shared memory of multiprocessors for many steps per launch.
 #pragma once
 
 #include <array>
@@ -13,12 +13,12 @@ namespace phyxel::cuda {
 template <class Real, class StateReal>
 class Residence {
  public:
-  /// Steps of one launch, at most.
+  /// Largest number of steps per launch.
   static constexpr int most_steps = 256;
 
-  /// The residence of a model, and why there is one or none, in words.
+  /// The residence of a model, and the reason for or against it.
   struct Attempt {
-    std::unique_ptr<Residence> residence;  ///< Null: the model cannot be resident.
+    std::unique_ptr<Residence> residence;  ///< Null if the model cannot be resident.
     std::string reason;
   };
   /// Makes a model resident if each body fits a cluster, or all bodies fit at once.
@@ -29,7 +29,7 @@ class Residence {
     return {std::move(residence), std::move(reason)};
   }
 
-  /// The way of launching, in words.
+  /// Description of the launches, for messages.
   std::string describe() const {
     return cluster_ ? "resident, clusters of " + std::to_string(cluster_)
                     : "resident, " + std::to_string(slices_.size()) + " blocks";
@@ -55,9 +55,9 @@ class Residence {
 
   explicit Residence(const DeviceModel<Real, StateReal>& model) : m_(model) {}
 
-  /// Makes all that launches need, or leaves `kernel_` null. @returns why, in words
+  /// Allocates the data of launches, or leaves `kernel_` null. @returns the reason of the outcome
   std::string make() {
-    constexpr Index most_places = 1 << 18;  // far more than fit any GPU of today
+    constexpr Index most_places = 1 << 18;  // far more than any GPU can hold
     const DeviceTiling& on_device = m_.tiling();
     if (m_.size() == 0) return "there are no phyxels";
     const std::string too_large =
@@ -110,7 +110,7 @@ class Residence {
     m_.launched("weigh_pairs", slices, threads);
     m_.wait();
   }
-  /// Before a plan is made, which takes its time.
+  /// Quick check before a plan is made, which takes time.
   bool may_fit() const {
     const bool in_clusters =
         std::all_of(m_.model().parts.begin(), m_.model().parts.end(), [&](const Part& part) {
@@ -154,7 +154,8 @@ class Residence {
   }
   template <class Channel>
   const void* kernel_without_closing() const {
-    // Without hourglass control the default law alone has a kernel of its own; others may have it.
+    // Only St Venant–Kirchhoff has a kernel without hourglass control; that of every other law
+    // includes it.
     const auto kernel_of = [&]<class Law>(std::type_identity<Law>) {
       constexpr bool controlled = !std::is_same_v<Law, StVenantKirchhoff<Real>>;
       return hourglass() ? kernel<Channel, Law, true, false>()
@@ -171,7 +172,7 @@ class Residence {
     return m_.has_history() ? kernel_of(std::type_identity<AnyLawWithHistory>{})
                             : kernel_of(std::type_identity<AnyLaw>{});
   }
-  /// One cluster a body, as many blocks each as the largest has slices.
+  /// True if clusters fit: one per body, with as many blocks as the largest body has slices.
   bool fits_clusters(const ResidentPlan& plan) {
     if (m_.device().major < 9) return false;
     use_channel<ClusterChannel<Real>>(plan);
@@ -188,7 +189,7 @@ class Residence {
     const LaunchOf launch(*this);
     int clusters = 0;
     const cudaError_t error = cudaOccupancyMaxActiveClusters(&clusters, kernel_, &launch.config);
-    if (error != cudaSuccess) cudaGetLastError();  // an answer: too large for this GPU
+    if (error != cudaSuccess) cudaGetLastError();  // too large for this GPU: clears the error
     return error == cudaSuccess && clusters > 0;
   }
   bool fits_at_once(const ResidentPlan& plan) {
@@ -203,7 +204,7 @@ class Residence {
     return blocks_ <= static_cast<unsigned>(blocks_each * m_.device().multiprocessors);
   }
 
-  /// A launch of all blocks. CUDA reads the attributes from where they stand.
+  /// A launch of all blocks. CUDA keeps a pointer to the attributes.
   struct LaunchOf {
     cudaLaunchAttribute attributes[2];
     cudaLaunchConfig_t config{};
@@ -239,7 +240,7 @@ class Residence {
 
   const DeviceModel<Real, StateReal>& m_;
   const void* kernel_ = nullptr;
-  int cluster_ = 0;  // blocks of one; 0: by mailboxes
+  int cluster_ = 0;  // blocks per cluster; 0 with mailboxes
   unsigned blocks_ = 0, threads_ = 0;
   int shared_bytes_ = 0;
   unsigned next_tag_ = 1;  // of packets in mailboxes

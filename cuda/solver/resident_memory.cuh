@@ -1,5 +1,4 @@
-/// What resident blocks read: the plan in device memory, and the arrays of a block in shared
-/// memory.
+/// Data of resident blocks: the plan in device memory, and the arrays of a block in shared memory.
 #pragma once
 
 #include <type_traits>
@@ -10,7 +9,7 @@
 
 namespace phyxel::cuda {
 
-/// A neighbour of a phyxel: w_ij x_ij and its slot. Whole 16-byte words, with nothing left over.
+/// A neighbour of a phyxel: w_ij x_ij and its slot, packed into 16-byte words without padding.
 template <class Real>
 struct alignas(16) Pair {
   Vec3<Real> wx;
@@ -23,19 +22,19 @@ struct ResidentView {
   const Slice* slices;
   const Index* place;
   const Pair<Real>* pairs;  ///< In the order of `ResidentPlan::entries`.
-  const Real* weights;      ///< w_ij of the pairs, for the terms that need them; or null.
+  const Real* weights;      ///< w_ij of the pairs if a term needs them, else null.
   const std::uint32_t* destinations;
-  const int* slice_of_block;  ///< -1: none.
+  const int* slice_of_block;  ///< -1 for a block without a slice.
   Packet* displacements;      ///< Mailboxes, shape [packets, places]; null in clusters.
   Packet* stresses;           ///< Likewise.
   int most_slots, most_destinations;
-  int longest[2];  ///< Entries a lane may have; the second is 0 where one list serves both passes.
+  int longest[2];  ///< Most entries of a lane; the second is 0 if one list serves both passes.
 };
 
-/// What surfels need of the phyxels that carry them, after each step of a launch.
+/// The trail of a launch: values of phyxels after each step, from which surfels are computed.
 template <class Real, class StateReal>
 struct Trail {
-  Real* gradients;           ///< [steps, 9, places]; null: nothing is wanted.
+  Real* gradients;           ///< [steps, 9, places]; null without surfels.
   StateReal* displacements;  ///< [steps, 3, places]
 };
 
@@ -45,20 +44,20 @@ struct SlotImage {
   int slots;
 };
 
-/// The passes whose weights w_ij a block keeps beside the pairs.
+/// The passes for which a block keeps the weights w_ij beside the pairs.
 enum class KeptWeights { none, first_pass, both_passes };
 
-/// Where everything is in a block's shared memory.
+/// The layout of a block's shared memory.
 template <class Real>
 struct ResidentMemory {
   SlotImage displacements, stresses;
   Pair<Real>*pairs, *second_pairs;
-  Real *weights, *second_weights;  ///< As far as they are kept.
+  Real *weights, *second_weights;  ///< Null if not kept.
   Index* place_of_slot;            ///< For mailboxes.
   unsigned long long* barriers;    ///< For clusters: two.
   std::uint32_t* destinations;     ///< Likewise.
 
-  /// @param packets of a phyxel's stresses
+  /// @param packets number of packets of a phyxel's stresses
   __device__ ResidentMemory(char* shared, const ResidentView<Real>& r, int packets,
                             KeptWeights kept) {
     const int slots = r.most_slots;
@@ -79,12 +78,13 @@ struct ResidentMemory {
     barriers = reinterpret_cast<unsigned long long*>(end);
     destinations = reinterpret_cast<std::uint32_t*>(barriers + 2);
   }
-  /// As many pairs take the room of the weights of `longest` entries a lane.
+  /// Number of pairs that take the space of the weights of `longest` entries per lane.
   __host__ __device__ static int weight_pairs(int longest) {
     return longest * slice_size * static_cast<int>(sizeof(Real)) /
            static_cast<int>(sizeof(Pair<Real>));
   }
-  /// @param packets of a phyxel's stresses. @param tail what the channel needs
+  /// Bytes of shared memory of a block. @param packets number of packets of a phyxel's stresses.
+  /// @param tail bytes that the channel needs
   static int bytes(int most_slots, int longest, int second_longest, int packets, KeptWeights kept,
                    int tail) {
     int pairs = (longest + second_longest) * slice_size;

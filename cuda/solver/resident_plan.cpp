@@ -9,17 +9,17 @@
 namespace phyxel::cuda {
 namespace {
 
-/// The image of one slice: which place stands in which slot.
+/// The image of one slice: the assignment of tile slots to slots of the image.
 class Image {
  public:
-  /// Own phyxels first: their columns are those of their places.
+  /// Assigns the slice's own phyxels first, in the columns of their tile slots.
   Image(const Tiling& tiling, Index first_place) {
     place_.assign(slice_size, -1);
     for (int p = 0; p < slice_size; ++p) {
       if (tiling.phyxel[first_place + p] >= 0) place_[p] = first_place + p;
     }
   }
-  /// The slot of a place, which gets the next free one of `column` if it has none.
+  /// Returns the slot of a tile slot, which gets the next free one of `column` if it has none.
   std::uint16_t slot_of(Index place, int column) {
     std::size_t slot = static_cast<std::size_t>(column);
     for (; slot < place_.size(); slot += columns) {
@@ -36,10 +36,10 @@ class Image {
   std::vector<Index> place_;
 };
 
-/// Slices by their first places.
+/// Map from first tile slots to slices.
 using SliceAt = std::unordered_map<Index, std::size_t>;
 
-/// Finds which slices reach each other, and so make a body, and ranks them.
+/// Groups slices that reach each other into bodies, and numbers the slices of each.
 void find_bodies(const SliceAt& slice_at, ResidentPlan& plan) {
   std::vector<std::size_t> root(plan.slices.size());
   std::iota(root.begin(), root.end(), std::size_t{0});
@@ -56,7 +56,7 @@ void find_bodies(const SliceAt& slice_at, ResidentPlan& plan) {
       root[std::max(a, b)] = std::min(a, b);  // the first slice of a body is its root
     }
   }
-  std::vector<int> slices(plan.slices.size(), 0);  // of the body of each root, so far
+  std::vector<int> slices(plan.slices.size(), 0);  // slices so far of the body of each root
   for (std::size_t s = 0; s < plan.slices.size(); ++s) {
     const std::size_t first = root_of(s);
     plan.slices[s].body = first == s ? plan.bodies++ : plan.slices[first].body;
@@ -65,7 +65,7 @@ void find_bodies(const SliceAt& slice_at, ResidentPlan& plan) {
   }
 }
 
-/// Tells every slice who else needs its phyxels.
+/// Finds the slices that need the phyxels of each slice.
 void find_destinations(const SliceAt& slice_at, ResidentPlan& plan) {
   std::vector<std::array<std::vector<std::uint32_t>, slice_size>> of_slice(plan.slices.size());
   for (Slice& slice : plan.slices) {

@@ -1,4 +1,4 @@
-/// Launches of several steps recorded once, and repeated at the cost of one launch.
+/// A graph of several steps, recorded once and then launched at the cost of one launch.
 #pragma once
 
 #include "solver/device_model.cuh"
@@ -12,13 +12,13 @@ class StepGraph {
   StepGraph& operator=(const StepGraph&) = delete;
   ~StepGraph() { forget(); }
 
-  /// Launches what `steps` launches on the stream; recorded if it is not yet.
+  /// Launches the kernels that `steps` launches on the stream, and records them first if necessary.
   template <class Steps>
   void launch(cudaStream_t stream, Steps&& steps) {
     if (!graph_) record(stream, steps);
     PHYXEL_CUDA(cudaGraphLaunch(graph_, stream));
   }
-  /// To be called before anything changes that the launches were told.
+  /// Discards the recording. Call before any argument of the launches changes.
   void forget() {
     if (graph_) cudaGraphExecDestroy(std::exchange(graph_, nullptr));
   }
@@ -32,7 +32,7 @@ class StepGraph {
       steps();
     } catch (...) {
       cudaStreamEndCapture(stream, &recorded);
-      cudaGetLastError();  // what went wrong is on its way
+      cudaGetLastError();  // clears the error, which an exception reports
       if (recorded) cudaGraphDestroy(recorded);
       throw;
     }

@@ -1,4 +1,4 @@
-/// The stiffest phyxel against its state at rest, found where the state is.
+/// The largest stiffening of a phyxel relative to rest, found on the GPU.
 #pragma once
 
 #include <vector>
@@ -14,7 +14,8 @@ struct TileStiffening {
   Index phyxel;
 };
 
-/// Of equal ratios the larger stretch counts, of equal stretches the smaller number: as `Stiffest`.
+/// True if a is stiffer than b. Ties of the ratio go to the larger stretch, ties of the stretch to
+/// the smaller id, as in `Stiffest`.
 __device__ inline bool is_stiffer(const TileStiffening& a, const TileStiffening& b) {
   if (a.phyxel < 0 || b.phyxel < 0) return b.phyxel < 0;
   if (a.ratio != b.ratio) return a.ratio > b.ratio;
@@ -22,9 +23,9 @@ __device__ inline bool is_stiffer(const TileStiffening& a, const TileStiffening&
   return a.phyxel < b.phyxel;
 }
 
-/// The stiffest phyxel of each tile; -1 where a tile has none.
-/// @param gradient of the present displacements, nine rows
-/// @param number_at of each tile slot: its phyxel's global id
+/// Finds the stiffest phyxel of each tile; -1 for a tile without phyxels.
+/// @param gradient displacement gradients, nine rows
+/// @param number_at global id of the phyxel in each tile slot
 template <class Real, class StateReal>
 __global__ void find_stiffest(const __grid_constant__ Fields<Real, StateReal> f,
                               const TileMaterial* materials, const Real* gradient,
@@ -41,7 +42,7 @@ __global__ void find_stiffest(const __grid_constant__ Fields<Real, StateReal> f,
     const PrincipalStretches<double> s = principal_stretches(grad_u);
     TileStiffening here{stiffening(m.law_index, m.law, m.volume_stiffness, s), s.largest,
                         number_at[place]};
-    // What is not a number counts as infinite.
+    // A NaN counts as infinite.
     if (!(here.ratio < HUGE_VAL)) here.ratio = HUGE_VAL;
     if (!(here.stretch < HUGE_VAL)) here.stretch = HUGE_VAL;
     if (is_stiffer(here, mine)) mine = here;

@@ -1,12 +1,11 @@
-/// CUDA's streams and events, which end with their owners.
+/// CUDA streams and events with RAII.
 #pragma once
 
 #include "check.hpp"
 
 namespace phyxel::cuda {
 
-/// The queue of a model's launches. It waits for what goes through CUDA's default queue, copies
-/// above all, and that waits for it.
+/// The stream of a model's launches. It synchronises with CUDA's default stream, which copies use.
 class Stream {
  public:
   Stream() { PHYXEL_CUDA(cudaStreamCreate(&stream_)); }
@@ -19,7 +18,7 @@ class Stream {
   cudaStream_t stream_ = nullptr;
 };
 
-/// A point in a queue of launches that can be waited for.
+/// A CUDA event: a point in a stream that the host or another stream can wait for.
 class Event {
  public:
   Event() { PHYXEL_CUDA(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming)); }

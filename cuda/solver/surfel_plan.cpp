@@ -13,15 +13,14 @@ namespace {
 
 int filled_up(int count, int group) { return (count + group - 1) / group * group; }
 
-/// What decides the order of phyxels: their places in the whole model, so that sums run alike
-/// whatever share of it this is.
+/// The order of phyxels in sums: that of the whole model, so that sums do not depend on the share.
 const std::vector<Index>& order_of(const Model& model, const std::vector<Index>& place) {
   return model.share ? model.share->place : place;
 }
 
-/// The phyxels that carry the surfels from `first` on, as many of these as a block takes, in order
-/// of places, so that surfels side by side name the same one at the same time; and where the next
-/// block begins.
+/// The carriers of the surfels of one block, which begins at surfel `first`, and the first surfel
+/// of the next block. Carriers are in the order of tile slots, so that neighbouring surfels read
+/// the same one at the same time.
 struct Taken {
   std::vector<Index> phyxels;
   Index next;
@@ -92,8 +91,8 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
 
 SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place) {
   const Surfels& surfels = model.surfels;
-  // Blocks take surfels of one tile, which is that of their first carrier: who owns that has the
-  // whole tile and all its surfels, and makes the blocks that one rank would make.
+  // A block takes surfels of one tile, that of their first carrier. The rank that owns the tile has
+  // all its surfels, and makes the same blocks as a single rank.
   const auto count = static_cast<Index>(surfels.position.size());
   std::vector<Index> by_tile(static_cast<std::size_t>(count)), tile(by_tile.size());
   std::iota(by_tile.begin(), by_tile.end(), 0);

@@ -1,5 +1,5 @@
-/// Surfels in blocks whose carriers are few, and the tiles that have carriers. Plain host code
-/// without CUDA.
+/// The plan of surfel advection: blocks of surfels with few carriers, and the tiles that have
+/// carriers. Host code without CUDA.
 #pragma once
 
 #include <cstdint>
@@ -9,40 +9,40 @@
 
 namespace phyxel::cuda {
 
-inline constexpr int surfel_block = 256;  ///< Surfels a block, at most.
-inline constexpr int block_slots =
-    512;  ///< Phyxels that carry them, at most, unless one surfel has more.
-inline constexpr int carrier_group = 4;  ///< Carriers that a surfel takes at once.
+inline constexpr int surfel_block = 256;  ///< Most surfels of a block.
+inline constexpr int block_slots = 512;   ///< Most carriers of a block, unless one surfel has more.
+inline constexpr int carrier_group = 4;   ///< Carriers that a surfel processes at once.
 
-/// Surfels near each other.
+/// Surfels close to each other, advected by one block.
 struct SurfelBlock {
   int first_surfel = 0, surfels = 0;
-  Offset first_slot = 0;  ///< In `SurfelPlan::place`.
-  int slots = 0;          ///< Phyxels that carry any of its surfels.
-  /// Carrier k of surfel s: first_carrier + k * surfel_block + s; filled up to whole groups.
+  Offset first_slot = 0;  ///< First of its slots in `SurfelPlan::place`.
+  int slots = 0;          ///< Number of its carriers.
+  /// Carrier k of surfel s has the index first_carrier + k * surfel_block + s; rows are padded to
+  /// whole groups.
   Offset first_carrier = 0;
-  int carriers = 0;  ///< Of a surfel, at most.
-  Index tile = 0;    ///< One of its body's (not more: of its carriers').
-  Vec3d centre;      ///< Of its surfels at rest [m].
+  int carriers = 0;  ///< Most carriers of a surfel.
+  Index tile = 0;    ///< A tile of its body.
+  Vec3d centre;      ///< Centre of its surfels at rest [m].
 };
 
-/// A carrier's slot, and how much it counts for the surfel; zero: filled up.
+/// A carrier's slot and weight; the weight is zero for padding.
 struct Carrier {
   double weight = 0;
   int slot = 0;
 };
 
 struct SurfelPlan {
-  std::vector<Index> order;  ///< Which surfel is the k-th.
+  std::vector<Index> order;  ///< Surfels in the order of the plan.
   std::vector<SurfelBlock> blocks;
-  std::vector<Index> place;  ///< Of each slot.
+  std::vector<Index> place;  ///< Tile slot of each slot.
   std::vector<Carrier> carriers;
-  std::vector<Index> tiles;  ///< That have carriers, ascending.
+  std::vector<Index> tiles;  ///< Tiles with carriers, ascending.
   int most_slots = 0;
 };
 
-/// Of a share, blocks are those of the whole model, surfel by surfel and carrier by carrier.
-/// @param place of each phyxel, as in `Tiling`
+/// Makes the plan. On a share, blocks equal those of the whole model, in surfels and carriers.
+/// @param place tile slot of each phyxel, as in `Tiling`
 SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place);
 
 }  // namespace phyxel::cuda

@@ -1,4 +1,4 @@
-/// Surfels carried along with the phyxels, by the gradients of those that carry them.
+/// Surfel advection on the GPU.
 #pragma once
 
 #include "phyxel/physics/surfel.hpp"
@@ -8,14 +8,14 @@
 
 namespace phyxel::cuda {
 
-/// A `SurfelBlock`, with its centre from its body's origin.
+/// A `SurfelBlock`, with its centre relative to its body's origin.
 template <class Real>
 struct DeviceSurfelBlock {
   SurfelBlock at;
   Vec3<Real> centre;
 };
 
-/// A `Carrier`.
+/// A `Carrier` in device memory.
 template <class Real>
 struct alignas(2 * sizeof(Real)) DeviceCarrier {
   Real weight;
@@ -26,21 +26,21 @@ struct alignas(2 * sizeof(Real)) DeviceCarrier {
 template <class Real, class StateReal>
 struct DeviceSurfels {
   const DeviceSurfelBlock<Real>* blocks;
-  const Index *place, *row;  ///< Of a slot: in the fields, and in the trail.
+  const Index *place, *row;  ///< Index of a slot in the fields, and in the trail.
   const DeviceCarrier<Real>* carriers;
-  const Vec3<Real>*position, *normal;  ///< At rest; positions from the centre of the block.
+  const Vec3<Real>*position, *normal;  ///< At rest; positions relative to the centre of the block.
   Vec3<StateReal>*displacement, *moved_normal;  ///< [steps, surfels]
-  Trail<Real, StateReal> trail;                 ///< Displacements null: as in the fields.
-  std::size_t stride, surfels;                  ///< Places of the trail, and surfels.
+  Trail<Real, StateReal> trail;                 ///< Null displacements: those of the fields.
+  std::size_t stride, surfels;                  ///< Tile slots of the trail; number of surfels.
   int most_slots;
 };
 
-/// The motions of carriers, u + ∇u (x - x_i) at the centre x of a block and ∇u: twelve numbers, as
-/// in an image of stresses.
+/// Motions of carriers, in the layout of an image of stresses: u + ∇u (x - x_i), at the centre x of
+/// a block, and ∇u.
 template <class Real>
 using CarrierMotions = Stresses<Real>;
 
-/// A thread a surfel and step.
+/// Advects surfels. One thread per surfel and step.
 template <class Real, class StateReal>
 __global__ void __launch_bounds__(surfel_block)
     move_surfels(const __grid_constant__ Fields<Real, StateReal> f,
@@ -104,7 +104,7 @@ __global__ void __launch_bounds__(surfel_block)
   s.moved_normal[out] = (StateReal(1) / sqrt(dot(normal, normal))) * normal;
 }
 
-/// What the owner of a phyxel that carries surfels of other ranks sends them.
+/// Records of phyxels that carry surfels of other ranks, which their owner sends.
 template <class Real, class StateReal>
 struct CarrierRecords {
   Real* gradients;  ///< [9, places]
@@ -138,13 +138,13 @@ struct CarrierRecords {
 template <class Real, class StateReal>
 class SurfelAdvection {
  public:
-  /// @param trail_steps of which `launch_trail` may be told, the steps of all places; 0: `launch`
-  ///   will do, which finds the gradients of the tiles that carry surfels
+  /// @param trail_steps largest number of steps of `launch_trail`; 0 if only `launch` is used,
+  /// which computes the gradients of tiles with carriers alone
   SurfelAdvection(const DeviceModel<Real, StateReal>& model, int trail_steps)
       : SurfelAdvection(model, trail_steps, make_surfel_plan(model.model(), model.tiling().place)) {
   }
 
-  /// As the phyxels are now. Steps may be under way.
+  /// Computes the surfels at the present state. Steps may be in progress.
   void launch(const Passes<Real, StateReal>& passes) const {
     if (m_.share()) {
       passes.put_gradients({gradients_.data(), stride_, nullptr}, m_.tiles());
@@ -157,7 +157,7 @@ class SurfelAdvection {
     }
     launch_kernel({gradients_.data(), nullptr}, 1);
   }
-  /// To be filled before `launch_trail`.
+  /// The trail that must be filled before `launch_trail`.
   Trail<Real, StateReal> trail() const { return {gradients_.data(), displacements_.data()}; }
   void launch_trail(int steps) const { launch_kernel(trail(), steps); }
   void download(SurfelState& out) const {
@@ -200,7 +200,7 @@ class SurfelAdvection {
       blocks.push_back({block, to<Real>(block.centre - origin)});
       for (int k = 0; k < block.surfels; ++k) {
         const auto s = static_cast<std::size_t>(plan.order[block.first_surfel + k]);
-        // From the centre as it is on the device.
+        // Relative to the centre as rounded on the device.
         const Vec3d centre = to<double>(blocks.back().centre) + origin;
         position.push_back(to<Real>(surfels.position[s] - centre));
         normal.push_back(to<Real>(surfels.normal[s]));
@@ -244,7 +244,7 @@ class SurfelAdvection {
                          order_.size(), most_slots_});
   }
 
-  /// Where each slot is among the tiles that carry surfels.
+  /// Returns the index of each slot among the slots of tiles with carriers.
   static std::vector<Index> rows_of(const SurfelPlan& plan) {
     std::vector<Index> rows;
     for (const Index place : plan.place) {
@@ -259,10 +259,10 @@ class SurfelAdvection {
   std::vector<Index> order_;
   int most_slots_ = 0, shared_bytes_ = 0;
   std::size_t stride_ = 0;
-  mutable std::size_t last_steps_ = 1;  // that the surfels were last moved after, together
+  mutable std::size_t last_steps_ = 1;  // steps of the last launch
   DeviceArray<DeviceSurfelBlock<Real>> blocks_;
   DeviceArray<Index> place_;
-  DeviceArray<Index> row_, tiles_;  // empty: the trail has all places
+  DeviceArray<Index> row_, tiles_;  // empty if the trail has all tile slots
   DeviceArray<DeviceCarrier<Real>> carriers_;
   DeviceArray<Vec3<Real>> position_, normal_;
   DeviceArray<Vec3<StateReal>> displacement_, moved_normal_;

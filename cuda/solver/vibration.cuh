@@ -1,5 +1,6 @@
-/// Vectors of three numbers a place, for the largest eigenfrequency. One thread a place. Products
-/// do not depend on the order of tiles, nor on which rank has which.
+/// Vectors with three numbers per tile slot for the largest eigenfrequency. Kernels run one thread
+/// per tile slot. Products depend neither on the order of tiles nor on their distribution over
+/// ranks.
 #pragma once
 
 #include <bit>
@@ -21,10 +22,10 @@ template <class Real>
 __device__ Real root_of_inverse_mass(const Real* force_constants, std::size_t places,
                                      std::size_t place) {
   const Real signed_inverse = force_constants[3 * places + place];
-  return sqrt(signed_inverse < Real(0) ? -signed_inverse : signed_inverse);  // held: taken as free
+  return sqrt(signed_inverse < Real(0) ? -signed_inverse : signed_inverse);  // < 0: fixed
 }
 
-/// u = a M^-1/2 x
+/// Computes u = a M^-1/2 x.
 template <class Real, class StateReal>
 __global__ void bend(Fields<Real, StateReal> f, const Real* x, Real amplitude) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
@@ -34,7 +35,7 @@ __global__ void bend(Fields<Real, StateReal> f, const Real* x, Real amplitude) {
   f.points.set(place, point);
 }
 
-/// u = there + a M^-1/2 x
+/// Computes u = there + a M^-1/2 x.
 template <class Real, class StateReal>
 __global__ void bend_from(Fields<Real, StateReal> f, const Real* there, const Real* x,
                           Real amplitude) {
@@ -59,8 +60,8 @@ __global__ void put_displacements(Fields<Real, StateReal> f, const Real* kept) {
   f.points.set(place, point);
 }
 
-/// The largest |M^-1/2 x| of a place, as the bits of a float: those of floats that are not negative
-/// are in the order of the floats.
+/// Finds the largest |M^-1/2 x| of a tile slot, as the bits of a float: bits of non-negative floats
+/// have the order of the floats.
 template <class Real, class StateReal>
 __global__ void find_farthest(Fields<Real, StateReal> f, const Real* x, unsigned* largest) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
@@ -78,7 +79,7 @@ __global__ void find_farthest(Fields<Real, StateReal> f, const Real* x, unsigned
   if (threadIdx.x == 0) atomicMax(largest, __float_as_uint(shared[0]));
 }
 
-/// y = -M^-1/2 f / a - beta x
+/// Computes y = -M^-1/2 f / a - beta x.
 template <class Real, class StateReal>
 __global__ void stiffness_times(Fields<Real, StateReal> f, const Real* force, const Real* x,
                                 Real beta, Real amplitude, Real* y) {
@@ -88,7 +89,7 @@ __global__ void stiffness_times(Fields<Real, StateReal> f, const Real* force, co
               scale * column3(force, f.places, place) - beta * column3(x, f.places, place));
 }
 
-/// y -= alpha x
+/// Computes y -= alpha x.
 template <class Real>
 __global__ void subtract_multiple(Real* y, const Real* x, std::size_t places, Real alpha) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
@@ -101,7 +102,8 @@ __global__ void scale_vector(Real* x, std::size_t places, Real factor) {
   for (int e = 0; e < 3; ++e) x[e * places + place] *= factor;
 }
 
-/// a · b, over a tile in a fixed tree, over tiles without rounding into an `ExactSum`'s words.
+/// Adds a · b to the words of an `ExactSum`: in a fixed tree over a tile, without rounding over
+/// tiles.
 template <class Real>
 __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
                                unsigned long long* words) {
@@ -119,8 +121,8 @@ __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
   if (threadIdx.x == 0) add_exactly(words, shared[0]);
 }
 
-/// The vectors of Lanczos' iteration on M^-1/2 K M^-1/2, on the device. The start vector does not
-/// depend on the order of tiles. Derived classes apply the stiffness K.
+/// The vectors of the Lanczos iteration on M^-1/2 K M^-1/2, on the device. Derived classes apply
+/// the stiffness K.
 template <class Real, class StateReal>
 class CudaLanczosVectors : public Vibration {
  public:
@@ -156,7 +158,7 @@ class CudaLanczosVectors : public Vibration {
   const Passes<Real, StateReal>& passes() const { return passes_; }
   const DeviceArray<Real>& current() const { return current_; }
   const DeviceArray<Real>& force() const { return force_; }
-  /// next = -M^-1/2 force / a - beta previous. @returns next · current
+  /// Computes next = -M^-1/2 force / a - beta previous. @returns next · current
   double times_stiffness(Real amplitude, double beta) {
     m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
                     previous_.data(), static_cast<Real>(beta), amplitude, next_.data());
@@ -184,7 +186,7 @@ class CudaLanczosVectors : public Vibration {
   DeviceArray<Real> previous_, current_, next_, force_;
 };
 
-/// The stiffness at rest, by the linear law that every material has there.
+/// The stiffness at rest, by the linearisation of every law.
 template <class Real, class StateReal>
 class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;
@@ -205,9 +207,9 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   }
 
  private:
-  /// Makes displacements of a vector's ones the size of a support: smallest support times the root
-  /// of the smallest mass. Forces of a unit vector then stay as far from the ends of float as those
-  /// of a step.
+  /// Returns the amplitude that scales vectors to displacements, the smallest support times the
+  /// root of the smallest mass: entries of one become displacements of a support, whose forces are
+  /// as far from the limits of float as those of a step.
   static Real amplitude_at_rest(const phyxel::Model& model) {
     double support = 0, mass = 0;
     for (Index i = 0; i < model.size(); ++i) {
@@ -216,7 +218,7 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
       if (m > 0 && (mass == 0 || m < mass)) mass = m;
     }
     if (model.share) {
-      // Of all ranks; a rank may have nobody.
+      // Over all ranks; a rank may have no phyxels.
       const auto smallest = [&](double value) {
         const double nobody = std::numeric_limits<double>::infinity();
         const double all = model.share->communicator->smallest(value > 0 ? value : nobody);
@@ -232,15 +234,15 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   DeviceArray<TileConstants<Real, StateReal>> tiles_;
 };
 
-/// The stiffness at the present displacements, by differences of forces there, with what laws
-/// remember held: unloading is elastic. The destructor restores the displacements; velocities are
-/// not touched.
+/// The stiffness at the present displacements, by differences of forces there, at fixed histories,
+/// since unloading is elastic. The destructor restores the displacements; velocities are not
+/// touched.
 template <class Real, class StateReal>
 class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;
 
  public:
-  /// @param distance how far the other displacements are off [m]
+  /// @param distance size of the displacement in differences [m]
   CudaDeformedVibration(const DeviceModel<Real, StateReal>& model,
                         const Passes<Real, StateReal>& passes, double distance)
       : Base(model, passes),
@@ -262,7 +264,7 @@ class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
                                  this->model().fields(), present_.data());
       this->passes().send_displacements();
       this->model().wait();
-    } catch (const DeviceError&) {  // the next step meets it again
+    } catch (const DeviceError&) {  // the next step reports it
     }
   }
 

@@ -1,4 +1,4 @@
-/// Loads and prescribed motions of a model, as all solvers see them.
+/// Loads and prescribed motions of a model, shared by all solvers.
 #pragma once
 
 #include <utility>
@@ -24,8 +24,8 @@ inline void add_loads(const Model& model, double time, std::vector<Vec3d>& force
   for_each_load(model, time, [&](Index i, Vec3d load) { force[i] += load; });
 }
 
-/// 1 along axes that a phyxel is free along, 0 along prescribed ones, shape [n]. Empty for a model
-/// without prescribed motions.
+/// Returns 1 for the free axes of each phyxel and 0 for prescribed ones, shape [n]. Empty for a
+/// model without prescribed motions.
 inline std::vector<Vec3d> free_axes(const Model& model) {
   std::vector<Vec3d> free(model.motions.empty() ? 0 : static_cast<std::size_t>(model.size()),
                           {1, 1, 1});
@@ -35,7 +35,7 @@ inline std::vector<Vec3d> free_axes(const Model& model) {
   return free;
 }
 
-/// Sets the displacements that motions prescribe at `time` [s]; others stay.
+/// Sets the displacements that motions prescribe at `time` [s]; others do not change.
 /// @param displacement [m], shape [n]
 inline void prescribe_displacements(const Model& model, double time,
                                     std::vector<Vec3d>& displacement) {

@@ -1,4 +1,4 @@
-/// How much each carrier counts for its surfel.
+/// Weights of the phyxels that carry a surfel.
 #pragma once
 
 #include <algorithm>
@@ -9,9 +9,9 @@
 
 namespace phyxel {
 
-/// Weights of a surfel's carriers over the largest of them, in the order of the carriers: only
-/// ratios matter, and full weights of a small body leave the range of float. A lone carrier may be
-/// out of reach (h too small) and counts as one.
+/// Returns the weights of a surfel's carriers divided by the largest of them, in the order of the
+/// carriers: only ratios matter, and full weights of a small body leave the range of float. The
+/// weight of a lone carrier is one, even if the surfel is outside its support.
 inline std::vector<double> carrier_weights(const Model& model, Index surfel) {
   std::vector<double> weights;
   for (const Index i : model.surfels.carriers.row(surfel)) {

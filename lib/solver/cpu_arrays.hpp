@@ -1,5 +1,5 @@
-/// The arrays of the CPU backend, by slot: what does not change of a model, its state, and the
-/// records that neighbours read.
+/// The arrays of the CPU backend, by slot: constants of the model, its state, and the records that
+/// neighbours read.
 #pragma once
 
 #include <algorithm>
@@ -17,18 +17,19 @@
 
 namespace phyxel {
 
-/// What the first pass reads of a phyxel, and where each value stands in its record.
+/// Record of a phyxel that the first pass reads: its length, and the offset of each value.
 struct PointRecord {
   static constexpr int size = 8;
   enum { position = 0, inverse_h_squared = 3, displacement = 4 };
 };
-/// What the second pass reads of a phyxel.
+/// Record of a phyxel that the second pass reads, likewise.
 struct StressRecord {
   static constexpr int size = 16;
   enum { pair_stress = 0, closing_stress = 9, position = 12, inverse_h_squared = 15 };
 };
 
-/// @tparam Real of the work on neighbours. @tparam StateReal of displacements and velocities
+/// Arrays of one model. @tparam Real scalar of neighbour sums. @tparam StateReal scalar of
+/// displacements and velocities
 template <class Real, class StateReal>
 class CpuArrays {
  public:
@@ -36,7 +37,7 @@ class CpuArrays {
   using P = Pack<Real, W>;
   using S = Pack<StateReal, W>;
 
-  /// @param boundary of `boundary_phyxels`
+  /// Packs the constants of a model. @param boundary result of `boundary_phyxels`
   CpuArrays(const Model& model, const std::vector<char>& boundary)
       : model_(model.with_lists()),
         layout_(model, boundary, W),
@@ -123,7 +124,7 @@ class CpuArrays {
 
   // --- records ----------------------------------------------------------------------------------
 
-  // An offset in records outgrows 32 bits long before a slot does.
+  // Offsets in records exceed 32 bits for far fewer slots than slot numbers do.
   PHYXEL_HD Real* point_record(Index slot) {
     return points_.data() + std::ptrdiff_t{slot} * PointRecord::size;
   }
@@ -133,7 +134,7 @@ class CpuArrays {
   PHYXEL_HD Real* stress_record(Index slot) {
     return stresses_.data() + std::ptrdiff_t{slot} * StressRecord::size;
   }
-  /// What ghosts take from their owners.
+  /// The displacements in the point records, which ghosts receive from their owners.
   Records displacement_records() {
     return records_of(points_, PointRecord::size, PointRecord::displacement, 3);
   }
@@ -185,7 +186,7 @@ class CpuArrays {
     }
   }
 
-  // --- history: [pack][number][lane], of packs whose law remembers ------------------------------
+  // --- history: [pack][number][lane], of packs whose law has one --------------------------------
 
   /// The history of the phyxels of pack p under `Law`.
   template <class Law>
@@ -207,8 +208,8 @@ class CpuArrays {
 
   // --- set-up -----------------------------------------------------------------------------------
 
-  /// Packs what does not change of one body. Positions are taken from the body's first phyxel, so
-  /// that a body far from the origin keeps its digits in float.
+  /// Packs the constants of one body. Positions are relative to the body's first phyxel, so that a
+  /// body far from the origin keeps its digits in float.
   void pack_part(std::size_t p) {
     const Part& part = model_.parts[p];
     for (Index i = part.begin; i < part.end; ++i) {
@@ -244,7 +245,7 @@ class CpuArrays {
     set_values(point_record(slot) + PointRecord::displacement, u);
   }
 
-  /// Makes room for what the laws remember.
+  /// Allocates the histories of laws that have one.
   void make_history() {
     history_columns_ = history_columns(model_);
     if (history_columns_.empty()) return;
@@ -261,8 +262,8 @@ class CpuArrays {
     }
     history_.assign(history_start_.back(), Real(0));
   }
-  /// Calls visit(phyxel, column, where it is in `history_`) for each number that a phyxel of this
-  /// rank remembers.
+  /// Calls visit(phyxel, column, index in `history_`) for each history number of this rank's
+  /// phyxels.
   template <class Visit>
   void for_each_history(Visit&& visit) const {
     for (std::size_t p = 0; p < columns_of_part_.size(); ++p) {
@@ -276,7 +277,7 @@ class CpuArrays {
       }
     }
   }
-  /// Finds the slots that no phyxel has.
+  /// Lists the slots without a phyxel in `padding_`.
   void find_padding() {
     std::vector<char> taken(static_cast<std::size_t>(layout_.slots()), 0);
     for (Index i = 0; i < model_.size(); ++i) taken[layout_.slot(i)] = 1;
@@ -284,7 +285,7 @@ class CpuArrays {
       if (!taken[slot]) padding_.push_back(slot);
     }
   }
-  /// Gravity moves the slots that no phyxel has, too; they are to hold zeros.
+  /// Resets slots without a phyxel to zero, since gravity accelerates them too.
   void clear_padding() {
     for (const Index slot : padding_) {
       set3(displacement_, slot, {});
@@ -327,18 +328,18 @@ class CpuArrays {
 
   const Model& model_;
   Layout layout_;
-  PackedLists lists_, inverse_;            // inverse_ is empty when lists_ is its own inverse
+  PackedLists lists_, inverse_;            // inverse_ is empty if lists are symmetric
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
-  AlignedVector<Real> applied_;  // forces of loads and of the caller; empty unless there are any
-  AlignedVector<Real> pull_;     // of hourglass control; likewise
-  AlignedVector<Real> closing_;  // of closed gradients; likewise
+  AlignedVector<Real> applied_;  // forces of loads and of the caller; empty if there are none
+  AlignedVector<Real> pull_;     // forces of hourglass control; likewise
+  AlignedVector<Real> closing_;  // b, ĉ and t of closed gradients; likewise
   std::vector<std::string> history_columns_;
-  std::vector<std::vector<std::size_t>> columns_of_part_;  // of the numbers of its law
-  std::vector<std::size_t> history_start_;  // [packs + 1]; empty unless laws remember
+  std::vector<std::vector<std::size_t>> columns_of_part_;  // history columns of each part's law
+  std::vector<std::size_t> history_start_;  // [packs + 1]; empty if no law has a history
   AlignedVector<Real> history_;
-  double history_interval_ = 0;  // from the history to the displacements [s]
+  double history_interval_ = 0;  // time from the history to the displacements [s]
   std::vector<Index> padding_;   // slots without a phyxel
 };
 

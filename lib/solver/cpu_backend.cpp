@@ -1,4 +1,4 @@
-/// The CPU backend: what it does of its passes, and what it tells of them.
+/// The CPU backend: drives the passes of `CpuPasses` and reports on them.
 #include <fmt/format.h>
 #include <omp.h>
 
@@ -35,7 +35,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
                        threads() == 1 ? "" : "s", W);
   }
   int threads() const override {
-    int used = 1;  // small bodies leave threads alone
+    int used = 1;  // small bodies use fewer threads
     for (const auto& runs : {boundary_runs_, interior_runs_}) {
       for (const Run& run : runs) used = std::max(used, this->threads_for(run.range));
     }
@@ -85,7 +85,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
   void set_history_interval(double interval) override { history_interval_ = interval; }
   void commit_history() override {
-    if (this->history_columns_.empty()) return;  // of all ranks alike
+    if (this->history_columns_.empty()) return;  // the same on all ranks
     find_stresses(HistoryUse::commit);
     history_interval_ = 0;
   }
@@ -190,13 +190,13 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::threads_;
   using Passes::velocity_;
 
-  /// Pass 1 of all phyxels.
+  /// Runs pass 1 for all phyxels.
   void find_stresses(HistoryUse use) {
     const Phase phase("stresses");
     this->pass(this->stress_records(),
                [&](const std::vector<Run>& runs) { Passes::find_stresses(runs, use); });
   }
-  /// Pass 2 of all phyxels, from `time` on.
+  /// Runs pass 2 for all phyxels, from `time` [s] to `time` + `dt`.
   void advance(double time, double dt) {
     const Phase phase("forces, motion");
     apply_loads(time);
@@ -207,7 +207,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     this->follow_motions(time, dt, false);
     this->clear_padding();
   }
-  /// Sums the forces that are applied at `time`; again only while a load still grows.
+  /// Sums the forces that are applied at `time` [s]. Repeated calls sum again only while a load
+  /// still grows.
   void apply_loads(double time) {
     if (applied_.empty()) return;
     double scales = 0;
@@ -228,10 +229,10 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   std::vector<Vec3d> external_force_;
-  std::optional<double> load_time_;  // of `applied_`, once it is summed
+  std::optional<double> load_time_;  // time of `applied_`; none before the first sum
   double load_scales_ = 0;
-  std::optional<CpuSurfels<StateReal>> surfels_;  // once they have been asked for
-  SurfelState moved_surfels_;                     // of `update_surfels`
+  std::optional<CpuSurfels<StateReal>> surfels_;  // created on the first `update_surfels`
+  SurfelState moved_surfels_;                     // result of `update_surfels`
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
-/// How the CPU backend numbers phyxels: bodies start at a multiple of the SIMD width, so that a
-/// pack never mixes two bodies, nor a share's boundary, interior and ghosts; neighbour lists are
-/// stored pack by pack.
+/// The numbering of phyxels in the CPU backend. Each body starts at a multiple of the SIMD width,
+/// and so do the boundary, interior and ghosts of a share, so that a pack never mixes two of them.
+/// Neighbour lists are stored pack by pack.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,7 @@
 
 namespace phyxel {
 
-/// std::vector storage aligned for SIMD and for whole cache lines; in huge pages, where it is
-/// large.
+/// A std::vector aligned to cache lines, and so for SIMD; large ones are in huge pages.
 template <class T>
 struct AlignedAllocator {
   using value_type = T;
@@ -46,8 +45,8 @@ struct PackRange {
   Index begin = 0, end = 0;
 };
 
-/// Whether each phyxel of a share is a ghost of another rank or has a ghost in its lists, shape
-/// [n]. Empty if the model is no share.
+/// Returns true for each phyxel of a share that another rank has as a ghost or that has a ghost in
+/// its lists, shape [n]. Empty if the model is not a share.
 inline std::vector<char> boundary_phyxels(const Model& model) {
   if (!model.share) return {};
   std::vector<char> boundary(static_cast<std::size_t>(model.size()), 0);
@@ -67,12 +66,13 @@ inline std::vector<char> boundary_phyxels(const Model& model) {
   return boundary;
 }
 
-/// Slots: phyxels renumbered so that what is alike fills whole packs: first the boundary of all
-/// bodies, then their interior, then their ghosts. Slots past an end are padding: they have no
-/// neighbours but themselves, no volume and no mass.
+/// Slots are phyxels renumbered so that each group fills whole packs: first the boundary of all
+/// bodies, then their interior, then their ghosts. Slots past the end of a group are padding: they
+/// have only themselves as neighbours, and neither volume nor mass.
 class Layout {
  public:
-  /// @param boundary of `boundary_phyxels`; empty: all is interior
+  /// Numbers the slots of a model. @param boundary result of `boundary_phyxels`; if empty, all
+  /// phyxels are interior. @param width lanes of a pack
   Layout(const Model& model, const std::vector<char>& boundary, int width)
       : width_(width), slot_(static_cast<std::size_t>(model.size())) {
     const auto is_boundary = [&](Index i) { return !boundary.empty() && boundary[i]; };
@@ -117,7 +117,7 @@ class Layout {
 };
 
 /// Neighbour lists in packs ("sliced ELLPACK"): entry k of the `width` phyxels of pack p stands at
-/// indices[start[p] + k * width ...]. Short rows are filled with the phyxel itself, whose share of
+/// indices[start[p] + k * width ...]. Short rows are filled with the phyxel itself, whose term in
 /// every sum is exactly zero (x_ii = 0, u_ii = 0).
 struct PackedLists {
   std::vector<Offset> start;  ///< shape [packs + 1]

@@ -23,15 +23,15 @@
 
 namespace phyxel {
 
-/// A caller's law for the phyxels of a pack, one by one. What it throws is kept until the threads
-/// have met.
+/// Evaluates a caller's law for the phyxels of a pack, one by one. An exception of the law is kept
+/// until the parallel region has ended.
 template <class P>
 class LaneByLane {
  public:
   LaneByLane(const CustomLaw& law, FirstError& error) : law_(law), error_(error) {}
 
-  /// P of each lane [Pa]. @param numbers the history of the pack, shape [numbers, lanes]; `use`
-  /// says what becomes of it
+  /// Returns P of each lane [Pa]. @param numbers history of the pack, shape [numbers, lanes],
+  /// treated as `use` says
   template <class Real>
   Mat3<P> first_piola_stress(const Mat3<P>& grad_u, Real* numbers, std::size_t count,
                              HistoryUse use, double dt) const {
@@ -77,7 +77,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   using typename Arrays::P;
   using typename Arrays::S;
 
-  /// @param threads of OpenMP
+  /// @param threads number of OpenMP threads
   CpuPasses(const Model& model, int threads) : CpuPasses(model, threads, boundary_phyxels(model)) {}
 
  protected:
@@ -101,7 +101,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
 
   // --- runs of packs ----------------------------------------------------------------------------
 
-  /// Neighbouring bodies of one material: one loop over all of them.
+  /// Consecutive bodies of one material, which one loop passes over.
   struct Run {
     Material material;
     ChosenLaw law;     ///< Unused with a custom law.
@@ -126,20 +126,21 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     return runs;
   }
 
-  /// Threads worth waking: 400 phyxels take a thread some 10 microseconds, a barrier about one; but
-  /// where other programs want the cores, a barrier waits for a thread that is not running.
+  /// Number of threads that pay for a range: a thread takes some 10 microseconds for 400 phyxels,
+  /// and a barrier about one. If other programs use the cores, a barrier waits for a thread that is
+  /// not running.
   int threads_for(PackRange range) const {
     return std::clamp((range.end - range.begin) * W / 400, 1, threads_);
   }
 
-  /// Interior packs in pieces, between which messages under way may advance; each is worth waking
-  /// all threads for.
+  /// Cuts the interior packs into pieces, between which messages in transit can progress; each
+  /// piece has enough work for all threads.
   void cut_interior() {
     constexpr Index most_pieces = 8, least_phyxels = 2000;
     Index packs = 0;
     for (const Run& run : interior_runs_) packs += run.range.end - run.range.begin;
     const Index each = std::max(packs / most_pieces + 1, least_phyxels * threads_ / W);
-    Index room = 0;  // of the last piece
+    Index room = 0;  // packs left in the last piece
     for (Run run : interior_runs_) {
       const Index end = run.range.end;
       while (run.range.begin < end) {
@@ -155,9 +156,9 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     }
   }
 
-  /// Does the work of a pass: first on the boundary, whose values other ranks wait for, then on the
-  /// interior, while they travel. Ghosts have their owners' values when it returns.
-  /// @param work(runs) finds the values
+  /// Does the work of a pass, first on the boundary, whose values other ranks wait for, then on the
+  /// interior, while the values are in transit. Ghosts have the values of their owners on return.
+  /// @param work function that computes the values of runs
   template <class Work>
   void pass(const Records& values, Work&& work) {
     if (!model_.share) return work(interior_runs_);
@@ -171,7 +172,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     halo.finish();
   }
 
-  /// Sets the phyxels that motions prescribe, those of the boundary or all others.
+  /// Moves phyxels with prescribed motions, either those of the boundary or the others.
   void follow_motions(double time, double dt, bool of_boundary) {
     for (const Motion& motion : model_.motions) {
       const Path before = motion.path_at(time), after = motion.path_at(time + dt);
@@ -203,7 +204,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     }
   }
 
-  /// The sums over the neighbours of the phyxels of pack p.
+  /// Computes the sums over the neighbours of the phyxels of pack p.
   template <bool pulls>
   PHYXEL_HD NeighbourSums<P> sums_of(Index p) const {
     NeighbourSums<P> sums;
@@ -211,7 +212,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
         p, [&](Vec3<P> x_ij, Vec3<P> u_ij, P w) { sums.template add<pulls>(x_ij, u_ij, w); });
     return sums;
   }
-  /// What stresses of the phyxels of pack p are made of.
+  /// Loads the constants of the phyxels of pack p that their stresses depend on.
   template <bool closed>
   PHYXEL_HD PointConstants<P> constants_of(Index p, P hourglass) const {
     PointConstants<P> point{load<P>(&volume_[p * W]), this->inverse_moment_of(p), hourglass};
@@ -221,7 +222,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     }
     return point;
   }
-  /// ∇u of the phyxels of pack p, as their stresses see it.
+  /// Returns ∇u of the phyxels of pack p, closed if gradients are.
   Mat3<P> whole_gradient_of(Index p) const {
     if (closing_.empty()) {
       return displacement_gradient(sums_of<false>(p).gradient, this->inverse_moment_of(p));
@@ -232,7 +233,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
                                sums.pull, point);
   }
 
-  /// Pass 2: internal forces on the phyxels of pack p, but for how they are pulled.
+  /// Returns the internal forces [N] on the phyxels of pack p without the own force of hourglass
+  /// control.
   template <bool Closed>
   PHYXEL_HD Vec3<P> force_of(Index p) const {
     const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
@@ -258,12 +260,12 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
 
   // --- pass 1 -----------------------------------------------------------------------------------
 
-  /// Finds the stresses of all phyxels, and their history as `use` says.
+  /// Computes the stresses of all phyxels, and treats their histories as `use` says.
   void find_stresses(const std::vector<Run>& runs, HistoryUse use) {
     for (const Run& run : runs) {
       for_each_law(run, use, [&](const auto& stress_of) {
         if (!closing_.empty()) {
-          find_stresses<true, true>(stress_of, run);  // costs what the second alone does
+          find_stresses<true, true>(stress_of, run);  // costs no more than closed gradients alone
         } else {
           run.hourglass > 0 ? find_stresses<true, false>(stress_of, run)
                             : find_stresses<false, false>(stress_of, run);
@@ -271,7 +273,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
       });
     }
   }
-  /// @param stress_of P [Pa] of a pack and its ∇u
+  /// Computes the stresses of a run. @param stress_of function that returns P [Pa] of a pack and
+  /// its ∇u
   template <bool Controlled, bool Closed, class StressOf>
   void find_stresses(const StressOf& stress_of, const Run& run) {
     const PackRange range = run.range;
@@ -290,8 +293,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   }
 
   /// Calls apply(stress_of) with the law of a run: the one place where terms chosen at run time
-  /// become code chosen at compile time. `stress_of(p, grad_u)` is P [Pa] of the phyxels of pack p,
-  /// whose history becomes what `use` says.
+  /// select code at compile time. `stress_of(p, grad_u)` returns P [Pa] of the phyxels of pack p
+  /// and treats their histories as `use` says.
   template <class Apply>
   void for_each_law(const Run& run, HistoryUse use, Apply&& apply) {
     const Material& m = run.material;
@@ -309,7 +312,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
                              : apply_to(law);
     });
   }
-  /// P of the phyxels of pack p [Pa].
+  /// Returns P [Pa] of the phyxels of pack p.
   template <class Law>
   PHYXEL_HD Mat3<P> stress_of(const Law& law, Index p, const Mat3<P>& grad_u, HistoryUse use) {
     if constexpr (!has_history<Law>) {
@@ -322,7 +325,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
       return stress;
     }
   }
-  /// The same for a caller's law. A law that throws leaves the history of before.
+  /// Calls apply(stress_of) with a caller's law. Histories do not change if the law throws.
   template <class Apply>
   void apply_custom_law(const Run& run, HistoryUse use, Apply&& apply) {
     const Material& m = run.material;
@@ -351,7 +354,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
       throw;
     }
   }
-  /// A law of `WithViscosity` alone, whose wrapped law is a caller's.
+  /// A law without stress, which `WithViscosity` wraps if the elastic law is a caller's.
   struct Stressless {
     Hooke<P> hooke;
     VolumeConservation<P> volume;
@@ -360,7 +363,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
       return SmallStrain<P>{hooke}.at_rest(volume.stiffness);
     }
   };
-  /// The viscous stress beside a caller's law. @param numbers its history
+  /// Returns the viscous stress that is added to a caller's law [Pa]. @param numbers history of the
+  /// viscosity
   Mat3<P> stress_beside(const WithViscosity<Stressless, P>& law, Real* numbers,
                         const Mat3<P>& grad_u, HistoryUse use) const {
     using Law = WithViscosity<Stressless, P>;
@@ -378,7 +382,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
 
   // --- pass 2 -----------------------------------------------------------------------------------
 
-  /// Takes a step of the phyxels of a run, by the code for the terms that the scene has.
+  /// Takes a step of the phyxels of a run, with code compiled for the terms of the scene.
   void advance_run(const Run& run, double dt) {
     const bool damped = run.material.damping > 0;
     if (!closing_.empty()) {
@@ -390,7 +394,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     }
   }
 
-  /// Force, gravity and the Verlet step. @tparam More whether hourglass or applied forces may act
+  /// Sums force and gravity and takes the Verlet step. @tparam More true if hourglass or applied
+  /// forces may act
   template <bool Damped, bool More, bool Closed = false>
   void advance_run(const Run& run, double dt) {
     const DampedFlow flow = damped_flow(run.material.damping, dt);
@@ -427,7 +432,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   }
 
   int threads_;
-  std::vector<char> boundary_;  // of a share: whether each phyxel is exchanged
+  std::vector<char> boundary_;  // result of `boundary_phyxels`
   std::vector<Run> boundary_runs_, interior_runs_;
   std::vector<std::vector<Run>> interior_pieces_;
 

@@ -12,13 +12,13 @@
 
 namespace phyxel {
 
-/// What surfels read of a phyxel, and where each value stands in its record.
+/// Record of a phyxel that surfels read: its length, and the offset of each value.
 struct CarrierRecord {
   static constexpr int size = 16;
   enum { gradient = 0, position = 9, displacement = 12 };
 };
 
-/// The surfels of a model and their carriers, in packs. Positions are taken from the first phyxel
+/// The surfels of a model and their carriers, in packs. Positions are relative to the first phyxel
 /// of the body, as those of the carriers are.
 template <class Real>
 class CpuSurfels {
@@ -52,7 +52,7 @@ class CpuSurfels {
     }
   }
 
-  /// @param records of all slots
+  /// Computes positions and normals of all surfels. @param records carrier records of all slots
   void advect(const AlignedVector<Real>& records, int threads, SurfelState& out) const {
     const auto count = static_cast<Index>(model_.surfels.position.size());
     out.position.resize(static_cast<std::size_t>(count));
@@ -87,7 +87,8 @@ class CpuSurfels {
   }
 
  private:
-  /// Lanes with fewer carriers repeat their first, with weight zero.
+  /// Fills the carriers of one surfel pack. Lanes with fewer carriers repeat the first one, with
+  /// weight zero.
   void set_carriers(const Layout& layout, Index s) {
     const auto carriers = model_.surfels.carriers.row(s);
     const std::vector<double> weights = carrier_weights(model_, s);
@@ -112,7 +113,7 @@ class CpuSurfels {
   }
 
   const Model& model_;
-  std::vector<Offset> start_;  // of each pack's carriers
+  std::vector<Offset> start_;  // first carrier of each pack
   AlignedVector<Index> carrier_;
   AlignedVector<Real> weight_, position_, normal_;
 };

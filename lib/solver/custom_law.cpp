@@ -9,7 +9,7 @@
 namespace phyxel {
 namespace {
 
-/// Stretch, squeeze and shear of some percent, with a rotation in them.
+/// Test deformations ∇u: stretch, compression and shear of some percent, with a rotation.
 const Mat3d deformations[] = {
     {{{0.05, 0.02, -0.01}, {0.0, -0.03, 0.02}, {0.01, -0.02, 0.04}}},
     {{{-0.06, -0.03, 0.02}, {0.05, 0.02, 0.0}, {-0.01, 0.03, -0.02}}},
@@ -30,7 +30,8 @@ void check_rest(const CustomLaw& law, double young) {
 }
 
 void check_derivative(const CustomLaw& law, double young, const Mat3d& grad_u) {
-  // Central: its own error is the square of this, rounding 1e-16 over it.
+  // Step of central differences, whose error is the square of the step, and whose rounding error is
+  // 1e-16 divided by it.
   constexpr double step = 1e-5;
   const Mat3d stress = law.first_piola_stress(grad_u);
   double size = 1e-3 * young;

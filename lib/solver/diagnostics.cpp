@@ -21,13 +21,13 @@
 namespace phyxel {
 namespace {
 
-/// sqrt(3/2 s:s) of the deviator of σ = P Fᵀ / det F.
+/// Von Mises stress sqrt(3/2 s:s) [Pa], with s the deviator of σ = P Fᵀ / det F.
 double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
   const Mat3d f = identity<double>() + grad_u;
   Mat3d sigma = (1 / determinant(f)) * (piola * transpose(f));
   const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
   for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
-  double largest = 0;  // squares of shares of it neither overflow nor vanish
+  double largest = 0;  // scales the entries, so that squares neither overflow nor vanish
   for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
   if (!(largest > 0) || !std::isfinite(largest)) return largest;
   double squares = 0;

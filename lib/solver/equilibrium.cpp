@@ -14,9 +14,9 @@
 namespace phyxel {
 namespace {
 
-constexpr double on_the_way = 1e-2;  // residual, at which the next stage may begin
+constexpr double on_the_way = 1e-2;  // residual at which the next stage begins
 
-/// Gravity and loads at their full size; targets are still to be set.
+/// Returns a balance with gravity and loads at full size, and with targets unset.
 Balance whole_balance(const Model& model, const Newton& newton) {
   const OwnedVectors& vectors = newton.vectors();
   Balance balance;
@@ -41,7 +41,7 @@ Balance whole_balance(const Model& model, const Newton& newton) {
   return balance;
 }
 
-/// Motions so much of their way.
+/// Sets the targets to the positions after a fraction `share` of each motion.
 void set_targets(const Model& model, double share, Balance& balance) {
   for (const Motion& motion : model.motions) {
     const Path path = motion.path_after(share);
@@ -51,15 +51,16 @@ void set_targets(const Model& model, double share, Balance& balance) {
   }
 }
 
-/// What turns is followed by an eighth of a turn at a time: straight ways there would flatten it.
+/// Number of stages of a search: a rotation is followed by an eighth of a turn at a time, since
+/// straight paths to the target would flatten the body.
 int stages_of(const Model& model) {
   double angle = 0;
   for (const Motion& motion : model.motions) angle = std::max(angle, norm(motion.rotation));
   return std::max(1, static_cast<int>(std::ceil(angle / (std::numbers::pi / 4) - 1e-9)));
 }
 
-/// How far phyxels that are moved are from the straight ways between the targets of two stages, and
-/// how long those are [m²].
+/// Sum of squared distances of prescribed phyxels from the straight paths between the targets of
+/// two stages, and of squared lengths of those paths [m²].
 struct Distance {
   double off = 0, way = 0;
 };
@@ -81,7 +82,8 @@ Distance distance_from_way(const OwnedVectors& vectors, const Balance& balance,
   return {off, way};
 }
 
-/// The stage that an interrupted search was in: the first one on whose way the moved phyxels are.
+/// Returns the stage of an interrupted search: the first one on whose paths the prescribed phyxels
+/// are.
 int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, int stages,
              const Newton::Vector& u) {
   for (int stage = 1; stage < stages; ++stage) {
@@ -97,7 +99,7 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
                                 const NewtonReport& report, double tolerance) {
   const std::string why = fmt::format(
       "no equilibrium was found in {} steps of Newton's method and {} evaluations of the forces "
-      "({}): the residual force is {:.2g} of what is applied, {:.2g} is asked; nothing may hold a "
+      "({}): the residual force is {:.2g} of what is applied, {:.2g} is needed; nothing may hold a "
       "part of the body, or it buckles: allowed are more support, smaller loads, or a run in time "
       "with damping",
       found.steps, found.evaluations, report.why, report.residual, tolerance);
@@ -138,7 +140,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     if (report.interrupted) {
       throw InterruptedError(
           fmt::format("the search for rest was stopped after {} steps of Newton's method, at a "
-                      "residual force of {:.2g} of what is applied, {:.2g} is asked",
+                      "residual force of {:.2g} of what is applied, {:.2g} is needed",
                       found.steps, report.residual, options.tolerance));
     }
     say_not_found(model, found, report, tolerance);

@@ -1,4 +1,4 @@
-/// Exceptions of a caller's code inside parallel regions, which may not leave them.
+/// Exceptions of a caller's code inside OpenMP parallel regions, which exceptions may not leave.
 #pragma once
 
 #include <exception>
@@ -6,10 +6,10 @@
 
 namespace phyxel {
 
-/// Keeps the first exception that any thread met, until the region has ended.
+/// Keeps the first exception of any thread until the region has ended.
 class FirstError {
  public:
-  /// `work()`, or a value of its type made of nothing if it throws.
+  /// Returns `work()`, or a default-constructed value if it throws.
   template <class Work>
   auto caught(Work&& work) noexcept -> decltype(work()) {
     try {
@@ -21,7 +21,7 @@ class FirstError {
     return {};
   }
 
-  /// Outside the region. @throws what was caught, once
+  /// Rethrows the caught exception, once. Call outside the region.
   void rethrow() {
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
   }

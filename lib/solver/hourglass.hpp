@@ -9,8 +9,9 @@
 
 namespace phyxel {
 
-/// κ of the body of a part [N/m]; 0: none. The same on every rank that has phyxels of it, and for
-/// all of its parts, whose pairs share it: by the softest. @param part of the model
+/// Returns κ [N/m] of the body of a part; 0 without hourglass control. All parts of a body share
+/// the value, that of the softest part, because pairs of phyxels of two parts do; it is the same on
+/// every rank that has phyxels of the body. @param part a part of the model
 inline double hourglass_stiffness(const Model& model, const Part& part) {
   const double strength = part.material.hourglass.value_or(0);
   if (!(strength > 0) || part.begin == part.end) return 0;

@@ -10,7 +10,7 @@
 namespace phyxel {
 namespace {
 
-// Of the forces. What is left of them is an error of the velocities, and far below the step's own.
+// Tolerance of residual forces, whose effect on velocities is far below the error of the step.
 constexpr double tolerance = 1e-8;
 constexpr int most_newton_steps = 100;
 const double share_of_step = 1 - std::sqrt(0.5);  // γ
@@ -42,8 +42,8 @@ void ImplicitStep::find_applied(double time) {
   newton_.add_external_forces(balance_.applied);
 }
 
-/// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): v' is put into the first, which leaves a
-/// balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
+/// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): substituting v' in the first equation
+/// leaves a balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
 void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u, Vector& v) {
   const OwnedVectors& vectors = newton_.vectors();
   find_applied(time);
@@ -71,12 +71,13 @@ void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector&
   if (!report.found) {
     const std::string why = fmt::format(
         "the implicit step to t = {:g} s failed: after {} steps of Newton's method ({}) the "
-        "residual force is {:.2g} of what acts, {:.2g} is asked; allowed is a smaller time.step",
+        "residual force is {:.2g} of what acts, {:.2g} is needed; allowed is a smaller time.step",
         time, report.steps, report.why, report.residual, tolerance);
     if (model_.share) throw AgreedError(ExitCode::diverged, why);
     throw DivergedError(why);
   }
-  // By forces rather than by displacements: sums of them are zero, so momentum is kept.
+  // Velocities are updated from forces rather than displacements: internal forces sum to zero, so
+  // momentum is conserved.
   const Vector force = newton_.inner_forces(u);
   vectors.for_each([&](Index i) {
     const Vec3d acceleration = (1 / model_.mass[i]) * (force[i] + balance_.applied[i]);
@@ -104,7 +105,8 @@ void ImplicitStep::take_both_stages(State& state) {
   Vector& v2 = state.velocity;
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);
-  // From the first stage's speed and acceleration over the rest of the step.
+  // The start extrapolates the velocity and acceleration of the first stage over the rest of the
+  // step.
   Vector from = vectors.make();
   vectors.for_each([&](Index i) {
     const Vec3d acceleration = (1 / s) * (v2[i] - v[i]);

@@ -1,4 +1,5 @@
-/// An implicit step: as long as what is to be seen allows, however stiff the body is.
+/// Implicit time integration, whose step the motions to be resolved limit rather than the
+/// stiffness.
 #pragma once
 
 #include "solver/newton.hpp"
@@ -6,9 +7,9 @@
 namespace phyxel {
 
 /// Steps of the singly diagonal Runge–Kutta method of Alexander 1977 (Diagonally implicit
-/// Runge–Kutta methods for stiff O.D.E.'s, equation for two stages): second order, L-stable, so
-/// that oscillations much faster than a step are damped away instead of kept. Each of its two
-/// stages is a balance of forces with inertia. Linear momentum is kept to rounding.
+/// Runge–Kutta methods for stiff O.D.E.'s, equation for two stages): of second order and L-stable,
+/// so that oscillations much faster than a step are damped out. Each of the two stages is a balance
+/// of forces with inertia. Linear momentum is conserved to rounding.
 class ImplicitStep {
  public:
   /// @param backend of the model, in double; both must outlive this
@@ -16,20 +17,21 @@ class ImplicitStep {
 
   void observe(NewtonObserver observer) { newton_.observe(std::move(observer)); }
 
-  /// From `state`, whose velocities are of its time, over state.dt; it is uploaded after.
-  /// Collective.
+  /// Advances `state`, whose velocities belong to its time, by state.dt, and uploads it to the
+  /// backend. Collective.
   /// @throws DivergedError if Newton's method does not find a balance, InterruptedError if the
-  ///   observer asks for it; `state` is then what it was
+  /// observer asks for it; `state` is then unchanged
   void take(State& state);
 
-  const NewtonReport& work() const { return work_; }  ///< Of all steps; the largest residual.
+  /// Sums over all steps, and the largest residual.
+  const NewtonReport& work() const { return work_; }
 
  private:
   using Vector = Newton::Vector;
   void find_applied(double time);
-  /// A stage of length s [s] that ends at `time`.
-  /// @param from,v U and V; @param u where the search begins
-  /// u and v are those after it.
+  /// Takes a stage of length s [s] that ends at `time` [s].
+  /// @param from U of the stage [m]. @param u start of the search; receives u' [m]. @param v V of
+  /// the stage; receives v' [m/s]
   void take_stage(double time, double s, const Vector& from, Vector& u, Vector& v);
   void take_both_stages(State& state);
 
@@ -37,7 +39,7 @@ class ImplicitStep {
   Backend& backend_;
   Newton newton_;
   Balance balance_;
-  std::vector<double> damping_;  ///< [1/s], shape [n]; empty: none.
+  std::vector<double> damping_;  ///< Damping [1/s], shape [n]; empty if there is none.
   NewtonReport work_;
 };
 

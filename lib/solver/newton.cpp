@@ -11,14 +11,14 @@
 namespace phyxel {
 namespace {
 
-constexpr double largest_strain = 0.3;  // of one step
+constexpr double largest_strain = 0.3;  // largest change of strain in one step
 constexpr int most_cuts = 8;
 constexpr double inner_tolerance = 1e-3;
 constexpr int most_inner = 50'000;
-// Of conjugate gradients, in unknowns: as many would do without rounding.
+// Limit of conjugate gradient iterations per unknown; in exact arithmetic one per unknown suffices.
 constexpr int most_inner_share = 10;
-constexpr int most_exhausted = 3;      // steps in a row whose linear equations stay unsolved
-constexpr int most_without_gain = 50;  // steps that leave the smallest residual about where it was
+constexpr int most_exhausted = 3;        // steps in a row whose linear equations stay unsolved
+constexpr int most_without_gain = 50;    // steps that hardly reduce the smallest residual
 constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
 
 Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
@@ -85,7 +85,7 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     for (int attempt = 0;; ++attempt, length *= 0.5) {
       vectors_.for_each([&](Index i) {
         next[i] = u[i] + length * step[i];
-        // To the last bit at the end of the way.
+        // A whole step ends exactly on the target.
         if (length == 1) {
           next[i] =
               by_components(balance.free[i], next[i]) + held_part(balance, i, balance.target[i]);
@@ -93,7 +93,7 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
       });
       force = forces(balance, next);
       const double now = potential(balance, next);
-      // Of what is moved along, energy rises; and rounding is no rise.
+      // Energy may rise while prescribed phyxels move; a rise by rounding does not count.
       const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
       if (std::isfinite(now) && (to_move > 0 || rise <= rounding || attempt == most_cuts)) {
         energy = now;
@@ -125,7 +125,7 @@ void Newton::add_external_forces(Vector& applied) const {
   if (!external.empty()) vectors_.for_each([&](Index i) { applied[i] += external[i]; });
 }
 
-/// Inner, applied and inertia's [N].
+/// The sum of internal, applied and inertial forces [N] at u.
 Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
   Vector force = inner_forces(u);
   vectors_.for_each([&](Index i) { force[i] += balance.applied[i]; });
@@ -143,9 +143,9 @@ void Newton::put(const Vector& u) {
   backend_.put_displacements(placed_);
 }
 
-/// Right after `forces` at u [J].
+/// The potential energy [J] at u. Call right after `forces` at the same u.
 double Newton::potential(const Balance& balance, const Vector& u) {
-  // With the potentials whose derivatives plastic and viscous stresses are over one step.
+  // Includes the incremental potentials of plastic and viscous stresses over one step.
   const Diagnostics now = diagnose(model_, backend_, 0, 1);
   const double elastic = now.elastic_energy() + now.plastic_work + 0.5 * now.viscous_work;
   ++evaluations_;
@@ -159,8 +159,9 @@ double Newton::potential(const Balance& balance, const Vector& u) {
   return elastic - vectors_.product(balance.applied, u) + inert;
 }
 
-/// Of what is applied, reacts and is inert; and of a share of the forces that moving one phyxel
-/// alone so far would take, whose rounding is left where nothing is loaded.
+/// The residual force relative to applied, reaction and inertial forces, plus a fraction of the
+/// forces that moving single phyxels as far would take: without loads, the rounding of these
+/// remains.
 double Newton::residual(const Balance& balance, const Vector& u, const Vector& force) const {
   const double free = vectors_.sum(
       [&](Index i) { return dot(by_components(balance.free[i], force[i]), force[i]); });
@@ -174,7 +175,7 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
   return scale > 0 ? std::sqrt(free) / scale : std::sqrt(free) > 0 ? 1 : 0;
 }
 
-/// The largest entry of the gradient of a displacement.
+/// The largest entry of ∇u of a displacement.
 double Newton::steepest(const Vector& step) {
   put(step);
   std::vector<Mat3d> gradient;
@@ -188,7 +189,8 @@ double Newton::steepest(const Vector& step) {
   return std::max(most, 1e-300);
 }
 
-/// out = (K + weight) v on what is free, K by a difference of forces. @param force at u
+/// Computes out = (K + weight) v on free axes, with K v by a difference of forces. @param force
+/// total force at u [N]
 void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                              const Vector& v, Vector& out) {
   const double size = vectors_.largest([&](Index i) { return norm(v[i]); });
@@ -201,8 +203,8 @@ void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vect
   });
 }
 
-/// About how stiff each phyxel is against its neighbours [N/m]: without inertia, as many times its
-/// true stiffness everywhere.
+/// Estimates the stiffness of each phyxel against its neighbours [N/m]. Without inertia only ratios
+/// matter, and a constant factor may remain.
 void Newton::find_stiffness(const Balance& balance) {
   stiffness_.resize(static_cast<std::size_t>(model_.size()));
   for (const Part& part : model_.parts) {
@@ -228,8 +230,9 @@ bool Newton::asked_to_stop(int iteration, double inner_residual) {
   return (model_.share ? model_.share->communicator->largest(stop) : stop) > 0;
 }
 
-/// The step of Newton's method, held phyxels all the way to their targets: conjugate gradients, by
-/// `stiffness_`. Where the stiffness has no definite sign, as far as it has.
+/// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate
+/// gradients preconditioned with `stiffness_`. They stop at the first direction of negative
+/// stiffness.
 Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const Vector& force,
                                 Vector& step) {
   Vector rest = vectors_.make(), image = vectors_.make();

@@ -1,4 +1,4 @@
-/// Newton's method for forces that cancel: what a search for rest and an implicit step share.
+/// Newton's method for a balance of forces, shared by searches for equilibrium and implicit steps.
 #pragma once
 
 #include <cstdint>
@@ -13,51 +13,55 @@
 
 namespace phyxel {
 
-/// Displacements u at which, along every axis that a phyxel is free along,
+/// A balance of forces: displacements u that satisfy, along every free axis of each phyxel,
 ///   f(u) + applied - weight (u - centre) = 0,
 /// the derivative of minus the energy E(u) - applied · u + ½ Σ weight |u - centre|².
 struct Balance {
   using Vector = OwnedVectors::Vector;
-  Vector free;                 ///< 1 along axes that a phyxel is free along, 0 along others.
-  Vector target;               ///< Where it is along the others [m].
-  Vector applied;              ///< [N]
-  std::vector<double> weight;  ///< [kg/s²], shape [n]; empty: nothing is inert.
-  Vector centre;               ///< Where inertia would lead [m]; empty likewise.
-  double scale = 0;            ///< Forces beside what is applied that residuals are held to [N].
+  Vector free;                 ///< 1 along free axes, 0 along prescribed ones.
+  Vector target;               ///< Displacement along prescribed axes [m].
+  Vector applied;              ///< Gravity, loads and the caller's forces [N].
+  std::vector<double> weight;  ///< Inertia [kg/s²], shape [n]; empty without inertia.
+  Vector centre;               ///< Displacement that inertia alone leads to [m]; empty likewise.
+  double scale = 0;  ///< Force added to the applied forces as the reference of residuals [N].
 };
 
-/// How a search went.
+/// The outcome of a search.
 struct NewtonReport {
-  double residual = 0;           ///< Of what is applied, by Euclidean norms.
-  int steps = 0;                 ///< Newton's.
-  std::int64_t evaluations = 0;  ///< Of the forces of all phyxels.
-  bool found = false;            ///< The residual is below the tolerance, all held are in place.
-  bool interrupted = false;      ///< The observer asked to stop.
-  std::string why;               ///< Why nothing was found, in words.
+  double residual = 0;           ///< Residual over applied forces, by Euclidean norms.
+  int steps = 0;                 ///< Number of Newton steps.
+  std::int64_t evaluations = 0;  ///< Evaluations of the forces of all phyxels.
+  bool found = false;  ///< True if the residual is below the tolerance and prescribed phyxels are
+                       ///< at their targets.
+  bool interrupted = false;  ///< True if the observer stopped the search.
+  std::string why;           ///< The reason of a failure, for error messages.
 };
 
-/// Each step's linear equations are solved by conjugate gradients over differences of the backend's
-/// forces, so that every term counts and no matrix is made. Steps are cut where they would strain
-/// the body by much, or would raise the energy.
+/// Newton's method with line search. The linear equations of each step are solved by conjugate
+/// gradients with differences of the backend's forces, so that all terms are included and no matrix
+/// is assembled. A step is shortened if it would strain the body too much or raise the energy.
 class Newton {
  public:
   using Vector = OwnedVectors::Vector;
 
-  /// @param backend of the model, in double; both must outlive this
+  /// @param backend backend of the model, in double. Both must outlive this object. @param
+  /// most_steps limit of Newton steps
   Newton(const Model& model, Backend& backend, int most_steps);
 
-  /// Whom to tell of every evaluation, and who may stop the search; on all ranks or on none.
+  /// Sets the observer, which is called after every evaluation and may stop the search. Set it on
+  /// all ranks or on none.
   void observe(NewtonObserver observer) { observer_ = std::move(observer); }
 
-  /// From u to the nearest balance downhill. The backend is left somewhere near. Collective.
-  /// Interrupted, u is that of the last accepted step, from which a second call goes on alike.
-  /// @param tolerance of the residual
+  /// Finds the balance that descending the energy from u leads to. The state of the backend
+  /// afterwards is close to u, not equal. Collective. If interrupted, u is that of the last
+  /// accepted step, from which a second call continues identically.
+  /// @param tolerance largest residual. @param u start of the search, and its result [m]
   NewtonReport solve(const Balance& balance, double tolerance, Vector& u);
 
-  /// Inner forces at u [N].
+  /// Returns the internal forces [N] at u.
   Vector inner_forces(const Vector& u);
   const OwnedVectors& vectors() const { return vectors_; }
-  /// Adds the caller's own forces [N], shape [n].
+  /// Adds the caller's forces [N], shape [n].
   void add_external_forces(Vector& applied) const;
 
  private:
@@ -69,20 +73,20 @@ class Newton {
   void stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                        const Vector& v, Vector& out);
   void find_stiffness(const Balance& balance);
-  /// How conjugate gradients ended.
+  /// The outcome of conjugate gradients.
   enum class Inner { converged, indefinite, exhausted, interrupted };
   Inner find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step);
-  /// Conjugate gradients' iterations of one step, at most.
+  /// Limit of conjugate gradient iterations in one step.
   int most_inner_here() const;
-  /// Tells the observer. @returns whether it, or another rank's, asks to stop
+  /// Calls the observer. @returns true if it, or that of another rank, asks to stop
   bool asked_to_stop(int iteration, double inner_residual);
 
   const Model& model_;
   Backend& backend_;
   int most_steps_;
   OwnedVectors vectors_;
-  double difference_;              ///< How far stiffness moves phyxels at most [m].
-  std::vector<double> stiffness_;  ///< About that of each phyxel against its neighbours [N/m].
+  double difference_;              ///< Largest displacement in differences of forces [m].
+  std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;
   std::int64_t evaluations_ = 0;
   NewtonObserver observer_;

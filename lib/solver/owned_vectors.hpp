@@ -1,6 +1,5 @@
-/// Vectors of three numbers a phyxel on the host, of which a rank has those of its own phyxels.
-/// Sums over all ranks are exact: they depend neither on the number of threads nor on that of
-/// ranks.
+/// Host vectors with three numbers per phyxel, of which each rank owns those of its phyxels. Sums
+/// over all ranks are exact, so they do not depend on the number of threads or ranks.
 #pragma once
 
 #include <algorithm>
@@ -15,13 +14,13 @@ namespace phyxel {
 
 class OwnedVectors {
  public:
-  using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; of ghosts it says nothing
+  using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; values of ghosts are undefined
 
   OwnedVectors(const Model& model, int threads) : model_(model), threads_(threads) {}
 
   Vector make() const { return Vector(static_cast<std::size_t>(model_.size())); }
 
-  /// Calls each(i) for the phyxels that are no ghosts.
+  /// Calls each(i) for the phyxels that are not ghosts.
   template <class Each>
   void for_each(Each&& each) const {
     for (const Part& part : model_.parts) {
@@ -63,7 +62,7 @@ class OwnedVectors {
     return model_.share ? model_.share->communicator->largest(largest) : largest;
   }
 
-  /// Ghosts take their owners' values. Collective.
+  /// Copies the owners' values to ghosts. Collective.
   void refresh_ghosts(Vector& values) const {
     if (!model_.share) return;
     HaloTransport& halo = *model_.share->transport;
@@ -72,7 +71,7 @@ class OwnedVectors {
     halo.finish();
   }
 
-  /// The smallest support of all ranks' phyxels [m]; infinite, if there is none. Collective.
+  /// The smallest support of the phyxels of all ranks [m]; infinite if there is none. Collective.
   double smallest_support() const {
     double smallest = std::numeric_limits<double>::infinity();
     for (Index i = 0; i < model_.size(); ++i) {

@@ -60,24 +60,25 @@ PHYXEL_HD Pack<To, W> convert(Pack<From, W> pack) {
 
 namespace detail {
 
-/// a0 b0 a1 b1 ... of the lower (Half = 0) or upper (Half = 1) halves.
+/// Interleaves the lower (Half = 0) or upper (Half = 1) halves of a and b: a0 b0 a1 b1 ...
 template <int Half, class V, std::size_t... I>
 PHYXEL_HD V zip(V a, V b, std::index_sequence<I...>) {
   constexpr int w = sizeof...(I);
   return __builtin_shufflevector(a, b, (int(I) % 2 * w + int(I) / 2 + Half * w / 2)...);
 }
 
-/// Two half rows side by side.
+/// Concatenates two half rows.
 template <class Half, std::size_t... I>
 PHYXEL_HD auto join(Half low, Half high, std::index_sequence<I...>) {
   return __builtin_shufflevector(low, high, int(I)...);
 }
 
-/// log2(W) rounds of zipping row r with row r + rows/2 turn rows of records into rows of lanes.
+/// Transposes rows of records into rows of lanes, in log2(W) rounds that interleave row r with row
+/// r + rows/2.
 template <int Rows, int W, class V>
 PHYXEL_HD void transpose_rows(V* rows) {
   using Lanes = std::make_index_sequence<W>;
-  // Unrolled by hand-set pragmas: left to itself the compiler keeps the rows in memory.
+  // Without the pragmas the compiler keeps the rows in memory.
 #pragma GCC unroll 8
   for (int round = W; round > 1; round /= 2) {
     V mixed[Rows];

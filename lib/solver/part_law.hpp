@@ -1,5 +1,5 @@
-/// The material of a part as sums over phyxels in double see it: a caller's law or one of ours,
-/// with what it remembers, volume conservation and viscosity.
+/// The material of a part in double, for sums over phyxels: a caller's law or a built-in one, with
+/// its history, volume conservation and viscosity.
 #pragma once
 
 #include <array>
@@ -24,13 +24,13 @@ class PartLaw {
       chosen_ = chosen_law(material);
     }
   }
-  /// Null for one of ours.
+  /// The caller's law; null for a built-in one.
   const CustomLaw* custom() const { return custom_; }
-  /// The index in `Laws` and the constants of one of ours.
+  /// The index in `Laws` and the constants of a built-in law.
   const ChosenLaw& chosen() const { return chosen_; }
 
   /// The response at the end of a step of `dt` [s].
-  /// @param history the phyxel's numbers at its start, in the law's order
+  /// @param history the phyxel's history at the start of the step, in the law's order
   PointResponse<double> after_step(const Mat3d& grad_u, std::span<double> history,
                                    double dt) const {
     if (custom_) return of_custom(grad_u, history, dt);
@@ -52,8 +52,8 @@ class PartLaw {
       response.plastic_work = custom_->plastic_work(own);
     }
     const double stiffness = material_.volume_stiffness;
-    // What stands beside the caller's law: as beside Hooke's law at rest, whose stress is zero
-    // here.
+    // Volume conservation and viscosity are evaluated with Hooke's law in place of the caller's,
+    // and Hooke's stress is subtracted.
     const std::array<double, 4> beside{material_.lame_lambda(), material_.lame_mu(), stiffness,
                                        material_.viscosity};
     if (stiffness > 0 || material_.viscosity > 0) {
@@ -87,9 +87,9 @@ class PartHistory {
       columns_.push_back(state.history.empty() ? nullptr : state.history[column].values.data());
     }
   }
-  /// How many numbers a phyxel has.
+  /// The number of history values of a phyxel.
   std::size_t size() const { return columns_.size(); }
-  /// The numbers of phyxel i. @param numbers room for them
+  /// Returns the history of phyxel i. @param numbers buffer for it
   std::span<double> of(Index i, std::span<double> numbers) const {
     for (std::size_t k = 0; k < columns_.size(); ++k) numbers[k] = columns_[k] ? columns_[k][i] : 0;
     return numbers.first(columns_.size());

@@ -1,4 +1,4 @@
-/// The contribution of one phyxel to `Diagnostics`: the physics of the totals, for all devices.
+/// The contribution of one phyxel to `Diagnostics`, shared by all devices.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace phyxel {
 
-/// Everything that adds up over phyxels, in the order of `Totals::for_each_sum`.
+/// Indices of the sums over phyxels, in the order of `Totals::for_each_sum`.
 struct Sums {
   enum : int {
     kinetic_energy,
@@ -30,7 +30,7 @@ struct Sums {
   };
 };
 
-/// What the totals need of one phyxel.
+/// State of one phyxel from which the totals are computed.
 struct PhyxelState {
   double mass, volume;          ///< [kg], [m³]
   Vec3<double> position;        ///< At the present displacement [m].
@@ -48,7 +48,7 @@ struct PhyxelState {
 /// The contribution of one phyxel.
 struct PhyxelTotals {
   double sum[Sums::count];
-  double displacement, speed;  ///< Their sizes [m], [m/s].
+  double displacement, speed;  ///< Magnitudes [m], [m/s].
   bool finite;                 ///< False if a value of the phyxel is not finite.
   bool inverted;               ///< True if det F <= 0.
 };
@@ -61,8 +61,8 @@ PHYXEL_HD void put(double* sum, Vec3<double> v) {
 }
 }  // namespace detail
 
-/// What a phyxel adds to the totals.
-/// @param response of its material at the present displacement (`response_after_step`)
+/// Computes the contribution of a phyxel to the totals.
+/// @param response response of its material at the present displacement (`response_after_step`)
 PHYXEL_HD PhyxelTotals totals_of(const PhyxelState& p, const PointResponse<double>& response) {
   PhyxelTotals t{};
   double all = 0;

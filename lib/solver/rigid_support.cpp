@@ -15,15 +15,15 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double rounding = 1e-9;      // of all forces: what sums of them leave
-constexpr double least_torque = 1e-2;  // of all forces times the body's size
-constexpr double singular = 1e-9;      // of the largest eigenvalue
+constexpr double rounding = 1e-9;      // rounding error of a sum, relative to all forces
+constexpr double least_torque = 1e-2;  // relative to all forces times the body's size
+constexpr double singular = 1e-9;      // smallest eigenvalue, relative to the largest
 
-/// Sums over one body; a rigid motion is three translations and three rotations about the body's
-/// centre, these in units of 1/size.
+/// Sums over one body. A rigid motion has three translations and three rotations about the body's
+/// centre, the latter in units of 1/size.
 struct BodySums {
   ExactSum square_distance, phyxels, force_size;
-  std::array<ExactSum, 6> force;  ///< What is applied, against each motion [N].
+  std::array<ExactSum, 6> force;  ///< Applied force along each motion [N].
   std::array<ExactSum, 21> held;  ///< Products of motions along held axes, lower triangle.
 
   template <class Each>
@@ -34,7 +34,7 @@ struct BodySums {
   }
 };
 
-/// Bodies are runs of parts.
+/// Calls each(body) for every body, a run of consecutive parts.
 template <class Each>
 void for_each_body(const Model& model, Each&& each) {
   for (std::size_t p = 0; p < model.parts.size();) {
@@ -135,7 +135,7 @@ void check(const Model& model, const Part& body, double size, BodySums& sums) {
                               body.name, std::abs(force[a]), "xyz"[a]));
   }
   const Eigen::SelfAdjointEigenSolver<Matrix6> motions(held);
-  Vector6 loose = Vector6::Zero();  // what is applied, on the motions that nothing holds
+  Vector6 loose = Vector6::Zero();  // applied force along the unsupported motions
   for (int k = 0; k < 6; ++k) {
     if (motions.eigenvalues()[k] > singular * std::max(1.0, motions.eigenvalues()[5])) continue;
     const Vector6 motion = motions.eigenvectors().col(k);

@@ -1,13 +1,13 @@
-/// Bodies that what is applied would move as a whole.
+/// Detection of bodies that applied forces would move as a whole.
 #pragma once
 
 #include "solver/newton.hpp"
 
 namespace phyxel {
 
-/// Checks, before a search for rest, that every body is held against what is applied to it. Forces
-/// along an axis that a body is not held along must cancel; so must torques about an axis that it
-/// may turn about, but for a hundredth, which a body may turn into its load.
+/// Checks before a search for equilibrium that every body is supported against its loads. Forces
+/// along an unsupported axis must cancel. So must torques about an unsupported axis, except for a
+/// hundredth, since a body may turn slightly to align with its load.
 /// @throws InputError naming the body, the force or torque, and what is missing. Collective.
 void refuse_unsupported_bodies(const Model& model, const Balance& balance);
 

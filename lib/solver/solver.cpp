@@ -15,20 +15,21 @@
 namespace phyxel {
 
 State initial_state(const Model& model, const Scene& scene, double dt) {
-  // Verlet's velocity is that of half a step earlier, from which half a step under a(0) and damping
-  // leads to v(0). At rest there are no internal forces.
   if (!model.parts.empty() && model.parts.back().body >= static_cast<Index>(scene.bodies.size())) {
     throw InputError(
         fmt::format("a model of {} bodies and a scene of {}: allowed is the scene that "
                     "the model was built from",
                     model.parts.back().body + 1, scene.bodies.size()));
   }
+  // Verlet's method starts with the velocity half a step earlier, from which half a step under a(0)
+  // and damping leads to v(0). There are no internal forces at rest.
   const double lag = scene.solver.method == Method::verlet ? dt / 2 : 0;
   State state;
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
-  if (scene.solver.method == Method::equilibrium) return state;  // what moves has yet to go there
+  // Prescribed phyxels have not moved yet.
+  if (scene.solver.method == Method::equilibrium) return state;
   std::vector<Vec3d> loaded(model.loads.empty() ? 0 : state.displacement.size());  // [N]
   add_loads(model, 0, loaded);
   for (const Part& part : model.parts) {
@@ -98,7 +99,7 @@ void Solver::observe(NewtonObserver observer) {
 void Solver::step(std::int64_t count, bool move_surfels) {
   if (method_ == Method::verlet) {
     const std::int64_t most =
-        backend_.best_steps();  // a law that throws does so in the first step of a call
+        backend_.best_steps();  // a law that throws, throws in the first step of a call
     while (count > 0) {
       const std::int64_t some = std::min(count, most);
       backend_.step(steps_, dt_, static_cast<int>(some), move_surfels);
@@ -127,7 +128,7 @@ void Solver::step_by_newton() {
       try {
         implicit_->take(implicit_state_);
       } catch (...) {
-        backend_.put(implicit_state_);  // of the last whole step
+        backend_.put(implicit_state_);  // the state of the last whole step
         throw;
       }
       backend_.put(implicit_state_);

@@ -12,7 +12,7 @@
 namespace phyxel {
 namespace {
 
-/// A phyxel may move at this multiple of the driving speed, because free ends whip.
+/// Allowed ratio of a phyxel's speed to the driving speed, because free ends whip.
 constexpr double whip = 10;
 
 double largest_over_ranks(const Model& model, double value) {
@@ -31,7 +31,7 @@ double largest_speed(const Model& model, const Motion& motion) {
   double speed =
       norm(motion.velocity) + 2 * std::numbers::pi * motion.frequency * norm(motion.amplitude);
   if (motion.duration > 0) {
-    // The slope of a smoothstep is largest, 1.5, at half the way.
+    // The largest slope of a smoothstep is 1.5, at its middle.
     speed += 1.5 * (norm(motion.displacement) + norm(motion.rotation) * arm) / motion.duration;
   }
   return speed;
@@ -109,8 +109,8 @@ void StabilityWatch::check(const Diagnostics& now, const StepControl* control) {
   const double gained = now.total_energy() - watched_.start_energy;
   const double turnover =
       std::max({watched_.peak_energy, std::abs(now.gravity_energy + now.load_energy)});
-  // Verlet's energy error is bounded by a share of what moves; gaining as much as has ever moved
-  // is no such error.
+  // The energy error of Verlet's method is bounded by a fraction of the energy in motion; a gain as
+  // large as that energy is an instability.
   if (conservative_ && now.step > 0 && gained > turnover + 1e-6 * std::abs(watched_.start_energy)) {
     throw DivergedError(fmt::format(
         "the simulation diverged: energy has run away, {:g} J gained {} where at most {:g} J were "

@@ -1,4 +1,4 @@
-/// Where the search for the largest eigenfrequency starts, the same on every device.
+/// The start vector of the search for the largest eigenfrequency, the same on every device.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace phyxel {
 
-/// Three numbers between -0.5 and 0.5 that look random. Source: S. Vigna's SplitMix64.
+/// Three pseudo-random numbers between -0.5 and 0.5 for a phyxel. Source: S. Vigna's SplitMix64.
 PHYXEL_HD Vec3d start_component(Index phyxel) {
   double values[3];
   for (int e = 0; e < 3; ++e) {

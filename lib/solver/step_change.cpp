@@ -1,4 +1,4 @@
-/// Verlet's steps, halved and doubled.
+/// Halving and doubling of the step of Verlet's method.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,9 +17,9 @@ namespace {
 
 using Vectors = std::vector<Vec3d>;
 
-/// The largest share of a support by which a phyxel moves where accelerations are compared: enough
-/// that, in float too, rounding leaves their differences right to some percent, and so little that
-/// second-order terms do.
+/// Largest displacement of a phyxel, in supports, in differences of accelerations: large enough
+/// that rounding, and small enough that second-order terms, leave them accurate to some percent, in
+/// float too.
 constexpr double compared_share = 3e-3;
 
 /// Accelerations of a model at states near the present one.
@@ -32,13 +32,13 @@ class Accelerations {
         owned_(model, std::max(1, backend.threads())),
         free_(free_axes(model)) {}
 
-  /// A vector of phyxel i without what is prescribed.
+  /// Returns a vector of phyxel i with its prescribed components set to zero.
   Vec3d free(Index i, Vec3d vector) const {
     return free_.empty() ? vector : by_components(free_[i], vector);
   }
-  /// Accelerations [m/s²] without damping at the displacements of a state, whose ghosts follow.
-  /// Prescribed ones are zero. Collective.
-  /// @param use `frozen`: of the elastic forces alone
+  /// Returns the accelerations [m/s²] without damping at the displacements of a state, whose ghosts
+  /// are updated. Prescribed components are zero. Collective.
+  /// @param use `frozen` for elastic forces alone
   Vectors at(State& state, HistoryUse use) const {
     owned_.refresh_ghosts(state.displacement);
     backend_.put(state);
@@ -51,9 +51,8 @@ class Accelerations {
         [&](Index i) { all[i] = free(i, (1 / model_.mass[i]) * all[i] + model_.gravity); });
     return all;
   }
-  /// Derivatives of the elastic accelerations, which are `here` at a state, along vectors w of any
-  /// unit.
-  /// Collective.
+  /// Returns the derivatives of the elastic accelerations along vectors w of any unit. Collective.
+  /// @param here the accelerations at the state
   Vectors derivatives(const State& state, const Vectors& here, const Vectors& w) const {
     Vectors found(here.size());
     const double largest = owned_.largest([&](Index i) { return norm(w[i]); });
@@ -65,7 +64,7 @@ class Accelerations {
     owned_.for_each([&](Index i) { found[i] = (1 / share) * (there[i] - here[i]); });
     return found;
   }
-  /// |to| / |from|, 0 if `from` is. Collective.
+  /// Returns |to| / |from|, or 0 if `from` is zero. Collective.
   double growth(const Vectors& from, const Vectors& to) const {
     const double length = owned_.product(from, from);
     return length > 0 ? std::sqrt(owned_.product(to, to) / length) : 0;
@@ -76,7 +75,7 @@ class Accelerations {
   Backend& backend_;
   double time_;
   OwnedVectors owned_;
-  Vectors free_;  // 0 along prescribed axes, 1 else; none are prescribed if it is empty
+  Vectors free_;  // 0 along prescribed axes, else 1; empty if none are prescribed
 };
 
 }  // namespace
@@ -136,7 +135,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
     const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);
     state.velocity[i] += accelerations.free(i, earlier - state.velocity[i]);
   });
-  first_step_ += steps - steps_;  // as many have been taken as before
+  first_step_ += steps - steps_;  // the number of steps taken does not change
   state.step = steps_ = steps;
   state.dt = dt_ = dt;
   backend_.put(state);

@@ -1,4 +1,4 @@
-/// `StepControl` decides when steps of Verlet's method are halved, and when doubled.
+/// `StepControl` decides when the step of Verlet's method is halved or doubled.
 #include "phyxel/step_control.hpp"
 
 #include <fmt/format.h>
@@ -12,24 +12,25 @@
 namespace phyxel {
 namespace {
 
-/// Phyxels at a surface have neighbours on one side, so that their gradients are not quite those of
-/// plane waves: modes of a stretched block are up to 11% stiffer than the bound.
+/// Factor of the stiffness bound for surfaces. Phyxels there have neighbours on one side only, so
+/// their gradients differ from those of plane waves: modes of a stretched block are up to 11%
+/// stiffer than the bound.
 constexpr double at_surfaces = 1.12;
 
-/// Steps after which the limit is found again, as a multiple of the fewest steps between two looks.
-/// It is found even if no phyxel has stiffened, because the stiffest place may have moved.
+/// Steps after which the step limit is computed again, as a multiple of the fewest steps between
+/// two looks. It is computed even if no phyxel has stiffened, because the stiffest place may have
+/// moved.
 constexpr std::int64_t least_apart = 16;
-/// The number of steps doubles up to this one each time that the limit has stayed the same.
+/// Upper limit of that number, which doubles each time that the step limit has not changed.
 constexpr std::int64_t most_apart = 2048;
-/// Half-life of the peak rate of stiffening, as a multiple of the same.
+/// Half-life of the peak rate of stiffening, in the same unit.
 constexpr std::int64_t memory = 64;
-constexpr double same_share = 0.02;  // the accuracy of a limit that was found
-/// Between two looks that are the fewest steps apart, a shock stiffens a phyxel by more than this
-/// share.
+constexpr double same_share = 0.02;  // relative accuracy of a computed limit
+/// A shock stiffens a phyxel by more than this fraction between two looks the fewest steps apart.
 constexpr double shock = 0.5;
-/// Steps are doubled where the bound is below this, so that no small change halves them again.
+/// The step is doubled if the bound is below this value, so that no small change halves it again.
 constexpr double calm_bound = 0.85;
-/// Steps are doubled where the limit found allows so much of the largest share, likewise.
+/// The step is doubled if the computed limit is below this fraction of the largest share, likewise.
 constexpr double calm_share = 0.9;
 
 }  // namespace
@@ -38,13 +39,13 @@ StepControl::StepControl(const Model& model, Backend& backend, const StepPlan& p
     : model_(model), backend_(backend), at_rest_(plan.limit), lengthens_(plan.lengthens) {
   if (!plan.shortens) return;
   for (const Part& part : model.parts) active_ = active_ || stiffens(part.material);
-  // Ranks look together; one of them may have nothing that stiffens.
+  // Looks are collective, even if nothing on this rank stiffens.
   if (model.share) active_ = model.share->communicator->largest(active_) > 0;
   if (!active_) return;
   viscosity_ = largest_viscosity(model);
   // A wave travels about one spacing in a step, and so crosses a body in as many steps as the body
   // has phyxels across: a small one deforms fully within a few steps.
-  std::map<Index, Index> size;  // of each body
+  std::map<Index, Index> size;  // number of phyxels of each body
   for (const Part& part : model.parts) size[part.body] += part.size;
   for (const auto& [body, phyxels] : size) {
     const auto across = static_cast<std::int64_t>(std::cbrt(phyxels));
@@ -70,7 +71,7 @@ int StepControl::look(Solver& solver, int halvings) {
 int StepControl::shorten(Solver& solver, double ratio, int halvings) {
   if (!(bound_of_share(solver.dt(), ratio) > 1)) return 0;
   const Looks& looks = solver.looks();
-  // A share found before is trusted, but not for less than it was.
+  // A share computed earlier is a lower bound.
   const double expected = std::max(looks.measured_share, expected_share(looks, ratio));
   if (looks.measured >= 0 && expected <= allowed_share(solver.dt()) &&
       solver.steps() - looks.measured < looks.apart) {
@@ -125,14 +126,14 @@ bool StepControl::lengthen(Solver& solver, double ratio) const {
 
 double StepControl::measure(Solver& solver, double ratio) const {
   const double omega = present_step_limit(model_, backend_).omega_max;
-  // Viscosity is at most as much above that at rest as the stiffest phyxel is, whatever the mode.
+  // The viscosity of any mode exceeds that at rest by at most the factor of the stiffest phyxel.
   const double slowed = at_rest_.omega_max / omega;
   const double viscosity = viscosity_ > 0 ? viscosity_ * ratio * slowed * slowed : 0;
   const double share = solver.dt() / stable_step(omega, viscosity);
   Looks& looks = solver.looks();
   looks.measured = solver.steps();
   looks.measured_ratio = ratio;
-  // Where forces nearby are not finite, only the bound is known.
+  // If forces nearby are not finite, only the bound is available.
   looks.measured_share = std::isfinite(share) ? share * share : bound_of_share(solver.dt(), ratio);
   return looks.measured_share;
 }
@@ -145,7 +146,7 @@ double StepControl::bound_of_share(double dt, double ratio) const {
 
 double StepControl::expected_share(const Looks& looks, double ratio) const {
   const double grown = ratio / looks.measured_ratio;
-  // Where viscosity sets the limit, it falls as the square of the frequency.
+  // A limit set by viscosity falls as the square of the frequency.
   return looks.measured_share * (viscosity_ > 0 ? std::max(grown, grown * grown) : grown);
 }
 
@@ -156,7 +157,7 @@ double StepControl::allowed_share(double dt) const {
 
 void StepControl::look_again(const Solver& solver, Looks& looks, double ratio) const {
   const std::int64_t step = solver.steps();
-  // The stiffening of one phyxel up to which nothing has to be done.
+  // The stiffening of a phyxel up to which the step is safe.
   const double reserve = 1 / bound_of_share(solver.dt(), 1);
   const double bounded = viscosity_ > 0 ? std::min(reserve, std::sqrt(reserve)) : reserve;
   const double most_ratio =
@@ -165,14 +166,15 @@ void StepControl::look_again(const Solver& solver, Looks& looks, double ratio) c
   std::int64_t wait = 1, least = 1;
   if (looks.last >= 0 && step > looks.last) {
     const double since = static_cast<double>(step - looks.last);
-    // Half the way there, and as fast back as forth; at most twice as long as before. The peak rate
-    // fades slowly, because a body that swings stiffens fast again and again.
+    // The next look is due after half the time in which the peak rate uses up the reserve, and
+    // after at most twice the last interval. The peak rate fades slowly, because a swinging body
+    // stiffens fast again and again.
     const double faded = looks.change * std::exp2(-since / static_cast<double>(memory * fewest_));
     const double rate = std::abs(ratio - looks.ratio) / since;
     looks.change = std::max(rate, faded);
     const double until = looks.change > 0 ? (most_ratio - ratio) / looks.change / 2 : 2 * since;
     wait = static_cast<std::int64_t>(std::min(until, 2 * since));
-    // A shock stiffens phyxels where it is before it has crossed the body.
+    // A shock stiffens only the phyxels that it has reached.
     const bool is_shock = rate * static_cast<double>(fewest_) > shock * ratio;
     least = is_shock ? 1 : std::min(fewest_, 2 * (step - looks.last));
   }

@@ -15,13 +15,13 @@
 namespace phyxel {
 namespace {
 
-/// K x is minus the difference of the forces at two displacements so close to each other that only
-/// its linear part shows; what laws remember is held, since unloading is elastic. Of a share,
-/// vectors have its own phyxels, and their products those of all ranks.
+/// Stiffness operator on the host. K x is minus the difference of the forces at two displacements
+/// so close that it is linear; histories are fixed, since unloading is elastic. On a share, vectors
+/// hold the values of this rank's phyxels, and products sum over all ranks.
 class HostVibration final : public Vibration {
  public:
-  /// @param present where forces are linear; with its ghosts
-  /// @param distance how far the other displacements are off [m]
+  /// @param present state about which forces are linearised, ghosts included
+  /// @param distance size of the displacement in differences [m]
   HostVibration(const Model& model, Backend& backend, const State& present, double distance)
       : model_(model),
         backend_(backend),
@@ -38,7 +38,7 @@ class HostVibration final : public Vibration {
     const double length = std::sqrt(vectors_.product(current_, current_));
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
   }
-  HostVibration(const Model&, Backend&, State&&, double) = delete;  // it is kept by reference
+  HostVibration(const Model&, Backend&, State&&, double) = delete;  // kept by reference
   HostVibration(const HostVibration&) = delete;
   HostVibration& operator=(const HostVibration&) = delete;
 
@@ -81,10 +81,11 @@ class HostVibration final : public Vibration {
   double distance_;  // [m]
 };
 
-/// Second-order terms are 1e-8 of the force, rounding 1e-8 of the strain.
+/// Strain in differences at rest: second-order terms are 1e-8 of the force, rounding 1e-8 of the
+/// strain.
 constexpr double strain_at_rest = 1e-8;
-/// Stresses that are there already lose digits in the difference: 1e-4 of it in float. Second-order
-/// terms are 3e-3 of it.
+/// Strain in differences about a deformed state. Cancellation of the stresses there costs 1e-4 of
+/// the difference in float; second-order terms are 3e-3 of it.
 constexpr double strain_at_work = 3e-3;
 
 State at_rest(const Model& model) {
@@ -127,13 +128,13 @@ double smallest_sound_step(const Model& model) {
 
 constexpr const char* stage_name = "largest time step";
 
-/// Largest eigenfrequency, with a bound of what is still missing in it.
+/// The largest eigenfrequency, with a bound of its error.
 struct Frequency {
   double omega = 0;  ///< [rad/s]; NaN where a force is not finite.
   int iterations = 0;
 };
 /// @param tolerance of the largest eigenvalue
-/// @param stage that is told how far the search is, or null
+/// @param stage receives the progress of the search; may be null
 Frequency largest_frequency(const Model& model, Vibration& vibration, double tolerance,
                             Stage* stage = nullptr) {
   Frequency found;
@@ -146,7 +147,7 @@ Frequency largest_frequency(const Model& model, Vibration& vibration, double tol
     diagonal.push_back(alpha);
     beta = vibration.subtract(alpha);
     if (!std::isfinite(alpha) || !std::isfinite(beta)) {
-      found.omega = std::numeric_limits<double>::quiet_NaN();  // earlier ones say nothing
+      found.omega = std::numeric_limits<double>::quiet_NaN();  // earlier values are meaningless
       break;
     }
     const auto [value, residual] = largest_eigenvalue(diagonal, off_diagonal, beta);
@@ -185,7 +186,7 @@ StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
 }  // namespace
 
 double viscous_step_share(double relaxation_time, double omega) {
-  const double ratio = relaxation_time * omega / 2;  // of critical damping
+  const double ratio = relaxation_time * omega / 2;  // damping ratio ξ
   return 1 / (std::hypot(1, ratio) + ratio);         // √(1 + ξ²) - ξ without its cancellation
 }
 

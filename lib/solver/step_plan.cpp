@@ -1,4 +1,4 @@
-/// Which steps a scene is taken in.
+/// The choice of a scene's time step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,15 +13,17 @@
 namespace phyxel {
 namespace {
 
-/// Limits found on different devices differ in their last digits, the steps taken shall not.
+/// Rounds a step [s] down to three digits: limits computed on different devices differ in their
+/// last digits, but the step must not.
 double three_digits_below(double step) {
   const double unit = std::pow(10, std::floor(std::log10(step)) - 2);
   return std::floor(step / unit) * unit;
 }
 
-/// Beyond these, double precision has lost the material itself, and a run would take for ever.
-constexpr double most_volume_stiffness = 1e8;  // times Young's modulus
-constexpr double most_hourglass = 1e4;         // of Young's modulus
+/// Above these limits, rounding in double exceeds the forces of the material, and steps become too
+/// short to reach the end.
+constexpr double most_volume_stiffness = 1e8;  // multiple of Young's modulus
+constexpr double most_hourglass = 1e4;         // fraction of Young's modulus
 
 void refuse_absurd_stiffness(const Model& model) {
   for (const Part& part : model.parts) {
@@ -43,7 +45,7 @@ void refuse_absurd_stiffness(const Model& model) {
   }
 }
 
-/// Steps of about `wanted` [s] that frames and the end fall on.
+/// Chooses a step of about `wanted` [s] such that frames and the end fall on steps.
 void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
   const double interval = scene.output.frames_per_second > 0
                               ? std::min(1 / scene.output.frames_per_second, scene.time.end)
@@ -63,19 +65,19 @@ void divide_time(const Scene& scene, double wanted, StepPlan& plan) {
   plan.steps = whole(scene.time.end / plan.dt);
 }
 
-/// The longest step [s] that resolves one thing, and what that is.
+/// The longest step [s] that resolves a motion or load, and the name of it.
 struct Resolution {
   double step = std::numeric_limits<double>::infinity();
   std::string what;  ///< "body.motion.frequency = 50 Hz of body "beam""
   std::string where;
 };
 
-/// Steps that each period, duration, turn or ramp of a motion or load is taken in at the least. A
-/// leapfrog or second-order implicit step follows a sine in twenty steps to within 1%.
+/// Fewest steps per period, duration, turn or ramp of a motion or load. Leapfrog and the
+/// second-order implicit method follow a sine of twenty steps per period to within 1%.
 constexpr double steps_per_period = 20;
 
-/// What is fastest of all motions and loads of a scene. Ramps of 0 are loads that act at once, on
-/// purpose.
+/// Returns the resolution of the fastest motion or load of a scene. A ramp of 0 is a load that acts
+/// at once, on purpose, and is ignored.
 Resolution finest_resolution(const Scene& scene) {
   Resolution finest;
   for (const BodyRequest& body : scene.bodies) {
@@ -95,7 +97,7 @@ Resolution finest_resolution(const Scene& scene) {
         add(motion.duration, motion.select,
             fmt::format("body.motion.duration = {:g} s", motion.duration));
       }
-      // Halfway it turns 1.5 times as fast as on average.
+      // The rotation is fastest in the middle, by 1.5 times the mean.
       const double turns = 1.5 * norm(motion.rotation) / 360;
       if (turns > 1) {
         add(motion.duration / turns, motion.select,
@@ -112,7 +114,7 @@ Resolution finest_resolution(const Scene& scene) {
   return finest;
 }
 
-/// @throws InputError if the scene's own step leaves out what moves
+/// Checks that a step given in the scene resolves its motions and loads. @throws InputError if not
 void check_resolves(const Scene& scene, const Resolution& finest) {
   if (!scene.time.step || *scene.time.step <= finest.step * (1 + 1e-9)) return;
   throw InputError(fmt::format(
@@ -128,10 +130,11 @@ double strongest_damping(const Model& model) {
   return damping;
 }
 
-/// Steps under damping: distances are off by a share of (c dt)²/24, so 1% at 0.5 / c.
+/// Longest step under damping, times c: distances have a relative error of (c dt)²/24, which is 1%
+/// at 0.5.
 constexpr double damped_share = 0.5;
 
-/// @throws InputError if the scene's own step is too long for its damping
+/// Checks a step given in the scene against its damping. @throws InputError if it is too long
 void check_damped(const Scene& scene, double damping) {
   if (!scene.time.step || !(*scene.time.step * damping > 1)) return;
   throw InputError(fmt::format(

@@ -1,4 +1,4 @@
-/// How much stiffer than at rest a deformed model is.
+/// The stiffness of a deformed model relative to that at rest.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,12 +12,12 @@
 namespace phyxel {
 namespace {
 
-/// Largest stiffness of plane waves [Pa] of a law that is known by its stresses only: forward
-/// differences give ∂P/∂F, and directions and polarisations are improved in turn.
+/// Estimates the largest stiffness of plane waves [Pa] of a caller's law from its stresses: forward
+/// differences give ∂P/∂F, and direction and polarisation are optimised in turn.
 double wave_stiffness_of(const CustomLaw& law, const Mat3d& grad_u) {
-  constexpr double step = 1e-6;  // rounding 1e-10 of the stiffness, curvature 1e-6
+  constexpr double step = 1e-6;  // relative errors: 1e-10 of rounding, 1e-6 of curvature
   const Mat3d stress = law.first_piola_stress(grad_u);
-  Mat3d tangent[9];  // of P by entry e of ∇u
+  Mat3d tangent[9];  // ∂P by entry e of ∇u
   for (int e = 0; e < 9; ++e) {
     Mat3d changed = grad_u;
     changed(e / 3, e % 3) += step;
@@ -55,7 +55,7 @@ double stiffening_of(const PartLaw& law, const Material& material, const Mat3d& 
   return material.viscosity > 0 ? std::max(stiffer, viscous_stiffening(stretches)) : stiffer;
 }
 
-/// Largest over the phyxels of this rank.
+/// The largest stiffening of this rank's phyxels.
 Stiffest stiffest_here(const Model& model, Backend& backend) {
   std::vector<Mat3d> gradient;
   backend.displacement_gradients(gradient);

@@ -1,4 +1,4 @@
-/// The largest `Stiffening` of phyxels, in whatever order they are looked at.
+/// The largest `Stiffening` of phyxels, independent of the order in which they are added.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace phyxel {
 
-/// Of equal ratios the larger stretch counts, of equal stretches the smaller global id. A ratio
-/// that is not a number counts as infinite.
+/// Ties of the ratio go to the larger stretch, ties of the stretch to the smaller global id. A NaN
+/// ratio counts as infinite.
 class Stiffest {
  public:
   Stiffest() = default;
@@ -31,7 +31,7 @@ class Stiffest {
     const Stiffening& o = other.found_;
     if (o.phyxel >= 0) look_at(o.ratio, o.stretch, o.phyxel);
   }
-  /// Collective.
+  /// Combines the results of all ranks. Collective.
   void look_at_ranks(const Communicator& ranks) {
     const bool any = found_.phyxel >= 0;
     const double ratio = ranks.largest(any ? found_.ratio : 0);

@@ -1,5 +1,5 @@
-/// What `Diagnostics` are made of: in whatever order, and on however many threads and ranks,
-/// phyxels are added, the same bits come out.
+/// The sums behind `Diagnostics`. They are exact: the result has the same bits for any order of
+/// phyxels and any number of threads and ranks.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace phyxel {
 
-/// Sums and extremes of phyxels. Phyxels go by their numbers in the whole model.
+/// Sums and extremes over phyxels, which are identified by global ids.
 struct Totals {
   ExactSum kinetic_energy, strain_energy, volume_energy, hourglass_energy, plastic_work,
       viscous_work;
@@ -33,14 +33,14 @@ struct Totals {
       each(v->x), each(v->y), each(v->z);
     }
   }
-  /// Of equally fast ones the first.
+  /// Updates the fastest phyxel; ties go to the smaller id.
   void look_at_speed(double speed, Index phyxel) {
     if (speed > largest_speed || (speed == largest_speed && fastest >= 0 && phyxel < fastest)) {
       largest_speed = speed;
       fastest = phyxel;
     }
   }
-  /// Adds one phyxel. @param id its index in the whole model
+  /// Adds one phyxel. @param id its global id
   void add(const PhyxelTotals& phyxel, Index id) {
     const double* term = phyxel.sum;
     for_each_sum([&](ExactSum& sum) { sum.add(*term++); });

@@ -1,5 +1,5 @@
-/// The backend under test: the CPU's, or in programs built with PHYXEL_TEST_CUDA the GPU's; those
-/// skip all their tests where there is none.
+/// The backend under test: that of the CPU, or in programs built with PHYXEL_TEST_CUDA that of the
+/// GPU. Without a GPU these programs skip all their tests.
 #pragma once
 
 #include "phyxel/backend.hpp"
@@ -13,7 +13,7 @@
 
 namespace phyxel::testing {
 
-/// @param threads of the CPU
+/// Makes the backend under test. @param threads threads of the CPU
 inline std::unique_ptr<Backend> make_test_backend(const Model& model, Precision precision,
                                                   [[maybe_unused]] int threads = 0) {
 #if defined(PHYXEL_TEST_CUDA)
@@ -24,7 +24,7 @@ inline std::unique_ptr<Backend> make_test_backend(const Model& model, Precision 
 }
 
 #if defined(PHYXEL_TEST_CUDA)
-/// All tests of a program on the GPU are skipped where there is none.
+/// Skips all tests of a program for GPUs if there is no GPU.
 class NeedsDevice : public ::testing::Environment {
  public:
   void SetUp() override {

@@ -10,8 +10,8 @@ namespace phyxel::test {
 /// Runs the program on a scene of one beam, beam.toml.
 class BeamProgram : public Program {
  protected:
-  /// Writes a small beam that swings for `end` seconds; `extra` goes on top of the file. One thread
-  /// steps, so that a second core can write files meanwhile.
+  /// Writes a small beam that swings for `end` seconds, with `extra` at the top of the file. One
+  /// thread steps, so that a second core can write files meanwhile.
   void write_beam(const std::string& end = "0.2", const std::string& extra = "") const {
     write("beam.toml", extra + R"(
 gravity = [0.0, 0.0, -9.81]

@@ -20,7 +20,8 @@ inline Vec3d uniform_vector(std::mt19937_64& engine, double amplitude) {
   return {x, y, uniform(engine, -amplitude, amplitude)};
 }
 
-/// nx × ny × nz phyxels, cell-centred, each moved by up to `jitter` spacings; equal volumes.
+/// Returns nx × ny × nz phyxels of equal volume at the centres of cells, each moved by up to
+/// `jitter` spacings.
 inline Cloud lattice(int nx, int ny, int nz, double spacing, double jitter = 0,
                      std::uint64_t seed = 1) {
   std::mt19937_64 engine(seed);
@@ -62,7 +63,7 @@ inline Model model_of(const Scene& scene, const Cloud& cloud) {
   return build_model(scene, std::span(&cloud, 1));
 }
 
-/// A small irregular block with every term at work.
+/// A small irregular block with all terms in use.
 inline Scene busy_scene() {
   Material material = rubber();
   material.volume_stiffness = 5e4;
@@ -82,7 +83,7 @@ inline Scene busy_scene() {
 
 inline Model busy_model() { return model_of(busy_scene(), lattice(8, 3, 4, 0.1, 0.2)); }
 
-/// Two built-in bodies that never meet, with their surfels.
+/// Two built-in bodies far apart, with their surfels.
 inline Model built_in_bodies(
     const char* first, const char* second,
     NeighbourhoodRule::Support support = NeighbourhoodRule::Support::uniform) {
@@ -100,7 +101,7 @@ inline Model built_in_bodies(
   return build_model(scene);
 }
 
-/// As where lists and moments are left to a device.
+/// Removes lists and moments, as if a device computed them.
 inline Model without_lists(Model model) {
   model.neighbourhood.neighbours = model.neighbourhood.inverse_lists = {};
   model.inverse_moment.clear();

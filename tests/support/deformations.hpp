@@ -1,5 +1,5 @@
-/// Deformations at random for the tests of laws at a point, and what a law is held against:
-/// differences of its energy, its acoustic tensor by differences, lanes of a pack.
+/// Random deformations for tests of laws at a point, and the references of these tests: differences
+/// of the energy, the acoustic tensor by differences, and lanes of a pack.
 #pragma once
 
 #include <Eigen/Dense>
@@ -16,7 +16,7 @@ namespace phyxel::testing {
 using M3 = Eigen::Matrix3d;
 using V3 = Eigen::Vector3d;
 
-/// Reproducible deformations.
+/// Reproducible random deformations.
 class Deformations {
  public:
   explicit Deformations(unsigned seed) : engine_(seed) {}
@@ -31,15 +31,15 @@ class Deformations {
     while (v.norm() > 1 || v.norm() < 0.1);
     return v.normalized();
   }
-  /// By an angle of up to half a turn.
+  /// A rotation by up to half a turn.
   M3 rotation() { return Eigen::AngleAxisd(uniform(-M_PI, M_PI), direction()).toRotationMatrix(); }
-  /// F of principal stretches between two bounds.
+  /// F with principal stretches between two bounds.
   M3 gradient(double low, double high) {
     return stretched(V3(uniform(low, high), uniform(low, high), uniform(low, high)));
   }
-  /// F of given principal stretches.
+  /// F with given principal stretches.
   M3 stretched(const V3& stretches) { return rotation() * stretches.asDiagonal() * rotation(); }
-  /// Entries in (-size, size).
+  /// A matrix with entries in (-size, size).
   M3 noise(double size) {
     M3 m;
     for (int e = 0; e < 9; ++e) m(e / 3, e % 3) = uniform(-size, size);
@@ -85,8 +85,8 @@ M3 gradient_of(const Energy& energy, const M3& f, double step) {
   return out;
 }
 
-/// Largest a bᵀ : ∂P/∂F : a bᵀ over unit a and b: P by central differences; the best a for each b
-/// and the best b for each a in turns, from many starts.
+/// Largest a bᵀ : ∂P/∂F : a bᵀ over unit vectors a and b, with ∂P/∂F by central differences. The
+/// maximum is found by optimising a and b in turn, from many starts.
 template <class Stress>
 double largest_wave_stiffness(const Stress& stress, const M3& f, Deformations& any) {
   const double step = 1e-5;
@@ -118,7 +118,7 @@ double largest_wave_stiffness(const Stress& stress, const M3& f, Deformations& a
   return largest;
 }
 
-/// A plain struct of numbers with each number in every lane of a pack.
+/// Broadcasts each number of a plain struct to all lanes of a pack.
 template <class Packed, class P, class Plain>
 Packed packed(const Plain& plain) {
   using T = std::decay_t<decltype(P{}[0])>;
@@ -132,7 +132,7 @@ Packed packed(const Plain& plain) {
   std::memcpy(static_cast<void*>(&out), lanes, sizeof(lanes));
   return out;
 }
-/// Number k of a packed struct, of one lane.
+/// Returns number k of one lane of a packed struct.
 template <class T, class P, class Packed>
 T lane_of(const Packed& packed, int k, int lane) {
   P number;
@@ -140,7 +140,7 @@ T lane_of(const Packed& packed, int k, int lane) {
               sizeof(P));
   return number[lane];
 }
-/// A matrix with lane l from matrix l.
+/// Packs matrices: lane l of the result is matrix l.
 template <class P, class T, int W>
 Mat3<P> packed_matrices(const Mat3<T> (&of)[W]) {
   Mat3<P> out;

@@ -1,4 +1,4 @@
-/// A folder of its own for a test, removed afterwards.
+/// A temporary folder of a test, which its destructor removes.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-/// Materials of every law, and a law of a caller's own whose answers are known.
+/// Materials of every law, and a caller's law with known results.
 #pragma once
 
 #include <string>
@@ -12,8 +12,8 @@
 
 namespace phyxel::testing {
 
-/// `rubber` with a law of any parameters: those of its own are about as stiff as E of rubber, which
-/// is a tenth of the E that `typical` goes with.
+/// `rubber` with any law. Parameters other than E and ν are a tenth of their `typical` values where
+/// these are in Pa, since E of rubber is a tenth of the E that those belong to.
 inline Material rubber_of(const std::string& law) {
   Material material = rubber();
   material.law = law;
@@ -36,7 +36,8 @@ Law law_of(Material material) {
   return make_law<Law, Real>(chosen_law(material).constants.data());
 }
 
-/// A law as its virgin material responds elastically: what an elastic law is anyway.
+/// Adapter of any law to the interface of an elastic law, by the elastic response of its virgin
+/// material.
 template <class Law>
 struct Virgin {
   Law law;
@@ -50,7 +51,7 @@ struct Virgin {
   }
 };
 
-/// Why a material is refused; "" if it is not.
+/// Returns the message with which a material is refused; "" if it is accepted.
 inline std::string law_refusal(const Material& material) {
   try {
     chosen_law(material);
@@ -60,7 +61,7 @@ inline std::string law_refusal(const Material& material) {
   return "";
 }
 
-/// The library's neo-Hookean law once more, so many times as stiff.
+/// The library's neo-Hookean law as a caller's law, with its stiffness multiplied by a factor.
 class Repeated final : public CustomLaw {
  public:
   explicit Repeated(const Material& m, double factor = 1)

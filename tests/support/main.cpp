@@ -1,4 +1,4 @@
-/// main() of the test programs: GoogleTest's, whose skips are counted.
+/// main() of the test programs, which counts the skips of GoogleTest.
 #include <gmock/gmock.h>
 
 #include "support/skips.hpp"

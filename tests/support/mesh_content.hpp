@@ -1,4 +1,4 @@
-/// A unit cube as the content of mesh files, whole and ready to be damaged.
+/// The content of mesh files of a unit cube, which tests read as it is or damage.
 #pragma once
 
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 
 namespace phyxel::test {
 
-/// Bytes of a number, in either order.
+/// Returns the bytes of a number, in either order.
 template <class T>
 std::string bytes(T value, bool big_endian = false) {
   std::string text(sizeof(T), '\0');

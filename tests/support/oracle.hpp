@@ -1,7 +1,7 @@
 /// The oracle: a plain evaluation of the papers' equations by double loops over all pairs, written
-/// from the papers and not from the library, short enough to read in one sitting. Everything else
-/// is held against it. Notation as in Mueller et al. 2004 and Farias et al. 2008: x rest position,
-/// u displacement, v volume, w weight, A moment matrix, J = I + grad u.
+/// from the papers and not from the library, and short. The tests compare everything else with it.
+/// Notation as in Mueller et al. 2004 and Farias et al. 2008: x rest position, u displacement, v
+/// volume, w weight, A moment matrix, J = I + grad u.
 #pragma once
 
 #include <Eigen/Dense>
@@ -17,8 +17,8 @@ using M3 = Eigen::Matrix3d;
 struct Material {
   double young = 0, poisson = 0, volume_stiffness = 0;
   std::string law = "st-venant-kirchhoff";
-  std::map<std::string, double> parameters = {};  // of laws that have others than E and ν
-  /// True if its strain is Green's.
+  std::map<std::string, double> parameters = {};  // of laws with parameters other than E and ν
+  /// True for a law in Green's strain.
   bool green() const { return law == "st-venant-kirchhoff"; }
 };
 
@@ -26,9 +26,9 @@ struct Body : Material {
   std::vector<V3> x;
   std::vector<double> v, h;
   std::vector<std::vector<int>> neighbours;
-  std::vector<Material> material;  // of each; none: the body's
+  std::vector<Material> material;  // of each phyxel; empty: that of the body
   double hourglass = 0;            // κ [N/m]
-  std::vector<V3> closing;         // ĉ [1/m], or none
+  std::vector<V3> closing;         // ĉ [1/m]; empty without closed gradients
 };
 
 inline const Material& material_of(const Body& b, int i) {
@@ -40,7 +40,7 @@ inline double w(double r, double h) {
   return 315 / (64 * M_PI * std::pow(h, 9)) * std::pow(h * h - r * r, 3);
 }
 
-/// Everyone closer than h_i.
+/// Finds all phyxels closer than h_i.
 inline void find_neighbours(Body& b) {
   const int n = static_cast<int>(b.x.size());
   b.neighbours.assign(b.x.size(), {});
@@ -51,7 +51,7 @@ inline void find_neighbours(Body& b) {
   }
 }
 
-/// A_i^-1 with singular directions left out.
+/// A_i^-1, by the pseudo-inverse.
 inline M3 inverse_moment(const Body& b, int i) {
   M3 a = M3::Zero();
   for (const int j : b.neighbours[i]) {
@@ -107,7 +107,7 @@ struct NeoHooke {
     lambda = b.young * b.poisson / ((1 + b.poisson) * (1 - 2 * b.poisson)) + 5 * shear / 6;
     alpha = 1 + mu / lambda - mu / (4 * lambda);
   }
-  /// Zero at rest.
+  /// Energy density, zero at rest.
   double energy(const M3& j) const {
     const auto whole = [&](double i, double det) {
       return mu / 2 * (i - 3) + lambda / 2 * std::pow(det - alpha, 2) - mu / 2 * std::log(i + 1);
@@ -206,16 +206,16 @@ struct MooneyRivlin {
   }
 };
 
-/// What the linear fit at i leaves of the motion of j.
+/// Residual of the linear fit at i for the displacement of j.
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
 }
-/// (1 - r²/h²)³: w without its unit.
+/// (1 - r²/h²)³, the weight w without its unit.
 inline double shape(const Body& b, int i, int j) {
   return w((b.x[j] - b.x[i]).norm(), b.h[i]) / w(0, b.h[i]);
 }
 
-/// grad u with the residual's share, and its derivative by u_j.
+/// The closed gradient.
 inline M3 closed_grad_u(const Body& b, const std::vector<V3>& u, int i) {
   M3 g = grad_u(b, u, i);
   if (b.closing.empty()) return g;
@@ -223,6 +223,7 @@ inline M3 closed_grad_u(const Body& b, const std::vector<V3>& u, int i) {
   for (const int j : b.neighbours[i]) r += shape(b, i, j) * residual(b, u, g, i, j);
   return g + r * b.closing[i].transpose();
 }
+/// The derivative of the closed gradient at i by u_j.
 inline V3 grad_of(const Body& b, const M3& inverse, int i, int j) {
   const auto slope = [&](int k) {
     const V3 x = b.x[k] - b.x[i];
@@ -261,7 +262,8 @@ inline double energy(const Body& b, const std::vector<V3>& u) {
   return total;
 }
 
-/// Forces by the papers' scatter: i pushes each of its neighbours, and itself the other way.
+/// Forces by the papers' scatter: phyxel i exerts a force on each of its neighbours, and the
+/// opposite one on itself.
 inline std::vector<V3> forces(const Body& b, const std::vector<V3>& u) {
   std::vector<V3> f(b.x.size(), V3::Zero());
   for (int i = 0; i < static_cast<int>(b.x.size()); ++i) {

@@ -1,4 +1,5 @@
-/// The oracle for a model of one body by the paper's rules, and equation (6) by double loops.
+/// The oracle for a model of one body with the paper's rules, and equation (6) of Farias et al.
+/// 2008 by double loops.
 #pragma once
 
 #include <algorithm>

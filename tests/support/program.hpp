@@ -1,4 +1,4 @@
-/// Runs the program in a folder of its own, as a user would.
+/// A fixture that runs the program in a temporary folder, as a user would.
 #pragma once
 
 #include <sys/wait.h>
@@ -43,7 +43,7 @@ class Program : public Folder {
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
 
-  /// Waits until a file of the test's folder is there, which a run is to write soon.
+  /// Waits until a file appears in the test's folder.
   void wait_for(const std::string& file) const {
     for (int wait = 0; wait < 4000 && !std::filesystem::exists(folder_ / file); ++wait) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -51,9 +51,9 @@ class Program : public Folder {
     EXPECT_TRUE(std::filesystem::exists(folder_ / file));
   }
 
-  /// What starts the program, e.g. mpirun and its options; empty: nothing.
+  /// Command that launches the program, e.g. mpirun and its options; empty if there is none.
   std::vector<std::string> launcher_;
-  /// Name and value, on top of the test's own.
+  /// Variables (name, value) added to the environment of the test.
   std::vector<std::pair<std::string, std::string>> environment_;
 };
 

@@ -1,4 +1,4 @@
-# For tests in CMake: run(command...) fails where the command does, and puts what it prints into `out`.
+# For tests in CMake. run(command...) runs a command, fails if it does, and sets `out` to its output.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out)
   if(NOT code EQUAL 0)
@@ -8,7 +8,7 @@ function(run)
   set(out "${out}" PARENT_SCOPE)
 endfunction()
 
-# in_ci(result): whether continuous integration runs this, as tests/support/skips.hpp has it.
+# in_ci(result): true in continuous integration, as in tests/support/skips.hpp.
 function(in_ci result)
   if("$ENV{CI}" MATCHES "^(0|false)?$")
     set(${result} FALSE PARENT_SCOPE)
@@ -17,7 +17,7 @@ function(in_ci result)
   endif()
 endfunction()
 
-# without_tool(test tool): a part of a test is left out for want of a tool. It is counted as a skip; in CI the test fails.
+# without_tool(test tool): counts a part of a test that a missing tool prevents as a skip; in CI the test fails.
 function(without_tool test tool)
   in_ci(ci)
   if(ci)

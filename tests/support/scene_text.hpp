@@ -1,4 +1,4 @@
-/// Pieces of scene files, and what is said about them.
+/// Pieces of scene files, and the messages about them.
 #pragma once
 
 #include <filesystem>

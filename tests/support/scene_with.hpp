@@ -1,4 +1,4 @@
-/// Scenes that say one thing more than a right one does.
+/// Valid scenes with one more entry.
 #pragma once
 
 #include "scene/scene_schema.hpp"
@@ -11,7 +11,7 @@ inline std::string after_beam(const std::string& lines) {
   return time_section + "\n" + beam + material + lines;  // 2 + 1 + 4 + 4 lines
 }
 
-/// A scene that gives `key` the value `text`, and is right up to there.
+/// A scene that sets `key` to `text` and is valid up to that line.
 inline std::string scene_with(const SceneKey& key, const std::string& text) {
   const std::string line = key.name + " = " + text + "\n";
   const std::string& section = key.section;

@@ -1,6 +1,6 @@
-/// No test is skipped in silence: a skipped case is written to a file that scripts/test.sh sums up,
-/// a program whose cases are all skipped ends with CTest's exit code for that, and in CI a tool
-/// that is missing is a failure.
+/// Reports of skipped tests: a skipped case is written to a file that scripts/test.sh summarises, a
+/// program that skips all its cases ends with CTest's exit code for skips, and in CI a missing tool
+/// is a failure.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 
 namespace phyxel::test {
 
-/// The exit code that CTest knows as "skipped" (`SKIP_RETURN_CODE` in cmake/PhyxelOptions.cmake).
+/// The exit code of a skipped test (`SKIP_RETURN_CODE` in cmake/PhyxelOptions.cmake).
 constexpr int skipped_exit_code = 77;
 
 /// True in continuous integration: `CI` is set to anything but "", "0" and "false".
@@ -44,8 +44,8 @@ inline std::string skip_reason(const ::testing::TestResult& result) {
 }
 
 /// Counts every skipped case and returns the exit code of a test program whose `RUN_ALL_TESTS` has
-/// returned `failed`. A failure stays one, whatever was skipped or printed beside it. A skip in an
-/// environment's `SetUp` is a skip of all cases.
+/// returned `failed`. A failure is reported as one whatever was skipped. A skip in an environment's
+/// `SetUp` skips all cases.
 ///
 /// @param counts false on ranks other than the first, which have the same skips
 inline int exit_code_of(int failed, bool counts = true) {
@@ -72,7 +72,7 @@ inline int exit_code_of(int failed, bool counts = true) {
 
 }  // namespace phyxel::test
 
-/// Skips a test where a tool is missing; in CI the test fails.
+/// Skips a test if a tool is missing; in CI the test fails.
 #define PHYXEL_NEEDS_TOOL(there, tool)                                                   \
   do {                                                                                   \
     if (there) break;                                                                    \

@@ -1,4 +1,4 @@
-/// What every closed surface of one part must be.
+/// Checks that every closed surface of one part must pass.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ inline Offset euler_characteristic(const Surface& surface) {
          static_cast<Offset>(surface.triangle.size()) / 2;
 }
 
-/// Twice the area over the square of the longest side, of the thinnest triangle.
+/// The smallest ratio, over all triangles, of twice the area to the square of the longest side.
 inline double worst_triangle(const Surface& surface) {
   double worst = 1;
   for (const Triangle& t : surface.triangle) {
@@ -26,7 +26,8 @@ inline double worst_triangle(const Surface& surface) {
   return worst;
 }
 
-/// Closed, manifold, outward, of one part, without handles, and with unit normals.
+/// Expects a closed manifold surface of one part, oriented outwards, without handles and with unit
+/// normals.
 inline void expect_closed_ball(const Surface& surface) {
   const SurfaceDefects defects = inspect_surface(surface);
   EXPECT_TRUE(defects.clean()) << defects.describe();

@@ -24,7 +24,8 @@ inline Surface box(Vec3d low, Vec3d high) {
 
 inline Surface unit_cube() { return box({0, 0, 0}, {1, 1, 1}); }
 
-/// Octahedron whose triangles are cut in four `levels` times, pushed out to a sphere.
+/// An octahedron whose triangles are divided in four `levels` times and whose vertices are
+/// projected to a sphere.
 inline Surface sphere(Vec3d centre, double radius, int levels) {
   Surface s;
   s.position = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
@@ -50,7 +51,7 @@ inline Surface sphere(Vec3d centre, double radius, int levels) {
   return s;
 }
 
-/// Both surfaces, as two parts of one.
+/// Joins two surfaces as two parts of one.
 inline Surface together(Surface a, const Surface& b) {
   const auto shift = static_cast<Index>(a.position.size());
   a.position.insert(a.position.end(), b.position.begin(), b.position.end());
@@ -61,13 +62,13 @@ inline Surface together(Surface a, const Surface& b) {
   return a;
 }
 
-/// The same surface with a hole.
+/// Removes one triangle from a surface.
 inline Surface without(Surface s, std::size_t triangle) {
   s.triangle.erase(s.triangle.begin() + static_cast<std::ptrdiff_t>(triangle));
   return s;
 }
 
-/// The same surface with its outside in.
+/// Inverts the orientation of a surface.
 inline Surface turned(Surface s) {
   for (Triangle& t : s.triangle) std::swap(t[1], t[2]);
   add_normals(s);

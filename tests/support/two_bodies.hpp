@@ -1,4 +1,4 @@
-/// A trajectory small enough to write down: two bodies that move along x.
+/// A small trajectory with known values: two bodies that move along x.
 #pragma once
 
 #include "phyxel/model.hpp"
@@ -23,7 +23,7 @@ inline Model two_bodies() {
   return model;
 }
 
-/// Asks for every field, written into `directory`.
+/// A scene that writes every field to `directory`.
 inline Scene two_bodies_scene(const std::filesystem::path& directory) {
   Scene scene;
   scene.title = "two bodies";
@@ -34,7 +34,7 @@ inline Scene two_bodies_scene(const std::filesystem::path& directory) {
   return scene;
 }
 
-/// Frame number `k`: everything moved by k/2 in x.
+/// Frame number `k`, with everything moved by k/2 along x.
 struct TwoBodiesFrame {
   TwoBodiesFrame(const Model& model, int k)
       : number(k), surfels{model.surfels.position, model.surfels.normal} {
@@ -45,7 +45,7 @@ struct TwoBodiesFrame {
     state.dt = 0.01;
     for (Vec3d& p : surfels.position) p.x += 0.5 * k;
   }
-  /// Points into this.
+  /// Returns the frame, which refers to the data of this object.
   Frame frame() const {
     Frame frame;
     frame.state = &state;

@@ -249,7 +249,7 @@ TEST(Equilibrium, OfABodyInTwoPiecesEndsWithItsResidual) {
   } catch (const DivergedError& error) {
     EXPECT_THAT(error.what(), HasSubstr("steps of Newton's method"));
     EXPECT_THAT(error.what(), HasSubstr("evaluations of the forces"));
-    EXPECT_THAT(error.what(), HasSubstr("1e-08 is asked"));
+    EXPECT_THAT(error.what(), HasSubstr("1e-08 is needed"));
   }
 }
 
