@@ -225,7 +225,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
   const Cloud& cloud = sorted ? sorted->cloud : given;
   // The most that a phyxel takes at any time. With its neighbour lists and the CPU's arrays:
-  // measured while the time step is found, in `phyxel check` of a block of two million. Without:
+  // measured in `phyxel run --dry-run` of a block of two million. Without:
   // its cloud, its share of the model and of two states.
   require_host_memory(
       fmt::format("body \"{}\"", request.name),

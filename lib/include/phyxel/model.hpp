@@ -153,9 +153,9 @@ struct Model {
   Offset pairs() const;
 };
 
-/// Checks that the arrays of a model fit together: their sizes, that indices name phyxels or
-/// surfels that there are, neighbours those of the same body, and that values are finite. Every
-/// backend asks this of its model, once.
+/// Checks that the arrays of a model fit together: sizes agree, indices name existing phyxels and
+/// surfels, neighbours belong to one body, and values are finite. Every backend calls it once, when
+/// it is made.
 /// @throws InputError naming the array, the value found, and what is allowed
 void check_model(const Model& model);
 

@@ -6,28 +6,19 @@
 
 #include "phyxel/body_file.hpp"
 #include "phyxel/checkpoint.hpp"
-#include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
 #include "support/clouds.hpp"
 #include "support/folder.hpp"
+#include "support/refusal.hpp"
 #include "support/two_bodies.hpp"
 
 namespace phyxel {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::refusal_of;
 
 class CallerArrays : public test::Folder {};
-
-template <class Work>
-std::string refusal_of(Work&& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
 
 TEST_F(CallerArrays, BodiesThatCouldNotBeReadAreNotWritten) {
   const auto with = [&](auto&& change) {

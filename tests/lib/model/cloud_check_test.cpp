@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"
 #include "support/clouds.hpp"
+#include "support/refusal.hpp"
 
 namespace phyxel {
 namespace {
@@ -17,16 +17,6 @@ using namespace phyxel::testing;
 using ::testing::HasSubstr;
 
 const double nan_value = std::nan("");
-
-template <class Work>
-std::string refusal_of(Work&& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
 
 /// 27 phyxels with a surface and a region.
 Cloud whole_cloud() {

@@ -7,9 +7,9 @@
 #include <set>
 #include <string>
 
-#include "phyxel/error.hpp"
 #include "support/clouds.hpp"
 #include "support/laws.hpp"
+#include "support/refusal.hpp"
 
 namespace phyxel {
 namespace {
@@ -19,12 +19,7 @@ using testing::rubber;
 
 /// The message of the refusal of a scene with this material.
 std::string refusal_of(const Material& material) {
-  try {
-    validate(testing::one_body(material));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return testing::refusal_of([&] { validate(testing::one_body(material)); });
 }
 
 TEST(LawTable, EveryLawHasANameOfItsOwnAndParametersThatAreToldApart) {

@@ -10,6 +10,7 @@
 #include "scene/scene_parameters.hpp"
 #include "scene/scene_schema.hpp"
 #include "support/clouds.hpp"
+#include "support/refusal.hpp"
 #include "support/scene_text.hpp"
 
 namespace phyxel {
@@ -19,12 +20,8 @@ using ::testing::HasSubstr;
 
 std::string refusal_of(const Scene& scene) {
   const Cloud cloud = testing::lattice(3, 3, 3, 0.1);
-  try {
-    build_model(scene, std::vector<Cloud>(scene.bodies.size(), cloud));
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return testing::refusal_of(
+      [&] { build_model(scene, std::vector<Cloud>(scene.bodies.size(), cloud)); });
 }
 
 TEST(Validate, RefusesInCodeWhatScenesRefuse) {

@@ -6,10 +6,10 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
-#include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
+#include "support/refusal.hpp"
 
 namespace phyxel {
 namespace {
@@ -18,16 +18,6 @@ using namespace phyxel::testing;
 using ::testing::HasSubstr;
 
 const double nan_value = std::nan("");
-
-template <class Work>
-std::string refusal_of(Work&& work) {
-  try {
-    work();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
 
 class CallerValues : public ::testing::Test {
  protected:
