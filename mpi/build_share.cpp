@@ -13,19 +13,27 @@
 namespace phyxel {
 namespace {
 
+/// `migrate_along_curve` of all parts.
+MigratingPhyxels along_curve(const ShareSetup& setup, const WholeBodies& whole,
+                             MigratingPhyxels own) {
+  std::vector<Index> sizes;
+  for (const WholePart& part : whole.parts) sizes.push_back(part.size());
+  const auto part_of = [&](const MigratingPhyxel& p) { return whole.part_of(p); };
+  const bool sorted = whole.parts.size() > whole.bodies.size();
+  const std::vector<Box> boxes =
+      sorted ? boxes_of(setup.ranks, own, whole.parts.size(), part_of) : whole.boxes;
+  return migrate_along_curve(setup.ranks, std::move(own), part_of, sizes, boxes, whole.group_size);
+}
+
 BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
   const MpiCommunicator& ranks = setup.ranks;
   WholeBodies whole;
   whole.bodies.resize(setup.scene.bodies.size());
   MigratingPhyxels own =
       in_stage("making phyxels", [&] { return make_pieces(setup, piece, whole); });
-  whole.boxes = boxes_of(ranks, own, whole.bodies.size());
   count_bodies(setup, whole);
-  std::vector<Index> sizes;
-  for (const WholeBody& body : whole.bodies) sizes.push_back(body.size);
-  own = in_stage("ordering along the curve", [&] {
-    return migrate_along_curve(ranks, std::move(own), sizes, whole.boxes, whole.group_size);
-  });
+  own = in_stage("ordering along the curve",
+                 [&] { return along_curve(setup, whole, std::move(own)); });
   in_stage("spacings", [&] { find_spacings(setup, whole, own); });
   find_supports(setup, whole, own);
   Cut cut = in_stage("partition", [&] { return partition(setup, whole, own); });
@@ -35,9 +43,19 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
       in_stage("lists", [&] { return surroundings_of(setup, whole, std::move(own)); });
   in_stage("masses, moments, boundary, surfels", [&] { complete_model(setup, whole, local); });
   BuiltShare share = in_stage("share", [&] { return share_out_of(setup, whole, cut, local); });
-  share.digest = model_digest(share.model);
-  share.digest_before_4 = model_digest_before_4(share.model);
+  share.digest = model_digest(share.model, share.surfaces);
+  share.digest_before_4 = model_digest_before_4(share.model, share.surfaces);
   return share;
+}
+
+/// Closing vectors are found from lists of neighbours on the host, and a device does not search
+/// among phyxels that are sorted by material.
+ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
+  ShareOptions own = options;
+  for (const BodyRequest& body : scene.bodies) {
+    if (body.closure > 0 || !body.inclusions.empty()) own.surveyor = nullptr;
+  }
+  return own;
 }
 
 /// Bodies begin on one rank after the other, so that small ones are not all the first one's.
@@ -50,9 +68,6 @@ Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
-  if (needs_whole(scene)) {
-    return share_of_whole(ranks, options, [&] { return build_model(scene); });
-  }
   // Copies of a body follow one another; making one serves them all.
   const BodySource* made = nullptr;
   Cloud rest;
@@ -72,8 +87,9 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
     place(cut.cloud, request);
     return cut;
   };
+  const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
-    return built({ranks, scene, options}, [&](std::size_t b, std::uint64_t& digest) {
+    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t& digest) {
       const BodyRequest& request = scene.bodies[b];
       return naming(request, [&] { return piece_of_source(request, piece_of(ranks, b), digest); });
     });
@@ -82,16 +98,14 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
-  if (needs_whole(scene)) {
-    return share_of_whole(ranks, options, [&] { return build_model(scene, clouds); });
-  }
+  const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
     if (clouds.size() != scene.bodies.size()) {
       throw AgreedError(ExitCode::bad_input,
                         fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
                                     clouds.size(), scene.bodies.size()));
     }
-    return built({ranks, scene, options}, [&](std::size_t b, std::uint64_t& digest) {
+    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t& digest) {
       digest = 31 * digest + cloud_digest(clouds[b]);
       naming(scene.bodies[b], [&] { check_cloud(scene.bodies[b], clouds[b]); });
       CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));

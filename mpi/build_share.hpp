@@ -31,7 +31,7 @@ struct BuiltShare {
   Model model;  ///< Its `share` is connected.
   Partitioner partitioner = Partitioner::metis;
   PartitionQuality quality;
-  std::vector<Surface> surfaces;  ///< Of the whole bodies, in place: each one's, or all in one.
+  std::vector<Surface> surfaces;  ///< Of the whole bodies, in place.
   /// Of the whole model, as the functions of these names tell them.
   std::uint64_t digest = 0, digest_before_4 = 0;
 };
@@ -40,8 +40,8 @@ struct BuiltShare {
 /// whole (but for moments of ghosts that only carry surfels, which nobody reads). Lattices are made
 /// piece by piece, other bodies are made or read by every rank, and cut; surfaces are held whole.
 /// Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to their
-/// owners, which ask the others for what is around. Scenes with closed gradients or inclusions are
-/// built whole by every rank, which keeps its share. Collective.
+/// owners, which ask the others for what is around. Closing vectors are found by all ranks
+/// together, from lists on the host. Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options);

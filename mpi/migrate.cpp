@@ -20,7 +20,7 @@ namespace {
 
 /// A phyxel's key in the global order.
 struct Key {
-  Index body = 0;
+  Index part = 0;
   std::uint64_t key = 0;  ///< Position along the curve.
   Index number = 0;
 };
@@ -28,7 +28,7 @@ struct Key {
 /// for equal keys.
 struct Keyed {
   std::uint64_t key;
-  Index body;
+  Index part;
   Index here;
 };
 using KeyedPhyxels = Bulk<Keyed>;
@@ -37,7 +37,7 @@ using KeyedPhyxels = Bulk<Keyed>;
 std::ptrdiff_t first_from(const MigratingPhyxels& phyxels, const KeyedPhyxels& sorted,
                           const Key& key) {
   const auto before = [&](const Keyed& a, const Key& b) {
-    return std::tuple(a.body, a.key, phyxels[a.here].number) < std::tuple(b.body, b.key, b.number);
+    return std::tuple(a.part, a.key, phyxels[a.here].number) < std::tuple(b.part, b.key, b.number);
   };
   return std::lower_bound(sorted.begin(), sorted.end(), key, before) - sorted.begin();
 }
@@ -47,14 +47,14 @@ std::vector<Key> find_splitters(const MpiCommunicator& ranks, const MigratingPhy
                                 const KeyedPhyxels& sorted,
                                 const std::vector<std::pair<Index, Index>>& starts) {
   std::vector<Key> splitters;
-  for (const auto& [body, offset] : starts) splitters.push_back({body, 0, 0});
+  for (const auto& [part, offset] : starts) splitters.push_back({part, 0, 0});
   const auto try_bits = [&](const auto& with_bit) {
     std::vector<std::int64_t> before;
     std::vector<Key> trials;
     for (const Key& splitter : splitters) {
       const Key trial = trials.emplace_back(with_bit(splitter));
       before.push_back(first_from(phyxels, sorted, trial) -
-                       first_from(phyxels, sorted, {trial.body, 0, 0}));
+                       first_from(phyxels, sorted, {trial.part, 0, 0}));
     }
     ranks.add(before);
     for (std::size_t s = 0; s < splitters.size(); ++s) {
@@ -180,9 +180,9 @@ std::vector<Index> near_others(const MpiCommunicator& ranks, const MigratingPhyx
 }  // namespace
 
 std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& own,
-                          std::size_t bodies) {
+                          std::size_t count, const WhichOf& which) {
   constexpr double far = std::numeric_limits<double>::infinity();
-  const std::vector<Box> none(bodies, {{far, far, far}, {-far, -far, -far}});
+  const std::vector<Box> none(count, {{far, far, far}, {-far, -far, -far}});
   std::vector<Box> boxes = none;
   const auto stretch = [](Box& box, const Vec3d& low, const Vec3d& high) {
     box.low = {std::min(box.low.x, low.x), std::min(box.low.y, low.y), std::min(box.low.z, low.z)};
@@ -194,31 +194,32 @@ std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& 
     std::vector<Box> mine = none;
 #pragma omp for schedule(static) nowait
     for (std::size_t i = 0; i < own.size(); ++i) {
-      stretch(mine[own[i].body], own[i].position, own[i].position);
+      stretch(mine[which(own[i])], own[i].position, own[i].position);
     }
 #pragma omp critical
-    for (std::size_t b = 0; b < bodies; ++b) stretch(boxes[b], mine[b].low, mine[b].high);
+    for (std::size_t b = 0; b < count; ++b) stretch(boxes[b], mine[b].low, mine[b].high);
   }
   const std::vector<Box> all = ranks.gathered(std::span<const Box>(boxes));
   for (std::size_t k = 0; k < all.size(); ++k) {
-    stretch(boxes[k % bodies], all[k].low, all[k].high);
+    stretch(boxes[k % count], all[k].low, all[k].high);
   }
   return boxes;
 }
 
 MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyxels own,
-                                     const std::vector<Index>& sizes, const std::vector<Box>& boxes,
-                                     Index group) {
+                                     const WhichOf& part_of, const std::vector<Index>& sizes,
+                                     const std::vector<Box>& boxes, Index group) {
   const int parts = ranks.size();
   std::vector<HilbertFrame> frames;
   for (const Box& box : boxes) frames.push_back(HilbertFrame::around(box.low, box.high));
   const auto keyed = [&](const MigratingPhyxels& phyxels) {
     KeyedPhyxels keys = in_bulk(phyxels.size(), [&](std::size_t i) {
-      const MigratingPhyxel& p = phyxels[i];
-      return Keyed{frames[p.body].key_of(p.position), p.body, static_cast<Index>(i)};
+      const std::size_t part = part_of(phyxels[i]);
+      return Keyed{frames[part].key_of(phyxels[i].position), static_cast<Index>(part),
+                   static_cast<Index>(i)};
     });
     parallel_sort(keys, [&](const Keyed& a, const Keyed& b) {
-      if (a.body != b.body) return a.body < b.body;
+      if (a.part != b.part) return a.part < b.part;
       if (a.key != b.key) return a.key < b.key;
       return phyxels[a.here].number < phyxels[b.here].number;
     });
@@ -227,13 +228,13 @@ MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyx
   const auto groups_of = [&](Index size) { return (std::int64_t{size} + group - 1) / group; };
   std::int64_t groups = 0;
   for (const Index size : sizes) groups += groups_of(size);
-  // Body and index along the curve of the start of each rank's range.
+  // Part and index along the curve of the start of each rank's range.
   std::vector<std::pair<Index, Index>> starts;
   for (int r = 0; r < parts; ++r) {
     std::int64_t at = groups * r / parts;
-    std::size_t body = 0;
-    while (body + 1 < sizes.size() && at >= groups_of(sizes[body])) at -= groups_of(sizes[body++]);
-    starts.emplace_back(static_cast<Index>(body), static_cast<Index>(at * group));
+    std::size_t part = 0;
+    while (part + 1 < sizes.size() && at >= groups_of(sizes[part])) at -= groups_of(sizes[part++]);
+    starts.emplace_back(static_cast<Index>(part), static_cast<Index>(at * group));
   }
   const auto ordered = [](const MigratingPhyxels& phyxels, const KeyedPhyxels& sorted) {
     return in_bulk(sorted.size(), [&](std::size_t k) { return phyxels[sorted[k].here]; });
@@ -251,11 +252,12 @@ MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyx
   release(own);
   own = ranks.alltoallv(send).values;
   release(send.values);
-  const auto [first_body, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
+  const auto [first_part, first_along] = starts[static_cast<std::size_t>(ranks.rank())];
   own = ordered(own, keyed(own));
-  for (const auto& [first, last] : ranges_of_bodies(own)) {
-    // A rank's first body may have begun on another one.
-    const Index begun = first == 0 && own[0].body == first_body ? first_along : 0;
+  for (const auto& [first, last] : ranges_by(own, part_of)) {
+    // A rank's first part may have begun on another one.
+    const bool begins = first > 0 || static_cast<Index>(part_of(own[0])) != first_part;
+    const Index begun = begins ? 0 : first_along;
     const std::size_t begin = first, end = last;  // for clang, whose OpenMP takes no bindings
 #pragma omp parallel for schedule(static)
     for (std::size_t k = begin; k < end; ++k) {
@@ -263,16 +265,6 @@ MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyx
     }
   }
   return own;
-}
-
-std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(const MigratingPhyxels& phyxels) {
-  std::vector<std::pair<std::size_t, std::size_t>> stretches;
-  for (auto first = phyxels.begin(), last = first; first != phyxels.end(); first = last) {
-    last = std::partition_point(first, phyxels.end(),
-                                [&](const MigratingPhyxel& p) { return p.body == first->body; });
-    stretches.emplace_back(first - phyxels.begin(), last - phyxels.begin());
-  }
-  return stretches;
 }
 
 namespace {

@@ -2,7 +2,9 @@
 /// phyxel is on one rank. Functions with the parameter `ranks` are collective.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -21,31 +23,48 @@ struct MigratingPhyxel {
   double support = 0;  ///< h [m]
   Index body = 0;
   Index number = 0;           ///< Index in its body.
-  Index along = 0;            ///< Index in its body along Hilbert's curve.
+  Index along = 0;            ///< Index in its part along Hilbert's curve.
   std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
 };
 using MigratingPhyxels = Bulk<MigratingPhyxel>;
 
-/// Returns the bounding box of each body.
-std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& own,
-                          std::size_t bodies);
+/// The number of the body of a phyxel, or of its part.
+using WhichOf = std::function<std::size_t(const MigratingPhyxel&)>;
 
-/// Sorts phyxels over all ranks by body, and within a body along Hilbert's curve over its box, as
+/// Returns the bounding boxes of `count` bodies or parts.
+std::vector<Box> boxes_of(const MpiCommunicator& ranks, const MigratingPhyxels& own,
+                          std::size_t count, const WhichOf& which);
+
+/// Sorts phyxels over all ranks by part, and within a part along Hilbert's curve over its box, as
 /// `curve_order` does. Each rank gets a contiguous range of whole groups, of about equal size. Sets
 /// `along`.
-/// @param sizes number of phyxels of each body. @param group number of phyxels that stay together,
-/// counted from the start of each body
+/// @param sizes number of phyxels of each part. @param boxes of the parts. @param group number of
+/// phyxels that stay together, counted from the start of each part
 MigratingPhyxels migrate_along_curve(const MpiCommunicator& ranks, MigratingPhyxels own,
-                                     const std::vector<Index>& sizes, const std::vector<Box>& boxes,
-                                     Index group);
+                                     const WhichOf& part_of, const std::vector<Index>& sizes,
+                                     const std::vector<Box>& boxes, Index group);
 
 /// Sends phyxels to their owners, which hold them in the order of bodies and numbers. @param owner
 /// rank of each phyxel
 MigratingPhyxels migrate_to_owners(const MpiCommunicator& ranks, MigratingPhyxels own,
                                    Bulk<int> owner);
 
-/// Returns the range [begin, end) of each body that has phyxels here. Bodies are contiguous.
-std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(const MigratingPhyxels& phyxels);
+/// Returns the range [begin, end) of each body or part that has phyxels here; each is contiguous.
+template <class Which>
+std::vector<std::pair<std::size_t, std::size_t>> ranges_by(const MigratingPhyxels& phyxels,
+                                                           Which&& which) {
+  std::vector<std::pair<std::size_t, std::size_t>> stretches;
+  for (auto first = phyxels.begin(), last = first; first != phyxels.end(); first = last) {
+    last = std::partition_point(
+        first, phyxels.end(), [&](const MigratingPhyxel& p) { return which(p) == which(*first); });
+    stretches.emplace_back(first - phyxels.begin(), last - phyxels.begin());
+  }
+  return stretches;
+}
+inline std::vector<std::pair<std::size_t, std::size_t>> ranges_of_bodies(
+    const MigratingPhyxels& phyxels) {
+  return ranges_by(phyxels, [](const MigratingPhyxel& p) { return p.body; });
+}
 
 /// Phyxels of other ranks, in the order of bodies and numbers, with their owners.
 struct RemotePhyxels {

@@ -2,6 +2,7 @@
 #include <tuple>
 #include <utility>
 
+#include "model/assembly.hpp"
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo_transport.hpp"
 #include "mpi/share_pipeline.hpp"
@@ -21,17 +22,17 @@ std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
   const auto phyxel = [&](Index k) -> const MigratingPhyxel& {
     return local.phyxels[share.global_id[k]];
   };
-  // body, along, which of the share
+  // part, along, which of the share
   const std::vector<Index> owned =
       chosen(0, static_cast<Index>(place.size()), [&](Index k) { return share.owned[k]; });
   auto sorted = in_bulk(owned.size(), [&](std::size_t k) {
     const MigratingPhyxel& p = phyxel(owned[k]);
-    return std::tuple(p.body, p.along, owned[k]);
+    return std::tuple(whole.part_of(p), p.along, owned[k]);
   });
   parallel_sort(sorted);
   auto own = in_bulk(sorted.size(), [&](std::size_t k) { return std::get<2>(sorted[k]); });
   const auto tile_of = [&](std::size_t k) {
-    return whole.bodies[std::get<0>(sorted[k])].tile + std::get<1>(sorted[k]) / setup.options.tile;
+    return whole.parts[std::get<0>(sorted[k])].tile + std::get<1>(sorted[k]) / setup.options.tile;
   };
   const auto n = static_cast<Index>(own.size());
   std::vector<Index> begin = chosen(0, n, [&](Index k) {  // of each tile
@@ -45,7 +46,7 @@ std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
     const auto last = static_cast<std::size_t>(begin[t + 1]);
     order_in_tile(std::span(own).subspan(first, last - first), [&](Index k) {
       const Index i = share.global_id[k], b = phyxel(k).body;
-      return local.around[b].length[i - local.model.parts[b].begin];
+      return local.around[b].length[i - local.bodies[b].begin];
     });
     for (std::size_t k = first; k < last; ++k) {
       place[own[k]] = tile_of(first) * setup.options.tile + static_cast<Index>(k - first);
@@ -65,15 +66,17 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   plan.owned = chosen(0, n, own);
   std::vector<Index>& ring = plan.ghosts;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    const Part& part = local.model.parts[b];
-    const std::vector<Index> needed = chosen(part.begin, part.end, [&](Index i) {
-      return !own(i) && local.around[b].needed[i - part.begin];
+    const Range& body = local.bodies[b];
+    const std::vector<Index> needed = chosen(body.begin, body.end, [&](Index i) {
+      return !own(i) && local.around[b].needed[i - body.begin];
     });
     ring.insert(ring.end(), needed.begin(), needed.end());
   }
   ModelShare made = share_of(local.model, plan, local.owner);
   Share& share = made.share;
   std::vector<Index> place = own_places(setup, whole, local, share);
+  std::vector<Vec3d> areas;
+  if (!local.areas.empty()) areas = values_of(share, local.areas);
   share.global_count = whole.size;
   share.global_id = tabulated(share.global_id.size(), [&](std::size_t k) {
     return global_id_of(whole, local, share.global_id[k]);
@@ -93,6 +96,11 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   from_owners(made.model.volume);
   BuiltShare built;
   built.model = model_of(std::move(made));
+  std::size_t surfels = 0;
+  for (const Surface& surface : whole.surfaces) surfels += surface.position.size();
+  built.model.warnings = whole.warnings;
+  close_share(setup, whole, built.model, areas);
+  add_warnings(built.model, surfels);
   built.partitioner = cut.partitioner;
   built.quality = cut.quality;
   built.surfaces = std::move(whole.surfaces);

@@ -3,6 +3,7 @@
 
 #include "exact_sum.hpp"
 #include "model/assembly.hpp"
+#include "model/closing_areas.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/share_surveyor.hpp"
 #include "mpi/share_pipeline.hpp"
@@ -15,37 +16,41 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
                            MigratingPhyxels own) {
   Surrounded all = surrounded(setup.ranks, own, remote_phyxels_within(setup, whole, own, 2));
   release(own);
-  LocalModel local{std::move(all.phyxels), std::move(all.owner), {}, {}, {}, setup.ranks.rank()};
+  LocalModel local{.phyxels = std::move(all.phyxels),
+                   .owner = std::move(all.owner),
+                   .bodies = std::vector<Range>(whole.bodies.size()),
+                   .model = {},
+                   .around = {},
+                   .surfel_id = {},
+                   .areas = {},
+                   .rank = setup.ranks.rank()};
   Model& m = local.model;
   setup.ranks.collectively([&] {
     m.position =
         tabulated(local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].position; });
     m.neighbourhood.support =
         tabulated(local.phyxels.size(), [&](std::size_t k) { return local.phyxels[k].support; });
-    m.parts.resize(whole.bodies.size());
-    for (std::size_t b = 0; b < whole.bodies.size(); ++b) m.parts[b].body = static_cast<Index>(b);
     for (const auto& [first, last] : ranges_of_bodies(local.phyxels)) {
-      Part& part = m.parts[static_cast<std::size_t>(local.phyxels[first].body)];
-      part.begin = static_cast<Index>(first);
-      part.end = static_cast<Index>(last);
+      local.bodies[static_cast<std::size_t>(local.phyxels[first].body)] = {
+          static_cast<Index>(first), static_cast<Index>(last)};
     }
     Index before = 0;
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-      Part& part = m.parts[b];
-      if (part.begin == part.end) part.begin = part.end = before;  // nobody is here
-      before = part.end;
+      Range& body = local.bodies[b];
+      if (body.begin == body.end) body.begin = body.end = before;  // nobody is here
+      before = body.end;
       const NeighbourhoodRule& rule = setup.scene.bodies[b].neighbourhood;
       if (setup.options.surveyor) {
         if (rule.one_sided()) m.neighbourhood.symmetric = false;
         continue;
       }
-      const Neighbourhood hood = neighbours_within(of_part(m.position, part),
-                                                   {m.neighbourhood.support.begin() + part.begin,
-                                                    m.neighbourhood.support.begin() + part.end},
+      const Neighbourhood hood = neighbours_within(of_range(m.position, body),
+                                                   {m.neighbourhood.support.begin() + body.begin,
+                                                    m.neighbourhood.support.begin() + body.end},
                                                    rule);
-      append_lists(m.neighbourhood, hood, part.begin);
+      append_lists(m.neighbourhood, hood, body.begin);
       std::copy(hood.support.begin(), hood.support.end(),
-                m.neighbourhood.support.begin() + part.begin);
+                m.neighbourhood.support.begin() + body.begin);
     }
   });
   return local;
@@ -68,6 +73,12 @@ void total(const MpiCommunicator& ranks, const std::vector<ExactSum*>& sums) {
   }
 }
 
+/// The parts of a body.
+std::span<const Part> model_parts_of(const WholeBodies& whole, const LocalModel& local,
+                                     std::size_t b) {
+  return local.model.parts_of_body(local.model.parts[whole.bodies[b].first_part]);
+}
+
 void extend(std::vector<double>& values, std::vector<double>&& more) {
   if (values.empty()) {
     values = std::move(more);
@@ -75,43 +86,43 @@ void extend(std::vector<double>& values, std::vector<double>&& more) {
     values.insert(values.end(), more.begin(), more.end());
   }
 }
-static std::vector<double> values_of(const LocalModel& local, const Part& part,
+static std::vector<double> values_of(const LocalModel& local, const Range& body,
                                      double MigratingPhyxel::*value) {
-  return tabulated(static_cast<std::size_t>(part.end - part.begin), [&](std::size_t k) {
-    return local.phyxels[static_cast<std::size_t>(part.begin) + k].*value;
+  return tabulated(static_cast<std::size_t>(body.end - body.begin), [&](std::size_t k) {
+    return local.phyxels[static_cast<std::size_t>(body.begin) + k].*value;
   });
 }
 
 void collect_ghost_neighbours(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local,
                               std::size_t b) {
   Model& m = local.model;
-  const Part& part = m.parts[b];
+  const Range& body = local.bodies[b];
   const std::vector<double> spacing = whole.bodies[b].kernel_volumes
-                                          ? values_of(local, part, &MigratingPhyxel::spacing)
+                                          ? values_of(local, body, &MigratingPhyxel::spacing)
                                           : std::vector<double>();
   const auto own = in_bulk(
-      static_cast<std::size_t>(part.end - part.begin),
-      [&](std::size_t k) -> char { return owns(local, static_cast<std::size_t>(part.begin) + k); });
+      static_cast<std::size_t>(body.end - body.begin),
+      [&](std::size_t k) -> char { return owns(local, static_cast<std::size_t>(body.begin) + k); });
   if (setup.options.surveyor) {
     Around& around = local.around.emplace_back(setup.options.surveyor->around(
-        of_part(m.position, part), of_part(m.neighbourhood.support, part), spacing, own,
+        of_range(m.position, body), of_range(m.neighbourhood.support, body), spacing, own,
         setup.scene.bodies[b].neighbourhood.one_sided()));
-    append(m.degenerate, around.degenerate, part.begin);
+    append(m.degenerate, around.degenerate, body.begin);
     return;
   }
   const Neighbourhood& hood = m.neighbourhood;
-  Around& around = local.around.emplace_back(around_by_lists(hood, part.begin, own));
+  Around& around = local.around.emplace_back(around_by_lists(hood, body.begin, own));
   if (whole.bodies[b].kernel_volumes) {
-    around.kernel_sum = kernel_sums(m.position, hood, spacing, part.begin);
+    around.kernel_sum = kernel_sums(m.position, hood, spacing, body.begin);
   }
 }
 
 /// `check_masses` of own phyxels, by their numbers in the body.
-void check_own_masses(const BodyRequest& request, const LocalModel& local, const Part& part,
+void check_own_masses(const BodyRequest& request, const LocalModel& local, const Range& body,
                       const Masses& masses) {
-  for (Index i = part.begin; i < part.end; ++i) {
+  for (Index i = body.begin; i < body.end; ++i) {
     if (!owns(local, static_cast<std::size_t>(i))) continue;
-    const auto k = static_cast<std::size_t>(i - part.begin);
+    const auto k = static_cast<std::size_t>(i - body.begin);
     check_mass(request, local.phyxels[i].number, masses.mass[k], masses.volume[k]);
   }
 }
@@ -123,10 +134,10 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   std::vector<ExactSum> sums(whole.bodies.size());
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     if (!whole.bodies[b].kernel_volumes) continue;
-    const Part& part = m.parts[b];
-    sums[b] = added_up<ExactSum>(part.begin, part.end, [&](ExactSum& sum, Index i) {
+    const Range& body = local.bodies[b];
+    sums[b] = added_up<ExactSum>(body.begin, body.end, [&](ExactSum& sum, Index i) {
       if (!owns(local, static_cast<std::size_t>(i))) return;
-      sum.add(local.around[b].kernel_sum[i - part.begin]);
+      sum.add(local.around[b].kernel_sum[i - body.begin]);
     });
   }
   std::vector<ExactSum*> all;
@@ -134,19 +145,24 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   total(setup.ranks, all);
   std::vector<Masses> made;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    const Part& part = m.parts[b];
+    const Range& body = local.bodies[b];
     const double density = setup.scene.bodies[b].material.density;
     Masses masses =
         whole.bodies[b].kernel_volumes
-            ? kernel_masses(values_of(local, part, &MigratingPhyxel::spacing),
+            ? kernel_masses(values_of(local, body, &MigratingPhyxel::spacing),
                             local.around[b].kernel_sum, sums[b].value() / whole.bodies[b].size,
                             density)
-            : geometric_masses(values_of(local, part, &MigratingPhyxel::volume), density);
+            : geometric_masses(values_of(local, body, &MigratingPhyxel::volume), density);
+    for (const Part& part : model_parts_of(whole, local, b).subspan(1)) {
+      for (Index i = part.begin; i < part.end; ++i) {
+        masses.mass[i - body.begin] = masses.volume[i - body.begin] * part.material.density;
+      }
+    }
     made.push_back(std::move(masses));
   }
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-      check_own_masses(setup.scene.bodies[b], local, m.parts[b], made[b]);
+      check_own_masses(setup.scene.bodies[b], local, local.bodies[b], made[b]);
     }
   });
   for (Masses& masses : made) {
@@ -155,56 +171,140 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   }
 }
 
-void describe_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
-  Model& m = local.model;
-  std::vector<BodySums> sums(whole.bodies.size());
-  std::vector<ListLengths> lists(whole.bodies.size());
-  std::vector<ExactSum*> all;
-  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    const BodyRequest& request = setup.scene.bodies[b];
-    Part& part = m.parts[b];
-    part.name = request.name;
-    part.material = request.material;
-    part.material.law = law_of(request, request.material);
+/// What is known of parts before phyxels have masses.
+void begin_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
+  for (std::size_t q = 0; q < whole.parts.size(); ++q) {
+    const WholePart& known = whole.parts[q];
+    const WholeBody& body = whole.bodies[known.body];
+    const BodyRequest& request = setup.scene.bodies[known.body];
+    Part& part = local.model.parts.emplace_back();
+    part.name = known.material.name;
+    part.body = static_cast<Index>(known.body);
+    const std::span<const MigratingPhyxel> here = of_range(local.phyxels, local.bodies[known.body]);
+    const auto first_from = [&](Index number) {
+      const auto first = std::partition_point(here.begin(), here.end(),
+                                              [&](const auto& p) { return p.number < number; });
+      return local.bodies[known.body].begin + static_cast<Index>(first - here.begin());
+    };
+    part.begin = first_from(known.material.begin);
+    part.end = first_from(known.material.end);
+    part.material = known.material.material;
+    part.material.law = law_of(request, known.material.material);
     part.material.hourglass = hourglass_of(request);
     part.neighbourhood = in_words(request.neighbourhood);
-    part.kernel_volumes = whole.bodies[b].kernel_volumes;
-    part.size = whole.bodies[b].size;
-    part.surfels = static_cast<Index>(whole.surfaces[b].position.size());
-    part.origin = whole.bodies[b].origin;
-    part.farthest = whole.boxes[b].farthest();
-    sums[b] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
+    part.closure = request.closure;
+    part.kernel_volumes = body.kernel_volumes;
+    part.size = known.size();
+    part.surfels =
+        q == body.first_part ? static_cast<Index>(whole.surfaces[known.body].position.size()) : 0;
+    part.origin = body.origin;
+    part.farthest = whole.boxes[known.body].farthest();
+  }
+}
+
+/// Lengths of the lists of own phyxels of a part.
+ListLengths own_lengths(const WholeBodies& whole, const LocalModel& local, const Part& part) {
+  const auto b = static_cast<std::size_t>(part.body);
+  const Index begin = local.bodies[b].begin;
+  Offset pairs = 0;
+  Index fewest = whole.bodies[b].size, most = 0;
+#pragma omp parallel for schedule(static) reduction(+ : pairs) reduction(min : fewest) \
+    reduction(max : most)
+  for (Index i = part.begin; i < part.end; ++i) {
+    if (!owns(local, static_cast<std::size_t>(i))) continue;
+    const Index length = local.around[b].length[i - begin];
+    pairs += length;
+    fewest = std::min(fewest, length);
+    most = std::max(most, length);
+  }
+  return {pairs, fewest, most};
+}
+
+/// Finds masses, volumes, centres and lengths of lists of whole parts.
+void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
+  Model& m = local.model;
+  std::vector<BodySums> sums(m.parts.size());
+  std::vector<ListLengths> lists(m.parts.size());
+  std::vector<ExactSum*> all;
+  for (std::size_t q = 0; q < m.parts.size(); ++q) {
+    const Part& part = m.parts[q];
+    sums[q] = added_up<BodySums>(part.begin, part.end, [&](BodySums& sum, Index i) {
       if (owns(local, static_cast<std::size_t>(i))) {
         sum.add(m.mass[i], m.volume[i], m.position[i]);
       }
     });
-    Offset pairs = 0;
-    Index fewest = whole.bodies[b].size, most = 0;
-#pragma omp parallel for schedule(static) reduction(+ : pairs) reduction(min : fewest) \
-    reduction(max : most)
-    for (Index i = part.begin; i < part.end; ++i) {
-      if (!owns(local, static_cast<std::size_t>(i))) continue;
-      const Index length = local.around[b].length[i - part.begin];
-      pairs += length;
-      fewest = std::min(fewest, length);
-      most = std::max(most, length);
-    }
-    lists[b] = {pairs, fewest, most};
-    BodySums& s = sums[b];
+    lists[q] = own_lengths(whole, local, part);
+    BodySums& s = sums[q];
     all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z});
   }
   total(setup.ranks, all);
   const std::vector<ListLengths> of_ranks = setup.ranks.gathered(std::span(std::as_const(lists)));
-  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    Part& part = m.parts[b];
-    sums[b].tell(part);
-    part.lists.fewest = whole.bodies[b].size;
-    for (std::size_t k = b; k < of_ranks.size(); k += whole.bodies.size()) {
+  for (std::size_t q = 0; q < m.parts.size(); ++q) {
+    Part& part = m.parts[q];
+    sums[q].tell(part);
+    BodySums all_parts;
+    for (std::size_t other = 0; other < m.parts.size(); ++other) {
+      if (m.parts[other].body == part.body) all_parts.add(sums[other]);
+    }
+    Part body;
+    all_parts.tell(body);
+    part.centre = body.centre;
+    part.lists.fewest = whole.bodies[static_cast<std::size_t>(part.body)].size;
+    for (std::size_t k = q; k < of_ranks.size(); k += m.parts.size()) {
       part.lists.pairs += of_ranks[k].pairs;
       part.lists.fewest = std::min(part.lists.fewest, of_ranks[k].fewest);
       part.lists.most = std::max(part.lists.most, of_ranks[k].most);
     }
   }
+}
+
+/// `check_closure` of each body.
+void check_surfaces(const ShareSetup& setup, const WholeBodies& whole, const LocalModel& local) {
+  setup.ranks.collectively([&] {
+    for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+      const BodyRequest& request = setup.scene.bodies[b];
+      if (whole.bodies[b].size == 0) continue;
+      double volume = 0;
+      for (const Part& part : model_parts_of(whole, local, b)) volume += part.volume;
+      naming(request, [&] {
+        check_closure(request, whole.surfaces[b],
+                      whole.bodies[b].kernel_volumes ? std::nullopt : std::optional(volume));
+      });
+    }
+  });
+}
+
+/// What the boundary of a body selects among its phyxels here, own or not.
+BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, const LocalModel& local,
+                         std::size_t b) {
+  const BodyRequest& request = setup.scene.bodies[b];
+  const WholeBody& body = whole.bodies[b];
+  const std::span<const MigratingPhyxel> here = of_range(local.phyxels, local.bodies[b]);
+  Cloud cloud;
+  cloud.position = tabulated(here.size(), [&](std::size_t k) { return here[k].position; });
+  const auto with_bit = [&](std::size_t bit) {
+    std::vector<Index> chosen;
+    for (std::size_t k = 0; k < here.size(); ++k) {
+      if (here[k].regions >> bit & 1) chosen.push_back(static_cast<Index>(k));
+    }
+    return chosen;
+  };
+  if (!body.bit_of_entry.empty()) {  // its piece has been checked
+    BoundaryChoice choice;
+    choice.first_load = request.fixed.size() + request.motions.size();
+    for (const Selection* selection : selections_of(request)) {
+      const int bit = body.bit_of_entry[choice.chosen.size()];
+      choice.chosen.push_back(bit >= 0 ? with_bit(static_cast<std::size_t>(bit))
+                                       : select(*selection, {cloud, {}, body.size}, request.name));
+    }
+    return choice;
+  }
+  auto number = tabulated(here.size(), [&](std::size_t k) { return here[k].number; });
+  for (const std::string& name : body.regions) cloud.regions[name];
+  for (std::size_t r = 0; r < body.used_regions; ++r) cloud.regions[body.regions[r]] = with_bit(r);
+  // No phyxel here: an empty list of numbers would mean all.
+  if (number.empty()) number.push_back(body.size);
+  return naming(request, [&] { return choose_boundary(request, cloud, number, body.size); });
 }
 
 void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
@@ -215,32 +315,15 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       if (selections_of(setup.scene.bodies[b]).empty()) continue;
-      const Part& part = m.parts[b];
-      const std::span<const MigratingPhyxel> here = of_part(local.phyxels, part);
-      Cloud cloud;
-      cloud.position = tabulated(here.size(), [&](std::size_t k) { return here[k].position; });
-      auto number = tabulated(here.size(), [&](std::size_t k) { return here[k].number; });
-      for (const std::string& name : whole.bodies[b].regions) cloud.regions[name];
-      for (std::size_t r = 0; r < whole.bodies[b].used_regions; ++r) {
-        std::vector<Index>& region = cloud.regions[whole.bodies[b].regions[r]];
-        for (std::size_t k = 0; k < here.size(); ++k) {
-          if (here[k].regions >> r & 1) region.push_back(static_cast<Index>(k));
-        }
-      }
-      BoundaryChoice& choice = choices[b];
-      // No phyxel here: an empty list of numbers would mean all.
-      if (number.empty()) number.push_back(whole.bodies[b].size);
-      choice = naming(setup.scene.bodies[b], [&] {
-        return choose_boundary(setup.scene.bodies[b], cloud, number, whole.bodies[b].size);
-      });
-      BoundaryChoice own = choice;
+      const Index begin = local.bodies[b].begin;
+      choices[b] = choice_of(setup, whole, local, b);
+      BoundaryChoice own = choices[b];
       for (std::vector<Index>& chosen : own.chosen) {
-        std::erase_if(chosen, [&](Index i) {
-          return !owns(local, static_cast<std::size_t>(part.begin + i));
-        });
+        std::erase_if(chosen,
+                      [&](Index i) { return !owns(local, static_cast<std::size_t>(begin + i)); });
       }
       for (const std::int64_t count : own.counts()) counts.push_back(count);
-      for (const ExactSum& mass : own.loaded_masses(m, part.begin)) masses.push_back(mass);
+      for (const ExactSum& mass : own.loaded_masses(m, begin)) masses.push_back(mass);
     }
   });
   setup.ranks.add(counts);
@@ -259,7 +342,7 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
       count += entries;
       std::vector<double> loaded;
       for (std::size_t l = 0; l < request.loads.size(); ++l) loaded.push_back((mass++)->value());
-      naming(request, [&] { choices[b].add_to(m, request, m.parts[b].begin, loaded); });
+      naming(request, [&] { choices[b].add_to(m, request, local.bodies[b].begin, loaded); });
     }
   });
 }
@@ -279,7 +362,7 @@ void gather_degenerate(const ShareSetup& setup, const WholeBodies& whole, LocalM
 
 }  // namespace
 
-void complete_model(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
+void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   m.gravity = setup.scene.gravity;
   find_moments(m);
@@ -288,15 +371,14 @@ void complete_model(const ShareSetup& setup, const WholeBodies& whole, LocalMode
       collect_ghost_neighbours(setup, whole, local, b);
     }
   });
+  begin_parts(setup, whole, local);
   find_masses(setup, whole, local);
-  describe_parts(setup, whole, local);
+  add_up_parts(setup, whole, local);
+  check_surfaces(setup, whole, local);
   add_boundary(setup, whole, local);
   gather_degenerate(setup, whole, local);
   add_surfels(setup, whole, local);
-  std::size_t surfels = 0;
-  for (const Surface& surface : whole.surfaces) surfels += surface.position.size();
-  m.warnings = whole.warnings;
-  add_warnings(m, surfels);
+  find_areas(setup, whole, local);
 }
 
 }  // namespace phyxel

@@ -15,10 +15,6 @@
 namespace phyxel {
 namespace {
 
-Index group_of(const WholeBodies& whole, const MigratingPhyxel& p) {
-  return whole.bodies[p.body].group + p.along / whole.group_size;
-}
-
 /// Own phyxels that stand for all, and with whom they share edges.
 struct Samples {
   MigratingPhyxels phyxels;        ///< Of one group after the other.
@@ -52,7 +48,7 @@ void find_edges(const WholeBodies& whole, std::span<const MigratingPhyxel> phyxe
         const double h = std::max(p.support, sample.support);
         const Vec3d apart = p.position - e.position;
         if (dot(apart, apart) < h * h && p.number != sample.number) {
-          mine.emplace_back(static_cast<Index>(first_sample) + e.index, group_of(whole, p));
+          mine.emplace_back(static_cast<Index>(first_sample) + e.index, whole.group_of(p));
         }
       });
     }
@@ -101,7 +97,7 @@ PartitionQuality quality_of_groups(const ShareSetup& setup, const WholeBodies& w
   for (std::size_t s = 0; s < samples.phyxels.size(); ++s) {
     others.clear();
     for (const Index group : samples.edges(s)) others.emplace_back(part_of[group], 1);
-    counts.add(part_of[group_of(whole, samples.phyxels[s])],
+    counts.add(part_of[whole.group_of(samples.phyxels[s])],
                1 + static_cast<std::int64_t>(others.size()), others);
   }
   for (std::int64_t& word : counts.words()) word *= sample_stride(setup, whole);
@@ -128,10 +124,10 @@ Graph gathered_graph(const MpiCommunicator& ranks, const WholeBodies& whole,
   std::vector<std::vector<EdgeRecord>> edges(each);
   std::vector<Index> crossing;
   for (std::size_t first = 0, last = 0; first < samples.phyxels.size(); first = last) {
-    const Index group = group_of(whole, samples.phyxels[first]);
+    const Index group = whole.group_of(samples.phyxels[first]);
     crossing.clear();
     GroupRecord record;
-    for (; last < samples.phyxels.size() && group_of(whole, samples.phyxels[last]) == group;
+    for (; last < samples.phyxels.size() && whole.group_of(samples.phyxels[last]) == group;
          ++last) {
       record.centre += samples.phyxels[last].position;
       const std::span<const Index> others = samples.edges(last);
@@ -220,7 +216,7 @@ Cut partition(const ShareSetup& setup, const WholeBodies& whole, const Migrating
     if (!best) throw InputError(refusal);
   });
   cut.quality = *best;
-  cut.owner = in_bulk(own.size(), [&](std::size_t i) { return part_of[group_of(whole, own[i])]; });
+  cut.owner = in_bulk(own.size(), [&](std::size_t i) { return part_of[whole.group_of(own[i])]; });
   return cut;
 }
 

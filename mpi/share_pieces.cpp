@@ -8,32 +8,65 @@
 #include "model/host_memory.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "scene/scene_error.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Of each phyxel of a piece; empty if the scene names no region.
-std::vector<std::uint32_t> region_bits(const ShareSetup& setup, WholeBodies& whole, std::size_t b,
-                                       const Cloud& cloud) {
-  WholeBody& body = whole.bodies[b];
+/// Marks the members of a boundary's entry by a bit of their own.
+/// @param name of a region, or of what stands for one
+int add_bit(const Selection& selection, const BodyRequest& request, const std::string& name,
+            std::span<const Index> members, WholeBody& body, std::vector<std::uint32_t>& bits) {
+  if (body.regions.size() == 32) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has more than 32 regions that are fixed, moved or loaded: allowed "
+        "are 32 where several ranks share it",
+        selection.where, request.name));
+  }
+  const auto bit = static_cast<int>(body.regions.size());
+  for (const Index i : members) bits[i] |= std::uint32_t{1} << bit;
+  body.regions.push_back(name);
+  return bit;
+}
+
+/// The numbers of a piece's phyxels in the cloud; one that no phyxel has, if the piece is empty.
+std::vector<Index> numbers_of(const CloudPiece& piece) {
+  std::vector<Index> number = tabulated(piece.cloud.position.size(), [&](std::size_t i) {
+    return piece.first + static_cast<Index>(i);
+  });
+  if (number.empty()) number.push_back(piece.whole);  // none would mean all
+  return number;
+}
+
+/// The bits of each phyxel of a piece; empty if the scene names no region. Phyxels that are sorted
+/// by material have bits, too, where the scene gives their numbers in the cloud.
+std::vector<std::uint32_t> region_bits(const BodyRequest& request, const CloudPiece& piece,
+                                       WholeBody& body) {
+  const Cloud& cloud = piece.cloud;
   std::vector<std::uint32_t> bits;
-  for (const Selection* selection : selections_of(setup.scene.bodies[b])) {
-    if (!selection->region) continue;
-    const auto found = cloud.regions.find(*selection->region);
-    // One that is not there is refused once phyxels are chosen.
-    if (found == cloud.regions.end() ||
-        std::count(body.regions.begin(), body.regions.end(), found->first) > 0) {
-      continue;
+  const std::vector<const Selection*> selections = selections_of(request);
+  BoundaryChoice choice;
+  if (!request.inclusions.empty() && !selections.empty()) {
+    choice = choose_boundary(request, cloud, numbers_of(piece), piece.whole);
+  }
+  for (std::size_t entry = 0; entry < selections.size(); ++entry) {
+    const Selection& selection = *selections[entry];
+    int bit = -1;
+    if (selection.region) {
+      const auto found = cloud.regions.find(*selection.region);
+      const auto known = std::find(body.regions.begin(), body.regions.end(), *selection.region);
+      if (known != body.regions.end()) {
+        bit = static_cast<int>(known - body.regions.begin());
+      } else if (found != cloud.regions.end()) {
+        // One that is not there is refused once phyxels are chosen.
+        bits.resize(cloud.position.size(), 0);
+        bit = add_bit(selection, request, found->first, found->second, body, bits);
+      }
+    } else if (selection.indices && !choice.chosen.empty()) {
+      bits.resize(cloud.position.size(), 0);
+      bit = add_bit(selection, request, selection.where, choice.chosen[entry], body, bits);
     }
-    if (body.regions.size() == 32) {
-      throw InputError(fmt::format(
-          "{}: body \"{}\" has more than 32 regions that are fixed, moved or loaded: allowed "
-          "are 32 where several ranks share it",
-          selection->where, setup.scene.bodies[b].name));
-    }
-    bits.resize(cloud.position.size(), 0);
-    for (const Index i : found->second) bits[i] |= std::uint32_t{1} << body.regions.size();
-    body.regions.push_back(found->first);
+    if (!choice.chosen.empty()) body.bit_of_entry.push_back(bit);
   }
   body.used_regions = body.regions.size();
   for (const auto& [name, members] : cloud.regions) {
@@ -42,6 +75,85 @@ std::vector<std::uint32_t> region_bits(const ShareSetup& setup, WholeBodies& who
     }
   }
   return bits;
+}
+
+/// The materials of this rank's piece of a body with inclusions.
+struct PieceMaterials {
+  std::size_t body = 0;
+  std::size_t begin = 0;  ///< The first of its phyxels among this rank's own.
+  Index first = 0;        ///< Number of that phyxel in the cloud.
+  MaterialChoice choice;
+};
+
+/// Phyxels of one material in a rank's piece of a body.
+struct MaterialCount {
+  Index body, first, material;  ///< `first`: the number of the piece's first phyxel in the cloud.
+  std::int64_t size, selected;
+};
+
+/// Finds the parts of all bodies. @param counts of all ranks
+void find_parts(const ShareSetup& setup, const std::vector<MaterialCount>& counts,
+                WholeBodies& whole) {
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+    const BodyRequest& request = setup.scene.bodies[b];
+    std::vector<std::int64_t> size(request.inclusions.size() + 1, 0);
+    std::vector<std::int64_t> selected(request.inclusions.size(), 0);
+    if (request.inclusions.empty()) size[0] = whole.bodies[b].size;
+    for (const MaterialCount& count : counts) {
+      if (count.body != static_cast<Index>(b)) continue;
+      size[count.material] += count.size;
+      if (count.material > 0) selected[count.material - 1] += count.selected;
+    }
+    whole.bodies[b].first_part = whole.parts.size();
+    naming(request, [&] {
+      for (MaterialGroup& group : material_groups(request, size, selected, whole.boxes[b])) {
+        whole.parts.push_back({.body = b, .material = std::move(group)});
+      }
+    });
+  }
+}
+
+/// Finds the parts of all bodies, and numbers this rank's phyxels by material.
+void number_by_material(const ShareSetup& setup, const std::vector<PieceMaterials>& pieces,
+                        WholeBodies& whole, MigratingPhyxels& own) {
+  std::vector<MaterialCount> here;
+  for (const PieceMaterials& piece : pieces) {
+    for (std::size_t k = 0; k < piece.choice.size.size(); ++k) {
+      here.push_back({static_cast<Index>(piece.body), piece.first, static_cast<Index>(k),
+                      piece.choice.size[k], k > 0 ? piece.choice.selected[k - 1] : 0});
+    }
+  }
+  const std::vector<MaterialCount> all = setup.ranks.gathered(std::span(std::as_const(here)));
+  setup.ranks.collectively([&] { find_parts(setup, all, whole); });
+  for (const PieceMaterials& piece : pieces) {
+    std::vector<Index> next(piece.choice.size.size(), 0);  // number in the body, of each material
+    for (const WholePart& part : whole.parts) {
+      if (part.body == piece.body) next[part.material.which] = part.material.begin;
+    }
+    for (const MaterialCount& count : all) {
+      if (count.body != static_cast<Index>(piece.body) || count.first >= piece.first) continue;
+      next[count.material] += static_cast<Index>(count.size);
+    }
+    const std::vector<Index>& material_of = piece.choice.material_of;
+    for (std::size_t i = 0; i < material_of.size(); ++i) {
+      own[piece.begin + i].number = next[material_of[i]]++;
+    }
+  }
+}
+
+/// Finds the place of each body's first phyxel.
+void find_origins(const ShareSetup& setup, const MigratingPhyxels& own, WholeBodies& whole) {
+  struct Origin {
+    std::size_t body;
+    Vec3d at;
+  };
+  std::vector<Origin> origins;
+  for (const MigratingPhyxel& p : own) {
+    if (p.number == 0) origins.push_back({static_cast<std::size_t>(p.body), p.position});
+  }
+  for (const Origin& origin : setup.ranks.gathered(std::span(std::as_const(origins)))) {
+    whole.bodies[origin.body].origin = origin.at;
+  }
 }
 
 /// Pieces of a length that hold `size`; none of no length.
@@ -69,11 +181,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   MigratingPhyxels own;
   whole.surfaces.resize(whole.bodies.size());
   std::vector<std::int64_t> with_volumes(whole.bodies.size());
-  struct Origin {
-    std::size_t body;
-    Vec3d at;
-  };
-  std::vector<Origin> origins;
+  std::vector<PieceMaterials> materials;
   std::uint64_t digest = 0;  // of what each rank has made or read for itself
   setup.ranks.collectively([&] {
     validate(setup.scene);
@@ -86,8 +194,16 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       WholeBody& body = whole.bodies[b];
       body.size = made.whole;
       with_volumes[b] = !cloud.volume.empty();
-      if (made.first == 0 && !cloud.position.empty()) origins.push_back({b, cloud.position[0]});
-      const std::vector<std::uint32_t> bits = region_bits(setup, whole, b, cloud);
+      const BodyRequest& request = setup.scene.bodies[b];
+      const std::vector<std::uint32_t> bits =
+          naming(request, [&] { return region_bits(request, made, body); });
+      if (!request.inclusions.empty()) {
+        naming(request, [&] {
+          materials.push_back(
+              {b, own.size(), made.first,
+               choose_materials(request, {made.cloud, numbers_of(made), made.whole})});
+        });
+      }
       const std::size_t before = own.size(), more = cloud.position.size();
       own.resize(before + more);
 #pragma omp parallel for schedule(static)
@@ -104,15 +220,17 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   });
   check_alike(setup.ranks, digest);
   setup.ranks.add(with_volumes);
-  for (const Origin& origin : setup.ranks.gathered(std::span(std::as_const(origins)))) {
-    whole.bodies[origin.body].origin = origin.at;
-  }
+  whole.boxes = boxes_of(setup.ranks, own, whole.bodies.size(),
+                         [](const MigratingPhyxel& p) { return static_cast<std::size_t>(p.body); });
+  number_by_material(setup, materials, whole, own);
+  find_origins(setup, own, whole);
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       check_terms(setup.scene.bodies[b]);
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));
+      if (whole.bodies[b].kernel_volumes) refuse_kernel_volumes(setup.scene.bodies[b]);
     }
   });
   return own;
@@ -126,25 +244,27 @@ void count_bodies(const ShareSetup& setup, WholeBodies& whole) {
   setup.ranks.collectively([&] {
     require_host_memory("the scene", static_cast<double>(size),
                         (setup.options.surveyor ? 280.0 : 1700.0) / setup.ranks.size());
-    std::int64_t places = 0;  // in tiles, of which bodies fill whole ones
-    for (const WholeBody& body : whole.bodies)
-      places += count_of(body.size, setup.options.tile) * setup.options.tile;
+    std::int64_t places = 0;  // in tiles, of which parts fill whole ones
+    for (const WholePart& part : whole.parts)
+      places += count_of(part.size(), setup.options.tile) * setup.options.tile;
     if (places > std::numeric_limits<Index>::max()) {
       throw InputError(fmt::format("the bodies fill {} places in tiles of {}: allowed are {}",
                                    places, setup.options.tile, std::numeric_limits<Index>::max()));
     }
   });
   const Index group = group_size(setup.options, static_cast<Index>(size));
-  WholeBody next;
+  Index base = 0;
   for (WholeBody& body : whole.bodies) {
-    body.base = next.base;
-    body.group = next.group;
-    body.tile = next.tile;
-    next.base += body.size;
-    next.group += static_cast<Index>(count_of(body.size, group));
-    next.tile += static_cast<Index>(count_of(body.size, setup.options.tile));
+    body.base = base;
+    base += body.size;
   }
-  whole.groups = next.group;
+  Index tiles = 0;
+  for (WholePart& part : whole.parts) {
+    part.group = whole.groups;
+    part.tile = tiles;
+    whole.groups += static_cast<Index>(count_of(part.size(), group));
+    tiles += static_cast<Index>(count_of(part.size(), setup.options.tile));
+  }
   whole.group_size = group;
   whole.size = static_cast<Index>(size);
 }

@@ -10,6 +10,7 @@
 
 #include "model/box.hpp"
 #include "model/cloud_piece.hpp"
+#include "model/inclusions.hpp"
 #include "model/share_surveyor.hpp"
 #include "mpi/build_share.hpp"
 #include "mpi/migrate.hpp"
@@ -25,25 +26,53 @@ struct ShareSetup {
 
 /// What all ranks know of a body.
 struct WholeBody {
-  Index size = 0;   ///< Phyxels.
-  Index base = 0;   ///< Global id of its first phyxel.
-  Index group = 0;  ///< Group of its first phyxel.
-  Index tile = 0;   ///< Tile of its first phyxel.
-  Vec3d origin;     ///< Its first phyxel at rest [m].
+  Index size = 0;              ///< Phyxels.
+  Index base = 0;              ///< Global id of its first phyxel.
+  std::size_t first_part = 0;  ///< Its own material; its inclusions follow.
+  Vec3d origin;                ///< Its first phyxel at rest [m].
   bool kernel_volumes = false;
   std::vector<std::string> regions;  ///< Names; those used have the first bits.
   std::size_t used_regions = 0;
-  double reach = 0;  ///< The largest support [m].
+  /// The bit of each entry of its boundary, or -1 if its place tells; empty for bodies of one
+  /// material.
+  std::vector<int> bit_of_entry;
+  double reach = 0;     ///< The largest support [m].
+  double enclosed = 0;  ///< Volume inside its surface, if its gradients are closed [m³].
+};
+/// What all ranks know of a part, which is of one material.
+struct WholePart {
+  std::size_t body = 0;
+  MaterialGroup material;  ///< With the numbers of its phyxels in the body.
+  Index group = 0;         ///< Group of its first phyxel along the curve.
+  Index tile = 0;          ///< Tile of that phyxel.
+  Index size() const { return material.end - material.begin; }
 };
 
 /// What all ranks know of all bodies.
 struct WholeBodies {
   std::vector<WholeBody> bodies;
+  std::vector<WholePart> parts;       ///< Of all bodies.
   std::vector<Box> boxes;             ///< Of the phyxels of each body.
   std::vector<Surface> surfaces;      ///< Of each body, whole.
   std::vector<std::string> warnings;  ///< Of the clouds, which every rank makes: alike on all.
   Index size = 0;                     ///< Phyxels of the whole model.
   Index groups = 0, group_size = 1;   ///< Phyxels along the curve that stay together.
+
+  /// The part of a phyxel, once phyxels are numbered by material.
+  std::size_t part_of(const MigratingPhyxel& p) const {
+    std::size_t part = bodies[static_cast<std::size_t>(p.body)].first_part;
+    while (p.number >= parts[part].material.end) ++part;
+    return part;
+  }
+  /// The group of a phyxel, once it has its place along the curve.
+  Index group_of(const MigratingPhyxel& p) const {
+    return parts[part_of(p)].group + p.along / group_size;
+  }
+};
+
+/// The range [begin, end) of a body in a local model.
+struct Range {
+  Index begin = 0, end = 0;
 };
 
 /// Who owns each own phyxel from now on, and how well that cuts the model.
@@ -57,11 +86,14 @@ struct Cut {
 /// Lists, unless they are left to a device, are whole for own phyxels and for their neighbours.
 struct LocalModel {
   MigratingPhyxels phyxels;
-  std::vector<int> owner;  ///< The rank of each phyxel.
+  std::vector<int> owner;     ///< The rank of each phyxel.
+  std::vector<Range> bodies;  ///< Whose parts `model` has, in the same order.
   Model model;
   std::vector<Around> around;    ///< [body]
   std::vector<Index> surfel_id;  ///< Global ids of the surfels that this rank moves.
-  int rank = 0;                  ///< This one.
+  /// Areas of own phyxels, where gradients are closed (`areas_of_phyxels`) [m²]; empty if none are.
+  std::vector<Vec3d> areas;
+  int rank = 0;  ///< This one.
 };
 /// True if phyxel i is no ghost.
 inline bool owns(const LocalModel& local, std::size_t i) { return local.owner[i] == local.rank; }
@@ -73,10 +105,11 @@ inline Index global_id_of(const WholeBodies& whole, const LocalModel& local, Ind
 /// Makes this rank's piece of a body. @param digest of the whole cloud, if this rank has it
 using Pieces = std::function<CloudPiece(std::size_t body, std::uint64_t& digest)>;
 
-/// The phyxels of this rank's pieces. Sets bodies, surfaces and warnings of `whole`.
+/// The phyxels of this rank's pieces, in the order of the clouds. Sets bodies, parts, boxes,
+/// surfaces and warnings of `whole`.
 /// @throws AgreedError for what `build_model` refuses, and for bodies that differ between ranks
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole);
-/// Numbers the phyxels, groups and tiles of bodies.
+/// Numbers the phyxels, groups and tiles of bodies and parts.
 void count_bodies(const ShareSetup& setup, WholeBodies& whole);
 
 /// Finds the spacing of own phyxels: asks farther and farther around until the nearest are there.
@@ -90,10 +123,28 @@ Cut partition(const ShareSetup& setup, const WholeBodies& whole, const Migrating
 /// Adds what surrounds own phyxels, as far as the neighbours of ghosts and the carriers of surfels,
 /// and finds the lists.
 LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels own);
-/// Finds masses, moments, boundary conditions and surfels.
-void complete_model(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local);
+/// Finds masses, moments, boundary conditions, surfels and the areas that close gradients.
+void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
 /// Adds the surfels whose first carrier is an own phyxel.
 void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local);
+/// Finds the areas of own phyxels of bodies with closed gradients, and the volumes inside their
+/// surfaces.
+void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
+/// Closes the gradients of the bodies of a connected share that ask for it.
+/// @param areas of each phyxel of the share [m²]; empty if none asks
+/// @throws AgreedError for what `close_gradients` refuses
+void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
+                 const std::vector<Vec3d>& areas);
+
+/// For points that no support reaches: the nearest phyxel.
+struct Unreached {
+  Index points = 0;             ///< Of all ranks.
+  std::vector<Index> carriers;  ///< Of each point: that phyxel, if this rank owns it; else -1.
+};
+/// @param reached whether each point is within the support of an own phyxel. Collective
+Unreached nearest_to_unreached(const ShareSetup& setup, const WholeBodies& whole,
+                               const LocalModel& local, std::size_t b,
+                               std::span<const Vec3d> points, const std::vector<char>& reached);
 
 /// Takes the share out of the local model, and connects it with the other ranks.
 BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& cut,
@@ -104,24 +155,16 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
 /// @throws AgreedError
 void check_alike(const MpiCommunicator& ranks, std::uint64_t digest);
 
-/// True for scenes whose shares are taken out of whole models: a body has closed gradients, whose
-/// closing vectors one rank has to find, or inclusions.
-bool needs_whole(const Scene& scene);
-/// Takes this rank's share out of the model that each rank builds whole. Collective.
-/// @throws AgreedError for what `build` refuses, and for models that differ between ranks
-BuiltShare share_of_whole(const MpiCommunicator& ranks, const ShareOptions& options,
-                          const std::function<Model()>& build);
-
 /// Other ranks' phyxels within so many supports of own ones.
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
                                     const MigratingPhyxels& own, double supports);
 /// The phyxels of one body. @param phyxels in the order of bodies
 std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::size_t b);
-/// The values of the phyxels of a part.
-template <class T>
-std::span<const typename T::value_type> of_part(const T& values, const Part& part) {
-  return std::span(values).subspan(static_cast<std::size_t>(part.begin),
-                                   static_cast<std::size_t>(part.end - part.begin));
+/// The values of the phyxels of a body or a part.
+template <class T, class R>
+std::span<const typename T::value_type> of_range(const T& values, const R& range) {
+  return std::span(values).subspan(static_cast<std::size_t>(range.begin),
+                                   static_cast<std::size_t>(range.end - range.begin));
 }
 
 }  // namespace phyxel

@@ -6,19 +6,15 @@
 #include "mpi/share_pipeline.hpp"
 
 namespace phyxel {
-namespace {
 
-/// For surfels beyond every support, of which the nearest phyxel is here: that phyxel; else -1.
-std::vector<Index> carriers_of_unreached(const ShareSetup& setup, const WholeBodies& whole,
-                                         LocalModel& local, std::size_t b,
-                                         const std::vector<char>& here) {
-  const Surface& surface = whole.surfaces[b];
-  const Part& part = local.model.parts[b];
-  std::vector<std::int64_t> reached(here.begin(), here.end());
-  setup.ranks.add(reached);
+Unreached nearest_to_unreached(const ShareSetup& setup, const WholeBodies& whole,
+                               const LocalModel& local, std::size_t b,
+                               std::span<const Vec3d> points, const std::vector<char>& reached) {
+  std::vector<std::int64_t> ranks_that_reach(reached.begin(), reached.end());
+  setup.ranks.add(ranks_that_reach);
   std::vector<Vec3d> own;
   std::vector<Index> own_at;
-  for (Index i = part.begin; i < part.end; ++i) {
+  for (Index i = local.bodies[b].begin; i < local.bodies[b].end; ++i) {
     if (!owns(local, static_cast<std::size_t>(i))) continue;
     own.push_back(local.phyxels[i].position);
     own_at.push_back(i);
@@ -31,31 +27,28 @@ std::vector<Index> carriers_of_unreached(const ShareSetup& setup, const WholeBod
     }
   };
   std::vector<Index> unreached;
-  for (std::size_t s = 0; s < reached.size(); ++s) {
-    if (reached[s] == 0) unreached.push_back(static_cast<Index>(s));
+  for (std::size_t s = 0; s < points.size(); ++s) {
+    if (ranks_that_reach[s] == 0) unreached.push_back(static_cast<Index>(s));
   }
   std::vector<Index> at(unreached.size());
   std::vector<Nearest> nearest(unreached.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t u = 0; u < unreached.size(); ++u) {
-    const auto [squared, k] = nearest_to(surface.position[unreached[u]], own);
+    const auto [squared, k] = nearest_to(points[unreached[u]], own);
     at[u] = k < 0 ? -1 : own_at[k];
     nearest[u] = {squared, k < 0 ? INT64_MAX : global_id_of(whole, local, own_at[k])};
   }
-  local.model.surfels.unreached += static_cast<Index>(unreached.size());
   const std::vector<Nearest> of_ranks = setup.ranks.gathered(std::span(std::as_const(nearest)));
-  std::vector<Index> carriers(reached.size(), -1);
+  Unreached found{static_cast<Index>(unreached.size()), std::vector<Index>(points.size(), -1)};
   for (std::size_t u = 0; u < unreached.size(); ++u) {
     bool first = at[u] >= 0;
     for (std::size_t k = u; k < of_ranks.size(); k += unreached.size()) {
       if (of_ranks[k] < nearest[u]) first = false;
     }
-    if (first) carriers[unreached[u]] = at[u];
+    if (first) found.carriers[unreached[u]] = at[u];
   }
-  return carriers;
+  return found;
 }
-
-}  // namespace
 
 /// Surfels that this rank moves.
 void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
@@ -63,15 +56,13 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   Index base = 0;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     const Surface& surface = whole.surfaces[b];
-    Part& part = m.parts[b];
+    const Range& body = local.bodies[b];
     const auto all = static_cast<Index>(surface.position.size());
-    part.surfel_begin = static_cast<Index>(local.surfel_id.size());
+    const auto surfel_begin = static_cast<Index>(local.surfel_id.size());
     if (all > 0) {
-      const auto size = static_cast<std::size_t>(part.end - part.begin);
-      const auto begin = static_cast<std::size_t>(part.begin);
-      const std::span<const Vec3d> position = std::span(m.position).subspan(begin, size);
-      Csr rows = phyxels_reaching(surface.position, position,
-                                  std::span(m.neighbourhood.support).subspan(begin, size));
+      const auto begin = static_cast<std::size_t>(body.begin);
+      const Csr rows = phyxels_reaching(surface.position, of_range(m.position, body),
+                                        of_range(m.neighbourhood.support, body));
       // Who has a surfel's first carrier knows all of them.
       std::vector<char> here(static_cast<std::size_t>(all), 0);
       std::int64_t found = 0;
@@ -80,9 +71,12 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
                   owns(local, begin + static_cast<std::size_t>(rows.row(s).front()));
         found += here[s];
       }
-      const std::vector<Index> nearest = setup.ranks.sum(found) < all
-                                             ? carriers_of_unreached(setup, whole, local, b, here)
-                                             : std::vector<Index>();
+      Unreached unreached;
+      if (setup.ranks.sum(found) < all) {
+        unreached = nearest_to_unreached(setup, whole, local, b, surface.position, here);
+      }
+      const std::vector<Index>& nearest = unreached.carriers;
+      m.surfels.unreached += unreached.points;
       for (Index s = 0; s < all; ++s) {
         const bool lone = !nearest.empty() && nearest[s] >= 0;
         if (!here[s] && !lone) continue;
@@ -92,14 +86,20 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
         if (lone) m.surfels.carriers.indices.push_back(nearest[s]);
         if (!lone) {
           for (const Index i : rows.row(s)) {
-            m.surfels.carriers.indices.push_back(part.begin + i);
+            m.surfels.carriers.indices.push_back(body.begin + i);
           }
         }
         m.surfels.carriers.offsets.push_back(
             static_cast<Offset>(m.surfels.carriers.indices.size()));
       }
     }
-    part.surfel_end = static_cast<Index>(local.surfel_id.size());
+    // The first part of a body has its surfels.
+    for (std::size_t q = whole.bodies[b].first_part;
+         q < m.parts.size() && m.parts[q].body == static_cast<Index>(b); ++q) {
+      m.parts[q].surfel_end = static_cast<Index>(local.surfel_id.size());
+      m.parts[q].surfel_begin =
+          q == whole.bodies[b].first_part ? surfel_begin : m.parts[q].surfel_end;
+    }
     base += all;
   }
 }

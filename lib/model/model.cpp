@@ -9,6 +9,7 @@
 
 #include "model/assembly.hpp"
 #include "model/box.hpp"
+#include "model/closing_areas.hpp"
 #include "model/closure.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
@@ -51,11 +52,6 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
   survey.support = hood.support;
   survey.lists = lengths_of(hood.neighbours, 0, hood.neighbours.rows());
   return survey;
-}
-
-void refuse_inclusions(const BodyRequest& request, const char* why, const char* allowed) {
-  throw InputError(fmt::format("{}: body \"{}\" has inclusions, {}: allowed is {}",
-                               request.inclusions[0].select.where, request.name, why, allowed));
 }
 
 /// A surveyor's device finds neighbours within one support of unsorted phyxels, and no more.
@@ -134,9 +130,9 @@ Masses masses_of(const BodyRequest& request, const Cloud& cloud, const Survey& s
           ? kernel_masses(survey.spacing, survey.kernel_sum,
                           kernel_sum.value() / static_cast<double>(survey.spacing.size()), density)
           : geometric_masses(cloud.volume, density);
-  for (std::size_t g = 1; g < groups.size(); ++g) {
-    for (Index i = groups[g].begin; i < groups[g].end; ++i) {
-      masses.mass[i] = masses.volume[i] * groups[g].material.density;
+  for (const MaterialGroup& group : groups.subspan(1)) {
+    for (Index i = group.begin; i < group.end; ++i) {
+      masses.mass[i] = masses.volume[i] * group.material.density;
     }
   }
   check_masses(request, masses);
@@ -234,16 +230,14 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   if (surveyor) check_surveyable(request);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
-  if (kernel_volumes && sorted) {
-    refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
-  }
+  if (kernel_volumes) refuse_kernel_volumes(request);
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   const Survey survey = add_neighbours(model, request, cloud, surveyor, kernel_volumes);
   const std::vector<MaterialGroup> groups =
-      sorted ? sorted->groups
-             : std::vector<MaterialGroup>{
-                   {request.material, request.name, 0, static_cast<Index>(cloud.position.size())}};
+      sorted
+          ? sorted->groups
+          : material_groups(request, std::vector<std::int64_t>{std::ssize(cloud.position)}, {}, {});
   const Masses masses = masses_of(request, cloud, survey, groups, kernel_volumes);
   append(model.neighbourhood.support, survey.support);
   append(model.position, cloud.position);

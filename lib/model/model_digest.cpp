@@ -15,13 +15,22 @@ void add(XXH3_state_t* state, const std::vector<T>& values) {
   XXH3_64bits_update(state, values.data(), values.size() * sizeof(T));
 }
 
-/// What closing vectors follow from beside the phyxels.
-void add_surface(XXH3_state_t* state, const Surfels& surfels, const Part& part) {
-  for (const Triangle& t : surfels.triangle) {
+/// Adds the surface of a part, from which closing vectors follow beside the phyxels. The first part
+/// of a body has its surface. @param surfaces of the bodies; empty: the model has them
+void add_surface(XXH3_state_t* state, const Model& model, const Part& part,
+                 std::span<const Surface> surfaces) {
+  const auto add_triangle = [&](const Triangle& t, const std::vector<Vec3d>& position) {
+    for (const Index s : t) XXH3_64bits_update(state, &position[s], sizeof(Vec3d));
+  };
+  if (!surfaces.empty()) {
+    if (&part != &model.parts_of_body(part).front()) return;
+    const Surface& surface = surfaces[static_cast<std::size_t>(part.body)];
+    for (const Triangle& t : surface.triangle) add_triangle(t, surface.position);
+    return;
+  }
+  for (const Triangle& t : model.surfels.triangle) {
     if (t[0] < part.surfel_begin || t[0] >= part.surfel_end) continue;
-    for (const Index s : t) {
-      XXH3_64bits_update(state, &surfels.position[s], sizeof(Vec3d));
-    }
+    add_triangle(t, model.surfels.position);
   }
 }
 
@@ -61,7 +70,7 @@ std::uint64_t digest_of_phyxels(const Model& model) {
 
 }  // namespace
 
-std::uint64_t model_digest_before_4(const Model& model) {
+std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface> surfaces) {
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
                                                                        &XXH3_freeState);
   XXH3_64bits_reset(state.get());
@@ -82,7 +91,7 @@ std::uint64_t model_digest_before_4(const Model& model) {
       const std::string name = m.custom_law->name();
       add(state.get(), std::vector<char>(name.begin(), name.end()));
     }
-    if (part.closure > 0) add_surface(state.get(), model.surfels, part);
+    if (part.closure > 0) add_surface(state.get(), model, part, surfaces);
   }
   for (const Motion& motion : model.motions) {
     const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
@@ -103,11 +112,11 @@ std::uint64_t model_digest_before_4(const Model& model) {
   return XXH3_64bits_digest(state.get());
 }
 
-std::uint64_t model_digest(const Model& model) {
+std::uint64_t model_digest(const Model& model, std::span<const Surface> surfaces) {
   struct {
     std::uint64_t rest;
     Vec3d gravity;
-  } const all{model_digest_before_4(model), model.gravity};
+  } const all{model_digest_before_4(model, surfaces), model.gravity};
   return XXH3_64bits(&all, sizeof(all));
 }
 

@@ -9,7 +9,7 @@
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
-#include "solver/owned_vectors.hpp"
+#include "model/owned_vectors.hpp"
 
 namespace phyxel {
 

@@ -10,7 +10,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
-#include "solver/owned_vectors.hpp"
+#include "model/owned_vectors.hpp"
 
 namespace phyxel {
 

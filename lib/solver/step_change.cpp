@@ -10,7 +10,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
-#include "solver/owned_vectors.hpp"
+#include "model/owned_vectors.hpp"
 
 namespace phyxel {
 namespace {

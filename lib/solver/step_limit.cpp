@@ -8,7 +8,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
-#include "solver/owned_vectors.hpp"
+#include "model/owned_vectors.hpp"
 #include "solver/start_vector.hpp"
 #include "stage.hpp"
 

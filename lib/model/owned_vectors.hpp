@@ -1,9 +1,10 @@
-/// Host vectors with three numbers per phyxel, of which each rank owns those of its phyxels. Sums
-/// over all ranks are exact, so they do not depend on the number of threads or ranks.
+/// Host vectors with values per phyxel, of which each rank owns those of its phyxels. Sums over all
+/// ranks are exact, so they do not depend on the number of threads or ranks.
 #pragma once
 
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "exact_sum.hpp"
@@ -16,14 +17,17 @@ class OwnedVectors {
  public:
   using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; values of ghosts are undefined
 
-  OwnedVectors(const Model& model, int threads) : model_(model), threads_(threads) {}
+  OwnedVectors(const Model& model, int threads) : OwnedVectors(model, model.parts, threads) {}
+  /// @param parts those of the model whose phyxels loops and sums are about
+  OwnedVectors(const Model& model, std::span<const Part> parts, int threads)
+      : model_(model), parts_(parts), threads_(threads) {}
 
   Vector make() const { return Vector(static_cast<std::size_t>(model_.size())); }
 
   /// Calls each(i) for the phyxels that are not ghosts.
   template <class Each>
   void for_each(Each&& each) const {
-    for (const Part& part : model_.parts) {
+    for (const Part& part : parts_) {
 #pragma omp parallel for schedule(static) num_threads(threads_)
       for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
     }
@@ -36,7 +40,7 @@ class OwnedVectors {
 #pragma omp parallel num_threads(threads_)
     {
       ExactSum own;
-      for (const Part& part : model_.parts) {
+      for (const Part& part : parts_) {
 #pragma omp for schedule(static) nowait
         for (Index i = part.begin; i < part.owned_end(); ++i) own.add(term(i));
       }
@@ -54,7 +58,7 @@ class OwnedVectors {
   template <class Value>
   double largest(Value&& value) const {
     double largest = 0;
-    for (const Part& part : model_.parts) {
+    for (const Part& part : parts_) {
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         largest = std::max(largest, value(i));
       }
@@ -63,11 +67,11 @@ class OwnedVectors {
   }
 
   /// Copies the owners' values to ghosts. Collective.
-  void refresh_ghosts(Vector& values) const {
+  template <class T>
+  void refresh_ghosts(std::vector<T>& values) const {
     if (!model_.share) return;
     HaloTransport& halo = *model_.share->transport;
-    halo.start(
-        {reinterpret_cast<std::byte*>(values.data()), sizeof(Vec3d), sizeof(Vec3d), nullptr});
+    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr});
     halo.finish();
   }
 
@@ -83,6 +87,7 @@ class OwnedVectors {
 
  private:
   const Model& model_;
+  std::span<const Part> parts_;
   int threads_;
 };
 

@@ -1,0 +1,134 @@
+#include "model/closing_areas.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "phyxel/error.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/weight.hpp"
+
+namespace phyxel {
+namespace {
+
+void add_facets(std::vector<Facet>& facets, Vec3d a, Vec3d b, Vec3d c, double longest) {
+  const double ab = norm(b - a), bc = norm(c - b), ca = norm(a - c);
+  if (std::max({ab, bc, ca}) <= longest) {
+    facets.push_back({(a + b + c) / 3.0, 0.5 * cross(b - a, c - a)});
+  } else if (ab >= bc && ab >= ca) {
+    const Vec3d middle = 0.5 * (a + b);
+    add_facets(facets, a, middle, c, longest);
+    add_facets(facets, middle, b, c, longest);
+  } else {
+    add_facets(facets, b, c, a, longest);  // the longest comes first within two turns
+  }
+}
+
+}  // namespace
+
+std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Triangle> triangles,
+                             Index first, double longest) {
+  std::vector<Facet> facets;
+  for (const Triangle& t : triangles) {
+    add_facets(facets, position[t[0] - first], position[t[1] - first], position[t[2] - first],
+               longest);
+  }
+  return facets;
+}
+
+Enclosed enclosed_by(std::span<const Facet> facets) {
+  Enclosed found;
+  if (facets.empty()) return found;
+  Vec3d sum;
+  Mat3d moment{};
+  double area = 0;
+  for (const Facet& f : facets) {
+    sum += f.area;
+    area += norm(f.area);
+    moment = fused_outer(f.centroid - facets[0].centroid, f.area, moment);
+  }
+  found.volume = (moment(0, 0) + moment(1, 1) + moment(2, 2)) / 3;
+  found.open = area > 0 ? norm(sum) / area : 1;
+  for (int e = 0; e < 9; ++e) {
+    const double off = moment(e / 3, e % 3) - (e % 4 == 0 ? found.volume : 0);
+    found.open = std::max(found.open, std::abs(off / found.volume));
+  }
+  return found;
+}
+
+std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& near,
+                                    std::span<const Vec3d> position,
+                                    std::span<const double> support) {
+  std::vector<double> share(near.indices.size());
+#pragma omp parallel for schedule(static)
+  for (Index f = 0; f < near.rows(); ++f) {
+    const Facet& facet = facets[f];
+    const double area = norm(facet.area);
+    const Vec3d normal = area > 0 ? facet.area / area : Vec3d{};
+    const auto x_of = [&](Index i) { return position[i] - facet.centroid; };
+    const auto weigh = [&](bool in_plane) {
+      // Moments about the weighted mean: 1 and x - mean are then orthogonal.
+      double sum = 0;
+      Vec3d first;
+      const auto weight_of = [&](Index i) {
+        const Vec3d x = x_of(i);
+        const double h = support[i];
+        // Whole units of rounding: a lattice's nodes are put on its faces by arithmetic.
+        if (in_plane && std::abs(dot(x, normal)) > 1e-6 * h) return 0.0;
+        return weight_shape(dot(x, x), 1 / (h * h));
+      };
+      for (const Index i : near.row(f)) {
+        sum += weight_of(i);
+        first += weight_of(i) * x_of(i);
+      }
+      if (!(sum > 0)) return -1;
+      const Vec3d mean = first / sum;
+      Sym3d moment;
+      for (const Index i : near.row(f)) moment += moment_term(x_of(i) - mean, weight_of(i));
+      const PseudoInverse<double> inverse = pseudo_inverse(moment);
+      const Vec3d slope = inverse.matrix * mean;
+      for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+        const Index i = near.indices[k];
+        share[k] = weight_of(i) * (1 / sum - dot(slope, x_of(i) - mean));
+      }
+      return inverse.rank;
+    };
+    if (weigh(true) == 2) continue;
+    if (weigh(false) < 0) {  // only the nearest, beyond its support
+      for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+        share[k] = 1.0 / near.length(f);
+      }
+    }
+  }
+  std::vector<Vec3d> areas(position.size());
+  for (Index f = 0; f < near.rows(); ++f) {
+    for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
+      areas[near.indices[k]] += share[k] * facets[f].area;
+    }
+  }
+  return areas;
+}
+
+void check_closure(const BodyRequest& request, const Surface& surface,
+                   std::optional<double> volume) {
+  if (!(request.closure > 0)) return;
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
+        "{}; "
+        "allowed are a mesh, a shape with surfels, a file with such a surface, or closure = 0",
+        request.where, request.name, request.closure, why));
+  };
+  if (surface.triangle.empty()) refuse("it has no triangles");
+  const Enclosed found = enclosed_by(facets_of(surface.position, surface.triangle, 0, HUGE_VAL));
+  // Coordinates of a file may be floats.
+  if (!(found.open <= 1e-5)) refuse("its triangles do not enclose a volume");
+  if (!(found.volume > 0)) refuse("its triangles face inward");
+  if (volume && !(std::abs(found.volume / *volume - 1) < 0.3)) {
+    refuse(fmt::format("that encloses {:.4g} m^3, and its phyxels have {:.4g}", found.volume,
+                       *volume));
+  }
+}
+
+}  // namespace phyxel

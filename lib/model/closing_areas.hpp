@@ -1,0 +1,50 @@
+/// The areas that phyxels represent of their body's surface (phyxel/physics/closing.hpp).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// A flat piece of the surface. Areas at centroids carry constants and linear functions exactly,
+/// however triangles are split.
+struct Facet {
+  Vec3d centroid, area;  ///< [m], outward [m²]
+};
+
+/// Returns the triangles of a surface, halved until no edge is longer than `longest`.
+/// @param first the number of the surface's first vertex in `triangles`. @param longest length [m]
+std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Triangle> triangles,
+                             Index first, double longest);
+
+/// The largest edge of a facet of a body whose phyxels have this support: short enough for the
+/// facet's area to go to the phyxels beside it [m].
+inline double longest_edge(double support) { return 0.5 * support; }
+
+/// The space inside a closed surface.
+struct Enclosed {
+  double volume = 0;  ///< [m³]
+  double open = 0;    ///< Relative deviation of Σ x Sᵀ from V I, or of Σ S from 0.
+};
+Enclosed enclosed_by(std::span<const Facet> facets);
+
+/// Distributes facets over the phyxels near them, so that Σ S = 0 and Σ x Sᵀ = V I hold as they do
+/// for the facets: by weights that reproduce linear functions, where phyxels span space. If the
+/// phyxels in a facet's plane span the plane, only they get shares, and none below the surface.
+/// @param near the phyxels within whose support each facet's centroid lies, or else the nearest
+/// @param support of each phyxel [m]
+/// @returns the area S of each phyxel [m²], summed in the order of the facets
+std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& near,
+                                    std::span<const Vec3d> position,
+                                    std::span<const double> support);
+
+/// Checks that a body with closed gradients has a surface that encloses its volume.
+/// @param volume of all phyxels [m³], if it follows from the geometry
+/// @throws InputError naming the body, its fault, and what is allowed
+void check_closure(const BodyRequest& request, const Surface& surface,
+                   std::optional<double> volume);
+
+}  // namespace phyxel
