@@ -180,6 +180,8 @@ BuildCase mixed() {
       {.select = {.indices = std::vector<Index>{77, 150}}, .velocity = {0.1, 0, 0}});
   body.loads.push_back({.select = {.region = "x-"}, .force = {3, 0, 1}});
   body.loads.push_back({.select = {.ball = Selection::Ball{{1, 0, 0}, 0.8}}, .force = {0, 1, 1}});
+  // Of which each rank takes a piece with phyxels of all materials.
+  for (const BodyRequest& request : c.scene.bodies) c.clouds.push_back(make_cloud(request));
   return c;
 }
 /// Closed bodies of every kind of volume, one of which has a spike that no phyxel reaches.
