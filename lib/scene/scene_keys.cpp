@@ -102,7 +102,7 @@ std::vector<SceneSection> make_sections() {
       {"body.inclusion", "[[body.inclusion]]", "selection",
        "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
        "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
-       "phyxels of a body with inclusions are numbered material by material. On several ranks each builds the whole scene, and keeps its share."},
+       "phyxels of a body with inclusions are numbered material by material."},
       {"body.neighbours", "[body.neighbours]", "",
        "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
        "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
@@ -274,7 +274,7 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
            "the phyxels are; 1e-3 is plenty. 0: as they come. Needs a closed surface, and one support "
-           "for the body. On several ranks each builds the whole scene, and keeps its share."},
+           "for the body."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
       {.section = "body", .name = "neighbours", .type = KeyType::table,
