@@ -32,6 +32,24 @@ std::vector<Triangle> triangles_of(const std::vector<Surface>& surfaces) {
   return triangles;
 }
 
+/// Checks the arguments of `SharedModel::gathered`. @throws InputError
+void check_gathered(const Model& here, Quantity quantity, std::size_t values, Index begin,
+                    Index end) {
+  const bool surfels = is_of_surfels(quantity);
+  const Index all = surfels ? here.global_surfel_count() : here.global_count();
+  if (begin < 0 || end < begin || end > all) {
+    throw InputError(fmt::format("{} {} to {} cannot be gathered; allowed: a range within 0 to {}",
+                                 surfels ? "surfels" : "phyxels", begin, end, all));
+  }
+  const std::size_t rows =
+      surfels ? here.surfels.position.size() : static_cast<std::size_t>(here.size());
+  if (values != rows * width_of(quantity)) {
+    throw InputError(fmt::format("{} values to gather from {} {} of this rank; allowed: {} of each",
+                                 values, rows, surfels ? "surfels" : "phyxels",
+                                 width_of(quantity)));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> partitioner_choices() {
@@ -96,6 +114,7 @@ std::unique_ptr<Backend> SharedModel::make_backend(Precision precision, int thre
 
 std::vector<double> SharedModel::gathered(Quantity quantity, std::span<const double> here,
                                           Index begin, Index end) const {
+  ranks_.collectively([&] { check_gathered(here_, quantity, here.size(), begin, end); });
   if (here_.share) return exchange_->gathered(quantity, here, {begin, end});
   const std::size_t width = width_of(quantity);
   const auto of_range = here.subspan(begin * width, (end - begin) * width);

@@ -214,8 +214,8 @@ TEST_F(Program, RefusesToResumeWhatDoesNotFit) {
       {"frames_per_second = 50", "frames_per_second = 50\nfields = [\"displacement\"]"}};
   const char* const names[] = {"gravity: [0, 0, -9.81] then, [0, 0, 9.81] now",
                                "body.velocity of body 1 (\"beam\"): [0, 0, 0] then, [1, 0, 0] now",
-                               "output.fields: [\"displacement\", \"velocity\"] then, "
-                               "[\"displacement\"] now"};
+                               ("output.fields: [\"displacement\", \"velocity\"] then, "
+                                "[\"displacement\"] now")};
   for (int k = 0; k < 3; ++k) {
     std::string other = scene;
     other.replace(other.find(flips[k].first), flips[k].first.size(), flips[k].second);

@@ -71,6 +71,29 @@ TEST_F(ASharedModel, FromCloudsIsTheSame) {
   EXPECT_EQ(shared.partitioner(), all_ranks().size() > 1 ? "curve" : "");
 }
 
+TEST_F(ASharedModel, RefusesToGatherWhatItDoesNotHave) {
+  const SharedModel shared(all_ranks(), spinning_beam(), cpu);
+  const auto here = static_cast<std::size_t>(shared.here().size());
+  const Index all = shared.here().global_count();
+  const std::vector<double> values(3 * here, 1.0);
+  const auto refusal = [&](Quantity quantity, std::size_t count, Index begin, Index end) {
+    try {
+      shared.gathered(quantity, std::span(values).first(count), begin, end);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const auto range = HasSubstr("allowed: a range within 0 to " + std::to_string(all));
+  EXPECT_THAT(refusal(Quantity::displacement, 3 * here, -1, 5), range);
+  EXPECT_THAT(refusal(Quantity::displacement, 3 * here, 5, all + 1), range);
+  EXPECT_THAT(refusal(Quantity::displacement, 3 * here, 5, 4), range);
+  // One rank alone has too few.
+  const std::size_t lacking = all_ranks().leads() ? 1 : 0;
+  EXPECT_THAT(refusal(Quantity::mass, here - lacking, 0, all), HasSubstr("allowed: 1 of each"));
+  EXPECT_EQ(refusal(Quantity::mass, here, 0, all), "accepted");
+}
+
 TEST_F(ASharedModel, StepsAsOneRankWould) {
   const Scene scene = spinning_beam();
   const SharedModel shared(all_ranks(), scene, cpu);

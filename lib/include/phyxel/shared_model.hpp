@@ -70,6 +70,8 @@ class SharedModel {
   /// Gathers the values of phyxels, or surfels, `begin` to `end` of the whole model on the first
   /// rank; the result is empty on other ranks. Collective.
   /// @param here values of this rank's phyxels or surfels, shape [n, width_of(quantity)]
+  /// @throws AgreedError for a range or a number of values that does not fit; with one rank,
+  ///   InputError
   std::vector<double> gathered(Quantity quantity, std::span<const double> here, Index begin,
                                Index end) const;
   /// This rank's share of the state of a checkpoint, read in chunks. Collective.

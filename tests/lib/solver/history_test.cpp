@@ -197,7 +197,9 @@ TEST(History, TheEnergyLedgerIsClosed) {
         worst = std::max(worst, std::abs(now.total_energy() / start - 1));
       }
       EXPECT_GT(now.plastic_work, 0.2 * start);
-      if (viscosity > 0) EXPECT_GT(now.viscous_work, 0.01 * start);
+      if (viscosity > 0) {
+        EXPECT_GT(now.viscous_work, 0.01 * start);
+      }
       return worst;
     };
     const double coarse = worst_in_steps_of(0.5 * impact.dt),
@@ -356,7 +358,7 @@ class Borrowed final : public CustomLaw {
  private:
   static J2<double>::State state_of(std::span<const double> numbers) {
     J2<double>::State state;
-    std::memcpy(&state, numbers.data(), sizeof(state));
+    std::memcpy(static_cast<void*>(&state), numbers.data(), sizeof(state));
     return state;
   }
   J2<double> law_;
