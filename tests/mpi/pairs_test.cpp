@@ -1,0 +1,143 @@
+/// All pairs: laws, terms, boundaries, devices, precisions and methods in every combination of two,
+/// on the ranks that run this program.
+#include <gmock/gmock.h>
+
+#include <memory>
+#include <vector>
+
+#include "device.hpp"
+#include "partition/share.hpp"
+#include "phyxel/shared_model.hpp"
+#include "ranks.hpp"
+#include "solver/cuda_backend.hpp"
+#include "support/pairs/combinations.hpp"
+#include "support/pairs/physics.hpp"
+#include "support/pairs/scene.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+using test::all_ranks;
+using test::world;
+using ::testing::IsEmpty;
+
+/// The device of a row on this rank.
+ChosenDevice device_of(const Combination& row) {
+  return choose_device(all_ranks(), row.on_gpu() ? "cuda" : "cpu");
+}
+
+/// The backend of a row. @param path of a GPU
+std::unique_ptr<Backend> backend_of(const Combination& row, const Model& model,
+                                    const ChosenDevice& device, CudaPath path) {
+  if (!device.gpu) return make_cpu_backend(model, row.working_precision(), 1);
+  return make_cuda_backend(model, row.working_precision(), device.gpu->index, path);
+}
+
+class Pairs : public ::testing::TestWithParam<Combination> {
+ protected:
+  void SetUp() override {
+    const bool found = world().smallest(std::int64_t{!cuda_devices().empty()}) == 1;
+    if (row_.on_gpu() && !found) GTEST_SKIP() << "no CUDA device";
+  }
+  const Combination& row_ = GetParam();
+};
+
+/// The values of phyxels that this rank owns.
+template <class T>
+std::vector<T> owned_values(const Model& here, const std::vector<T>& values) {
+  std::vector<T> own;
+  for (Index i = 0; i < here.size(); ++i) {
+    if (here.owns(i)) own.push_back(values[i]);
+  }
+  return own;
+}
+
+/// The course of a share has the bits of that of the whole model.
+void expect_same_bits(const Model& here, const Course& whole, const Course& share) {
+  const auto expect_same = [&](const auto& all, const auto& own, const char* what) {
+    const auto expected = here.share ? values_of(*here.share, all) : all;
+    EXPECT_TRUE(owned_values(here, expected) == owned_values(here, own)) << what;
+  };
+  expect_same(whole.after.displacement, share.after.displacement, "displacement");
+  expect_same(whole.after.velocity, share.after.velocity, "velocity");
+  expect_same(whole.force, share.force, "force");
+  EXPECT_EQ(whole.after.history.size(), share.after.history.size());
+  for (std::size_t k = 0; k < std::min(whole.after.history.size(), share.after.history.size());
+       ++k) {
+    expect_same(whole.after.history[k].values, share.after.history[k].values,
+                whole.after.history[k].name.c_str());
+  }
+  const Diagnostics &d = whole.energies, &e = share.energies;
+  EXPECT_EQ(d.total_energy(), e.total_energy());
+  EXPECT_EQ(d.momentum, e.momentum);
+  EXPECT_EQ(d.internal_torque, e.internal_torque);
+}
+
+/// A row on all ranks has the bits of one rank; on one rank of a GPU, those of launches over tiles.
+/// The first rank checks the physics of the whole model.
+TEST_P(Pairs, AreComputed) {
+  const Scene scene = scene_of(row_);
+  const ChosenDevice device = device_of(row_);
+  const Model whole = build_model(scene);
+  const double dt = (row_.is(method, "implicit") ? 1.5 : 0.3) * step_limit(whole, 1).largest_step;
+  const State start = start_of(row_, scene, whole, dt);
+  const std::vector<Vec3d> external = external_forces_of(row_, whole);
+  const auto alone = backend_of(row_, whole, device, CudaPath::launches);
+  const Course course = course_of(row_, whole, *alone, start, external);
+
+  if (world().size() > 1 || row_.on_gpu()) {
+    const SharedModel shared(all_ranks(), scene, device);
+    const Model& here = shared.here();
+    const auto of_share = [&](const auto& values) {
+      return here.share && !values.empty() ? values_of(*here.share, values) : values;
+    };
+    State start_here = start;
+    start_here.displacement = of_share(start.displacement);
+    start_here.velocity = of_share(start.velocity);
+    const bool resident = row_.is(testing::device, in_residence);
+    const auto backend = backend_of(row_, here, device,
+                                    resident ? CudaPath::automatic : CudaPath::launches);
+    if (resident) {
+      const bool changes = row_.is(boundary, "moved") || row_.is(boundary, "loaded");
+      EXPECT_EQ(backend->name().find("resident") != std::string::npos,
+                world().size() == 1 && !changes)
+          << backend->path_reason();
+    }
+    expect_same_bits(here, course,
+                     course_of(row_, here, *backend, start_here, of_share(external)));
+    world().barrier();  // before memory that other ranks store into is released
+  }
+  if (all_ranks().leads()) Physics(row_, whole, course, external).check();
+}
+
+std::string name_of(const ::testing::TestParamInfo<Combination>& test) {
+  return test_name(test.param);
+}
+INSTANTIATE_TEST_SUITE_P(Cpu, Pairs, ::testing::ValuesIn(rows_on(on_cpu)), name_of);
+INSTANTIATE_TEST_SUITE_P(GpuByTiles, Pairs, ::testing::ValuesIn(rows_on(by_tiles)), name_of);
+INSTANTIATE_TEST_SUITE_P(GpuInResidence, Pairs, ::testing::ValuesIn(rows_on(in_residence)),
+                         name_of);
+
+/// Every pair of values occurs in a row of each device, or is refused, with a reason.
+TEST(PairsOfAllRows, AreCoveredOrRefused) {
+  std::vector<std::string> missing;
+  for (const std::string& name : factors()[testing::device].values) {
+    const std::vector<Combination> rows = rows_on(name);
+    const int here = level_of(testing::device, name);
+    for (const LevelPair& pair : all_pairs(level_counts())) {
+      if (pair.first == testing::device && pair.first_level != here) continue;
+      const bool is_refused = refusal_of_pair(pair) ||
+                              refusal_of_pair({testing::device, here, pair.first, pair.first_level}) ||
+                              refusal_of_pair({testing::device, here, pair.second, pair.second_level});
+      const bool is_covered = std::any_of(rows.begin(), rows.end(), [&](const Combination& row) {
+        return contains(row.levels, pair);
+      });
+      if (is_covered == is_refused) missing.push_back(name + ": " + describe(pair));
+    }
+  }
+  EXPECT_THAT(missing, IsEmpty());
+}
+
+}  // namespace
+}  // namespace phyxel
