@@ -96,16 +96,15 @@ TEST_P(Pairs, AreComputed) {
     start_here.displacement = of_share(start.displacement);
     start_here.velocity = of_share(start.velocity);
     const bool resident = row_.is(testing::device, in_residence);
-    const auto backend = backend_of(row_, here, device,
-                                    resident ? CudaPath::automatic : CudaPath::launches);
+    const auto backend =
+        backend_of(row_, here, device, resident ? CudaPath::automatic : CudaPath::launches);
     if (resident) {
       const bool changes = row_.is(boundary, "moved") || row_.is(boundary, "loaded");
       EXPECT_EQ(backend->name().find("resident") != std::string::npos,
                 world().size() == 1 && !changes)
           << backend->path_reason();
     }
-    expect_same_bits(here, course,
-                     course_of(row_, here, *backend, start_here, of_share(external)));
+    expect_same_bits(here, course, course_of(row_, here, *backend, start_here, of_share(external)));
     world().barrier();  // before memory that other ranks store into is released
   }
   if (all_ranks().leads()) Physics(row_, whole, course, external).check();
@@ -127,9 +126,10 @@ TEST(PairsOfAllRows, AreCoveredOrRefused) {
     const int here = level_of(testing::device, name);
     for (const LevelPair& pair : all_pairs(level_counts())) {
       if (pair.first == testing::device && pair.first_level != here) continue;
-      const bool is_refused = refusal_of_pair(pair) ||
-                              refusal_of_pair({testing::device, here, pair.first, pair.first_level}) ||
-                              refusal_of_pair({testing::device, here, pair.second, pair.second_level});
+      const bool is_refused =
+          refusal_of_pair(pair) ||
+          refusal_of_pair({testing::device, here, pair.first, pair.first_level}) ||
+          refusal_of_pair({testing::device, here, pair.second, pair.second_level});
       const bool is_covered = std::any_of(rows.begin(), rows.end(), [&](const Combination& row) {
         return contains(row.levels, pair);
       });

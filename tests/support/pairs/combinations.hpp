@@ -71,11 +71,14 @@ inline const std::vector<FactorEntry>& factors() {
 /// Number of values of each factor.
 inline std::vector<int> level_counts() {
   std::vector<int> counts;
-  for (const FactorEntry& factor : factors()) counts.push_back(static_cast<int>(factor.values.size()));
+  for (const FactorEntry& factor : factors())
+    counts.push_back(static_cast<int>(factor.values.size()));
   return counts;
 }
 
-inline const std::string& value_name(int factor, int level) { return factors()[factor].values[level]; }
+inline const std::string& value_name(int factor, int level) {
+  return factors()[factor].values[level];
+}
 
 /// "law = j2 with closure = closed gradients"
 inline std::string describe(const LevelPair& pair) {
@@ -131,16 +134,14 @@ inline const std::vector<Refusal>& refusals() {
        {"hourglass control"},
        supports,
        {"adaptive supports", "capped lists"},
-       {"hourglass control (0.1)", "allowed are neighbours.support = \"uniform\"",
-        "hourglass = 0"},
+       {"hourglass control (0.1)", "allowed are neighbours.support = \"uniform\"", "hourglass = 0"},
        "its energy counts each pair of neighbours from both sides with one weight, which needs "
        "lists that are symmetric"},
       {closure,
        {"closed gradients"},
        supports,
        {"adaptive supports", "capped lists"},
-       {"closed gradients (0.001)", "allowed are neighbours.support = \"uniform\"",
-        "closure = 0"},
+       {"closed gradients (0.001)", "allowed are neighbours.support = \"uniform\"", "closure = 0"},
        "the integration constraint is a sum over symmetric lists with one weight for each pair"}};
   return all;
 }
@@ -194,8 +195,8 @@ inline std::vector<Combination> rows_on(const std::string& device_name) {
   // Pairs of values that the device itself excludes occur in no row.
   const Covering covering(level_counts(), [&](const LevelPair& pair) {
     if (!allowed(pair)) return false;
-    for (const auto& [factor, level] : {std::pair{pair.first, pair.first_level},
-                                        std::pair{pair.second, pair.second_level}}) {
+    for (const auto& [factor, level] :
+         {std::pair{pair.first, pair.first_level}, std::pair{pair.second, pair.second_level}}) {
       if (factor != device && !allowed({device, here, factor, level})) return false;
     }
     return true;
@@ -209,8 +210,7 @@ inline std::vector<Combination> rows_on(const std::string& device_name) {
 
 /// "Row07_NeoHookeanFixedDoubleImplicit", for names of tests.
 inline std::string test_name(const Combination& row) {
-  std::string name =
-      (row.number < 10 ? "Row0" : "Row") + std::to_string(row.number) + "_";
+  std::string name = (row.number < 10 ? "Row0" : "Row") + std::to_string(row.number) + "_";
   for (const Factor factor : {law, boundary, precision, method}) {
     bool begins = true;
     for (const char c : row.value(factor)) {

@@ -1,5 +1,5 @@
-/// Covering arrays of strength two: a few rows of factor values in which every pair of values of two
-/// factors occurs.
+/// Covering arrays of strength two: a few rows of factor values in which every pair of values of
+/// two factors occurs.
 #pragma once
 
 #include <algorithm>
@@ -39,10 +39,10 @@ inline bool contains(const Levels& row, const LevelPair& pair) {
   return row[pair.first] == pair.first_level && row[pair.second] == pair.second_level;
 }
 
-/// A greedy covering array. Each row starts with the first pair that is still uncovered; every other
-/// factor, those with the most values first, takes the allowed value that completes the most
-/// uncovered pairs, and of several such values one that depends on the row's number. The result is a
-/// function of the arguments alone.
+/// A greedy covering array. Each row starts with the first pair that is still uncovered; every
+/// other factor, those with the most values first, takes the allowed value that completes the most
+/// uncovered pairs, and of several such values one that depends on the row's number. The result is
+/// a function of the arguments alone.
 class Covering {
  public:
   /// @param levels number of values of each factor. @param allowed false for a refused pair

@@ -99,8 +99,7 @@ class Physics {
     for (const auto& [expected_energy, found] :
          {std::pair{d.strain_energy, e.strain_energy}, std::pair{d.volume_energy, e.volume_energy},
           std::pair{d.hourglass_energy, e.hourglass_energy},
-          std::pair{d.plastic_work, e.plastic_work},
-          std::pair{d.viscous_work, e.viscous_work}}) {
+          std::pair{d.plastic_work, e.plastic_work}, std::pair{d.viscous_work, e.viscous_work}}) {
       EXPECT_NEAR(found, expected_energy, std::max(force_tolerance(), 1e-12) * stored);
     }
   }
@@ -210,8 +209,7 @@ class Physics {
     const std::vector<double> damping_of = damping_rates();
     double worst = 0, off = 0, largest = 0;
     for (Index i = 0; i < whole_.size(); ++i) {
-      const double c = damping_of[i], keep = std::exp(-c * dt),
-                   gain = c > 0 ? (1 - keep) / c : dt;
+      const double c = damping_of[i], keep = std::exp(-c * dt), gain = c > 0 ? (1 - keep) / c : dt;
       const Vec3d change = (gain / whole_.mass[i]) * (force[i] + applied[i]);
       const Vec3d next = keep * before.velocity[i] + change;
       worst = std::max(worst, norm(along(free[i], after.velocity[i] - next)));

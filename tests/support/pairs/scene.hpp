@@ -77,7 +77,8 @@ inline void set_boundary(const Combination& row, Scene& scene) {
   BodyRequest& body = scene.bodies[0];
   if (row.is(boundary, "free")) return;
   scene.gravity = {0.05, 0.02, -0.1};
-  const Selection low = in_box({-1, -1, -1}, {0.07, 1, 1}), high = in_box({0.73, -1, -1}, {2, 1, 1});
+  const Selection low = in_box({-1, -1, -1}, {0.07, 1, 1}),
+                  high = in_box({0.73, -1, -1}, {2, 1, 1});
   if (row.is(boundary, "rollers")) {
     body.fixed.push_back({low, {.x = true, .y = false, .z = false}});
     body.fixed.push_back({in_box({-1, -1, -1}, {2, -0.1, 1}), {.x = false, .y = true, .z = false}});
@@ -146,9 +147,9 @@ inline Scene scene_of(const Combination& row) {
   return scene;
 }
 
-/// Forces that pull pairs of phyxels apart, along the lines that join them at rest [N], shape [n] of
-/// the whole model. They have no sum and no torque and stretch the body, so that a free body has an
-/// equilibrium, which is stable. Empty for a combination without external forces.
+/// Forces that pull pairs of phyxels apart, along the lines that join them at rest [N], shape [n]
+/// of the whole model. They have no sum and no torque and stretch the body, so that a free body has
+/// an equilibrium, which is stable. Empty for a combination without external forces.
 inline std::vector<Vec3d> external_forces_of(const Combination& row, const Model& whole) {
   if (!row.has(external)) return {};
   const Index n = whole.size();
