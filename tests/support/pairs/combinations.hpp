@@ -61,7 +61,7 @@ inline const std::vector<FactorEntry>& factors() {
         {"external", {"", "external forces"}},
         {"boundary", {"free", "fixed", "rollers", "moved", "loaded"}},
         {"supports", {"one support", "adaptive supports", "capped lists"}},
-        {"cloud", {"lattice", "irregular"}},
+        {"cloud", {"lattice", "jittered lattice", "filled mesh"}},
         {"precision", {"float", "double", "mixed"}},
         {"method", {"verlet", "implicit", "equilibrium"}}};
   }();
