@@ -2,16 +2,22 @@
 /// on the ranks that run this program.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <fstream>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "device.hpp"
 #include "partition/share.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/shared_model.hpp"
 #include "ranks.hpp"
 #include "solver/cuda_backend.hpp"
 #include "support/pairs/combinations.hpp"
+#include "support/pairs/conditions.hpp"
 #include "support/pairs/physics.hpp"
+#include "support/pairs/refusals.hpp"
 #include "support/pairs/scene.hpp"
 
 namespace phyxel {
@@ -20,6 +26,7 @@ namespace {
 using namespace phyxel::testing;
 using test::all_ranks;
 using test::world;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 /// The device of a row on this rank.
@@ -89,6 +96,7 @@ TEST_P(Pairs, AreComputed) {
   if (world().size() > 1 || row_.on_gpu()) {
     const SharedModel shared(all_ranks(), scene, device);
     const Model& here = shared.here();
+    EXPECT_EQ(shared.digest(), model_digest(whole));
     const auto of_share = [&](const auto& values) {
       return here.share && !values.empty() ? values_of(*here.share, values) : values;
     };
@@ -137,6 +145,92 @@ TEST(PairsOfAllRows, AreCoveredOrRefused) {
     }
   }
   EXPECT_THAT(missing, IsEmpty());
+}
+
+/// The error of what all ranks do; "computed" if there is none.
+template <class Work>
+std::string error_of(Work&& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::bad_input) << error.what();
+    return error.what();
+  }
+  return "computed";
+}
+
+void expect_refused(const std::string& message, const std::vector<std::string>& words) {
+  for (const std::string& part : words) EXPECT_THAT(message, HasSubstr(part));
+}
+/// The words of a refusal with the values of a row.
+std::vector<std::string> words_for(const Combination& row, std::vector<std::string> words) {
+  for (std::string& part : words) {
+    for (const Factor factor : {precision, method}) {
+      const std::string name = std::string("{") + factors()[factor].name + "}";
+      const std::size_t at = part.find(name);
+      if (at != std::string::npos) part.replace(at, name.size(), row.value(factor));
+    }
+  }
+  return words;
+}
+
+/// Every pair of the list of refusals is refused, with plain values of all other factors.
+TEST(RefusedPairs, NameKeyValueAndWhatIsAllowed) {
+  int refused = 0;
+  for (const LevelPair& pair : all_pairs(level_counts())) {
+    const Refusal* const refusal = refusal_of_pair(pair);
+    if (!refusal) continue;
+    Combination row{Levels(factor_count, 0)};
+    row.levels[pair.first] = pair.first_level;
+    row.levels[pair.second] = pair.second_level;
+    if (row.on_gpu() && cuda_version() == "no CUDA") continue;  // which refuses every model
+    SCOPED_TRACE(describe(pair));
+    const std::string message = error_of([&] {
+      Scene scene = scene_of(row);
+      scene.time.step = 1e-3;
+      if (row.on_gpu()) {
+        make_cuda_backend(build_model(scene), row.working_precision());
+        return;
+      }
+      compute(all_ranks(), scene, make_cloud(scene.bodies[0]));
+    });
+    expect_refused(message, words_for(row, refusal->words));
+    ++refused;
+  }
+  EXPECT_EQ(refused, cuda_version() == "no CUDA" ? 8 : 12);
+}
+
+class RefusedConditions : public ::testing::TestWithParam<Condition> {};
+
+TEST_P(RefusedConditions, NameKeyValueAndWhatIsAllowed) {
+  Scene scene = resting_beam();
+  scene.time.step = 1e-3;
+  Cloud beam = make_cloud(scene.bodies[0]);
+  EXPECT_EQ(error_of([&] { compute(all_ranks(), scene, beam); }), "computed");
+  GetParam().change(scene, beam);
+  const std::string message = error_of([&] { compute(all_ranks(), scene, beam); });
+  if (all_ranks().size() < GetParam().least_ranks) {
+    EXPECT_EQ(message, "computed");
+  } else {
+    expect_refused(message, GetParam().words);
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, RefusedConditions, ::testing::ValuesIn(conditions()),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+/// The table of docs/combinations.md has all refusals, and no other.
+TEST(Refusals, AreListedInOnePlace) {
+  std::ifstream page(PHYXEL_SOURCE_DIR "/docs/combinations.md");
+  std::string found;
+  for (std::string line; std::getline(page, line);) {
+    if (line.rfind("| ", 0) == 0) found += line + '\n';
+  }
+  std::string expected = "| combination | the error says | reason |\n| --- | --- | --- |\n";
+  for (const Refusal& r : refusals()) expected += table_line(r.what, r.words, r.reason) + '\n';
+  for (const Condition& c : conditions()) {
+    expected += table_line(c.what, c.words, c.reason) + '\n';
+  }
+  EXPECT_EQ(found, expected) << expected;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 /// What a scene combines: laws, terms, boundaries, devices, precisions and methods, as factors with
-/// values, and the pairs of values that the library refuses.
+/// values, and the rows of a table of them.
 #pragma once
 
 #include <algorithm>
@@ -89,71 +89,6 @@ inline std::string describe(const LevelPair& pair) {
   return one(pair.first, pair.first_level) + " with " + one(pair.second, pair.second_level);
 }
 
-/// Values of two factors that the library refuses together.
-struct Refusal {
-  Factor first;
-  std::vector<std::string> first_values;
-  Factor second;
-  std::vector<std::string> second_values;
-  std::vector<std::string> words;  ///< Key, value and what is allowed, as the error names them.
-  const char* reason;
-
-  bool covers(const LevelPair& pair) const {
-    return covers(pair.first, pair.first_level, pair.second, pair.second_level) ||
-           covers(pair.second, pair.second_level, pair.first, pair.first_level);
-  }
-
- private:
-  bool covers(int f, int a, int g, int b) const {
-    const auto has = [](const std::vector<std::string>& values, const std::string& value) {
-      return std::find(values.begin(), values.end(), value) != values.end();
-    };
-    return f == first && g == second && has(first_values, value_name(f, a)) &&
-           has(second_values, value_name(g, b));
-  }
-};
-
-/// All pairs that are refused; every other pair is computed.
-inline const std::vector<Refusal>& refusals() {
-  static const std::vector<Refusal> all{
-      {law,
-       {custom, custom_history},
-       device,
-       {by_tiles, in_residence},
-       {"custom_law = \"", "cannot run on a GPU", "allowed is the CPU"},
-       "it is C++ of the caller's program, compiled for the CPU; a law that shall run on GPUs is a "
-       "struct in the library (docs/extending.md)"},
-      {method,
-       {"implicit", "equilibrium"},
-       precision,
-       {"float", "mixed"},
-       {"solver.precision = \"", "solver.method = \"", "allowed", "\"double\""},
-       "Newton's method takes differences of forces over 1e-7 of a support, and ends at a residual "
-       "of 1e-8 of what acts: forces in float are rounded to 1e-7 of themselves"},
-      {hourglass,
-       {"hourglass control"},
-       supports,
-       {"adaptive supports", "capped lists"},
-       {"hourglass control (0.1)", "allowed are neighbours.support = \"uniform\"", "hourglass = 0"},
-       "its energy counts each pair of neighbours from both sides with one weight, which needs "
-       "lists that are symmetric"},
-      {closure,
-       {"closed gradients"},
-       supports,
-       {"adaptive supports", "capped lists"},
-       {"closed gradients (0.001)", "allowed are neighbours.support = \"uniform\"", "closure = 0"},
-       "the integration constraint is a sum over symmetric lists with one weight for each pair"}};
-  return all;
-}
-
-/// The refusal of a pair; null if it is computed.
-inline const Refusal* refusal_of_pair(const LevelPair& pair) {
-  for (const Refusal& refusal : refusals()) {
-    if (refusal.covers(pair)) return &refusal;
-  }
-  return nullptr;
-}
-
 /// A row of the table: one value of every factor.
 struct Combination {
   Levels levels;
@@ -182,30 +117,6 @@ inline void PrintTo(const Combination& row, std::ostream* out) { *out << row.des
 inline int level_of(Factor factor, const std::string& value) {
   const std::vector<std::string>& values = factors()[factor].values;
   return static_cast<int>(std::find(values.begin(), values.end(), value) - values.begin());
-}
-
-/// The rows of one device: every pair of values of the other factors, and each of them on that
-/// device, but for those that are refused.
-inline std::vector<Combination> rows_on(const std::string& device_name) {
-  const int here = level_of(device, device_name);
-  const auto allowed = [&](const LevelPair& pair) {
-    const bool elsewhere = pair.first == device && pair.first_level != here;
-    return !elsewhere && !refusal_of_pair(pair);
-  };
-  // Pairs of values that the device itself excludes occur in no row.
-  const Covering covering(level_counts(), [&](const LevelPair& pair) {
-    if (!allowed(pair)) return false;
-    for (const auto& [factor, level] :
-         {std::pair{pair.first, pair.first_level}, std::pair{pair.second, pair.second_level}}) {
-      if (factor != device && !allowed({device, here, factor, level})) return false;
-    }
-    return true;
-  });
-  std::vector<Combination> rows;
-  for (const Levels& levels : covering.rows()) {
-    rows.push_back({levels, static_cast<int>(rows.size()) + 1});
-  }
-  return rows;
 }
 
 /// "Row07_NeoHookeanFixedDoubleImplicit", for names of tests.
