@@ -13,9 +13,9 @@
 
 namespace phyxel {
 
-/// Checks that a backend computes in double, without which a search by Newton's method does not come
-/// to an end: it takes differences of forces over 1e-7 of a support, and residuals have to fall to
-/// 1e-8 of what acts.
+/// Checks that a backend computes in double, without which a search by Newton's method does not
+/// come to an end: it takes differences of forces over 1e-7 of a support, and residuals have to
+/// fall to 1e-8 of what acts.
 /// @throws InputError with the precision, the method, and what is allowed
 void check_precision(const Backend& backend, Method method);
 

@@ -108,9 +108,14 @@ TEST_P(Pairs, AreComputed) {
         backend_of(row_, here, device, resident ? CudaPath::automatic : CudaPath::launches);
     if (resident) {
       const bool changes = row_.is(boundary, "moved") || row_.is(boundary, "loaded");
-      EXPECT_EQ(backend->name().find("resident") != std::string::npos,
-                world().size() == 1 && !changes)
-          << backend->path_reason();
+      const bool is_resident = backend->name().find("resident") != std::string::npos;
+      if (world().size() > 1 || changes) {
+        EXPECT_FALSE(is_resident) << backend->name();
+      }
+      // Histories in double may take more than there is of shared memory.
+      if (world().size() == 1 && !changes && row_.is(precision, "float")) {
+        EXPECT_TRUE(is_resident) << backend->path_reason();
+      }
     }
     expect_same_bits(here, course, course_of(row_, here, *backend, start_here, of_share(external)));
     world().barrier();  // before memory that other ranks store into is released
@@ -126,25 +131,49 @@ INSTANTIATE_TEST_SUITE_P(GpuByTiles, Pairs, ::testing::ValuesIn(rows_on(by_tiles
 INSTANTIATE_TEST_SUITE_P(GpuInResidence, Pairs, ::testing::ValuesIn(rows_on(in_residence)),
                          name_of);
 
-/// Every pair of values occurs in a row of each device, or is refused, with a reason.
+/// Values of a row that a device refuses together, or not.
+bool refuses(int device_level, const std::vector<std::pair<int, int>>& values) {
+  for (const auto& [f, a] : values) {
+    if (refusal_of_pair({testing::device, device_level, f, a})) return true;
+    for (const auto& [g, b] : values) {
+      if (f < g && refusal_of_pair({f, a, g, b})) return true;
+    }
+  }
+  return false;
+}
+
+/// On each device every pair of values, and every value with each precision of each method, occurs
+/// in a row or is refused, and never both.
 TEST(PairsOfAllRows, AreCoveredOrRefused) {
-  std::vector<std::string> missing;
+  std::vector<std::string> wrong;
   for (const std::string& name : factors()[testing::device].values) {
     const std::vector<Combination> rows = rows_on(name);
     const int here = level_of(testing::device, name);
-    for (const LevelPair& pair : all_pairs(level_counts())) {
-      if (pair.first == testing::device && pair.first_level != here) continue;
-      const bool is_refused =
-          refusal_of_pair(pair) ||
-          refusal_of_pair({testing::device, here, pair.first, pair.first_level}) ||
-          refusal_of_pair({testing::device, here, pair.second, pair.second_level});
+    const auto look_at = [&](const std::vector<std::pair<int, int>>& values) {
       const bool is_covered = std::any_of(rows.begin(), rows.end(), [&](const Combination& row) {
-        return contains(row.levels, pair);
+        return std::all_of(values.begin(), values.end(), [&](const auto& value) {
+          return row.levels[value.first] == value.second;
+        });
       });
-      if (is_covered == is_refused) missing.push_back(name + ": " + describe(pair));
+      if (is_covered != refuses(here, values)) return;
+      std::string words = name;
+      for (const auto& [factor, level] : values) words += ", " + value_name(factor, level);
+      wrong.push_back(words);
+    };
+    for (const LevelPair& pair : all_pairs(level_counts())) {
+      if (pair.first == testing::device) {
+        if (pair.first_level == here) look_at({{pair.second, pair.second_level}});
+        continue;
+      }
+      look_at({{pair.first, pair.first_level}, {pair.second, pair.second_level}});
+      if (pair.first == precision || pair.second != precision) continue;
+      for (int m = 0; m < level_counts()[method]; ++m) {
+        look_at({{pair.first, pair.first_level}, {precision, pair.second_level}, {method, m}});
+      }
     }
+    for (const Combination& row : rows) EXPECT_EQ(row.levels[testing::device], here);
   }
-  EXPECT_THAT(missing, IsEmpty());
+  EXPECT_THAT(wrong, IsEmpty());
 }
 
 /// The error of what all ranks do; "computed" if there is none.

@@ -17,8 +17,8 @@ struct Refusal {
   std::vector<std::string> first_values;
   Factor second;
   std::vector<std::string> second_values;
-  /// Key, value and what is allowed, as the error names them. "{precision}" and "{method}" stand for
-  /// the values of these factors.
+  /// Key, value and what is allowed, as the error names them. "{precision}" and "{method}" stand
+  /// for the values of these factors.
   std::vector<std::string> words;
   const char* reason;
 
@@ -46,14 +46,16 @@ inline const std::vector<Refusal>& refusals() {
        device,
        {by_tiles, in_residence},
        {"custom_law = \"", "cannot run on a GPU", "allowed is the CPU"},
-       "it is C++ that the caller's program compiles for the CPU; a law for GPUs is a struct in the "
+       "it is C++ that the caller's program compiles for the CPU; a law for GPUs is a struct in "
+       "the "
        "library (extending.md)"},
       {"implicit steps and equilibrium in float and mixed precision",
        method,
        {"implicit", "equilibrium"},
        precision,
        {"float", "mixed"},
-       {"solver.precision = \"{precision}\"", "allowed with solver.method = \"{method}\": \"double\""},
+       {"solver.precision = \"{precision}\"",
+        "allowed with solver.method = \"{method}\": \"double\""},
        "Newton's method ends where residual forces are 1e-8 of what acts, and takes differences of "
        "forces; forces in float are rounded to 6e-8 of themselves, and residuals stay above 1e-8"},
       {"hourglass control with adaptive supports or `max_neighbours`",
@@ -91,25 +93,53 @@ inline std::string table_line(const std::string& what, const std::vector<std::st
   return "| " + what + " | " + says + " | " + reason + " |";
 }
 
-/// The rows of one device: every pair of values of the other factors, and each of them on that
-/// device, but for those that are refused.
-inline std::vector<Combination> rows_on(const std::string& device_name) {
-  const int here = level_of(device, device_name);
-  const auto allowed = [&](const LevelPair& pair) {
-    const bool elsewhere = pair.first == device && pair.first_level != here;
-    return !elsewhere && !refusal_of_pair(pair);
-  };
-  // Pairs of values that the device itself excludes occur in no row.
-  const Covering covering(level_counts(), [&](const LevelPair& pair) {
-    if (!allowed(pair)) return false;
-    for (const auto& [factor, level] :
-         {std::pair{pair.first, pair.first_level}, std::pair{pair.second, pair.second_level}}) {
-      if (factor != device && !allowed({device, here, factor, level})) return false;
+/// A precision with a method that takes it.
+struct Mode {
+  int precision_level, method_level;
+};
+inline std::vector<Mode> all_modes() {
+  std::vector<Mode> modes;
+  const std::vector<int> counts = level_counts();
+  for (int p = 0; p < counts[precision]; ++p) {
+    for (int m = 0; m < counts[method]; ++m) {
+      if (!refusal_of_pair({precision, p, method, m})) modes.push_back({p, m});
     }
-    return true;
+  }
+  return modes;
+}
+
+/// The rows of one device: every pair of values of the other factors that is not refused. Precision
+/// and method are covered as one factor, so that each value of another meets each precision of each
+/// method.
+inline std::vector<Combination> rows_on(const std::string& device_name) {
+  static_assert(precision == factor_count - 2 && method == factor_count - 1);
+  const std::vector<Mode> modes = all_modes();
+  const int here = level_of(device, device_name);
+  std::vector<int> counts = level_counts();
+  counts[precision] = static_cast<int>(modes.size());
+  counts.pop_back();
+  /// Calls each(factor, level) for the values that a value of the array stands for.
+  const auto for_values = [&](int factor, int level, auto&& each) {
+    if (factor != precision) return each(factor, level);
+    each(precision, modes[level].precision_level);
+    each(method, modes[level].method_level);
+  };
+  const Covering covering(counts, [&](const LevelPair& pair) {
+    bool allowed = pair.first != device || pair.first_level == here;
+    for_values(pair.first, pair.first_level, [&](int f, int a) {
+      allowed = allowed && (f == device || !refusal_of_pair({device, here, f, a}));
+      for_values(pair.second, pair.second_level, [&](int g, int b) {
+        allowed =
+            allowed && !refusal_of_pair({f, a, g, b}) && !refusal_of_pair({device, here, g, b});
+      });
+    });
+    return allowed;
   });
   std::vector<Combination> rows;
-  for (const Levels& levels : covering.rows()) {
+  for (Levels levels : covering.rows()) {
+    const Mode mode = modes[levels[precision]];
+    levels[precision] = mode.precision_level;
+    levels.push_back(mode.method_level);
     rows.push_back({levels, static_cast<int>(rows.size()) + 1});
   }
   return rows;

@@ -81,7 +81,8 @@ inline void set_boundary(const Combination& row, Scene& scene) {
                   high = in_box({0.73, -1, -1}, {2, 1, 1});
   if (row.is(boundary, "rollers")) {
     body.fixed.push_back({low, {.x = true, .y = false, .z = false}});
-    body.fixed.push_back({in_box({-1, -1, -1}, {2, -0.07, 1}), {.x = false, .y = true, .z = false}});
+    body.fixed.push_back(
+        {in_box({-1, -1, -1}, {2, -0.07, 1}), {.x = false, .y = true, .z = false}});
     body.fixed.push_back({in_box({-1, -1, -1}, {2, 1, -0.1}), {.x = false, .y = false, .z = true}});
     return;
   }
@@ -100,7 +101,8 @@ inline void set_boundary(const Combination& row, Scene& scene) {
 }
 
 /// One body from x = 0 to 0.8 m with a closed surface: a beam with phyxels on its faces, a cylinder
-/// of a jittered lattice, or a ring from a mesh, with phyxels on its surface.
+/// of a jittered lattice, or a ring from a mesh, with phyxels on its surface. Of some hundred
+/// phyxels on the CPU; on a GPU of three tiles and more, so that three ranks have some each.
 inline BodyRequest shape_of(const Combination& row) {
   BodyRequest body;
   body.name = "body";
@@ -108,13 +110,13 @@ inline BodyRequest shape_of(const Combination& row) {
   ShapeRequest& shape = body.source.shape;
   if (row.is(cloud, "filled mesh")) {
     body.source.mesh = PHYXEL_SOURCE_DIR "/examples/mesh/ring.obj";
-    body.source.phyxels = 400;
+    body.source.phyxels = row.on_gpu() ? 800 : 400;
     body.source.relaxations = 10;
     body.scale = 0.8 / 0.94;
     body.translation = {0.4, 0, 0};
     return body;
   }
-  shape.spacing = 0.08;
+  shape.spacing = row.on_gpu() ? 0.05 : 0.08;
   if (row.is(cloud, "lattice")) {
     shape.name = "beam";
     shape.size = {0.8, 0.32, 0.32};
