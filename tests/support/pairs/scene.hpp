@@ -94,8 +94,9 @@ inline void set_boundary(const Combination& row, Scene& scene) {
                             .about = {0.8, 0, 0},
                             .duration = 0.02});
   }
-  if (row.is(boundary, "loaded")) {
-    body.loads.push_back({.select = high, .force = {20, 1, 3}, .ramp = 0.02});
+  if (row.is(boundary, "loaded") || row.is(boundary, "growing loads")) {
+    const double ramp = row.is(boundary, "loaded") ? 0 : 0.02;
+    body.loads.push_back({.select = high, .force = {20, 1, 3}, .ramp = ramp});
     body.loads.push_back({.select = {.all = true}, .force_density = {0, 30, 0}});
   }
 }
