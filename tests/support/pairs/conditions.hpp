@@ -59,12 +59,12 @@ inline const std::vector<Condition>& conditions() {
       {"Unsupported",
        "equilibrium of a body that nothing holds against its weight or loads",
        {"body \"body\": nothing is held against a force of", "needed are fixed phyxels"},
-       "it moves for ever",
+       "the body accelerates for ever",
        [](Scene& scene, Cloud&) { scene.bodies[0].fixed.clear(); }},
       {"ImplicitWithoutStep",
        "implicit steps without `time.step`",
        {"time.step = \"adaptive\"", "needed is one"},
-       "they are stable at any size, so that no size follows from the scene",
+       "implicit steps are stable at any size, so that no size follows from the scene",
        [](Scene& scene, Cloud&) {
          scene.solver.method = Method::implicit;
          scene.time.step.reset();

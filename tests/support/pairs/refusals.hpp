@@ -46,9 +46,8 @@ inline const std::vector<Refusal>& refusals() {
        device,
        {by_tiles, in_residence},
        {"custom_law = \"", "cannot run on a GPU", "allowed is the CPU"},
-       "it is C++ that the caller's program compiles for the CPU; a law for GPUs is a struct in "
-       "the "
-       "library (extending.md)"},
+       "a caller's law is C++ that the caller's program compiles for the CPU; a law for GPUs is "
+       "a struct in the library (extending.md)"},
       {"implicit steps and equilibrium in float and mixed precision",
        method,
        {"implicit", "equilibrium"},
@@ -56,24 +55,25 @@ inline const std::vector<Refusal>& refusals() {
        {"float", "mixed"},
        {"solver.precision = \"{precision}\"",
         "allowed with solver.method = \"{method}\": \"double\""},
-       "Newton's method ends where residual forces are 1e-8 of what acts, and takes differences of "
-       "forces; forces in float are rounded to 6e-8 of themselves, and residuals stay above 1e-8"},
+       "Newton's method ends where residual forces are 1e-8 of what acts, and takes differences "
+       "of forces; forces in float are rounded to 6e-8 of themselves, and residuals stay above "
+       "1e-8"},
       {"hourglass control with adaptive supports or `max_neighbours`",
        hourglass,
        {"hourglass control"},
        supports,
        {"adaptive supports", "capped lists"},
        {"hourglass control (0.1)", "allowed are neighbours.support = \"uniform\"", "hourglass = 0"},
-       "its force is derived for lists and weights that are the same from both sides; others need "
-       "one more sum over the inverse lists, which is not written"},
+       "the force of hourglass control is derived for lists and weights that are the same from "
+       "both sides; others need one more sum over the inverse lists, which is not written"},
       {"closed gradients with adaptive supports or `max_neighbours`",
        closure,
        {"closed gradients"},
        supports,
        {"adaptive supports", "capped lists"},
        {"closed gradients (0.001)", "allowed are neighbours.support = \"uniform\"", "closure = 0"},
-       "closing vectors and their forces are derived for lists and weights that are the same from "
-       "both sides; others need one more sum over the inverse lists, which is not written"}};
+       "closing vectors and their forces are derived for lists and weights that are the same "
+       "from both sides; others need one more sum over the inverse lists, which is not written"}};
   return all;
 }
 
