@@ -63,6 +63,9 @@ class GpuBackend final : public PaperBackend {
     return "the kernels of 2008, " + std::string(arithmetic) + ", " +
            (dense_ ? "n x n force matrix" : "CSR gather") + ", on " + device_.name;
   }
+  Precision precision() const override {
+    return std::is_same_v<Real, float> ? Precision::single : Precision::double_;
+  }
   Index size() const override { return n_; }
   int threads() const override { return 0; }
 

@@ -55,6 +55,10 @@ class SequentialBackend final : public PaperBackend {
                                                             : "long double";
     return fmt::format("the sequential program of 2008, {}, 1 thread", arithmetic);
   }
+  /// `double_` in long double, too.
+  Precision precision() const override {
+    return std::is_same_v<Real, float> ? Precision::single : Precision::double_;
+  }
   Index size() const override { return model_.size(); }
   int threads() const override { return 1; }
 

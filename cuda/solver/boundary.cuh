@@ -134,7 +134,12 @@ class Boundary {
     std::vector<char> moved;
     std::vector<Index> held;
     for (const Motion& motion : m_.model().motions) {
-      const std::vector<Index> at = places_of(motion.phyxels);
+      // Ghosts have the values of their owners, whose free axes are not known here.
+      std::vector<Index> own;
+      for (const Index i : motion.phyxels) {
+        if (m_.model().owns(i)) own.push_back(i);
+      }
+      const std::vector<Index> at = places_of(own);
       if (motion.stands_still() && motion.axes.all()) {
         held.insert(held.end(), at.begin(), at.end());
         continue;

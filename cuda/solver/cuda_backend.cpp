@@ -25,9 +25,9 @@ std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precisi
   }
   for (const Part& part : model.parts) {
     if (!part.material.custom_law) continue;
-    throw InputError("body \"" + part.name + "\" has a law of the caller's own, \"" +
+    throw InputError("body \"" + part.name + "\": custom_law = \"" +
                      part.material.custom_law->name() +
-                     "\", which cannot run on a GPU: allowed is the CPU");
+                     "\", a law of the caller's own, cannot run on a GPU: allowed is the CPU");
   }
   switch (precision) {
     case Precision::single:

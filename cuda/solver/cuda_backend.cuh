@@ -31,14 +31,17 @@ class CudaBackend final : public Backend {
   }
 
   std::string name() const override {
-    const char* precision = m_.mixed ? "mixed" : sizeof(Real) == 4 ? "float" : "double";
     const std::string path =
         path_.residence
             ? path_.residence->describe()
             : "tiles of " + std::to_string(tile_size) +
                   (path_.recorded ? ", graphs of " + std::to_string(steps_together) + " steps"
                                   : "");
-    return m_.device().name + ", " + precision + ", " + path;
+    return m_.device().name + ", " + precision_name(precision()) + ", " + path;
+  }
+  Precision precision() const override {
+    if (m_.mixed) return Precision::mixed;
+    return sizeof(Real) == 4 ? Precision::single : Precision::double_;
   }
   std::string path_reason() const override { return path_.reason; }
   Index size() const override { return m_.size(); }

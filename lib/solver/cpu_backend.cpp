@@ -28,11 +28,12 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   std::string name() const override {
-    const char* precision = sizeof(Real) == 8        ? "double"
-                            : sizeof(StateReal) == 8 ? "mixed"
-                                                     : "float";
-    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision, threads(),
+    return fmt::format("cpu, {}, {} thread{}, {} lanes", precision_name(precision()), threads(),
                        threads() == 1 ? "" : "s", W);
+  }
+  Precision precision() const override {
+    if (sizeof(Real) == 8) return Precision::double_;
+    return sizeof(StateReal) == 8 ? Precision::mixed : Precision::single;
   }
   int threads() const override {
     int used = 1;  // small bodies use fewer threads

@@ -172,12 +172,13 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     halo.finish();
   }
 
-  /// Moves phyxels with prescribed motions, either those of the boundary or the others.
+  /// Moves phyxels with prescribed motions, either those of the boundary or the others. Ghosts have
+  /// the values of their owners, whose free axes are not known here.
   void follow_motions(double time, double dt, bool of_boundary) {
     for (const Motion& motion : model_.motions) {
       const Path before = motion.path_at(time), after = motion.path_at(time + dt);
       for (const Index i : motion.phyxels) {
-        if ((!boundary_.empty() && boundary_[i]) != of_boundary) continue;
+        if (!model_.owns(i) || (!boundary_.empty() && boundary_[i]) != of_boundary) continue;
         const Index slot = layout_.slot(i);
         const Vec3d x = model_.position[i], u = after.at(x);
         this->set_state(i, motion.along_axes(u, this->get3(displacement_, slot)),

@@ -112,6 +112,7 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options) {
   check_fits(model, backend);
+  check_precision(backend, Method::equilibrium);
   Newton newton(model, backend, options.most_steps);
   newton.observe(options.observer);
   const OwnedVectors& vectors = newton.vectors();

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/error.hpp"
 
 namespace phyxel {
 namespace {
@@ -26,6 +27,13 @@ Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
 }
 
 }  // namespace
+
+void check_precision(const Backend& backend, Method method) {
+  if (backend.precision() == Precision::double_) return;
+  throw InputError(fmt::format(
+      "solver.precision = \"{}\" found; allowed with solver.method = \"{}\": \"double\"",
+      precision_name(backend.precision()), method_name(method)));
+}
 
 Newton::Newton(const Model& model, Backend& backend, int most_steps)
     : model_(model),

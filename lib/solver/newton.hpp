@@ -5,13 +5,19 @@
 #include <string>
 #include <vector>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
-#include "model/owned_vectors.hpp"
 
 namespace phyxel {
+
+/// Checks that a backend computes in double, without which a search by Newton's method does not
+/// come to an end: it takes differences of forces over 1e-7 of a support, and residuals have to
+/// fall to 1e-8 of what acts.
+/// @throws InputError with the precision, the method, and what is allowed
+void check_precision(const Backend& backend, Method method);
 
 /// A balance of forces: displacements u that satisfy, along every free axis of each phyxel,
 ///   f(u) + applied - weight (u - centre) = 0,

@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
-#include "model/owned_vectors.hpp"
+#include "solver/newton.hpp"
 
 namespace phyxel {
 
@@ -78,6 +79,7 @@ Solver::Solver(Backend& backend, const State& start)
 Solver::Solver(const Model& model, Backend& backend, const State& start, Method method)
     : Solver(backend, start) {
   check_fits(model, backend);
+  if (method != Method::verlet) check_precision(backend, method);
   model_ = &model;
   method_ = method;
   if (method == Method::equilibrium && start.step == 0) {

@@ -6,11 +6,11 @@
 #include <span>
 #include <vector>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
-#include "model/owned_vectors.hpp"
 
 namespace phyxel {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
-#include "model/owned_vectors.hpp"
 #include "solver/start_vector.hpp"
 #include "stage.hpp"
 

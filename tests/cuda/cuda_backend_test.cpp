@@ -241,7 +241,7 @@ TEST(CudaRefusal, OfWhatIsTheCallersOwn) {
   material.custom_law = std::make_shared<Repeated>(material);
   const Model custom = model_of(one_body(material), cloud), ours = model_of(one_body(), cloud);
   EXPECT_THAT(refusal_of([&] { make_test_backend(custom, Precision::single); }),
-              HasSubstr("body \"body\" has a law of the caller's own, \"repeated"));
+              HasSubstr("body \"body\": custom_law = \"repeated"));
   const auto backend = make_test_backend(ours, Precision::single);
   EXPECT_FALSE(backend->view());
 }

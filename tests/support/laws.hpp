@@ -1,8 +1,11 @@
 /// Materials of every law, and a caller's law with known results.
 #pragma once
 
+#include <cstring>
+#include <span>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
@@ -75,6 +78,43 @@ class Repeated final : public CustomLaw {
  private:
   NeoHookean<double> law_;
   double factor_;
+};
+
+/// The library's J2 plasticity as a caller's law, with its history.
+class Borrowed final : public CustomLaw {
+ public:
+  explicit Borrowed(const Material& m) : law_(law_of<J2<double>>(m)) {}
+  std::string name() const override { return "borrowed"; }
+  double energy(const Mat3d& g) const override { return law_.energy(g, {}); }
+  Mat3d first_piola_stress(const Mat3d& g) const override { return law_.elastic_stress(g, {}); }
+  std::vector<std::string> history() const override {
+    std::vector<std::string> names;
+    for (const HistoryNumber& n : J2<double>::history) names.emplace_back(n.name);
+    return names;
+  }
+  double energy(const Mat3d& g, std::span<const double> numbers) const override {
+    return law_.energy(g, state_of(numbers));
+  }
+  Mat3d first_piola_stress(const Mat3d& g, std::span<double> numbers, double dt) const override {
+    J2<double>::State state = state_of(numbers);
+    const Mat3d p = law_.first_piola_stress(g, state, dt);
+    std::memcpy(numbers.data(), &state, sizeof(state));
+    return p;
+  }
+  Mat3d elastic_stress(const Mat3d& g, std::span<const double> numbers) const override {
+    return law_.elastic_stress(g, state_of(numbers));
+  }
+  double plastic_work(std::span<const double> numbers) const override {
+    return law_.plastic_work(state_of(numbers));
+  }
+
+ private:
+  static J2<double>::State state_of(std::span<const double> numbers) {
+    J2<double>::State state;
+    std::memcpy(static_cast<void*>(&state), numbers.data(), sizeof(state));
+    return state;
+  }
+  J2<double> law_;
 };
 
 }  // namespace phyxel::testing

@@ -76,6 +76,8 @@ class Backend {
 
   /// e.g. "cpu, float, 2 threads, 16 lanes".
   virtual std::string name() const = 0;
+  /// The precision of its arithmetic.
+  virtual Precision precision() const = 0;
   /// Why steps are launched as `name` says, in words; empty where there is no choice.
   virtual std::string path_reason() const { return {}; }
   /// Phyxels of the model, n; of a share with its ghosts.

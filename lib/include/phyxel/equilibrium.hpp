@@ -50,10 +50,10 @@ struct Equilibrium {
 /// and no matrix is formed. Steps are shortened if they would strain the body strongly or increase
 /// its energy, so that of several equilibria a stable one near the path is found.
 /// @param backend backend of the model in double; receives the state found
-/// @throws InputError if a motion has no end, or a body is not supported against its loads;
-///   DivergedError, with the residual, if no equilibrium is found within `most_steps` or the search
-///   stagnates; InterruptedError if the observer requests it: the backend then has the state of the
-///   last accepted step
+/// @throws InputError if the backend is not in double, a motion has no end, or a body is not
+///   supported against its loads; DivergedError, with the residual, if no equilibrium is found
+///   within `most_steps` or the search stagnates; InterruptedError if the observer requests it: the
+///   backend then has the state of the last accepted step
 Equilibrium find_equilibrium(const Model& model, Backend& backend,
                              const EquilibriumOptions& options = {});
 

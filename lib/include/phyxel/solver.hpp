@@ -104,6 +104,7 @@ class Solver {
   /// By the method asked for. One step of the method `equilibrium` finds where the model comes to
   /// rest.
   /// @param backend in double, for another method than Verlet's
+  /// @throws InputError for such a method and a backend in float or mixed
   Solver(const Model& model, Backend& backend, const State& start, Method method);
   ~Solver();
 
