@@ -96,8 +96,8 @@ inline const std::vector<Condition>& conditions() {
       {"ManyRegions",
        "more than 32 named regions that are fixed, moved or loaded, on several ranks",
        {"has more than 32 regions that are fixed, moved or loaded", "allowed are 32"},
-       "ranks send the regions of a phyxel as the bits of one word; boxes, balls and lists of "
-       "indices have no limit",
+       "ranks send the regions of a phyxel as the bits of one word; boxes and balls have no limit, "
+       "nor have lists of indices in bodies without inclusions",
        [](Scene& scene, Cloud& cloud) {
          for (Index k = 0; k < 33; ++k) {
            const std::string name = "region " + std::to_string(k);
