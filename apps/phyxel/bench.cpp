@@ -269,19 +269,20 @@ void bench_cantilever(const BenchOptions& options) {
 void add_factors(CLI::App& command, BenchOptions& options) {
   command
       .add_option("--factor", options.factors,
-                  "Supports, as multiples of the mean distance to the 10 nearest")
+                  "Support radii, in mean distances to the ten nearest phyxels")
       ->delimiter(',')
       ->check(CLI::Range(1.0, 4.0));
 }
 
 void add_device_options(CLI::App& command, BenchOptions& options) {
   command.add_option("--device", options.device, device_help)->capture_default_str();
-  command.add_option("--precision", options.precisions, "float, double, mixed")->delimiter(',');
+  command.add_option("--precision", options.precisions, "Precisions: float, double, mixed")
+      ->delimiter(',');
 }
 
 void add_bench_step(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
-      "step", "Time steps per second of a jittered cube, per term and precision");
+      "step", "Measure the time steps per second of a jittered cube, per term and precision");
   auto options = std::make_shared<BenchOptions>();
   options->sizes = {1000, 10648, 103823, 1000000};
   for (int t = 1; t <= std::min(2, omp_get_num_procs()); ++t) options->threads.push_back(t);
@@ -294,10 +295,10 @@ void add_bench_step(CLI::App& bench) {
       ->add_option("--terms", options->terms,
                    fmt::format("Term sets: {}", fmt::join(all_terms, ", ")))
       ->delimiter(',');
-  command->add_option("--shape", options->shape, "cube, or a body of the 2008 paper")
+  command->add_option("--shape", options->shape, "Body: cube, or one of the 2008 paper")
       ->check(CLI::IsMember({"cube", "horn_bug", "dino", "alien_head"}));
   add_factors(*command, *options);
-  command->add_option("--bodies", options->bodies, "Number of bodies, side by side")
+  command->add_option("--bodies", options->bodies, "Number of bodies side by side")
       ->check(CLI::Range(1, 100'000));
   add_seconds_option(*command, options->seconds);
   command->footer(
@@ -311,13 +312,14 @@ void add_bench_step(CLI::App& bench) {
 void add_bench_cantilever(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
       "cantilever",
-      "Time to the known deflection of a beam, with discretisation and rounding errors");
+      "Measure the time to solution of a beam with a known deflection, with discretisation and "
+      "rounding errors");
   auto options = std::make_shared<BenchOptions>();
   options->across = {4, 6, 8, 12, 16, 24};
   options->factors = {1.4, 1.6, 1.8, 2};
   command
       ->add_option("--across", options->across,
-                   "Phyxels across the height, which is a tenth of the length")
+                   "Numbers of phyxels across the height, which is a tenth of the length")
       ->delimiter(',')
       ->check(CLI::Range(2, 200))
       ->capture_default_str();

@@ -68,21 +68,21 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
 }
 
 void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats) {
-  command.add_option("--phyxels", sizes, "Sizes, comma separated (rounded to cubes)")
+  command.add_option("--phyxels", sizes, "Numbers of phyxels, comma separated (rounded to cubes)")
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
-  command.add_option("--repeat", repeats, "Repeats; the median is reported")
+  command.add_option("--repeat", repeats, "Number of repeats; the median is reported")
       ->check(CLI::Range(1, 1000));
 }
 
 void add_thread_counts(CLI::App& command, std::vector<int>& threads) {
-  command.add_option("--threads", threads, "Thread counts, comma separated")
+  command.add_option("--threads", threads, "Numbers of threads, comma separated")
       ->delimiter(',')
       ->check(CLI::Range(1, 4096));
 }
 
 void add_seconds_option(CLI::App& command, double& seconds) {
-  command.add_option("--seconds", seconds, "Length of one repeat [s]")
+  command.add_option("--seconds", seconds, "Duration of one repeat [s]")
       ->check(CLI::Range(0.01, 60.0));
 }
 

@@ -264,20 +264,27 @@ void bench_scaling(const Options& options) {
 
 void add_bench_scaling(CLI::App& bench) {
   CLI::App* command = bench.add_subcommand(
-      "scaling", "Measure the steps per second of a cube on mpirun's ranks, or on one");
+      "scaling", "Measure the steps per second of a cube on the ranks of mpirun, or on one rank");
   auto options = std::make_shared<Options>();
   add_size_options(*command, options->sizes, options->repeats);
-  command->add_flag("--weak", options->weak, "Sizes are those of one rank, not of the body");
+  command->add_flag("--weak", options->weak,
+                    "Numbers of phyxels are per rank, not of the whole "
+                    "body");
   command->add_flag("--without-one", options->without_one,
-                    "Do not measure the first rank alone, with which speed-ups are computed");
-  command->add_option("--partitioner", options->partitioners, "metis, curve, bisection, auto")
+                    "Do not measure the first rank alone, the reference of speed-ups");
+  command
+      ->add_option("--partitioner", options->partitioners,
+                   "Partitioners: metis, curve, "
+                   "bisection, auto")
       ->delimiter(',')
       ->check(CLI::IsMember(partitioner_choices()));
   command->add_option("--device", options->device, device_help);
   command
-      ->add_option("--transport", options->transport, "auto, direct, nccl, mpi, host: between GPUs")
+      ->add_option("--transport", options->transport,
+                   "Transport between GPUs: auto, direct, nccl, "
+                   "mpi, host")
       ->check(CLI::IsMember(transport_names()));
-  command->add_option("--precision", options->precisions, "float, double, mixed")
+  command->add_option("--precision", options->precisions, "Precisions: float, double, mixed")
       ->delimiter(',')
       ->check(CLI::IsMember({"float", "double", "mixed"}));
   add_seconds_option(*command, options->seconds);

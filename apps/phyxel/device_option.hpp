@@ -9,7 +9,7 @@
 
 namespace phyxel::app {
 
-inline constexpr const char* device_help = "auto, cpu, cuda or cuda:<number>";
+inline constexpr const char* device_help = "Device: auto, cpu, cuda or cuda:<number>";
 
 /// Chooses the device of this program's ranks; warns on stderr if "auto" finds a GPU that it cannot
 /// use. Collective. @throws as `phyxel::choose_device`

@@ -164,9 +164,9 @@ std::string table(const Findings& f) {
 
 void add_doctor(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "doctor", "Show GPUs, MPI, HDF5 and memory of this machine, and what a run would choose");
+      "doctor", "Show GPUs, MPI, HDF5 and memory of this machine, and the choices of a run");
   auto json = std::make_shared<bool>(false);
-  command->add_flag("--json", *json, "As JSON");
+  command->add_flag("--json", *json, "Print the result as JSON");
   command->footer(
       "Examples:\n"
       "  phyxel doctor\n"

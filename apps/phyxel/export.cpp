@@ -36,8 +36,7 @@ void export_command(const ExportOptions& options) {
 
 void add_export(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "export",
-      "Gather a series of frames into one temporal VTKHDF file (ParaView 5.12 and later)");
+      "export", "Write a series of frames to one temporal VTKHDF file (ParaView 5.12 and later)");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("series", options->series, "A .hdf.series file of a run")->required();
   command->add_option("--single", options->single, "The file to write, .vtkhdf or .hdf")

@@ -247,16 +247,17 @@ void add_info(CLI::App& program) {
   };
   auto options = std::make_shared<Options>();
   command->add_option("file", options->file, "File or folder")->required();
-  command->add_flag("--json", options->json, "As JSON");
+  command->add_flag("--json", options->json, "Print the content as JSON");
   CLI::Option* partition =
       command
           ->add_option("--partition", options->parts,
-                       "Cut a scene into this number of parts by each method, and show what they "
-                       "would exchange")
+                       "Cut a scene into this number of parts by each method, and show their "
+                       "exchanges")
           ->check(CLI::Range(1, 100'000));
   command
       ->add_option("--partitioner", options->partitioner,
-                   "Method whose parts are listed: metis, curve, bisection, or auto, the best")
+                   "Partitioner whose parts are listed: metis, curve, bisection, or auto (the "
+                   "best)")
       ->needs(partition)
       ->capture_default_str();
   command->footer(

@@ -57,15 +57,15 @@ void add_overrides(CLI::App& command, Overrides& o) {
   command.add_option("scene", o.scene, "Scene file (TOML)")->required();
   command.add_option("--out", o.out, "Output folder, instead of the scene's");
   command.add_option("--device", o.device, device_help);
-  command.add_option("--precision", o.precision, "float, double or mixed");
+  command.add_option("--precision", o.precision, "Precision: float, double or mixed");
   command.add_option(
       "--method", o.method,
-      "verlet, implicit (needs --step or the scene's time.step) or equilibrium (finds "
-      "the state at rest); the last two in double");
-  command.add_option("--threads", o.threads, "CPU threads (default: all)");
+      "Method: verlet, implicit (needs --step or the scene's time.step) or equilibrium (finds the "
+      "state at rest); the last two compute in double");
+  command.add_option("--threads", o.threads, "Number of CPU threads (default: all)");
   command.add_option("--until", o.until, "Simulated time to stop at [s]");
   command.add_option("--step", o.step, "Time step [s], instead of the scene's");
-  command.add_flag("--unsafe-step", o.unsafe_step, "Allow a step above the largest stable one");
+  command.add_flag("--unsafe-step", o.unsafe_step, "Allow a time step above the stability limit");
 }
 
 Scene scene_with(const Overrides& o) {

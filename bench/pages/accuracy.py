@@ -13,11 +13,12 @@ HEAD = """# Accuracy
 Written by `bench/make_pages.py` from the table of `phyxel accuracy` in `docs/results/`: problems with known answers, \
 solved on the CPU in double (*inf*: the solution diverged). *Cells*: a phyxel in the middle of each cell of a lattice; \
 *nodes*: a phyxel at each corner of the cells, also on faces, edges and corners of the body; *mesh*: as many phyxels as \
-nodes, on and in the body's surface as `phyxel sample --on-surface` places them. *Jitter*: largest random displacement of \
-phyxels in spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: with closed gradients; \
-*plain*: with neither. *Order*: power of the spacing by which the error has fallen since the row before. *Evaluations*: \
-number of evaluations of all forces, in Newton's method and in its preparation. *Set-up*: time from the scene to the first \
-evaluation; bold rows and charts include it. Errors are relative to the reference, or as the quantity says."""
+nodes, on the body's surface and inside it, as `phyxel sample --on-surface` places them. *Jitter*: largest random \
+displacement of phyxels in spacings, with the volumes of the lattice. α: strength of hourglass control; *closed*: with \
+closed gradients; *plain*: with neither. *Order*: order of convergence in the spacing, from the row before. \
+*Evaluations*: number of evaluations of all forces, in Newton's method and in its preparation. *Set-up*: time from the \
+scene to the first evaluation; bold rows and charts include it. Errors are relative to the reference, or as the quantity \
+says."""
 
 #: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
@@ -121,7 +122,7 @@ def beside_lammps(page, results):
         cells.append([way, row["across"], row["phyxels"], short_error(row.number("error")), row["seconds"]])
     page.paragraph("## Beside LAMMPS")
     page.paragraph(
-        "The bar of *bending* below rings for ten periods, on the same cores: the error of its frequency, and the time. "
+        "The bar of *bending* below vibrates for ten periods, on the same cores: the error of its frequency, and the time. "
         f"{table.fact('what')}. `bench/compare/lammps_bending.py` runs both programs: LAMMPS with its largest stable step "
         f"and without its set-up, phyxel with its default step and with its set-up. {table.fact('program')} on "
         f"{table.fact('hardware')}; {table.fact('date')}.")
@@ -153,7 +154,7 @@ def hourglass(page, results):
                        "`phyxel_studies pictures`.")
         page.add(markdown_table([p["what"] for p in shown], [[f"![{p['what']}]({page.link}{p['file']})" for p in shown]]))
     if costs:
-        page.paragraph("Ratio of the time of a step to one without the term, from `phyxel bench step`:")
+        page.paragraph("Extra time per step with the term, from `phyxel bench step`:")
         page.add(markdown_table(["", "precision", "phyxels", "hourglass control", "closed gradients"], costs))
 
 
@@ -232,7 +233,7 @@ def hard_section(page, results):
             refusals += f"- {hard['name']}: {messages[0]}\n"
     measured = " ".join(f"{device}: {measured_by(table)}." for device, table in tables.items())
     page.paragraph("## Hard cases")
-    page.paragraph("From `phyxel accuracy hard`: each case is answered within its tolerance, or refused with its cause. "
+    page.paragraph("From `phyxel accuracy hard`: each case is solved within its tolerance, or refused with an error that names the cause. "
                    f"{measured}")
     page.add(markdown_table(["case", "what", "allowed", *tables], cells))
     if refusals:

@@ -30,12 +30,12 @@ def words(table):
     beam = problems()["cantilever"]
     text = (
         f"A square beam on a regular lattice, {beam['heights_long']:g} heights long, Poisson's ratio {beam['poisson']:g}, "
-        f"clamped at one end, under a shear at the other that deflects it by {beam['deflection_by_length']:.2g} of its "
-        f"length; damped critically until its deflection changes by less than {beam['settled']:g} relative to itself while "
-        "the first mode decays by e. *Discretisation* is the difference from the known deflection, "
+        f"clamped at one end, under a shear force at the other that deflects it by {beam['deflection_by_length']:.2g} of its "
+        "length; it is critically damped until the deflection changes by a relative "
+        f"{beam['settled']:g} or less while the first mode decays by e. *Discretisation*: difference from the known deflection, "
         f"{beam['known_by_timoshenko']:.4g} of Timoshenko's (in which the clamped end may contract sideways, unlike fixed "
-        "phyxels); *rounding* is the largest difference of a displacement from double on the same cloud after the same "
-        "number of steps, over the largest displacement. Times are those of the steps.\n\n")
+        "phyxels); *rounding*: largest difference of a displacement from double on the same cloud after the same number of "
+        "steps, over the largest displacement. Times are those of the steps alone.\n\n")
     usual = usual_factor(table)
     clouds = refinement(table, usual, "double")
     coarse, fine = clouds[0], clouds[-1]
@@ -48,22 +48,22 @@ def words(table):
 
     if coarse.number("across") < fine.number("across"):
         order = math.log(error(coarse) / error(fine)) / math.log(fine.number("across") / coarse.number("across"))
-        text += (f"From {coarse['across']} to {fine['across']} phyxels across, {fine['neighbours']} neighbours in the end: "
-                 f"discretisation falls from {100 * error(coarse):.2g}% to {100 * error(fine):.2g}%, with order "
+        text += (f"From {coarse['across']} to {fine['across']} phyxels across, with {fine['neighbours']} neighbours at the finest: the "
+                 f"discretisation error falls from {100 * error(coarse):.2g}% to {100 * error(fine):.2g}%, of order "
                  f"{order:.2f}.\n\n")
     for factor in table.values("factor"):
         if factor == usual:
             continue
         row = refinement(table, factor, "double")[-1]
-        text += (f"{row['neighbours']} neighbours, {row['across']} across: discretisation of {100 * error(row):.2g}%, in "
-                 f"{seconds(row) / seconds(fine):.2g} of the time that {fine['neighbours']} neighbours take.\n\n")
+        text += (f"{row['neighbours']} neighbours, {row['across']} across: a discretisation error of {100 * error(row):.2g}% in "
+                 f"{seconds(row) / seconds(fine):.2g} of the time with {fine['neighbours']} neighbours.\n\n")
     for precision in rounded_precisions(table):
         rows = table.where(precision=precision)
         rounding = [row.number("rounding_error") for row in rows]
         least = min(error(row) / r if r else math.inf for row, r in zip(rows, rounding))
         same = refinement(table, usual, precision)[-1]
-        text += (f"{precision}: rounding is {max(rounding):.1e} at most, and discretisation at least {least:.0e} times as "
-                 f"much; {same['across']} across, with {same['neighbours']} neighbours, settles in "
+        text += (f"{precision}: the rounding error is at most {max(rounding):.1e}, the discretisation error at least {least:.0e} "
+                 f"times as large; the beam {same['across']} across, with {same['neighbours']} neighbours, takes "
                  f"{seconds(same) / seconds(fine):.2g} of double's time.\n\n")
     return text
 

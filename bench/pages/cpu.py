@@ -6,19 +6,19 @@ BEGIN, END = "<!-- speed: made by bench/make_pages.py -->\n", "<!-- end of speed
 
 HEAD = """# Measurements
 
-Made by `bench/make_pages.py` from the CSV files in this folder, which the `bench` commands write. [The 2008 paper, run \
-again](paper/paper.md) is a page of its own, made by `phyxel paper`; so is [the GPU solver's \
+Written by `bench/make_pages.py` from the CSV files in this folder, which the `bench` commands write. [The measurements of \
+the 2008 paper](paper/paper.md) have a page of their own, written by `phyxel paper`; so has [the GPU solver's \
 performance](../performance.md)."""
 
 STEP = """A jittered cube; medians; `spread` is (fastest − slowest)/median over the repeats. The force error is the \
-largest difference from double over the largest force. Bytes are the minimum that a step must move; the last column \
-compares them with a plain copy on the same threads (above 100%: the body fits in cache)."""
+largest difference from double over the largest force. Bytes are the minimum traffic of a step; *of copy \
+bandwidth* compares them with a plain copy on the same threads (above 100%: the body fits in cache)."""
 
 MORE_THREADS = """### More threads
 
-The speed over that of one thread. The last column is the round-trip time of two cores through a cache line in \
-nanoseconds, measured right after: a virtual machine may move its cores, and small bodies scale less if they do not share \
-a cache."""
+*Ratio*: speed relative to one thread. The last column is the round-trip time of a cache line between two cores in \
+nanoseconds, measured right after: a virtual machine may move its cores, and small bodies scale less if the cores do not \
+share a cache."""
 
 
 def measured(table):
@@ -53,8 +53,8 @@ def step_section(page, table, title):
 
 def neighbours_section(page, table):
     page.paragraph("## Neighbour search")
-    page.paragraph(f"`phyxel_studies neighbour-search`, {measured(table)}. Microseconds per phyxel: mean spacing to the ten "
-                   "nearest, search within the support, transposition into the inverse neighbourhood.")
+    page.paragraph(f"`phyxel_studies neighbour-search`, {measured(table)}. Times in microseconds per phyxel: mean distance to "
+                   "the ten nearest, search within the support, transposition into the inverse neighbour lists.")
     parts = ["spacing_us_per_phyxel", "search_us_per_phyxel", "transpose_us_per_phyxel"]
     page.add(markdown_table(
         ["threads", "phyxels", "neighbours", "spacing", "search", "transpose", "together"],

@@ -5,9 +5,10 @@ from pages.tables import PageError, markdown_table, read_table
 
 HEAD = """# Laws: the default, and why
 
-Written by `bench/make_pages.py` from the table of `phyxel_studies laws` in `docs/results/laws.csv`. First scenes, as \
-somebody makes them who is new to phyxel: soft bodies under gravity, pressed, pulled, twisted and thrown ones, two seconds \
-each, in float on the CPU, with all that scenes have by default but the law. What is computed: [physics.md](physics.md)."""
+Written by `bench/make_pages.py` from the table of `phyxel_studies laws` in `docs/results/laws.csv`. The \
+scenes are typical first scenes of a new user: soft bodies under gravity, compressed, stretched, twisted and thrown \
+bodies, for two seconds each, in float on the CPU, with default settings except for the law. [physics.md](physics.md) \
+describes the laws."""
 
 #: A scene is spoilt if it ends early, with more than this share of its phyxels inside out, or a phyxel this far away [m]:
 #: bodies are at most 1 m long.
@@ -49,7 +50,7 @@ def time_of(rows):
 
 
 def best_law(table):
-    """The law that spoils the fewest scenes; of several, the one that is through with all of them first."""
+    """The law that spoils the fewest scenes; among equals, the one with the shortest time for all scenes."""
     laws = table.values("law", part="scene")
     if not laws:
         raise PageError(f"{table.file}: no row of part \"scene\"; allowed: a table of phyxel_studies laws")
@@ -58,14 +59,15 @@ def best_law(table):
 
 
 def summary(page, table):
-    """Adds a row for each law: how its scenes end, and what they take."""
+    """Adds a row for each law: how its scenes end, and the time that they take."""
     best, default = best_law(table), problems()["default_law"]
     page.paragraph("## Side by side")
     page.paragraph(
-        "*Early*: scenes that ended before their time. *Inside out*: scenes at whose end more than "
-        f"{percent(INSIDE_OUT)} of the phyxels have det F ≤ 0, and the largest such share. *Apart*: scenes in which a phyxel is "
-        f"more than {FAR} m from where it was. *Halvings* of the step in all scenes, and the *time* of all, by that of the default. "
-        "*Step*: time of one step of a strained cube, likewise. *Accuracy*: the largest error in the cases below.")
+        "*Early*: number of scenes that stopped before their end time. *Inside out*: number of scenes in which more than "
+        f"{percent(INSIDE_OUT)} of the phyxels have det F ≤ 0 at the end, and the largest such share. *Apart*: number of scenes "
+        f"in which a phyxel moves by more than {FAR} m. *Halvings* of the step and *time*: totals over all scenes; times are "
+        "relative to the default law. *Step*: time per step of a strained cube, likewise. *Accuracy*: the largest error in the "
+        "cases below.")
     cells = []
     of_default = table.where(part="scene", law=default)
     for law in table.values("law", part="scene"):
@@ -86,13 +88,14 @@ def summary(page, table):
                             cells))
     fewest = sum(map(is_spoilt, table.where(part="scene", law=best)))
     page.paragraph(
-        f"The law that spoils the fewest scenes ({fewest} of {len(table.values('case', part='scene'))}), and of several such laws "
-        f"the one that takes the least time, is **{best}**. Scenes, code and Python that name no law have **{default}**; the "
-        "bodies of Farias et al. 2008 have st-venant-kirchhoff, as in the paper.")
+        f"The law that spoils the fewest scenes ({fewest} of {len(table.values('case', part='scene'))}), and among equals the "
+        f"one that takes the least time, is **{best}**. The default in scenes, C++ and Python is **{default}**; the bodies of "
+        "Farias et al. 2008 have st-venant-kirchhoff, as in the paper.")
     page.paragraph(
-        "Hooke's law in Green's strain gives way under compression, and then holds a body that is inside out. Hencky's resists "
-        "compression best, but gives way under a pull: bodies are drawn out like threads. The corotated law takes the fewest "
-        "steps, since it stiffens least, and turns inside out more often. The small-strain law is right for small rotations only.")
+        "St. Venant-Kirchhoff's law softens under compression, and an inverted body stays inverted. Hencky's law resists "
+        "compression best, but softens under tension: bodies are drawn out like threads. The corotated law takes the fewest "
+        "steps, since it stiffens least, but its bodies turn inside out more often. The small-strain law holds for small "
+        "rotations only.")
 
 
 def scenes(page, table):
@@ -100,8 +103,10 @@ def scenes(page, table):
     what = {scene["name"]: scene["what"] for scene in problems()["first_scenes"]}
     page.paragraph("## The scenes")
     page.add("".join(f"- *{name}*: {text}\n" for name, text in what.items()))
-    page.paragraph("- Others: a mesh of `examples/`, made 1 m high, which stands on or hangs from a tenth of its height; E in Pa.")
-    page.paragraph("Inside out: the share of phyxels at the end, and the largest share of all frames. In bold: spoilt.")
+    page.paragraph("- All others: a mesh of `examples/`, scaled to a height of 1 m, which stands on or hangs from a tenth of its height; "
+                   "E in Pa.")
+    page.paragraph("*Inside out*: share of phyxels with det F ≤ 0 at the end; *ever*: the largest share in any frame. Spoilt scenes, those "
+                   "that end early, inside out or apart, are in bold.")
     cells = []
     for row in table.where(part="scene"):
         law = f"**{row['law']}**" if is_spoilt(row) else row["law"]
@@ -118,8 +123,8 @@ def accuracy(page, table):
     if not laws:
         return
     page.paragraph("## Accuracy")
-    page.paragraph("Errors of cases of [accuracy.md](accuracy.md), six cells across, α = 0.1, closed. Strains are small, and "
-                   "references are of Hooke's law: differences between the laws are those of the laws.")
+    page.paragraph("Errors of problems of [accuracy.md](accuracy.md), six cells across, with α = 0.1 and closed gradients. Strains are "
+                   "small, and the references are for Hooke's law: the rows include the differences between the laws themselves.")
     cells = []
     for case in table.values("case", part="accuracy"):
         errors = [table.find(part="accuracy", case=case, law=law) for law in laws]

@@ -8,65 +8,67 @@ from pages.page import Page, measured_by
 from pages.tables import markdown_table, read_if_there
 
 # Targets for one H200, in float unless the name says otherwise.
-ASKED_LARGE, ASKED_DOUBLE = 8e9, 3e9  # phyxel-steps/s, 2 to 17 million phyxels
-ASKED_SETUP = 1                       # s for 16 million
-ASKED_WITH_SURFELS = 1e5              # steps/s of the dino
-ASKED_STEPS = {"dino": 2, "alien_head": 1.5}  # µs
+TARGET_LARGE, TARGET_DOUBLE = 8e9, 3e9  # phyxel-steps/s of 2 to 17 million phyxels
+TARGET_SETUP = 1                        # s for 16 million phyxels
+TARGET_WITH_SURFELS = 1e5               # steps/s of the dino
+TARGET_STEPS = {"dino": 2, "alien_head": 1.5}  # µs per step
 
 HEAD = """# Performance of the GPU solver
 
 Written by `bench/make_pages.py` from the CSV files in `docs/results/`, which `scripts/measure_gpu.sh` and \
-`scripts/profile_gpu.sh` make. A step is both passes and Verlet's, of a jittered cube under gravity with Green's strain \
-unless said otherwise; *error* is the largest difference of a force from that in double on the same GPU (which the tests \
-hold against the CPU), over the largest force, at strains of some 10%; *spread* is (fastest − slowest)/median of the \
-repeats: under load the GPU lowers its clock, so that the first repeat is the fastest."""
+`scripts/profile_gpu.sh` make. A step is a step of Verlet's method with both passes over the neighbour lists; unless said \
+otherwise, the body is a jittered cube under gravity with Green's strain. *Error* is the largest difference of a force \
+from the force in double on the same GPU (which the tests compare with the CPU), over the largest force, at strains of \
+about 10%; *spread* is (fastest − slowest)/median of the repeats: the GPU lowers its clock under load, so the first \
+repeat is the fastest."""
 
-PATH = """*Path*: `tiles` are two launches a step, repeated by a graph where the launch overhead matters; resident bodies \
-stay in shared memory for many steps a launch, in a cluster of blocks for each body or in blocks that exchange packets. \
-*Bytes moved* are the minimum of a step; their share of a plain copy's bandwidth shows that memory bandwidth is not the \
-limit."""
+PATH = """*Path*: `tiles` take two launches per step, replayed by a CUDA graph where the launch overhead matters; resident \
+bodies stay in shared memory for many steps per launch, in a thread block cluster per body or in blocks that exchange \
+packets. *Bytes moved* are the minimum traffic of a step; their share of a plain copy's bandwidth shows that memory \
+bandwidth is not the limit."""
 
-ALONE = """The time of a single body is the latency of its slowest block: twice the dependent operations of its longest \
-list, and two exchanges. Many bodies side by side are limited by the throughput of loads from shared memory."""
+ALONE = """The time per step of a single body is the latency of its slowest block: two passes over its longest list, \
+whose operations depend on each other, and two exchanges. Many bodies side by side are limited by the throughput of \
+loads from shared memory."""
 
-SURFELS = """A resident body stores the data of its surfels after each of up to sixteen steps of a launch; one launch then \
-moves all surfels for all of those steps. A caller that reads surfels after a step ends the launch there."""
+SURFELS = """A resident body stores the data of its surfels after each of up to sixteen steps of a launch; a second launch \
+then moves all surfels for all of these steps. If a caller reads surfels after a step, the launch ends with that step."""
 
 TRIED = """## What was tried
 
-Gains over one thread for each phyxel on compressed rows, largest first: tiles in shared memory with 16-bit slots; lists \
-ordered so that eight lanes have no bank conflicts, with broadcasts free; the phyxel's own stress by a constant of the \
-cloud; a tile's own phyxels in its first slots; lists loaded 16 bytes at a time; constants prefetched into the second-level \
-cache. Losses: two phyxels a lane (half the loads, too few warps); tiles of 512 and 1024 (too few resident blocks); lists \
-padded with the lane's own phyxel instead of null points (bank conflicts); records in half precision. Programmatic \
-dependent launches gained 2 to 5% at half a million phyxels, nothing above, and lost a third at 27 thousand; graphs gain 4 \
-to 17% below a million and never lose. For surfels, gradients computed by each block of surfels took twice as long as the \
-tiles' own pass, and carrier lists common to a warp gained 4% with dense surfels and lost 20% otherwise; for the surfels of \
-resident bodies, one launch a step was a third slower than sixteen steps together, and blocks that loop over the sixteen \
-steps up to twice as slow as one block a step. In clusters, prefetching the next neighbours' stresses lost (the longer \
-loop waits for instructions)."""
+Gains over one thread per phyxel on compressed rows, largest first: tiles in shared memory with 16-bit slots; lists \
+ordered so that eight lanes have no bank conflicts (broadcasts are free); the contribution of the phyxel's own stress from \
+a constant of the cloud; a tile's own phyxels in its first slots; lists loaded 16 bytes at a time; constants prefetched \
+into the L2 cache. Losses: two phyxels per lane (half the loads, too few warps); tiles of 512 and 1024 (too few resident \
+blocks); lists padded with the lane's own phyxel instead of null points (bank conflicts); records in half precision. \
+Programmatic dependent launch gained 2 to 5% at half a million phyxels, nothing above, and lost a third at 27 thousand; \
+graphs gain 4 to 17% below a million and never lose. For surfels, gradients computed by each block of surfels took twice \
+as long as the tiles' own pass, and carrier lists shared by a warp gained 4% with dense surfels and lost 20% otherwise; \
+for the surfels of resident bodies, one launch per step was a third slower than sixteen steps together, and blocks that \
+loop over the sixteen steps were up to twice as slow as one block per step. In clusters, prefetching the next neighbours' \
+stresses lost (the longer loop waits for instructions)."""
 
 #: Nsight Compute's name of a metric, the page's title and the factor between their units.
 METRICS = [
     ("gpu__time_duration.sum", "time [µs]", 1e-3),
     ("smsp__cycles_elapsed.avg.per_second", "clock [GHz]", 1e-9),
-    ("smsp__inst_executed.sum", "10⁶ instructions of a warp", 1e-6),
+    ("smsp__inst_executed.sum", "10⁶ warp instructions", 1e-6),
     ("smsp__issue_active.avg.pct_of_peak_sustained_active", "issue slots used [%]", 1),
-    ("l1tex__data_pipe_lsu_wavefronts.avg.pct_of_peak_sustained_elapsed", "loads and stores of shared memory and cache [%]", 1),
-    ("sm__pipe_fma_cycles_active.avg.pct_of_peak_sustained_active", "float arithmetic [%]", 1),
-    ("sm__pipe_fp64_cycles_active.avg.pct_of_peak_sustained_active", "double arithmetic [%]", 1),
-    ("lts__t_bytes.sum", "second-level cache [MB]", 1e-6),
-    ("lts__t_sectors.avg.pct_of_peak_sustained_elapsed", "second-level cache [%]", 1),
-    ("dram__bytes.sum", "memory [MB]", 1e-6),
-    ("dram__throughput.avg.pct_of_peak_sustained_elapsed", "memory [%]", 1),
-    ("sm__warps_active.avg.pct_of_peak_sustained_active", "warps in residence [%]", 1),
+    ("l1tex__data_pipe_lsu_wavefronts.avg.pct_of_peak_sustained_elapsed", "load/store pipe: shared memory, L1 [%]", 1),
+    ("sm__pipe_fma_cycles_active.avg.pct_of_peak_sustained_active", "FP32 pipe [%]", 1),
+    ("sm__pipe_fp64_cycles_active.avg.pct_of_peak_sustained_active", "FP64 pipe [%]", 1),
+    ("lts__t_bytes.sum", "L2 cache [MB]", 1e-6),
+    ("lts__t_sectors.avg.pct_of_peak_sustained_elapsed", "L2 cache [%]", 1),
+    ("dram__bytes.sum", "DRAM [MB]", 1e-6),
+    ("dram__throughput.avg.pct_of_peak_sustained_elapsed", "DRAM [%]", 1),
+    ("sm__warps_active.avg.pct_of_peak_sustained_active", "active warps [%]", 1),
 ]
 
 
-def against(reached, asked):
+def against(reached, target):
     """The deviation of a speed or a time from its target, in words."""
-    share = reached / asked - 1
-    return "as asked" if abs(share) < 0.005 else f"{100 * share:+.0f}% of what was asked"
+    share = reached / target - 1
+    return "on target" if abs(share) < 0.005 else f"{100 * abs(share):.0f}% {'above' if share > 0 else 'below'} target"
 
 
 def rate(row):
@@ -85,7 +87,7 @@ def speeds(rows, title, x, x_label, logarithmic):
 
 
 def sizes(page, table, results):
-    page.paragraph("## Against size")
+    page.paragraph("## Speed by size")
     page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
     more = read_if_there(results / "gpu_capacity.csv")
     rows = table.rows + (more.rows if more else [])
@@ -105,30 +107,30 @@ def sizes(page, table, results):
         in_double = min(speed["double"], default=math.inf)
         page.paragraph(
             f"From 2 to 17 million phyxels, float: {slowest * 1e-9:.3g} to {fastest * 1e-9:.3g} billion phyxel-steps/s "
-            f"({against(slowest, ASKED_LARGE)}; {against(fastest, ASKED_LARGE)}); double: at least {in_double * 1e-9:.3g} "
-            f"({against(in_double, ASKED_DOUBLE)}). The largest body measured has "
+            f"({against(slowest, TARGET_LARGE)}; {against(fastest, TARGET_LARGE)}); double: at least {in_double * 1e-9:.3g} "
+            f"({against(in_double, TARGET_DOUBLE)}). The largest body measured has "
             f"{max(row.number('phyxels') for row in rows) * 1e-6:.0f} million phyxels.")
     page.show(speeds(rows, "Steps of a cube on one GPU", "phyxels", "phyxels", True), "gpu_sizes")
     page.paragraph(PATH)
-    page.add(markdown_table(["phyxels", "precision", "path", "µs a step", "10⁹ phyxel-steps/s", "spread",
-                             "bytes held a phyxel", "bytes moved a phyxel-step", "of copy bandwidth", "error"], cells))
+    page.add(markdown_table(["phyxels", "precision", "path", "µs per step", "10⁹ phyxel-steps/s", "spread",
+                             "bytes stored per phyxel", "bytes moved per phyxel-step", "of copy bandwidth", "error"], cells))
 
 
 def small(page, table, _):
     page.paragraph("## The paper's bodies, alone and side by side")
     page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
-    for body, asked in ASKED_STEPS.items():
+    for body, target in TARGET_STEPS.items():
         row = table.find(shape=body, bodies="1")
         if row:
-            page.paragraph(f"{body}, {row['phyxels']} phyxels: {1e6 / row.positive('steps_per_s'):.3g} µs a step, "
-                           f"{asked:.3g} µs asked.")
+            page.paragraph(f"{body}, {row['phyxels']} phyxels: {1e6 / row.positive('steps_per_s'):.3g} µs per step; target: "
+                           f"{target:.3g} µs.")
     cells = []
     for row in table.rows:
         alone = 1 / table.find(shape=row["shape"]).positive("steps_per_s")
         step = 1 / row.positive("steps_per_s")
         cells.append([row["shape"], row["bodies"], row["phyxels"], row["path"], f"{1e6 * step:.3g}", f"{step / alone:.3g}",
                       rate(row), row["force_error"]])
-    page.add(markdown_table(["body", "bodies", "phyxels", "path", "µs a step of all", "× one alone", "10⁹ phyxel-steps/s",
+    page.add(markdown_table(["body", "bodies", "phyxels", "path", "µs per step of all", "× one body", "10⁹ phyxel-steps/s",
                              "error"], cells))
     page.paragraph(ALONE)
 
@@ -143,17 +145,17 @@ def surfels(page, table, _):
         cells.append([row["shape"], row["phyxels"], row["surfels"], f"{steps:.4g}", f"{1e6 / steps:.3g}",
                       f"{1e6 / without.positive('steps_per_s'):.3g}" if without else "–"])
         if row["shape"] == "dino":
-            page.paragraph(f"Dino, {row['surfels']} surfels: {steps:.3g} steps/s ({against(steps, ASKED_WITH_SURFELS)}).")
-    page.add(markdown_table(["body", "phyxels", "surfels", "steps/s", "µs a step", "µs a step without"], cells))
+            page.paragraph(f"Dino, {row['surfels']} surfels: {steps:.3g} steps/s ({against(steps, TARGET_WITH_SURFELS)}).")
+    page.add(markdown_table(["body", "phyxels", "surfels", "steps/s", "µs per step", "µs per step without"], cells))
     page.paragraph(SURFELS)
 
 
 def neighbours(page, table, _):
-    page.paragraph("## Against neighbours")
+    page.paragraph("## Speed by number of neighbours")
     page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
-    page.show(speeds(table.rows, "Two million phyxels", "neighbours", "neighbours a phyxel", False), "gpu_neighbours")
+    page.show(speeds(table.rows, "Two million phyxels", "neighbours", "neighbours per phyxel", False), "gpu_neighbours")
     page.add(markdown_table(
-        ["neighbours", "precision", "10⁹ phyxel-steps/s", "10⁹ pairs/s, both passes", "bytes held a phyxel", "error"],
+        ["neighbours", "precision", "10⁹ phyxel-steps/s", "10⁹ pairs/s, both passes", "bytes stored per phyxel", "error"],
         [[row["neighbours"], row["precision"], rate(row), f"{row.number('pairs_per_s') * 1e-9:.3g}",
           row["memory_bytes_per_phyxel"], row["force_error"]] for row in table.rows]))
 
@@ -167,10 +169,10 @@ def bending(page, table, _):
 
 
 def terms(page, table, _):
-    page.paragraph("## What each term costs")
+    page.paragraph("## Cost of each term")
     page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
     page.paragraph("Two million phyxels. *Added* is the difference from Green's strain alone in the same precision; "
-                   "differences of time within the spread are noise. A term that is off has no array and is in no kernel.")
+                   "differences of time within the spread are noise. A term that is off takes no memory and no instructions.")
     cells = []
     for row in table.rows:
         base = table.find(terms="green", precision=row["precision"])
@@ -185,7 +187,7 @@ def terms(page, table, _):
             added = (f"{picoseconds - base_picoseconds:+.0f}", f"{held - base_held:+.0f}")
         cells.append([row["terms"], row["precision"], f"{picoseconds:.0f}", added[0], f"{100 * row.number('spread'):.0f}%",
                       f"{held:.0f}", added[1], row["force_error"]])
-    page.add(markdown_table(["term", "precision", "ps a phyxel-step", "added [ps]", "spread", "bytes held a phyxel", "added",
+    page.add(markdown_table(["term", "precision", "ps per phyxel-step", "added [ps]", "spread", "bytes stored per phyxel", "added",
                              "error"], cells))
 
 
@@ -195,18 +197,18 @@ def setup(page, table, _):
     last = table.rows[-1]
     on_device = last.number("survey_s") + last.number("backend_s")
     page.paragraph(
-        "*Survey*: spacings, supports, list lengths, ranks of moments. *Model*: the host's copies. *Backend*: order along "
-        "the curve, tiles, lists, moments, all arrays. *Step limit*: Lanczos' iteration. Survey and backend together for "
-        f"{last['phyxels']} phyxels: {on_device:.3g} s ({against(on_device, ASKED_SETUP)}).")
+        "*Survey*: spacings, supports, list lengths, ranks of moment matrices. *Model*: arrays on the host. *Backend*: order "
+        "along the curve, tiles, lists, moments, arrays on the GPU. *Step limit*: Lanczos iteration. Survey and backend together for "
+        f"{last['phyxels']} phyxels: {on_device:.3g} s ({against(on_device, TARGET_SETUP)}).")
     columns = ["phyxels", "survey_s", "model_s", "backend_s", "limit_s", "iterations"]
     page.add(markdown_table(["phyxels", "survey [s]", "model [s]", "backend [s]", "step limit [s]", "iterations"],
                             [[row[column] for column in columns] for row in table.rows]))
 
 
 def profile(page, table, _):
-    page.paragraph("## What limits the two passes")
+    page.paragraph("## Limits of the two passes")
     page.paragraph(f"Nsight Compute on {table.fact('gpu')} with {table.fact('program')}, {table.fact('date')}, two million "
-                   "phyxels; it holds the clock at its base. Shares are of what the hardware can do at most.")
+                   "phyxels; it locks the clock to its base frequency. Percentages are shares of the hardware's peak.")
     columns = [(kernel, precision) for precision in table.values("precision") for kernel in ("pass 1", "pass 2")]
     cells = []
     for name, title, scale in METRICS:

@@ -3,25 +3,25 @@ from pages.page import Page
 from pages.scaling_model import model
 from pages.tables import PageError, Table, markdown_table, read_if_there, read_table
 
-ASKED_OF_TWO = 1.8  # target speed-up of two ranks on two cores, from 200,000 phyxels on
+TARGET_OF_TWO = 1.8  # target speed-up of two ranks on two cores, from 200,000 phyxels on
 
 HEAD = """# Scaling
 
 Written by `bench/make_pages.py` from the tables of `phyxel bench scaling` in `docs/results/`: one jittered cube under \
-gravity with Green's strain, stepped by the ranks of `mpirun -n N`. Positions are equal bit by bit for any number of ranks \
+gravity with Green's strain, stepped by the ranks of `mpirun -n N`. Positions are bitwise equal for any number of ranks \
 and any partitioner (`tests/mpi/share_test.cpp`, `tests/apps/mpirun_test.cpp`), so the error of a scaled run is that of \
 one rank. Ranks have one ring of ghosts, whose displacements and stresses are exchanged; rows with two rings, where the \
 stresses of the inner ring were computed twice, are from earlier versions. *One alone*: 10⁶ phyxel-steps/s of the first \
-rank by itself, with the whole body or with one rank's part of it, measured in turn with all ranks; *speed-up*: the ratio \
-to it; *efficiency*: the speed-up over the number of ranks; *spread*: (largest - smallest) / median of the repeats, of all \
-ranks and of one. *Exchanging* is the largest share of a rank's time for packing, waiting and unpacking, including load \
-imbalance. *Shares*: time until each rank has its share of the body; *backend*: time from there to the first step; *host*: \
-peak of the host's memory that all ranks use."""
+rank by itself, with the whole body or with one rank's part of it, measured alternately with all ranks; *speed-up*: the \
+ratio of all ranks to one alone; *efficiency*: the speed-up over the number of ranks; *spread*: (largest - smallest) / \
+median of the repeats, for all ranks and for one. *Exchanging* is the largest share of a rank's time for packing, waiting \
+and unpacking, including load imbalance. *Shares*: time until each rank has its share of the body; *backend*: time from \
+there to the first step; *host*: peak host memory of all ranks together."""
 
 WITH_ONE = ["phyxels", "precision", "cut by", "ghost rings", "transport", "10⁶ phyxel-steps/s", "one alone", "speed-up",
-            "efficiency", "spread", "most ghosts", "kB sent a step", "exchanging", "set-up [s]"]
-WITHOUT_ONE = ["phyxels", "precision", "cut by", "transport", "10⁶ phyxel-steps/s", "steps/s", "spread", "most of a rank",
-               "most ghosts", "kB sent a step", "exchanging", "shares [s]", "backend [s]", "host [GB]"]
+            "efficiency", "spread", "most ghosts", "kB sent per step", "exchanging", "set-up [s]"]
+WITHOUT_ONE = ["phyxels", "precision", "cut by", "transport", "10⁶ phyxel-steps/s", "steps/s", "spread", "largest part",
+               "most ghosts", "kB sent per step", "exchanging", "shares [s]", "backend [s]", "host [GB]"]
 
 
 def joined(first, second):
@@ -46,7 +46,7 @@ def tables_in(results, kind):
         table = read_table(file)
         ranks = table.rows[0].number("ranks")
         if not 1 <= ranks <= 1e6:
-            raise PageError(f"{file}: of {ranks:g} ranks; allowed: 1 to 1000000")
+            raise PageError(f"{file}: {ranks:g} ranks; allowed: 1 to 1000000")
         ranks = int(ranks)
         tables[ranks] = joined(tables[ranks], table) if ranks in tables else table
     return dict(sorted(tables.items()))
@@ -58,8 +58,8 @@ def exchanging(row):
 
 
 def cells_with_one(row, speed_up, ranks):
-    asked, cut_by = row["partitioner"], row["cut_by"]
-    return [row["phyxels"], row["precision"], cut_by if asked == cut_by else f"{cut_by} ({asked})", row["rings"],
+    requested, cut_by = row["partitioner"], row["cut_by"]
+    return [row["phyxels"], row["precision"], cut_by if requested == cut_by else f"{cut_by} ({requested})", row["rings"],
             row["transport"], f"{row.number('phyxel_steps_per_s') * 1e-6:.2f}",
             f"{row.number('phyxel_steps_per_s_alone') * 1e-6:.2f}", f"{speed_up:.2f}", f"{100 * speed_up / ranks:.0f}%",
             f"{100 * row.number('spread'):.0f}%, {100 * row.number('spread_alone'):.0f}%", row["most_ghosts"],
@@ -74,7 +74,7 @@ def cells_without_one(row):
 
 
 def section(page, table, ranks, gpus):
-    page.paragraph(f"### {ranks} {'ranks, a GPU each' if gpus else 'CPU ranks'}")
+    page.paragraph(f"### {ranks} {'ranks, one GPU each' if gpus else 'CPU ranks'}")
     devices = f", {table.fact('gpus')} × {table.fact('gpu')}" if gpus else ""
     page.paragraph(f"Measured by {table.fact('program')} on {table.fact('hardware')}{devices}; {table.fact('compiler')}; "
                    f"{table.fact('date')}.")
@@ -89,11 +89,11 @@ def section(page, table, ranks, gpus):
         if same and row.number("phyxels") > 150_000 and row["rings"] == "1":
             best = max(best, gain)
     if not gpus and ranks == 2 and best > 0:
-        page.paragraph(f"Two ranks on two cores from 200,000 phyxels on, one ring of ghosts: {best:.2f} by the best cut "
-                       f"({ASKED_OF_TWO:g} asked).")
+        page.paragraph(f"Two ranks on two cores from 200,000 phyxels on, one ring of ghosts: {best:.2f} by the best partitioner; "
+                       f"target: {TARGET_OF_TWO:g}.")
     for title, head, rows in (("The same body on more ranks:", WITH_ONE, strong),
                               ("A body that grows with the ranks:", WITH_ONE, weak),
-                              ("Measured without one rank beside:", WITHOUT_ONE, large)):
+                              ("Without a measurement of one rank:", WITHOUT_ONE, large)):
         if rows:
             page.paragraph(title)
             page.add(markdown_table(head, rows))
@@ -109,7 +109,8 @@ def make(results, link):
     page.paragraph(HEAD)
     page.paragraph("## GPUs")
     if shown["gpu"]:
-        page.paragraph("Asked of 8 GPUs in float: 80% of 17 million phyxels, 50% of 2 million, 95% of 16 million a GPU.")
+        page.paragraph("Targets for the efficiency of 8 GPUs in float: 80% with 17 million phyxels, 50% with 2 million, 95% with 16 million "
+                       "per GPU.")
     else:
         page.paragraph("Not measured yet.")
     for ranks, table in shown["gpu"].items():
@@ -119,7 +120,7 @@ def make(results, link):
         page.add(model(list(gpus.values()), sizes))
     if shown["cpu"]:
         page.paragraph("## CPUs")
-        page.paragraph("A thread a rank.")
+        page.paragraph("One thread per rank.")
     for ranks, table in shown["cpu"].items():
         section(page, table, ranks, gpus=False)
     return page

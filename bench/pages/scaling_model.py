@@ -33,7 +33,7 @@ class Fit:
     """A linear fit of the time that exchanges add to a step over the bytes sent."""
     latency: float          #: [s]
     bytes_per_s: float
-    slowdown: float         #: of one GPU on that day, against the table of sizes
+    slowdown: float         #: of one GPU on that day, relative to the table of sizes
     layers: float           #: of ghosts at a face
     bytes_per_ghost: float
     rows: int
@@ -72,15 +72,16 @@ def model(tables, sizes):
     if not fit:
         return ""
     text = (
-        "### A model of more GPUs\n\nNot a measurement. A step of a part takes what one GPU takes for as many phyxels (its "
-        f"table of sizes, times {fit.slowdown:.3f} for the clocks of that day), and for its exchanges "
-        f"{1e6 * fit.latency:.1f} µs and a second for every {1e-9 * fit.bytes_per_s:.0f} GB: a line fitted to the "
+        "### A model of more GPUs\n\nThe table is a forecast, not a measurement. The time of a step is the sum of two terms: that of "
+        "one GPU with the phyxels of a part (from the table of sizes, times "
+        f"{fit.slowdown:.3f} for the clocks of that day), and that of the exchanges, "
+        f"{1e6 * fit.latency:.1f} µs plus the bytes sent at {1e-9 * fit.bytes_per_s:.0f} GB/s: a line fitted to the "
         f"{fit.rows} rows above. Parts are cubes with {fit.layers:.2f} layers of ghosts on six faces, "
-        f"{fit.bytes_per_ghost:.0f} bytes each. *Between nodes* each GPU is given {1e-9 * NETWORK_BYTES_PER_S:.0f} GB/s and "
-        f"{1e6 * NETWORK_LATENCY:.0f} µs for each of the two exchanges instead, which are assumed: no second node was to be "
-        "had.\n\n")
+        f"{fit.bytes_per_ghost:.0f} bytes each. *Between nodes*, each GPU is assumed to have "
+        f"{1e-9 * NETWORK_BYTES_PER_S:.0f} GB/s and {1e6 * NETWORK_LATENCY:.0f} µs of latency more for each of the two "
+        "exchanges; no second node was available for a measurement.\n\n")
     rows = []
-    for name, phyxels, each in (("17 million", 17e6, False), ("a billion", 1e9, False), ("16 million a GPU", 16e6, True)):
+    for name, phyxels, each in (("17 million", 17e6, False), ("a billion", 1e9, False), ("16 million per GPU", 16e6, True)):
         for gpus in (8, 64, 512, 1024):
             part = phyxels if each else phyxels / gpus
             alone = fit.slowdown * one.seconds(part)

@@ -121,19 +121,20 @@ void measure(const Study& study, const app::TableOptions& options) {
 std::vector<Study> accuracy_studies() {
   return {
       {"neighbours",
-       "The bar of *gravity* at 1,519 phyxels with α = 0.1, over supports of 1.3 to 2.5 times the "
-       "mean distance to the ten nearest: what more neighbours take and give. Scenes that say "
-       "nothing have 1.8.",
+       "The bar of *gravity* at 1,519 phyxels with α = 0.1, with supports of 1.3 to 2.5 times the "
+       "mean distance to the ten nearest phyxels: benefit and cost of more neighbours. The default "
+       "of scenes is 1.8.",
        "neighbours", "neighbours", false, measure_neighbours},
       {"precision",
        "A spinning block of 64 phyxels is thrown and falls for a second, in steps of 0.8 of the "
-       "limit, which shrink as E grows. Error: of its centre of mass, by the way that it went. In "
-       "float, what a step adds falls below a displacement's last digit.",
+       "stability limit, which shrinks as E grows. Error: that of the centre of mass, relative to "
+       "its displacement. In float, the increment per step falls below the last digit of a "
+       "displacement.",
        "E_Pa", "E [Pa]", false, measure_precision},
       {"steps",
-       "A bar (0.6 m by 0.1 m, 189 phyxels) sways for a second, about a period, from rest under "
-       "its weight. Error: of all displacements at the end, by their norm, against Verlet's steps "
-       "of a twentieth of the limit.",
+       "A bar (0.6 m by 0.1 m, 189 phyxels) released at rest swings under its weight for a second, "
+       "about a period. Error: the norm of the error of all displacements at the end, relative to "
+       "Verlet's method with steps of a twentieth of the stability limit.",
        "step_s", "time [s]", true, measure_steps},
   };
 }

@@ -75,45 +75,51 @@ std::vector<FirstScene> scenes_of_shapes() {
   const Vec3d cube{0.4, 0.4, 0.4}, column{0.2, 0.2, 0.8};
   Scene ball = shape("sphere", {0.3, 0, 0}, 0.06, 1e4);
   ball.bodies[0].fixed.push_back({.select = slab(-1, -0.22)});
-  add("jelly ball", "A ball, 0.6 m across, E = 10⁴ Pa, stands on its lowest part.",
+  add("jelly ball", "A ball, 0.6 m across, E = 10⁴ Pa, stands with its lowest part fixed.",
       under_gravity(ball));
   Scene pillar = shape("cylinder", {0.1, 0, 0.8}, 0.04, 2e4, 0.45);
   pillar.bodies[0].fixed.push_back({.select = slab(-1, -0.36)});
   add("pillar", "A cylinder, 0.8 m high, 0.2 m across, E = 2·10⁴ Pa, buckles under its weight.",
       under_gravity(pillar));
   Scene beam = shape("block", {1, 0.2, 0.2}, 0.04, 3e4);
-  add("soft beam", "A beam of 1 m by 0.2 m, E = 3·10⁴ Pa, clamped at one end, falls down.",
+  add("soft beam",
+      "A beam of 1 m by 0.2 m, E = 3·10⁴ Pa, clamped at one end, falls under its "
+      "weight.",
       under_gravity(held(beam, "x-")));
   Scene hung = shape("block", column, 0.04, 3e4, 0.45);
-  add("hung column", "A column of 0.8 m by 0.2 m, E = 3·10⁴ Pa, is let go from its upper end.",
+  add("hung column",
+      "A column of 0.8 m by 0.2 m, E = 3·10⁴ Pa, is released, hanging from its "
+      "upper end.",
       under_gravity(held(hung, "z+")));
   Scene thin = shape("block", column, 0.04, 1e4, 0.45);
   add("hung jelly",
-      "The same column with E = 10⁴ Pa, whose weight pulls it to twice its length and more.",
+      "The same column with E = 10⁴ Pa, whose weight stretches it to more than twice its length.",
       under_gravity(held(thin, "z+")));
   Scene dropped = shape("block", cube, 0.05, 3e4);
   dropped.bodies[0].velocity = {0, 0, -4};
-  add("dropped cube", "A cube of 0.4 m, E = 3·10⁴ Pa, falls at 4 m/s onto its foot, and sticks.",
+  add("dropped cube", "A cube of 0.4 m, E = 3·10⁴ Pa, hits the ground at 4 m/s and sticks.",
       under_gravity(held(dropped, "z-")));
   Scene pressed = shape("block", cube, 0.05, 1e5);
-  add("pressed cube", "A cube, E = 10⁵ Pa, is pressed to 30% of its height within a second.",
+  add("pressed cube", "A cube, E = 10⁵ Pa, is compressed to 30% of its height within a second.",
       moved(pressed, {.displacement = {0, 0, -0.28}}));
   Scene pulled = shape("block", cube, 0.05, 1e5);
-  add("pulled cube", "A cube is pulled to twice its height within a second.",
+  add("pulled cube", "A cube is stretched to twice its height within a second.",
       moved(pulled, {.displacement = {0, 0, 0.4}}));
   Scene sheared = shape("block", cube, 0.05, 1e5);
   add("sheared cube", "A cube is sheared by its height within a second.",
       moved(sheared, {.displacement = {0.4, 0, 0}}));
   Scene twisted = shape("block", column, 0.04, 1e5);
-  add("twisted column", "A column is twisted by a turn within a second.",
+  add("twisted column", "A column is twisted by one turn within a second.",
       moved(twisted, {.rotation = {0, 0, 360}}));
   Scene thrown = shape("block", {0.6, 0.2, 0.2}, 0.04, 1e5);
   thrown.bodies[0].spin = {0, 0, 25};
   Scene sprung = shape("block", cube, 0.1, 1e6);
   sprung.bodies[0].material.damping = 30;
-  add("flattened cube", "A free cube, E = 10⁶ Pa, damped, is let go from a tenth of its length.",
+  add("flattened cube", "A free cube, E = 10⁶ Pa, damped, is released from a tenth of its length.",
       sprung, flattened);
-  add("mirrored cube", "The same cube is let go from its mirror image, with an irregularity.",
+  add("mirrored cube",
+      "The same cube is released from its mirror image, with a small "
+      "perturbation.",
       sprung, mirrored);
   add("spinning bar", "A free bar of 0.6 m, E = 10⁵ Pa, starts to spin at 25 rad/s.", thrown);
   return all;

@@ -199,8 +199,10 @@ void measure_laws(LawOptions options) {
   if (options.laws.empty()) options.laws = all;
   for (const std::string& law : options.laws) {
     if (std::find(all.begin(), all.end(), law) != all.end()) continue;
-    throw InputError(fmt::format("--law {}: found; allowed: laws of E and ν alone: {}", law,
-                                 fmt::join(all, ", ")));
+    throw InputError(
+        fmt::format("--law {}: unknown, or with other parameters than E and ν; "
+                    "allowed: {}",
+                    law, fmt::join(all, ", ")));
   }
   LawTable table(options.table);
   run_scenes(options, table);
@@ -213,18 +215,25 @@ void measure_laws(LawOptions options) {
 
 void add_laws(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "laws", "First scenes, speed and accuracy of each law: which is the best default");
+      "laws", "Compare laws as the default: first scenes, speed and accuracy of each");
   auto options = std::make_shared<LawOptions>();
-  command->add_option("--mesh", options->meshes, "Closed surfaces that stand and hang")
+  command
+      ->add_option("--mesh", options->meshes,
+                   "Closed surfaces for the scenes of standing and "
+                   "hanging bodies")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--law", options->laws, "Laws, comma separated (default: all of E and ν)")
+  command
+      ->add_option("--law", options->laws,
+                   "Laws, comma separated (default: all with E and ν as "
+                   "their only parameters)")
       ->delimiter(',');
   command
       ->add_option("--case", options->cases,
-                   "Scenes, comma separated, without speed and accuracy (default: all)")
+                   "Scenes, comma separated, to run without measurements of speed and accuracy "
+                   "(default: all)")
       ->delimiter(',');
-  command->add_option("--seconds", options->most_seconds, "The longest time of a run [s]")
+  command->add_option("--seconds", options->most_seconds, "Time limit of a run [s]")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   app::add_table_options(*command, options->table);

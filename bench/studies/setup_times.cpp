@@ -80,7 +80,8 @@ void add_setup(CLI::App& program) {
   auto options = std::make_shared<SetupOptions>();
   app::add_size_options(*command, options->sizes, options->repeats);
   command->add_option("--device", options->device, app::device_help)->capture_default_str();
-  command->add_option("--precision", options->precisions, "float, double, mixed")->delimiter(',');
+  command->add_option("--precision", options->precisions, "Precisions: float, double, mixed")
+      ->delimiter(',');
   app::add_table_options(*command, options->table);
   command->footer(
       "Examples:\n"

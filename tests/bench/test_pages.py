@@ -49,7 +49,7 @@ def test_a_page_about_speed_is_made_of_what_bench_writes(tmp_path):
            "1", "--seconds", "0.01", "--repeat", "1", "--csv", "gpu_sizes.csv")
     text = page_of("performance", tmp_path)
     assert "| 27 | float | 1 thread:" in text and "| 64 | double | 1 thread:" in text
-    assert "What each term costs" not in text and "cantilever" not in text  # these tables are not there
+    assert "Cost of each term" not in text and "cantilever" not in text  # these tables are not there
     # Double is measured although only float is asked for: it is what float is compared with.
     phyxel(tmp_path, "bench", "cantilever", "--device", "cpu", "--across", "2,3", "--factor", "1.4", "--precision", "float",
            "--csv", "gpu_cantilever.csv")
@@ -328,9 +328,9 @@ def test_errors_are_short(error, words):
     assert accuracy.short_error(error) == words
 
 
-@pytest.mark.parametrize("reached, words", [(8e9, "as asked"), (7.65e9, "-4% of what was asked"),
-                                            (9.7e9, "+21% of what was asked")])
-def test_speeds_are_held_against_what_was_asked(reached, words):
+@pytest.mark.parametrize("reached, words", [(8e9, "on target"), (7.65e9, "4% below target"),
+                                            (9.7e9, "21% above target")])
+def test_speeds_are_compared_with_their_targets(reached, words):
     assert performance.against(reached, 8e9) == words
 
 
@@ -350,7 +350,7 @@ def test_tables_of_as_many_ranks_are_one_that_tells_all_programs(tmp_path):
     assert [row["phyxels"] for row in table.rows] == ["8", "27"]
     assert [row["backend_s"] for row in table.rows] == ["", "1"]
     text = page_of("scaling", tmp_path)
-    assert text.count("### 2 ranks, a GPU each") == 1 and "Not measured yet" not in text
+    assert text.count("### 2 ranks, one GPU each") == 1 and "Not measured yet" not in text
     write_table(tmp_path / "gpu_ranks_2c.csv", {}, ["ranks", "other"], [["2", "1"]])
     with pytest.raises(PageError, match="gpu_ranks_2c.csv: other columns than"):
         scaling.tables_in(tmp_path, "gpu")
@@ -382,4 +382,4 @@ def test_the_model_finds_the_link_that_tables_were_made_with(tmp_path):
     fit = scaling_model.fitted([read_table(tmp_path / "gpu_ranks_2.csv")], one)
     assert fit.latency == pytest.approx(3e-6) and fit.bytes_per_s == pytest.approx(100e9)
     assert (fit.layers, fit.bytes_per_ghost, fit.slowdown, fit.rows) == pytest.approx((2, 72, 1, 3))
-    assert "3.0 µs and a second for every 100 GB" in page_of("scaling", tmp_path)
+    assert "3.0 µs plus the bytes sent at 100 GB/s" in page_of("scaling", tmp_path)

@@ -187,23 +187,24 @@ std::vector<AccuracyCase> collapse_cases() {
   return {
       {.name = "tube",
        .what =
-           "A quarter of a thick tube, outer radius twice the inner one, of steel that does not "
-           "harden (E 210 GPa, ν 0.3, yield stress σ 0.24 GPa), in plane strain. Its inner "
-           "surface is pushed outwards by 0.8% of its radius, in increments that Newton's method "
-           "brings to rest; the pressure is that of its reactions. Reference: 2/√3 σ ln(b/a) at "
-           "collapse (Hill 1950; de Souza Neto, Perić and Owen 2008, 7.5.1), for the radii b and "
-           "a reached, brought back to those at rest. The radius up to which the wall is plastic "
-           "half-way: by the displacement of the outer surface, against Hill's for the same "
-           "pressure. Finite differences of one dimension find 0.07% less than Hill's pressure.",
+           "A quarter of a thick tube in plane strain, outer radius twice the inner one, of steel "
+           "without hardening (E 210 GPa, ν 0.3, yield stress σ 0.24 GPa). Its inner surface is "
+           "displaced outwards by 0.8% of its radius, in increments that Newton's method brings to "
+           "equilibrium; the pressure is computed from the reactions of that surface. Reference: "
+           "2/√3 σ ln(b/a) at collapse (Hill 1950; de Souza Neto, Perić and Owen 2008, 7.5.1); the "
+           "pressure is scaled from the present radii b and a to those at rest. *Plastic radius*: "
+           "the radius up to which the wall is plastic half-way to collapse, from the displacement "
+           "of the outer surface; reference: Hill's radius at the same pressure. One-dimensional "
+           "finite differences give 0.07% less than Hill's pressure.",
        .across = {4, 8, 12},
        .solve = tube,
        .jitters = {0},
        .hourglass = {0.1},
        .fillings = fillings},
       {.name = "sphere",
-       .what = "An eighth of a hollow sphere of the same steel and radii, in the same way. "
-               "Reference: 2 σ ln(b/a) (Hill 1950; de Souza Neto, Perić and Owen 2008, 7.5.2); "
-               "finite differences of one dimension find the same to 0.01%.",
+       .what = "An eighth of a hollow sphere with the same steel, radii and method. Reference: 2 σ "
+               "ln(b/a) (Hill 1950; de Souza Neto, Perić and Owen 2008, 7.5.2); one-dimensional "
+               "finite differences give the same to 0.01%.",
        .across = {4, 8},
        .solve = sphere,
        .jitters = {0},

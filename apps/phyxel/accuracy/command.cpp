@@ -37,20 +37,20 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
     }
   }
   for (const AccuracyCase& c : all) {
-    const bool asked = std::find(names.begin(), names.end(), c.name) != names.end() ||
-                       std::find(names.begin(), names.end(), "all") != names.end();
-    if (asked) chosen.push_back(c);
+    const bool wanted = std::find(names.begin(), names.end(), c.name) != names.end() ||
+                        std::find(names.begin(), names.end(), "all") != names.end();
+    if (wanted) chosen.push_back(c);
   }
   return chosen;
 }
 
 std::vector<Discretisation> discretisations(const AccuracyOptions& options,
                                             const AccuracyCase& of) {
-  const auto asked = [](const std::vector<double>& values, const std::vector<double>& own) {
+  const auto given_or = [](const std::vector<double>& values, const std::vector<double>& own) {
     return values.empty() ? own : values;
   };
-  const std::vector<double> closures = asked(options.closures, of.closures);
-  const std::vector<double> jitters = asked(options.jitters, of.jitters);
+  const std::vector<double> closures = given_or(options.closures, of.closures);
+  const std::vector<double> jitters = given_or(options.jitters, of.jitters);
   std::vector<Discretisation> list;
   for (const Filling filling : of.fillings) {
     if (std::find(options.lattices.begin(), options.lattices.end(), filling_name(filling)) ==
@@ -60,7 +60,7 @@ std::vector<Discretisation> discretisations(const AccuracyOptions& options,
     for (const double jitter : jitters) {
       if (filling == Filling::mesh && jitter != jitters.front()) continue;  // has none
       for (const double factor : options.factors) {
-        for (const double hourglass : asked(options.hourglass, of.hourglass)) {
+        for (const double hourglass : given_or(options.hourglass, of.hourglass)) {
           for (const double closure : closures) {
             list.push_back({.filling = filling,
                             .jitter = filling == Filling::mesh ? 0 : jitter,
@@ -142,10 +142,10 @@ bool measure_hard(const HardOptions& options) {
       device_facts(device));
   bool all_good = true;
   for (const HardCase& hard : hard_cases()) {
-    const bool asked =
+    const bool wanted =
         options.cases.empty() ||
         std::find(options.cases.begin(), options.cases.end(), hard.name) != options.cases.end();
-    if (!asked || (hard.is_long && !options.include_long)) continue;
+    if (!wanted || (hard.is_long && !options.include_long)) continue;
     for (const std::string& name : options.precisions) {
       const Precision precision = *precision_named(name);
       if (hard.in_double && precision != Precision::double_) continue;
@@ -166,49 +166,59 @@ bool measure_hard(const HardOptions& options) {
 
 void add_accuracy(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "accuracy", "Solve problems with known answers: errors and time, on the CPU in double");
+      "accuracy",
+      "Solve problems with known answers on the CPU in double, and print errors and "
+      "times");
   auto options = std::make_shared<AccuracyOptions>();
-  std::string known = "Which, of:";
+  std::string known = "Problems:";
   for (const AccuracyCase& c : accuracy_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
   command->add_option("cases", options->cases, known)->capture_default_str();
-  command->add_option("--across", options->across, "Cells across the thinner sides")
+  command
+      ->add_option("--across", options->across,
+                   "Numbers of cells across the thinner sides "
+                   "(default: those of each case)")
       ->delimiter(',')
       ->check(CLI::Range(2, 200));
   command
       ->add_option("--lattice", options->lattices,
-                   "Placement of phyxels: nodes, cells, or mesh (on and in a surface)")
+                   "Placements of phyxels: nodes, cells, or mesh (on and in a surface)")
       ->delimiter(',')
       ->check(CLI::IsMember({"nodes", "cells", "mesh"}))
       ->capture_default_str();
   command
       ->add_option("--jitter", options->jitters,
-                   "Phyxels moved by so many spacings; otherwise each case's own, mostly 0 and 0.2")
+                   "Largest random displacements of phyxels, in spacings (default: those of each "
+                   "case, mostly 0 and 0.2)")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 0.5));
   command
       ->add_option("--factor", options->factors,
-                   "Supports, as multiples of the mean distance to the 10 nearest")
+                   "Support radii, in mean distances to the ten nearest phyxels")
       ->delimiter(',')
       ->check(CLI::Range(1.0, 4.0))
       ->capture_default_str();
   command
       ->add_option("--hourglass", options->hourglass,
-                   "Strengths of hourglass control; otherwise each case's own, mostly 0 and 0.1")
+                   "Strengths of hourglass control (default: those of each case, mostly 0 and 0.1)")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--closure", options->closures, "Closures of gradients; 0: none")
+  command
+      ->add_option("--closure", options->closures,
+                   "Tolerances of closed gradients; 0 for none "
+                   "(default: those of each case, mostly 0 and "
+                   "0.001)")
       ->delimiter(',')
       ->check(CLI::Range(0.0, 1.0));
   add_table_options(*command, options->table);
   auto hard_options = std::make_shared<HardOptions>();
   CLI::App* hard = command->add_subcommand(
       "hard",
-      "Solve cases that are hard to keep stable: each is answered, or refused with its cause");
-  std::string hard_names = "Which, of:";
+      "Solve cases that are hard to keep stable: each must be solved, or refused with its cause");
+  std::string hard_names = "Cases (default: all):";
   for (const HardCase& c : hard_cases()) hard_names += fmt::format("\n{}: {}", c.name, c.what);
   hard->add_option("cases", hard_options->cases, hard_names);
   hard->add_option("--device", hard_options->device, device_help)->capture_default_str();
-  hard->add_option("--precision", hard_options->precisions, "double, mixed, float")
+  hard->add_option("--precision", hard_options->precisions, "Precisions: double, mixed, float")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->check(CLI::IsMember({"double", "mixed", "float"}))

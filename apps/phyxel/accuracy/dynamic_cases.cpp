@@ -375,36 +375,36 @@ Solution l_block(const Discretisation& d) {
 std::vector<AccuracyCase> dynamic_cases() {
   return {
       {"bending",
-       "The bar of the gravity case, clamped, without weight, rings in bending. Reference: "
-       "quadratic "
-       "finite elements, graded towards the held edges; ± 0.002%.",
+       "The bar of *gravity*, clamped at one end and without weight, vibrates in its first bending "
+       "mode. Reference: quadratic finite elements, graded towards the clamped edges; ± 0.002%.",
        {4, 6, 8},
        bending},
       {"torsion",
-       "It rings in torsion. Reference: the same elements; ± 0.005%.",
+       "The same bar vibrates in its first torsional mode. Reference: the same elements; ± 0.005%.",
        {4, 6, 8},
        torsion},
       {"stretching",
-       "It rings along its axis. Reference: the same elements; ± 0.001%.",
+       "The same bar vibrates in its first axial mode. Reference: the same elements; ± 0.001%.",
        {4, 6, 8},
        stretching},
       {"damping",
-       "The stretching bar with viscosity, of a relaxation time τ that damps its first mode by 2% "
-       "of critical damping, ξ = τ ω/2: the logarithmic decrement of its swings. Reference: Kelvin "
-       "and Voigt's 2 π ξ/√(1 - ξ²).",
+       "The bar of *stretching* with viscosity, whose relaxation time τ damps the first mode by 2% "
+       "of critical damping, ξ = τ ω/2: the logarithmic decrement of the vibration. Reference: 2 π "
+       "ξ/√(1 - ξ²) of a Kelvin-Voigt solid.",
        {4, 6, 8},
        damped},
       {"spinning",
        "A free block, 3 : 2 : 1, tumbles about its middle axis for a million steps of 0.8 of the "
-       "limit, strained by a percent: momenta and energy are to stay. Energy is the mean of a "
-       "hundred looks at the beginning and at the end.",
+       "stability limit, at strains of a percent: momenta and energy should be conserved. The "
+       "energies compared are means of a hundred samples at the beginning and at the end.",
        {4},
        spinning},
       {"L-block",
        "A free L-shaped block is pushed at its two ends in opposite directions for five seconds, "
-       "tumbles and bends by much for 100,000 steps more (Simo and Tarnow 1992): momenta and "
-       "energy are to stay. Energy as above; that of fast waves, into which some of it goes, is "
-       "known the worse the longer the step: so also as long in steps of half the length.",
+       "then tumbles for 100,000 steps with large bending (Simo and Tarnow 1992): momenta and "
+       "energy should be conserved. Energy is sampled as in *spinning*. Part of it goes into fast "
+       "waves, whose energy has a larger error at longer steps; so the same time is also run with "
+       "steps of half the length.",
        {4},
        l_block},
   };

@@ -363,7 +363,7 @@ double far_away(const Machine& m) {
 std::vector<HardCase> hard_cases() {
   return {
       {"ν = -0.5",
-       "The clamped bar under its weight, 1,519 phyxels: its sag against finite "
+       "The clamped bar under its weight, 1,519 phyxels: error of its deflection against finite "
        "elements.",
        0.03, true, false, sag_auxetic},
       {"ν = 0", "The same.", 0.03, true, false, sag_0},
@@ -371,64 +371,69 @@ std::vector<HardCase> hard_cases() {
       {"ν = 0.499", "The same.", 0.03, true, false, sag_0499},
       {"ν = 0.4999", "The same.", 0.03, true, false, sag_04999},
       {"sheet",
-       "A sheet one phyxel thick swings from an edge for a second: drift of energy. It "
-       "resists stretch in its plane only, which a warning says.",
+       "A sheet one phyxel thick swings from an edge for a second: drift of energy. It has only "
+       "in-plane stiffness, and a warning says so.",
        0.02, false, false, sheet},
       {"thread",
-       "A thread of phyxels swings from an end for a second: drift of energy. It resists "
-       "stretch along itself only, which a warning says.",
+       "A thread of phyxels swings from an end for a second: drift of energy. It has only axial "
+       "stiffness, and a warning says so.",
        0.02, false, false, thread},
-      {"single phyxel", "A body of one phyxel, which nothing can deform: refused.", 0, false, false,
+      {"single phyxel", "A body of one phyxel, which cannot deform: refused.", 0, false, false,
        single_phyxel},
-      {"lone phyxel", "One phyxel out of reach of the others of its body falls freely: its fall.",
+      {"lone phyxel",
+       "A phyxel out of reach of all others of its body falls freely: error of its "
+       "fall.",
        1e-3, false, false, lone_phyxel},
       {"coincident phyxels",
-       "A spinning block with two phyxels in one place, two 10⁻¹² m apart and "
-       "two 10⁻⁶ m apart: drift of energy.",
+       "A spinning block with two phyxels at the same point, two 10⁻¹² m apart and two 10⁻⁶ m "
+       "apart: drift of energy.",
        0.02, false, false, coincident},
       {"graded cloud",
-       "A cube with phyxels ten times as close in its middle as at its faces, "
-       "strained evenly, then let go: error of the gradients, drift of energy.",
+       "A cube with a spacing ten times smaller in its middle than at its faces, uniformly "
+       "strained, then released: error of the gradients, drift of energy.",
        0.02, false, false, graded},
       {"E contrast 10⁶",
-       "A bar whose second half is a million times stiffer, stretched: where its "
-       "middle goes.",
+       "A bar whose second half is a million times stiffer is stretched: error of the displacement "
+       "of its middle.",
        0.02, true, false, contrast},
       {"flattened (Hooke)",
-       "A block pressed to a tenth and let go: this law gives way there, so it "
-       "is refused.",
+       "A block compressed to a tenth of its length and released: this law softens in compression, "
+       "so the case is refused.",
        0, false, false, flattened_hooke},
       {"flattened (neo-Hookean)",
-       "The same, in a quarter of the step: energy that is left at rest.", 1e-3, false, false,
+       "The same with a quarter of the step: energy that remains at rest.", 1e-3, false, false,
        flattened_neo},
-      {"flattened (corotated)", "The same, in usual steps.", 1e-3, false, false,
+      {"flattened (corotated)", "The same with the usual step.", 1e-3, false, false,
        flattened_corotated},
       {"inside out (neo-Hookean)",
-       "A block that is its own mirror image, let go: energy that is left "
-       "at rest.",
-       1e-3, false, false, inside_out_neo},
+       "A block released from its mirror image: energy that remains at rest.", 1e-3, false, false,
+       inside_out_neo},
       {"inside out (corotated)", "The same.", 1e-3, false, false, inside_out_corotated},
       {"three turns",
-       "A column, neo-Hookean, stretched by a fifth, one end turned three times: "
-       "its middle turns by half of that.",
+       "A neo-Hookean column, stretched by a fifth, has one end rotated by three turns: its middle "
+       "should rotate by half of that.",
        1e-3, true, false, twist},
       {"impact",
-       "A bar flies at a wall with a tenth of its wave speed and sticks: when its "
-       "momentum vanishes, drift of energy.",
+       "A bar strikes a wall at a tenth of its wave speed and sticks: time at which its momentum "
+       "vanishes, drift of energy.",
        0.03, false, false, impact},
-      {"step 0.99", "A free bar rings for 20,000 steps of 0.99 of the limit: drift of energy.", 0.3,
-       false, false, short_step},
-      {"step 1.01", "Steps above the limit: refused.", 0, false, false, long_step},
-      {"10⁵ steps", "A free bar rings in steps of half the limit: drift of energy.", 0.05, false,
-       false, hundred_thousand_steps},
+      {"step 0.99",
+       "A free bar vibrates for 20,000 steps of 0.99 of the stability limit: drift of "
+       "energy.",
+       0.3, false, false, short_step},
+      {"step 1.01", "Steps above the stability limit: refused.", 0, false, false, long_step},
+      {"10⁵ steps", "A free bar vibrates with steps of half the limit: drift of energy.", 0.05,
+       false, false, hundred_thousand_steps},
       {"10⁷ steps", "The same.", 0.05, false, true, ten_million_steps},
       {"a micrometre",
-       "The clamped bar, a micrometre long, against the one of a metre: "
-       "displacements by the length.",
+       "The clamped bar, a micrometre long, compared with the bar of a metre: displacements over "
+       "the length.",
        1e-3, false, false, micrometre},
       {"a kilometre", "The same, a kilometre long.", 1e-3, false, false, kilometre},
-      {"far away", "The bar 1,700 km from the origin against the one there: displacements.", 1e-3,
-       false, false, far_away},
+      {"far away",
+       "The bar 1,700 km from the origin, compared with the bar at the origin: "
+       "displacements.",
+       1e-3, false, false, far_away},
   };
 }
 

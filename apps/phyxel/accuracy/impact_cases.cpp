@@ -118,14 +118,14 @@ std::vector<AccuracyCase> impact_cases() {
   return {
       {.name = "taylor",
        .what =
-           "Taylor's bar: a rod of copper (32.4 mm long, 6.4 mm across; E 117 GPa, ν 0.35, ρ 8930 "
-           "kg/m³, yield stress 0.4 GPa, linear hardening 0.1 GPa) strikes a smooth wall at 227 "
-           "m/s; 80 µs. References: the middles of published spans, length 21.26 to 21.66 mm, "
-           "radius of the foot 6.97 to 7.24 mm, largest plastic strain 2.47 to 3.25 (Kamoulakos "
-           "1990; Zhu and Cescotto 1995; Camacho and Ortiz 1997; as Li, Habbal and Ortiz 2010 "
-           "table them), quoted from memory: errors below 0.9%, 1.9% and 14% lie within the spans. "
-           "Energy: kinetic, elastic and hourglass energy and plastic work, at the end against "
-           "the start.",
+           "Taylor's bar: a copper rod (32.4 mm long, 6.4 mm across; E 117 GPa, ν 0.35, ρ 8930 "
+           "kg/m³, yield stress 0.4 GPa, linear hardening 0.1 GPa) strikes a frictionless wall at "
+           "227 m/s; it is simulated for 80 µs. References: midpoints of the published ranges, "
+           "length 21.26 to 21.66 mm, radius of the foot 6.97 to 7.24 mm, largest plastic strain "
+           "2.47 to 3.25 (Kamoulakos 1990; Zhu and Cescotto 1995; Camacho and Ortiz 1997; "
+           "tabulated by Li, Habbal and Ortiz 2010), quoted from memory: errors below 0.9%, 1.9% "
+           "and 14% lie within these ranges. Energy: the sum of kinetic, elastic and hourglass "
+           "energy and plastic work at the end, compared with the start.",
        .across = {8, 12, 20},
        .solve = taylor,
        .closures = {0},

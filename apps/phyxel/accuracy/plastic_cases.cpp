@@ -203,10 +203,10 @@ std::vector<AccuracyCase> plastic_cases() {
   return {
       {.name = "cycles",
        .what =
-           "A cube of J2 metal with linear hardening on rollers, free to the sides, is drawn and "
-           "pressed by turns to logarithmic strains of 0.02, 0.005, -0.03, -0.025 and 0.06. "
-           "Reference: the rod of one dimension, whose Kirchhoff stress is E (ε - ε_p) and "
-           "whose flow stress grows by H ε̄.",
+           "A cube of J2 metal with linear hardening, on rollers and free to contract sideways, is "
+           "alternately stretched and compressed to logarithmic strains of 0.02, 0.005, -0.03, "
+           "-0.025 and 0.06. Reference: uniaxial stress in closed form, with the Kirchhoff stress "
+           "E (ε - ε_p) and a flow stress that grows by H ε̄.",
        .across = {3, 5},
        .solve = cycles,
        .closures = {0, 1e-11},
@@ -215,9 +215,10 @@ std::vector<AccuracyCase> plastic_cases() {
        .fillings = {Filling::nodes, Filling::mesh}},
       {.name = "simple-shear",
        .what =
-           "A cube of J2 metal that does not harden is sheared to γ = 5 by 1,000 steps, all its "
-           "phyxels led: its von Mises stress stays the yield stress, also when the body is then "
-           "turned by 120° in one step; forces of a cube that lies turned by 120° are the same.",
+           "A cube of J2 metal without hardening is sheared to γ = 5 in 1,000 steps; the motion of "
+           "all phyxels is prescribed. Its von Mises stress should stay the yield stress, also "
+           "after a rotation of the body by 120° in one step; the forces of a copy that lies "
+           "rotated by 120° should be the same.",
        .across = {4},
        .solve = shearing,
        .closures = {0},

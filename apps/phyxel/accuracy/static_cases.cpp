@@ -324,53 +324,53 @@ std::vector<AccuracyCase> static_cases() {
   return {
       {"patch",
        "A cube whose outer phyxels (the outer two layers, on cells) follow an affine motion of "
-       "0.1%; all others should, too.",
+       "0.1%; the inner phyxels should follow it, too.",
        {6, 10},
        patch,
        {0, 1e-3, 1e-11}},
-      {"rotation", "A cube turned by 120 degrees; no force should arise.", {6, 10}, rotation},
+      {"rotation", "A cube is rotated by 120 degrees; no force should arise.", {6, 10}, rotation},
       {"tension",
-       "A bar, five times as long as wide, pulled at both ends by 10⁻⁶ E; E and ν should come "
-       "back.",
+       "A bar, five times as long as wide, is pulled at both ends by a stress of 10⁻⁶ E; its "
+       "strains should give E and ν.",
        {4, 6, 8, 12},
        tension},
       {"wood",
-       "The same bar of spruce, 23 times as stiff along the grain as across, whose grain is turned "
-       "out of the bar's axis: Young's modulus along the bar. Reference: 1/E = c⁴/E₁ + s⁴/E₂ + c² "
-       "s² "
-       "(1/G₁₂ - 2 ν₁₂/E₁) with cosine c and sine s of the angle (Lekhnitskii 1963).",
+       "The same bar made of spruce, which is 23 times as stiff along the grain as across it. The "
+       "grain is inclined to the axis of the bar; the result is Young's modulus along the bar. "
+       "Reference: 1/E = c⁴/E₁ + s⁴/E₂ + c² s² (1/G₁₂ - 2 ν₁₂/E₁), where c and s are the cosine "
+       "and sine of the angle (Lekhnitskii 1963).",
        {4, 6, 8},
        wood},
       {"gravity",
-       "A bar, five times as long as wide, clamped at one end, under its weight. Reference: finite "
-       "elements of quadratic displacements and linear pressure, graded towards the held edges and "
-       "extrapolated; ± 0.0005%.",
+       "A bar, five times as long as wide, is clamped at one end and bends under its weight. "
+       "Reference: finite elements with quadratic displacements and linear pressure, graded "
+       "towards the clamped edges and extrapolated; ± 0.0005%.",
        {4, 6, 8, 12},
        gravity},
       {"shear",
-       "The same bar under a shear at its end. Reference: quadratic finite elements, graded "
-       "towards "
-       "the held edges and extrapolated; ± 0.005%.",
+       "The same bar under a shear force at its free end. Reference: quadratic finite elements, "
+       "graded towards the clamped edges and extrapolated; ± 0.005%.",
        {4, 6, 8, 12},
        shear},
       {"elastica",
-       "A bar, twenty times as long as wide, ν = 0, clamped at one end, under an end load F L² = 2 "
-       "E I that bends it by half its length. Reference: quadratic finite elements in the plane, "
-       "which is exact for ν = 0; ± 0.001%. Bisshopp and Drucker's bar of 1945 without thickness, "
-       "which neither shears nor stretches, goes 0.2% less down and 0.4% less back.",
+       "A bar, twenty times as long as wide, ν = 0, is clamped at one end; an end load F with F L² "
+       "= 2 E I bends it by half its length. Reference: plane quadratic finite elements, which are "
+       "exact for ν = 0; ± 0.001%. The beam of Bisshopp and Drucker 1945, inextensible and rigid "
+       "in shear, moves 0.2% less down and 0.4% less back.",
        {4, 6, 8},
        elastica},
       {"twist",
-       "A neo-Hookean column, five times as long as wide, held at one end and turned at the other, "
-       "both ends staying flat. Reference: finite elements of order 4 to 6 on graded hexahedra, "
-       "extrapolated; ± 0.0001%.",
+       "A neo-Hookean column, five times as long as wide, is fixed at one end and rotated at the "
+       "other; both ends stay flat. Reference: finite elements of order 4 to 6 on graded "
+       "hexahedra, extrapolated; ± 0.0001%.",
        {4, 6, 8},
        twist},
       {"cook",
        "Cook's membrane in plane strain: a panel that tapers from 44 to 16 over a length of 48, "
-       "clamped at its left side, under a shear on its right side of which displacements are told, "
-       "in units of force over E. Reference: finite elements of quadratic displacements and linear "
-       "pressure, 128 × 128 of them, graded towards all corners and extrapolated; ± 0.0002%.",
+       "clamped at its left side, under a shear force on its right side. Displacements of the "
+       "right side are in units of force per thickness over E. Reference: 128 × 128 finite "
+       "elements with quadratic displacements and linear pressure, graded towards all corners and "
+       "extrapolated; ± 0.0002%.",
        {11, 22},
        cook},
   };

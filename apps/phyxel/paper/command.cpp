@@ -222,13 +222,13 @@ void add_paper(CLI::App& program) {
   command->add_option("--body", request.bodies, "Only these bodies: horn_bug, alien_head, dino")
       ->delimiter(',');
   command->add_option("--device", options->device, device_help)->capture_default_str();
-  command->add_option("--repeat", request.repeat, "Repeats; the median is reported")
+  command->add_option("--repeat", request.repeat, "Number of repeats; the median is reported")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
   command->add_option("--objects", request.objects, "Largest number of objects")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
-  command->add_option("--seconds", request.seconds, "Length of one repeat [s]")
+  command->add_option("--seconds", request.seconds, "Duration of one repeat [s]")
       ->capture_default_str()
       ->check(CLI::Range(0.001, 60.0));
   command->add_flag("--force", options->force, "Replace earlier tables in the folder");

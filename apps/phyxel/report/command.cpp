@@ -60,7 +60,7 @@ void report_command(const ReportOptions& options) {
 void add_report(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "report",
-      "Write a page for a browser, offline: the run to replay and turn, its energies and timing");
+      "Write an offline HTML page that replays a run in 3D, with its energies and timing");
   auto options = std::make_shared<ReportOptions>();
   command
       ->add_option("input", options->input, "Folder of a run, a .series file, or one frame (.hdf)")
@@ -69,7 +69,8 @@ void add_report(CLI::App& program) {
                       "The page (default: report.html in the folder, or beside the file)");
   command
       ->add_option("--max-megabytes", options->megabytes,
-                   "Largest size of the page, for which frames and then phyxels are left out")
+                   "Largest size of the page [MB]; frames and then phyxels are omitted to stay "
+                   "below it")
       ->check(CLI::Range(1.0, 1e4))
       ->capture_default_str();
   command->add_flag(

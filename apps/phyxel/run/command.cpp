@@ -45,8 +45,8 @@ void add_run(CLI::App& program) {
       "Continue from a checkpoint file, or from the newest in the output folder (auto)");
   command
       ->add_option("--partitioner", options->cut.partitioner,
-                   "Method that cuts bodies among mpirun's ranks: metis, curve, bisection, or "
-                   "auto, the best")
+                   "Partitioner of bodies among the ranks of mpirun: metis, curve, bisection, or "
+                   "auto (the best)")
       ->check(CLI::IsMember(partitioner_choices()));
   command
       ->add_option("--transport", options->transport,

@@ -37,7 +37,7 @@ void Run::watch_newton(Progress& progress) {
   solver_.observe([this, &progress](const NewtonProgress& now) {
     const std::string newton = fmt::format("newton {}", now.step + 1),
                       iteration = fmt::format("iteration {}", now.iteration),
-                      residual = fmt::format("residual {:.1e} ({:.0e} asked)", now.residual,
+                      residual = fmt::format("residual {:.1e} (target {:.0e})", now.residual,
                                              now.tolerance),
                       energy = fmt::format("E = {:.4g} J", now.energy);
     if (scene_.solver.method == Method::equilibrium) {
