@@ -15,14 +15,16 @@ struct AffineField {
 
 /// Sets displacements and velocities of phyxels with a prescribed motion, along its axes, after
 /// each step. One thread per phyxel.
+/// @param position of the moved phyxels relative to the body's origin [m]; null if all move alike
 template <class Real, class StateReal>
-__global__ void follow(Fields<Real, StateReal> f, const Index* place, int count, Axes axes,
+__global__ void follow(Fields<Real, StateReal> f, const Index* place,
+                       const Vec3<StateReal>* position, int count, Axes axes,
                        AffineField<StateReal> displacements, AffineField<StateReal> velocities) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   const Index at = place[k];
   auto point = f.points.get(at);
-  const Vec3<StateReal> x = to<StateReal>(point.x);
+  const Vec3<StateReal> x = position ? position[k] : Vec3<StateReal>{};
   Vec3<StateReal> displacement = displacements.at(x), velocity = velocities.at(x);
   if (!axes.x || !axes.y || !axes.z) {
     const auto along_axes = [axes](Vec3<StateReal> path, Vec3<StateReal> free) {
@@ -101,14 +103,15 @@ class Boundary {
     for (const Moved& path : paths_) {
       const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
       const Vec3d x = path.origin, there = after.at(x);
-      set(path.places, path.of->axes, {to<StateReal>(there), to_real(after.turn)},
+      set(path.places, path.positions.data(), path.of->axes,
+          {to<StateReal>(there), to_real(after.turn)},
           {to<StateReal>((there - before.at(x)) / dt),
            to_real((1 / dt) * (after.turn - before.turn))});
     }
   }
   /// Returns fixed phyxels to their prescribed positions, at rest, whatever an uploaded state says.
   void put_held_at_rest() const {
-    if (held_.size() > 0) set(held_, {}, {}, {});
+    if (held_.size() > 0) set(held_, nullptr, {}, {}, {});
   }
   /// The prescribed axes of each phyxel (`Axes::bits`), shape [places]; null if there are none.
   const char* moved() const { return moved_.data(); }
@@ -118,6 +121,9 @@ class Boundary {
     const Motion* of;
     Vec3d origin;  ///< Origin of their body.
     DeviceArray<Index> places;
+    /// Positions relative to `origin` [m]: those of the tiles are float in mixed precision, and
+    /// prescribed displacements are not.
+    DeviceArray<Vec3<StateReal>> positions;
   };
   struct Loading {
     const Load* of;
@@ -144,7 +150,13 @@ class Boundary {
         held.insert(held.end(), at.begin(), at.end());
         continue;
       }
-      paths_.push_back({&motion, origin_of(motion), sent(at, "moved phyxels")});
+      const Vec3d origin = origin_of(motion);
+      std::vector<Vec3<StateReal>> positions;
+      for (const Index i : own) {
+        positions.push_back(to<StateReal>(m_.model().position[i] - origin));
+      }
+      paths_.push_back({&motion, origin, sent(at, "moved phyxels"),
+                        sent(positions, "positions of moved phyxels")});
       moved.resize(m_.places(), 0);
       for (const Index place : at) moved[place] |= motion.axes.bits();
     }
@@ -174,11 +186,12 @@ class Boundary {
           {&load, sent(places_of(load.phyxels), "loaded phyxels"), sent(force, "loads")});
     }
   }
-  void set(const DeviceArray<Index>& at, Axes axes, const AffineField<StateReal>& displacement,
+  void set(const DeviceArray<Index>& at, const Vec3<StateReal>* positions, Axes axes,
+           const AffineField<StateReal>& displacement,
            const AffineField<StateReal>& velocity) const {
     const auto count = static_cast<int>(at.size());
-    m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), count, axes,
-                   displacement, velocity);
+    m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), positions,
+                   count, axes, displacement, velocity);
   }
 
   DeviceModel<Real, StateReal>& m_;

@@ -8,11 +8,7 @@
 /// instructions limits pass 1.
 #pragma once
 
-#include "phyxel/physics/closing.hpp"
-#include "phyxel/physics/force.hpp"
-#include "phyxel/physics/hourglass.hpp"
-#include "phyxel/physics/strain.hpp"
-#include "phyxel/physics/verlet.hpp"
+#include "phyxel/physics/point.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "solver/fused_halo.cuh"
 #include "solver/law_stress.cuh"
@@ -222,27 +218,25 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
   __syncthreads();
 
   const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
-  Mat3<Real> sum;
-  Vec3<Real> pull;
+  NeighbourSums<Real> sums;
   walk(lists, row, first, [&](unsigned offset) {
     const auto p = Points<Real>::at(image, lists.slots, offset);
     const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
     const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
-    add_gradient_term(sum, u, w * x);
-    if constexpr (term != PairTerm::none) add_pull(pull, u, w);
+    sums.template add<term != PairTerm::none>(x, u, w);
   });
 
+  constexpr bool closed = term == PairTerm::closing;
   const Real* c = f.moment_constants + place;
-  const Sym3<Real> inverse_moment{
+  PointConstants<Real> point;
+  point.inverse_moment = {
       c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
-  const Mat3<Real> fit = displacement_gradient(sum, inverse_moment);
-  Mat3<Real> grad_u = fit;
-  Vec3<Real> moment_offset, closing;
-  if constexpr (term == PairTerm::closing) {
-    moment_offset = column3(f.force_constants, f.places, place);
-    closing = column3(f.closing, f.places, place);
-    grad_u = closed_gradient(fit, pull, moment_offset, closing);
+  const Mat3<Real> fit = displacement_gradient(sums.gradient, point.inverse_moment);
+  if constexpr (closed) {
+    point.moment_offset = column3(f.force_constants, f.places, place);
+    point.closing = column3(f.closing, f.places, place);
   }
+  const Mat3<Real> grad_u = seen_gradient<closed>(fit, sums.pull, point);
   if constexpr (only_gradient) {
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
@@ -265,17 +259,14 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
       stress = stress_of_law(make_law<Law, Real>(body.law), grad_u, history, f.history_use,
                              f.history_interval);
     }
-    Mat3<Real> q = pair_stress(c[6 * f.places], stress, inverse_moment);
-    if constexpr (term == PairTerm::closing) {
-      const Vec3<Real> t = closing_stress(c[6 * f.places], stress, closing);
-      q = closed_pair_stress(q, t, moment_offset, inverse_moment);
-      f.closing_stresses.set(place, t);
+    point.volume = c[6 * f.places];
+    PointStress<Real> spread = elastic_point_stress<closed>(stress, point);
+    if constexpr (closed) f.closing_stresses.set(place, spread.closing_stress);
+    if (term == PairTerm::hourglass || (closed && f.pull)) {
+      spread.pair_stress = with_hourglass(spread.pair_stress, body.hourglass, fit);
+      set_column3(f.pull, f.places, place, pull_force(body.hourglass, sums.pull));
     }
-    if (term == PairTerm::hourglass || (term == PairTerm::closing && f.pull)) {
-      q = with_hourglass(q, body.hourglass, fit);
-      set_column3(f.pull, f.places, place, pull_force(body.hourglass, pull));
-    }
-    f.stresses.set(place, {own.x, q});
+    f.stresses.set(place, {own.x, spread.pair_stress});
     exchange.after(tile);
   }
 }

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "model/owned_vectors.hpp"
-#include "model/owned_vectors.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"

@@ -165,9 +165,10 @@ std::vector<char> held_phyxels(const Model& model);
 /// A number that tells two models apart: rest positions, supports, geometric volumes, materials,
 /// motions and loads, and the surfaces of bodies with closed gradients, from which all else
 /// follows; so it is the same whatever device built them. A checkpoint carries it, so that a state
-/// never continues on another body. The digest of a share is that of the whole model, and collective
-/// (see `SharedModel::digest`).
-/// @param surfaces of the bodies of a share with closed gradients, which has no whole surface itself
+/// never continues on another body. The digest of a share is that of the whole model, and
+/// collective (see `SharedModel::digest`).
+/// @param surfaces of the bodies of a share with closed gradients, which has no whole surface
+/// itself
 std::uint64_t model_digest(const Model& model, std::span<const Surface> surfaces = {});
 /// The digest that checkpoints before version 4 hold: without gravity.
 std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface> surfaces = {});

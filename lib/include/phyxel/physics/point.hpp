@@ -55,21 +55,30 @@ PHYXEL_HD Mat3<Real> seen_gradient(const Mat3<Real>& fit, Vec3<Real> pull,
   }
 }
 
-/// The stress of a phyxel.
-/// @tparam controlled true with hourglass control. @tparam closed true with closed gradients
-/// @param stress_of function that returns P [Pa] of ∇u by the law and its history
-template <bool controlled, bool closed, class Real, class StressOf>
-PHYXEL_HD PointStress<Real> point_stress(const NeighbourSums<Real>& sums,
-                                         const PointConstants<Real>& point, StressOf&& stress_of) {
+/// The pair stress and the closing stress of a phyxel without hourglass control.
+/// @param stress P [Pa]. @tparam closed true with closed gradients
+template <bool closed, class Real>
+PHYXEL_HD PointStress<Real> elastic_point_stress(const Mat3<Real>& stress,
+                                                 const PointConstants<Real>& point) {
   PointStress<Real> result;
-  const Mat3<Real> fit = displacement_gradient(sums.gradient, point.inverse_moment);
-  const Mat3<Real> stress = stress_of(seen_gradient<closed>(fit, sums.pull, point));
   result.pair_stress = pair_stress(point.volume, stress, point.inverse_moment);
   if constexpr (closed) {
     result.closing_stress = closing_stress(point.volume, stress, point.closing);
     result.pair_stress = closed_pair_stress(result.pair_stress, result.closing_stress,
                                             point.moment_offset, point.inverse_moment);
   }
+  return result;
+}
+
+/// The stress of a phyxel.
+/// @tparam controlled true with hourglass control. @tparam closed true with closed gradients
+/// @param stress_of function that returns P [Pa] of ∇u by the law and its history
+template <bool controlled, bool closed, class Real, class StressOf>
+PHYXEL_HD PointStress<Real> point_stress(const NeighbourSums<Real>& sums,
+                                         const PointConstants<Real>& point, StressOf&& stress_of) {
+  const Mat3<Real> fit = displacement_gradient(sums.gradient, point.inverse_moment);
+  const Mat3<Real> stress = stress_of(seen_gradient<closed>(fit, sums.pull, point));
+  PointStress<Real> result = elastic_point_stress<closed>(stress, point);
   if constexpr (controlled) {
     result.pair_stress = with_hourglass(result.pair_stress, point.hourglass, fit);
     result.hourglass_force = pull_force(point.hourglass, sums.pull);
