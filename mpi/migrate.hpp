@@ -22,9 +22,9 @@ struct MigratingPhyxel {
   double spacing = 0;  ///< r̄ [m], if needed.
   double support = 0;  ///< h [m]
   Index body = 0;
-  Index number = 0;           ///< Index in its body.
-  Index along = 0;            ///< Index in its part along Hilbert's curve.
-  std::uint32_t regions = 0;  ///< A bit for each region that the scene names.
+  Index number = 0;              ///< Index in its body.
+  Index along = 0;               ///< Index in its part along Hilbert's curve.
+  std::uint32_t region_set = 0;  ///< Number of its set in `RegionSets`.
 };
 using MigratingPhyxels = Bulk<MigratingPhyxel>;
 

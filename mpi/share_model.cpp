@@ -282,26 +282,31 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   const std::span<const MigratingPhyxel> here = of_range(local.phyxels, local.bodies[b]);
   Cloud cloud;
   cloud.position = tabulated(here.size(), [&](std::size_t k) { return here[k].position; });
-  const auto with_bit = [&](std::size_t bit) {
+  const auto in_region = [&](Index region) {
     std::vector<Index> chosen;
     for (std::size_t k = 0; k < here.size(); ++k) {
-      if (here[k].regions >> bit & 1) chosen.push_back(static_cast<Index>(k));
+      if (body.region_sets.contains(here[k].region_set, region)) {
+        chosen.push_back(static_cast<Index>(k));
+      }
     }
     return chosen;
   };
-  if (!body.bit_of_entry.empty()) {  // its piece has been checked
+  if (!body.region_of_entry.empty()) {  // its piece has been checked
     BoundaryChoice choice;
     choice.first_load = request.fixed.size() + request.motions.size();
     for (const Selection* selection : selections_of(request)) {
-      const int bit = body.bit_of_entry[choice.chosen.size()];
-      choice.chosen.push_back(bit >= 0 ? with_bit(static_cast<std::size_t>(bit))
-                                       : select(*selection, {cloud, {}, body.size}, request.name));
+      const int region = body.region_of_entry[choice.chosen.size()];
+      choice.chosen.push_back(region >= 0
+                                  ? in_region(region)
+                                  : select(*selection, {cloud, {}, body.size}, request.name));
     }
     return choice;
   }
   auto number = tabulated(here.size(), [&](std::size_t k) { return here[k].number; });
   for (const std::string& name : body.regions) cloud.regions[name];
-  for (std::size_t r = 0; r < body.used_regions; ++r) cloud.regions[body.regions[r]] = with_bit(r);
+  for (std::size_t r = 0; r < body.used_regions; ++r) {
+    cloud.regions[body.regions[r]] = in_region(static_cast<Index>(r));
+  }
   // No phyxel here: an empty list of numbers would mean all.
   if (number.empty()) number.push_back(body.size);
   return naming(request, [&] { return choose_boundary(request, cloud, number, body.size); });

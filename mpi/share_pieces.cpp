@@ -13,20 +13,15 @@
 namespace phyxel {
 namespace {
 
-/// Marks the members of a boundary's entry by a bit of their own.
-/// @param name of a region, or of what stands for one
-int add_bit(const Selection& selection, const BodyRequest& request, const std::string& name,
-            std::span<const Index> members, WholeBody& body, std::vector<std::uint32_t>& bits) {
-  if (body.regions.size() == 32) {
-    throw InputError(fmt::format(
-        "{}: body \"{}\" has more than 32 regions that are fixed, moved or loaded: allowed "
-        "are 32 where several ranks share it",
-        selection.where, request.name));
-  }
-  const auto bit = static_cast<int>(body.regions.size());
-  for (const Index i : members) bits[i] |= std::uint32_t{1} << bit;
+/// Makes a region of the members of a boundary's entry, and returns its number.
+/// @param name of a region, or of what stands for one. @param sets number of the set of regions of
+/// each phyxel
+int add_region(const std::string& name, std::span<const Index> members, WholeBody& body,
+               std::vector<std::uint32_t>& sets) {
+  const auto region = static_cast<Index>(body.regions.size());
+  for (const Index i : members) sets[i] = body.region_sets.with(sets[i], region);
   body.regions.push_back(name);
-  return bit;
+  return region;
 }
 
 /// The numbers of a piece's phyxels in the cloud; one that no phyxel has, if the piece is empty.
@@ -38,12 +33,13 @@ std::vector<Index> numbers_of(const CloudPiece& piece) {
   return number;
 }
 
-/// The bits of each phyxel of a piece; empty if the scene names no region. Phyxels that are sorted
-/// by material have bits, too, where the scene gives their numbers in the cloud.
-std::vector<std::uint32_t> region_bits(const BodyRequest& request, const CloudPiece& piece,
-                                       WholeBody& body) {
+/// The set of regions of each phyxel of a piece, by its number in `WholeBody::region_sets`; empty
+/// if the scene names no region. Phyxels that are sorted by material are in regions, too, where the
+/// scene gives their numbers in the cloud.
+std::vector<std::uint32_t> find_region_sets(const BodyRequest& request, const CloudPiece& piece,
+                                            WholeBody& body) {
   const Cloud& cloud = piece.cloud;
-  std::vector<std::uint32_t> bits;
+  std::vector<std::uint32_t> sets;
   const std::vector<const Selection*> selections = selections_of(request);
   BoundaryChoice choice;
   if (!request.inclusions.empty() && !selections.empty()) {
@@ -51,22 +47,22 @@ std::vector<std::uint32_t> region_bits(const BodyRequest& request, const CloudPi
   }
   for (std::size_t entry = 0; entry < selections.size(); ++entry) {
     const Selection& selection = *selections[entry];
-    int bit = -1;
+    int region = -1;
     if (selection.region) {
       const auto found = cloud.regions.find(*selection.region);
       const auto known = std::find(body.regions.begin(), body.regions.end(), *selection.region);
       if (known != body.regions.end()) {
-        bit = static_cast<int>(known - body.regions.begin());
+        region = static_cast<int>(known - body.regions.begin());
       } else if (found != cloud.regions.end()) {
         // One that is not there is refused once phyxels are chosen.
-        bits.resize(cloud.position.size(), 0);
-        bit = add_bit(selection, request, found->first, found->second, body, bits);
+        sets.resize(cloud.position.size(), RegionSets::none);
+        region = add_region(found->first, found->second, body, sets);
       }
     } else if (selection.indices && !choice.chosen.empty()) {
-      bits.resize(cloud.position.size(), 0);
-      bit = add_bit(selection, request, selection.where, choice.chosen[entry], body, bits);
+      sets.resize(cloud.position.size(), RegionSets::none);
+      region = add_region(selection.where, choice.chosen[entry], body, sets);
     }
-    if (!choice.chosen.empty()) body.bit_of_entry.push_back(bit);
+    if (!choice.chosen.empty()) body.region_of_entry.push_back(region);
   }
   body.used_regions = body.regions.size();
   for (const auto& [name, members] : cloud.regions) {
@@ -74,7 +70,16 @@ std::vector<std::uint32_t> region_bits(const BodyRequest& request, const CloudPi
       body.regions.push_back(name);
     }
   }
-  return bits;
+  return sets;
+}
+
+/// Gives the sets of regions the same numbers on all ranks.
+void agree_on_regions(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own) {
+  std::vector<RegionSets> sets;
+  for (WholeBody& body : whole.bodies) sets.push_back(std::move(body.region_sets));
+  const auto renumbered = RegionSets::agree(setup.ranks, sets);
+  for (std::size_t b = 0; b < sets.size(); ++b) whole.bodies[b].region_sets = std::move(sets[b]);
+  for (MigratingPhyxel& p : own) p.region_set = renumbered[p.body][p.region_set];
 }
 
 /// The materials of this rank's piece of a body with inclusions.
@@ -195,8 +200,8 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       body.size = made.whole;
       with_volumes[b] = !cloud.volume.empty();
       const BodyRequest& request = setup.scene.bodies[b];
-      const std::vector<std::uint32_t> bits =
-          naming(request, [&] { return region_bits(request, made, body); });
+      const std::vector<std::uint32_t> sets =
+          naming(request, [&] { return find_region_sets(request, made, body); });
       if (!request.inclusions.empty()) {
         naming(request, [&] {
           materials.push_back(
@@ -212,7 +217,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
                            .volume = cloud.volume.empty() ? 0 : cloud.volume[i],
                            .body = static_cast<Index>(b),
                            .number = made.first + static_cast<Index>(i),
-                           .regions = bits.empty() ? 0 : bits[i]};
+                           .region_set = sets.empty() ? RegionSets::none : sets[i]};
       }
       whole.surfaces[b] = std::move(cloud.surface);
       for (std::string& warning : cloud.warnings) whole.warnings.push_back(std::move(warning));
@@ -222,6 +227,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   setup.ranks.add(with_volumes);
   whole.boxes = boxes_of(setup.ranks, own, whole.bodies.size(),
                          [](const MigratingPhyxel& p) { return static_cast<std::size_t>(p.body); });
+  agree_on_regions(setup, whole, own);
   number_by_material(setup, materials, whole, own);
   find_origins(setup, own, whole);
   setup.ranks.collectively([&] {

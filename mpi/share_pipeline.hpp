@@ -14,6 +14,7 @@
 #include "model/share_surveyor.hpp"
 #include "mpi/build_share.hpp"
 #include "mpi/migrate.hpp"
+#include "mpi/region_sets.hpp"
 
 namespace phyxel {
 
@@ -31,11 +32,12 @@ struct WholeBody {
   std::size_t first_part = 0;  ///< Its own material; its inclusions follow.
   Vec3d origin;                ///< Its first phyxel at rest [m].
   bool kernel_volumes = false;
-  std::vector<std::string> regions;  ///< Names; those used have the first bits.
+  std::vector<std::string> regions;  ///< Names; those used have the first numbers.
   std::size_t used_regions = 0;
-  /// The bit of each entry of its boundary, or -1 if its place tells; empty for bodies of one
+  RegionSets region_sets;  ///< Of its phyxels.
+  /// The region of each entry of its boundary, or -1 if its place tells; empty for bodies of one
   /// material.
-  std::vector<int> bit_of_entry;
+  std::vector<int> region_of_entry;
   double reach = 0;     ///< The largest support [m].
   double enclosed = 0;  ///< Volume inside its surface, if its gradients are closed [m³].
 };

@@ -23,7 +23,7 @@ OWN_WAYS = ["cycles", "simple-shear", "tube", "sphere", "taylor"]  # measured in
 
 def cases(program):
     text = subprocess.run([program, "accuracy", "--help"], check=True, capture_output=True, text=True).stdout
-    listed = text.split("Which, of:", 1)[1].split("OPTIONS", 1)[0]
+    listed = text.split("Problems:", 1)[1].split("\n\n", 1)[0]
     return re.findall(r"^\s*([A-Za-z][\w-]*): ", listed, re.MULTILINE)
 
 

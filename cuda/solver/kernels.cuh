@@ -168,15 +168,17 @@ __device__ inline uint4 first_entries(const DeviceLists& lists, TileLists::Row r
   return row.length > 0 ? __ldcs(list_of(lists, row)) : uint4{0, 0, 0, 0};
 }
 
-/// Blocks of pass 1 per multiprocessor: more of them hide more latency, but leave a thread 40
-/// registers in float, which would make some laws spill.
-template <class Real, class Law>
-constexpr int pass_1_blocks = needs_many_registers<Law> ? (sizeof(Real) == 4 ? 4 : 2)
-                                                        : (sizeof(Real) == 4 ? 6 : 3);
+/// Blocks of pass 1 per multiprocessor: more of them hide more latency, but leave a thread fewer
+/// registers, of which some laws and terms need more than the 40 of six blocks in float.
+template <class Real, class Law, class Terms>
+constexpr int pass_1_blocks = sizeof(Real) == 4 ? (needs_many_registers<Law> || Terms::sends ? 4
+                                                   : Terms::pulls                            ? 5
+                                                                                             : 6)
+                                                : (needs_many_registers<Law> ? 2 : 3);
 template <class Real>
 constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
 template <class Real>
-constexpr int pass_2_blocks_closed = sizeof(Real) == 4 ? 4 : 2;
+constexpr int pass_2_blocks_sent = sizeof(Real) == 4 ? 4 : 2;
 
 /// Output of the gradient-only variant of pass 1: entry e of thread t of block b is stored in
 /// values[e * stride + b * tile_size + t].
@@ -188,15 +190,12 @@ struct Gradients {
   Real* residuals = nullptr;   ///< Residuals of the fits (`add_residual`), or null.
 };
 
-/// Term of pass 1 in the residual of the linear fit. `closing` includes hourglass control.
-enum class PairTerm { none, hourglass, closing };
-
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`,
-/// only the gradients are written.
+/// only the gradients are written. @tparam Terms a list of pair terms
 /// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
-template <class Real, class StateReal, class Law, PairTerm term, bool only_gradient,
+template <class Real, class StateReal, class Law, class Terms, bool only_gradient,
           class Halo = NoHalo>
-__global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
+__global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
     pass_1(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, Gradients<Real> gradients,
            const __grid_constant__ Halo exchange) {
@@ -223,20 +222,19 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
     const auto p = Points<Real>::at(image, lists.slots, offset);
     const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
     const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
-    sums.template add<term != PairTerm::none>(x, u, w);
+    sums.template add<Terms::pulls>(x, u, w);
   });
 
-  constexpr bool closed = term == PairTerm::closing;
   const Real* c = f.moment_constants + place;
   PointConstants<Real> point;
   point.inverse_moment = {
       c[0], c[f.places], c[2 * f.places], c[3 * f.places], c[4 * f.places], c[5 * f.places]};
   const Mat3<Real> fit = displacement_gradient(sums.gradient, point.inverse_moment);
-  if constexpr (closed) {
+  if constexpr (Terms::sends) {
     point.moment_offset = column3(f.force_constants, f.places, place);
     point.closing = column3(f.closing, f.places, place);
   }
-  const Mat3<Real> grad_u = seen_gradient<closed>(fit, sums.pull, point);
+  const Mat3<Real> grad_u = Terms::gradient(fit, sums, point);
   if constexpr (only_gradient) {
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
@@ -260,11 +258,11 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
                              f.history_interval);
     }
     point.volume = c[6 * f.places];
-    PointStress<Real> spread = elastic_point_stress<closed>(stress, point);
-    if constexpr (closed) f.closing_stresses.set(place, spread.closing_stress);
-    if (term == PairTerm::hourglass || (closed && f.pull)) {
-      spread.pair_stress = with_hourglass(spread.pair_stress, body.hourglass, fit);
-      set_column3(f.pull, f.places, place, pull_force(body.hourglass, sums.pull));
+    if constexpr (Terms::template has<HourglassControl>) point.hourglass = body.hourglass;
+    const PointStress<Real> spread = Terms::stresses(stress, fit, sums, point);
+    if constexpr (Terms::sends) f.closing_stresses.set(place, spread.closing_stress);
+    if constexpr (Terms::template has<HourglassControl>) {
+      if (!Terms::sends || f.pull) set_column3(f.pull, f.places, place, spread.hourglass_force);
     }
     f.stresses.set(place, {own.x, spread.pair_stress});
     exchange.after(tile);
@@ -273,11 +271,11 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law>))
 
 /// Pass 2: gathers Q into forces and takes one step. With `only_force`, only the internal forces
 /// are written, to `force`, shape [3, places]. With `extra_forces`, loads and the forces of
-/// hourglass control are added; with `closed`, those of closing stresses.
+/// hourglass control are added. @tparam Terms a list of pair terms
 template <class Real, class StateReal, bool own_supports, bool damped, bool extra_forces,
-          bool only_force, class Halo = NoHalo, bool closed = false>
+          bool only_force, class Halo = NoHalo, class Terms = NoPairTerms>
 __global__ void __launch_bounds__(tile_size,
-                                  closed ? pass_2_blocks_closed<Real> : pass_2_blocks<Real>)
+                                  Terms::sends ? pass_2_blocks_sent<Real> : pass_2_blocks<Real>)
     pass_2(const __grid_constant__ Fields<Real, StateReal> f,
            const __grid_constant__ DeviceLists lists, Index first_tile, StateReal dt, Real* force,
            const __grid_constant__ Halo exchange) {
@@ -287,11 +285,11 @@ __global__ void __launch_bounds__(tile_size,
   const TileLists::Row row = lists.rows[place / warp_size];
   exchange.before(tile);
   fetch_tile(f.stresses, lists, tile, image);
-  // The records are followed by closing stresses, then by the support of each point.
-  char* closings = image + Stresses<Real>::bytes * lists.slots;
-  if constexpr (closed) fetch_tile(f.closing_stresses, lists, tile, closings);
-  Real* supports =
-      reinterpret_cast<Real*>(closings + (closed ? ClosingStresses<Real>::bytes : 0) * lists.slots);
+  // The records are followed by what terms send, then by the support of each point.
+  char* sent = image + Stresses<Real>::bytes * lists.slots;
+  if constexpr (Terms::sends) fetch_tile(f.closing_stresses, lists, tile, sent);
+  Real* supports = reinterpret_cast<Real*>(
+      sent + (Terms::sends ? ClosingStresses<Real>::bytes : 0) * lists.slots);
   if constexpr (own_supports) {
     supports[threadIdx.x] = f.inverse_h_squared[place];
     if (threadIdx.x < far_slots) supports[tile_size + threadIdx.x] = Real(1);
@@ -312,16 +310,18 @@ __global__ void __launch_bounds__(tile_size,
     const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
     return weight_shape_anywhere(dot(x, x), inverse_h_squared);
   };
-  Vec3<Real> t_i;
-  if constexpr (closed) t_i = ClosingStresses<Real>::at(closings, lists.slots, 16 * threadIdx.x);
+  Vec3<Real> sent_i;
+  if constexpr (Terms::sends) {
+    sent_i = ClosingStresses<Real>::at(sent, lists.slots, 16 * threadIdx.x);
+  }
   Vec3<Real> sum;
   walk(lists, row, first, [&](unsigned offset) {
     const auto p = Stresses<Real>::at(image, lists.slots, offset);
     const Vec3<Real> x = p.x - x_i;
     const Real w = weight_of(x, offset);
     add_neighbour_force(sum, p.q, x, w);
-    if constexpr (closed) {
-      add_closing_force(sum, t_i, ClosingStresses<Real>::at(closings, lists.slots, offset), w);
+    if constexpr (Terms::sends) {
+      Terms::add_forces(sum, sent_i, ClosingStresses<Real>::at(sent, lists.slots, offset), w);
     }
   });
   const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;

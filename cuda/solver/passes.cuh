@@ -97,8 +97,9 @@ class Passes {
   /// [3, places]
   void gather(Real* forces) const {
     receive(Sent::stresses);
-    launch_pass_2<NoHalo>({m_.closed() ? gather_of<true>() : gather_of<false>(), 0, m_.tiles()},
-                          StateReal(0), forces, {});
+    launch_pass_2<NoHalo>(
+        {m_.closed() ? gather_of<WithClosing>() : gather_of<NoPairTerms>(), 0, m_.tiles()},
+        StateReal(0), forces, {});
   }
   /// Advances histories to the present displacements.
   void commit(double interval) const {
@@ -129,8 +130,8 @@ class Passes {
     receive(Sent::displacements);
     using Any = StVenantKirchhoff<Real>;  // gradients do not depend on the law
     launch_pass_1<NoHalo>(m_.fields(),
-                          {m_.closed() ? pass_1<Real, StateReal, Any, PairTerm::closing, true>
-                                       : pass_1<Real, StateReal, Any, PairTerm::none, true>,
+                          {m_.closed() ? pass_1<Real, StateReal, Any, WithClosing, true>
+                                       : pass_1<Real, StateReal, Any, NoPairTerms, true>,
                            0, tiles},
                           gradients, {});
   }
@@ -202,23 +203,22 @@ class Passes {
   template <class Halo>
   Pass1<Halo> pass_1_of(const Material& m) const {
     if constexpr (std::is_same_v<Halo, FusedClosed1>) {
-      return pass_1_of<PairTerm::closing, Halo>(m);
+      return pass_1_of<WithClosing, Halo>(m);
     } else {
       if constexpr (std::is_same_v<Halo, NoHalo>) {
-        if (m_.closed()) return pass_1_of<PairTerm::closing, Halo>(m);
+        if (m_.closed()) return pass_1_of<WithClosing, Halo>(m);
       }
-      return m.hourglass > 0 ? pass_1_of<PairTerm::hourglass, Halo>(m)
-                             : pass_1_of<PairTerm::none, Halo>(m);
+      return m.hourglass > 0 ? pass_1_of<WithHourglass, Halo>(m) : pass_1_of<NoPairTerms, Halo>(m);
     }
   }
-  template <PairTerm term, class Halo>
+  template <class Terms, class Halo>
   static Pass1<Halo> pass_1_of(const Material& m) {
-    if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, term, false, Halo>;
+    if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, Terms, false, Halo>;
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using WithVolume = SolidLaw<Law, Real>;
       return m.volume_stiffness > 0
-                 ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, term, false, Halo>)
-                 : cuda::pass_1<Real, StateReal, Law, term, false, Halo>;
+                 ? Pass1<Halo>(cuda::pass_1<Real, StateReal, WithVolume, Terms, false, Halo>)
+                 : cuda::pass_1<Real, StateReal, Law, Terms, false, Halo>;
     });
   }
   /// Returns the kernel of pass 1 with the linearisation of a law at rest.
@@ -226,19 +226,20 @@ class Passes {
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using Linear = decltype(std::declval<Law>().at_rest(Real()));
       if (m_.closed()) {
-        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, PairTerm::closing, false>);
+        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, WithClosing, false>);
       }
       return m_.fields().pull
-                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, PairTerm::hourglass, false>)
-                 : cuda::pass_1<Real, StateReal, Linear, PairTerm::none, false>;
+                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, WithHourglass, false>)
+                 : cuda::pass_1<Real, StateReal, Linear, NoPairTerms, false>;
     });
   }
   template <bool own_supports, class Halo>
   Pass2<Halo> pass_2_of(const Material& m) const {
     if (m_.closed()) {
       return m.damping > 0
-                 ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo, true>
-                 : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo, true>;
+                 ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo, WithClosing>
+                 : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo,
+                                WithClosing>;
     }
     const bool extra_forces = m_.fields().load || m_.fields().pull;
     if (m.damping > 0) {
@@ -249,11 +250,11 @@ class Passes {
                         : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Halo>;
   }
 
-  template <bool closed>
+  template <class Terms>
   Pass2<NoHalo> gather_of() const {
     return m_.own_supports()
-               ? cuda::pass_2<Real, StateReal, true, false, false, true, NoHalo, closed>
-               : cuda::pass_2<Real, StateReal, false, false, false, true, NoHalo, closed>;
+               ? cuda::pass_2<Real, StateReal, true, false, false, true, NoHalo, Terms>
+               : cuda::pass_2<Real, StateReal, false, false, false, true, NoHalo, Terms>;
   }
 
   template <class Halo>

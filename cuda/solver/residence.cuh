@@ -139,27 +139,27 @@ class Residence {
   }
   template <class Channel>
   void use_channel(const ResidentPlan& plan) {
-    kernel_ = m_.closed() ? m_.has_history() ? kernel<Channel, AnyLawWithHistory, true, true>()
-                                             : kernel<Channel, AnyLaw, true, true>()
+    kernel_ = m_.closed() ? m_.has_history() ? kernel<Channel, AnyLawWithHistory, WithClosing>()
+                                             : kernel<Channel, AnyLaw, WithClosing>()
                           : kernel_without_closing<Channel>();
     threads_ = Channel::threads;
     shared_bytes_ = ResidentMemory<Real>::bytes(
         plan.most_slots, plan.longest[0], second_longest(plan), stress_packets_each(),
         kept_weights(), Channel::bytes(plan.most_slots, plan.most_destinations));
   }
-  template <class Channel, class Law, bool controlled, bool closed>
+  template <class Channel, class Law, class Terms>
   static const void* kernel() {
-    return reinterpret_cast<const void*>(
-        resident_steps<Real, StateReal, Channel, Law, controlled, closed>);
+    return reinterpret_cast<const void*>(resident_steps<Real, StateReal, Channel, Law, Terms>);
   }
   template <class Channel>
   const void* kernel_without_closing() const {
-    // Only St Venant–Kirchhoff has a kernel without hourglass control; that of every other law
-    // includes it.
+    // Only the default law and the paper's have a kernel without hourglass control; that of every
+    // other law includes it, with κ = 0.
     const auto kernel_of = [&]<class Law>(std::type_identity<Law>) {
-      constexpr bool controlled = !std::is_same_v<Law, StVenantKirchhoff<Real>>;
-      return hourglass() ? kernel<Channel, Law, true, false>()
-                         : kernel<Channel, Law, controlled, false>();
+      constexpr bool common =
+          std::is_same_v<Law, StVenantKirchhoff<Real>> || std::is_same_v<Law, NeoHookean<Real>>;
+      using Fewest = std::conditional_t<common, NoPairTerms, WithHourglass>;
+      return hourglass() ? kernel<Channel, Law, WithHourglass>() : kernel<Channel, Law, Fewest>();
     };
     const auto& parts = m_.model().parts;
     const int law = chosen_law(parts.front().material).index;

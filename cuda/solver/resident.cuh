@@ -138,9 +138,9 @@ __device__ __forceinline__ bool stands_by(int number) {
   return false;
 }
 
-/// The weights that a block without closed gradients keeps.
-__device__ __forceinline__ KeptWeights weights_kept(bool hourglass) {
-  return hourglass ? KeptWeights::first_pass : KeptWeights::none;
+/// The weights that a block keeps whose terms send nothing.
+__device__ __forceinline__ KeptWeights weights_kept(bool weighted) {
+  return weighted ? KeptWeights::first_pass : KeptWeights::none;
 }
 
 /// Lets the next launch begin, and waits until the last one has written the state.
@@ -151,14 +151,14 @@ __device__ __forceinline__ void follow_last_launch() {
 
 /// Starts to copy the pairs of a slice, and the weights that its block keeps, into shared memory.
 /// @param weighted whether weights of the first pass are kept
-template <bool closed, class Real>
+template <class Terms, class Real>
 __device__ __forceinline__ void fetch_tables(const ResidentView<Real>& r, const Slice& slice,
                                              const ResidentMemory<Real>& memory, bool weighted) {
   fetch_pairs(r, slice.rows[0], memory.pairs);
   if (weighted) fetch_weights(r, slice.rows[0], memory.weights);
   if (r.longest[1]) {
     fetch_pairs(r, slice.rows[1], memory.second_pairs);
-    if constexpr (closed) fetch_weights(r, slice.rows[1], memory.second_weights);
+    if constexpr (Terms::sends) fetch_weights(r, slice.rows[1], memory.second_weights);
   }
 }
 
@@ -219,67 +219,33 @@ __device__ __forceinline__ void exchange(Channel& channel, int half, SlotImage i
 }
 
 /// Gathers the sums of a thread's phyxel over its neighbours in the first pass.
-/// @param sum receives Σ w u xᵀ. @param pull receives Σ w u, if `weighted`
+/// @param weighted whether terms need `NeighbourSums::pull`
 template <class Real>
-__device__ __forceinline__ void gather_gradient(const ResidentMemory<Real>& memory, int thread,
-                                                int length,
-                                                const typename Points<Real>::Value& point,
-                                                bool weighted, Mat3<Real>& sum, Vec3<Real>& pull) {
+__device__ __forceinline__ void gather_sums(const ResidentMemory<Real>& memory, int thread,
+                                            int length, const typename Points<Real>::Value& point,
+                                            bool weighted, NeighbourSums<Real>& sums) {
   walk_pairs<Real, displacement_packets<Real>>(
       memory.pairs + thread, length, memory.displacements,
       [&](const Real* u_j, Vec3<Real> wx, [[maybe_unused]] int entry) {
         const Vec3<Real> u_ij = Vec3<Real>{u_j[0], u_j[1], u_j[2]} - point.u;
-        add_gradient_term(sum, u_ij, wx);
-        if (weighted) add_pull(pull, u_ij, memory.weights[entry * slice_size + thread]);
+        add_gradient_term(sums.gradient, u_ij, wx);
+        if (weighted) add_pull(sums.pull, u_ij, memory.weights[entry * slice_size + thread]);
       });
 }
 
-/// The displacement gradient that the material feels: closed, if bodies have closed gradients.
-/// @param fit linear fit to the displacements. @param pull sum of `gather_gradient`
-template <bool closed, class Real>
-__device__ __forceinline__ Mat3<Real> gradient_of_material(Mat3<Real> fit, Vec3<Real> pull,
-                                                           Vec3<Real> moment_offset,
-                                                           Vec3<Real> closing) {
-  if constexpr (closed) {
-    return closed_gradient(fit, pull, moment_offset, closing);
-  } else {
-    return fit;
-  }
-}
-
-/// Adds the terms of closed gradients to the pair stress q. @param t receives the closing stress
-template <bool closed, class Real>
-__device__ __forceinline__ void add_closing(Mat3<Real>& q, Vec3<Real>& t, Real volume,
-                                            Mat3<Real> stress, Vec3<Real> closing,
-                                            Vec3<Real> moment_offset, Sym3<Real> inverse_moment) {
-  if constexpr (closed) {
-    t = closing_stress(volume, stress, closing);
-    q = closed_pair_stress(q, t, moment_offset, inverse_moment);
-  }
-}
-
-/// Adds hourglass control to the pair stress q. @param pull sum of `gather_gradient`, which becomes
-/// the hourglass force
-template <class Real>
-__device__ __forceinline__ void add_hourglass(Mat3<Real>& q, Vec3<Real>& pull, Real strength,
-                                              const Mat3<Real>& fit) {
-  q = with_hourglass(q, strength, fit);
-  pull = pull_force(strength, pull);
-}
-
 /// Gathers the internal force on a thread's phyxel, without the hourglass force.
-template <bool closed, class Real>
+template <class Terms, class Real>
 __device__ __forceinline__ Vec3<Real> find_force(const ResidentMemory<Real>& memory, int thread,
                                                  int length, Vec3<Real> moment_offset, Mat3<Real> q,
-                                                 Vec3<Real> t) {
+                                                 Vec3<Real> sent) {
   Vec3<Real> sum;
-  walk_pairs<Real, stress_packets<Real, closed>>(
+  walk_pairs<Real, stress_packets<Real, Terms::sends>>(
       memory.second_pairs + thread, length, memory.stresses,
       [&](const Real* n, Vec3<Real> wx, [[maybe_unused]] int entry) {
         const Mat3<Real> q_j{{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, {n[6], n[7], n[8]}}};
         add_neighbour_force(sum, q_j, wx);
-        if constexpr (closed) {
-          add_closing_force(sum, t, {n[9], n[10], n[11]},
+        if constexpr (Terms::sends) {
+          Terms::add_forces(sum, sent, {n[9], n[10], n[11]},
                             memory.second_weights[entry * slice_size + thread]);
         }
       });
@@ -303,9 +269,8 @@ __device__ __forceinline__ Vec3<StateReal> velocity_after(
 /// Takes steps. With a trail, half a step more finds the gradients of the last displacements.
 /// @param first_tag not used since the mail was last cleared, nor any up to first_tag + 2 steps + 1
 /// @tparam Law that of all bodies, `AnyLaw` or `AnyLawWithHistory`
-/// @tparam controlled some bodies may have hourglass control
-/// @tparam closed some bodies have closed gradients
-template <class Real, class StateReal, class Channel, class Law, bool controlled, bool closed>
+/// @tparam Terms a list of the pair terms that some bodies may have
+template <class Real, class StateReal, class Channel, class Law, class Terms>
 __global__ void __launch_bounds__(Channel::threads)
     resident_steps(const __grid_constant__ Fields<Real, StateReal> f,
                    const __grid_constant__ ResidentView<Real> r, StateReal dt, int steps,
@@ -315,20 +280,21 @@ __global__ void __launch_bounds__(Channel::threads)
   if (stands_by<Channel, Real>(number)) return;
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
-  const bool hourglass = controlled && (closed ? f.pull != nullptr : r.weights != nullptr);
-  const ResidentMemory<Real> memory(shared, r, stress_packets<Real, closed>,
-                                    closed ? KeptWeights::both_passes : weights_kept(hourglass));
+  const bool weighted = Terms::sends || (Terms::pulls && r.weights != nullptr);
+  const ResidentMemory<Real> memory(
+      shared, r, stress_packets<Real, Terms::sends>,
+      Terms::sends ? KeptWeights::both_passes : weights_kept(weighted));
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
-  fetch_tables<closed>(r, slice, memory, closed || hourglass);
+  fetch_tables<Terms>(r, slice, memory, weighted);
   const bool owner = thread < slice_size;
   const std::size_t place = static_cast<std::size_t>(slice.first_place) + (owner ? thread : 0);
-  Sym3<Real> inverse_moment;
-  Vec3<Real> moment_offset, closing;
-  Real volume{}, inverse_mass{};
+  PointConstants<Real> constants{};
+  Real inverse_mass{};
   if (owner) {
-    fetch_moment(f.moment_constants + place, f.places, inverse_moment, volume);
-    moment_offset = column3(f.force_constants, f.places, place);
-    if constexpr (closed) closing = column3(f.closing, f.places, place);
+    fetch_moment(f.moment_constants + place, f.places, constants.inverse_moment, constants.volume);
+    constants.moment_offset = column3(f.force_constants, f.places, place);
+    if constexpr (Terms::sends) constants.closing = column3(f.closing, f.places, place);
+    constants.hourglass = body.hourglass;
     inverse_mass = f.force_constants[3 * f.places + place];
   }
   const bool somebody = owner && inverse_mass != Real(0);
@@ -350,13 +316,12 @@ __global__ void __launch_bounds__(Channel::threads)
   }
   for (int step = 0; step < steps + (trail.gradients ? 1 : 0); ++step) {
     exchange_displacements(channel, memory.displacements, place, somebody, point.u);
-    Mat3<Real> q;
-    Vec3<Real> pull, t;
+    PointStress<Real> spread;
     if (owner) {
-      Mat3<Real> sum;
-      gather_gradient<Real>(memory, thread, length, point, closed || hourglass, sum, pull);
-      const Mat3<Real> fit = displacement_gradient(sum, inverse_moment);
-      const Mat3<Real> grad_u = gradient_of_material<closed>(fit, pull, moment_offset, closing);
+      NeighbourSums<Real> sums;
+      gather_sums<Real>(memory, thread, length, point, weighted, sums);
+      const Mat3<Real> fit = displacement_gradient(sums.gradient, constants.inverse_moment);
+      const Mat3<Real> grad_u = Terms::gradient(fit, sums, constants);
       if (trail.gradients && step > 0) {
         const auto before = static_cast<std::size_t>(step - 1) * f.places;
         for (int e = 0; e < 9; ++e)
@@ -365,18 +330,20 @@ __global__ void __launch_bounds__(Channel::threads)
       }
       const HistoryUse use = step == steps ? HistoryUse::trial : HistoryUse::commit;
       const Mat3<Real> stress = stress_of_material<Law>(body, grad_u, history, use, Real(dt));
-      q = pair_stress(volume, stress, inverse_moment);
-      add_closing<closed>(q, t, volume, stress, closing, moment_offset, inverse_moment);
-      if (hourglass) add_hourglass(q, pull, body.hourglass, fit);
+      spread = Terms::stresses(stress, fit, sums, constants);
     }
     if (step == steps) break;
+    const Mat3<Real>& q = spread.pair_stress;
+    const Vec3<Real> t = spread.closing_stress;
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1), q(1, 2),
                             q(2, 0), q(2, 1), q(2, 2), t.x,     t.y,     t.z};
-    exchange<stress_packets<Real, closed>>(channel, 1, memory.stresses, place, somebody, numbers);
+    exchange<stress_packets<Real, Terms::sends>>(channel, 1, memory.stresses, place, somebody,
+                                                 numbers);
     if (owner) {
-      Vec3<Real> sum = find_force<closed>(memory, thread, second_length, moment_offset, q, t);
+      Vec3<Real> sum =
+          find_force<Terms>(memory, thread, second_length, constants.moment_offset, q, t);
       if (inverse_mass > Real(0)) {
-        if (hourglass) sum += pull;
+        if constexpr (Terms::template has<HourglassControl>) sum += spread.hourglass_force;
         if (f.load) sum += load;
         velocity = velocity_after(velocity, sum, inverse_mass, f, dt, body);
         displacement = fused(dt, velocity, displacement);

@@ -97,8 +97,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     std::vector<Vec3d> by_slot(static_cast<std::size_t>(layout_.slots()));
 #pragma omp parallel for schedule(static) num_threads(threads_)
     for (Index p = 0; p < layout_.packs(); ++p) {
-      Vec3<P> f =
-          closing_.empty() ? this->template force_of<false>(p) : this->template force_of<true>(p);
+      Vec3<P> f = closing_.empty() ? this->template force_of<NoPairTerms>(p)
+                                   : this->template force_of<WithClosing>(p);
       if (!pull_.empty()) f += this->template vec3_of<P>(pull_, p);
       for (int l = 0; l < W; ++l) by_slot[p * W + l] = {f.x[l], f.y[l], f.z[l]};
     }

@@ -214,10 +214,10 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     return sums;
   }
   /// Loads the constants of the phyxels of pack p that their stresses depend on.
-  template <bool closed>
+  template <class Terms>
   PHYXEL_HD PointConstants<P> constants_of(Index p, P hourglass) const {
     PointConstants<P> point{load<P>(&volume_[p * W]), this->inverse_moment_of(p), hourglass};
-    if constexpr (closed) {
+    if constexpr (Terms::sends) {
       point.moment_offset = this->template vec3_of<P>(moment_offset_, p);
       point.closing = this->template vec3_of<P>(closing_, p);
     }
@@ -225,18 +225,18 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   }
   /// Returns ∇u of the phyxels of pack p, closed if gradients are.
   Mat3<P> whole_gradient_of(Index p) const {
-    if (closing_.empty()) {
-      return displacement_gradient(sums_of<false>(p).gradient, this->inverse_moment_of(p));
-    }
-    const NeighbourSums<P> sums = sums_of<true>(p);
-    const PointConstants<P> point = constants_of<true>(p, P(0));
-    return seen_gradient<true>(displacement_gradient(sums.gradient, point.inverse_moment),
-                               sums.pull, point);
+    return closing_.empty() ? whole_gradient_of<NoPairTerms>(p) : whole_gradient_of<WithClosing>(p);
+  }
+  template <class Terms>
+  Mat3<P> whole_gradient_of(Index p) const {
+    const NeighbourSums<P> sums = sums_of<Terms::pulls>(p);
+    const PointConstants<P> point = constants_of<Terms>(p, P(0));
+    return Terms::gradient(displacement_gradient(sums.gradient, point.inverse_moment), sums, point);
   }
 
   /// Returns the internal forces [N] on the phyxels of pack p without the own force of hourglass
   /// control.
-  template <bool Closed>
+  template <class Terms>
   PHYXEL_HD Vec3<P> force_of(Index p) const {
     const PackedLists& lists = inverse_.start.empty() ? lists_ : inverse_;
     Index own[W];
@@ -245,16 +245,14 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     load_records<StressRecord::size>(stresses_.data(), own, record);
     const Vec3<P> x_i = this->vec3_at(record, StressRecord::position);
     Vec3<P> force = own_force(this->mat3_at(record), this->template vec3_of<P>(moment_offset_, p));
-    const Vec3<P> t_i = this->vec3_at(record, StressRecord::closing_stress);
+    const Vec3<P> sent_i = this->vec3_at(record, StressRecord::closing_stress);
     const Index* end = lists.indices.data() + lists.start[p + 1];
     for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
       load_records<StressRecord::size>(stresses_.data(), j, record);
       const Vec3<P> x_ij = this->vec3_at(record, StressRecord::position) - x_i;
       const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
       add_neighbour_force(force, this->mat3_at(record), x_ij, w_ji);
-      if constexpr (Closed) {
-        add_closing_force(force, t_i, this->vec3_at(record, StressRecord::closing_stress), w_ji);
-      }
+      Terms::add_forces(force, sent_i, this->vec3_at(record, StressRecord::closing_stress), w_ji);
     }
     return force;
   }
@@ -265,28 +263,25 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   void find_stresses(const std::vector<Run>& runs, HistoryUse use) {
     for (const Run& run : runs) {
       for_each_law(run, use, [&](const auto& stress_of) {
-        if (!closing_.empty()) {
-          find_stresses<true, true>(stress_of, run);  // costs no more than closed gradients alone
-        } else {
-          run.hourglass > 0 ? find_stresses<true, false>(stress_of, run)
-                            : find_stresses<false, false>(stress_of, run);
-        }
+        if (!closing_.empty()) return find_stresses<WithClosing>(stress_of, run);
+        run.hourglass > 0 ? find_stresses<WithHourglass>(stress_of, run)
+                          : find_stresses<NoPairTerms>(stress_of, run);
       });
     }
   }
   /// Computes the stresses of a run. @param stress_of function that returns P [Pa] of a pack and
   /// its ∇u
-  template <bool Controlled, bool Closed, class StressOf>
+  template <class Terms, class StressOf>
   void find_stresses(const StressOf& stress_of, const Run& run) {
     const PackRange range = run.range;
     const P kappa(static_cast<Real>(run.hourglass));
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
-      const PointStress<P> stress = point_stress<Controlled, Closed>(
-          sums_of < Controlled || Closed > (p), constants_of<Closed>(p, kappa),
-          [&](const Mat3<P>& grad_u) { return stress_of(p, grad_u); });
-      if constexpr (Closed) this->store_closing_stress(p, stress.closing_stress);
-      if constexpr (Controlled) {
+      const PointStress<P> stress =
+          point_stress<Terms>(sums_of<Terms::pulls>(p), constants_of<Terms>(p, kappa),
+                              [&](const Mat3<P>& grad_u) { return stress_of(p, grad_u); });
+      if constexpr (Terms::sends) this->store_closing_stress(p, stress.closing_stress);
+      if constexpr (Terms::template has<HourglassControl>) {
         if (!pull_.empty()) this->store3(pull_, p, stress.hourglass_force);
       }
       this->store_pair_stress(p, stress.pair_stress);
@@ -385,19 +380,23 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
 
   /// Takes a step of the phyxels of a run, with code compiled for the terms of the scene.
   void advance_run(const Run& run, double dt) {
-    const bool damped = run.material.damping > 0;
     if (!closing_.empty()) {
-      damped ? advance_run<true, true, true>(run, dt) : advance_run<false, true, true>(run, dt);
+      advance_run_with<true, WithClosing>(run, dt);
     } else if (applied_.empty() && pull_.empty()) {
-      damped ? advance_run<true, false>(run, dt) : advance_run<false, false>(run, dt);
+      advance_run_with<false, NoPairTerms>(run, dt);
     } else {
-      damped ? advance_run<true, true>(run, dt) : advance_run<false, true>(run, dt);
+      advance_run_with<true, NoPairTerms>(run, dt);
     }
+  }
+  template <bool More, class Terms>
+  void advance_run_with(const Run& run, double dt) {
+    run.material.damping > 0 ? advance_run<true, More, Terms>(run, dt)
+                             : advance_run<false, More, Terms>(run, dt);
   }
 
   /// Sums force and gravity and takes the Verlet step. @tparam More true if hourglass or applied
   /// forces may act
-  template <bool Damped, bool More, bool Closed = false>
+  template <bool Damped, bool More, class Terms>
   void advance_run(const Run& run, double dt) {
     const DampedFlow flow = damped_flow(run.material.damping, dt);
     const S keep(flow.keep), gain(flow.gain), step(dt);
@@ -405,7 +404,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     const PackRange range = run.range;
 #pragma omp parallel for schedule(static) num_threads(threads_for(range))
     for (Index p = range.begin; p < range.end; ++p) {
-      Vec3<P> force = force_of<Closed>(p);
+      Vec3<P> force = force_of<Terms>(p);
       if constexpr (More) {
         if (!pull_.empty()) force += this->template vec3_of<P>(pull_, p);
         if (!applied_.empty()) force += this->template vec3_of<P>(applied_, p);

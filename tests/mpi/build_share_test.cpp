@@ -9,6 +9,7 @@
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <set>
 
 #include "../partition/bodies.hpp"
 #include "host_surveyor.hpp"
@@ -184,6 +185,26 @@ BuildCase mixed() {
   for (const BodyRequest& request : c.scene.bodies) c.clouds.push_back(make_cloud(request));
   return c;
 }
+/// A hundred regions that overlap, in bodies of one and of two materials.
+BuildCase many_regions() {
+  BuildCase c{"ManyRegions", {.bodies = {shape("beam", 0.2), shape("block", 0.19)}}, {}};
+  Material stiff = c.scene.bodies[1].material;
+  stiff.young *= 2;
+  c.scene.bodies[1].inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0, 0, 0}, 0.4}}, .material = stiff});
+  for (BodyRequest& body : c.scene.bodies) {
+    Cloud cloud = make_cloud(body);
+    const auto size = static_cast<Index>(cloud.position.size());
+    for (Index k = 0; k < 100; ++k) {
+      const std::string name = "region " + std::to_string(k);
+      const std::set<Index> members{k, (k * k) % size, (7 * k) % size, size - 1 - k};
+      cloud.regions[name].assign(members.begin(), members.end());
+      body.loads.push_back({.select = {.region = name}, .force = {0, 0, 1.0 + k}});
+    }
+    c.clouds.push_back(std::move(cloud));
+  }
+  return c;
+}
 /// Closed bodies of every kind of volume, one of which has a spike that no phyxel reaches.
 BuildCase closed_alone() {
   BuildCase c{"ClosedAlone", {.bodies = {shape("sphere", 0.25), shape("beam", 0.25)}}, {}};
@@ -199,9 +220,9 @@ BuildCase closed_alone() {
 }
 
 const std::vector<BuildCase>& build_cases() {
-  static const std::vector<BuildCase> cases{beam(),       rules(),  nearest(), small(),
-                                            degenerate(), lumps(),  astray(),  lattice(),
-                                            included(),   closed(), mixed(),   closed_alone()};
+  static const std::vector<BuildCase> cases{
+      beam(),    rules(),    nearest(), small(), degenerate(),   lumps(),       astray(),
+      lattice(), included(), closed(),  mixed(), closed_alone(), many_regions()};
   return cases;
 }
 

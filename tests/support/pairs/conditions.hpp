@@ -23,7 +23,6 @@ struct Condition {
   const char* reason;
   /// Changes a scene that is computed, and its body, into what is refused.
   std::function<void(Scene&, Cloud&)> change;
-  int least_ranks = 1;  ///< Fewer ranks compute the scene.
 };
 inline void PrintTo(const Condition& condition, std::ostream* out) { *out << condition.what; }
 
@@ -92,20 +91,7 @@ inline const std::vector<Condition>& conditions() {
        "the part of the body's own material carries its surfels",
        [](Scene& scene, Cloud&) {
          scene.bodies[0].inclusions.push_back({in_box({-9, -9, -9}, {9, 9, 9}), rubber()});
-       }},
-      {"ManyRegions",
-       "more than 32 named regions that are fixed, moved or loaded, on several ranks",
-       {"has more than 32 regions that are fixed, moved or loaded", "allowed are 32"},
-       "ranks send the regions of a phyxel as the bits of one word; boxes and balls have no limit, "
-       "nor have lists of indices in bodies without inclusions",
-       [](Scene& scene, Cloud& cloud) {
-         for (Index k = 0; k < 33; ++k) {
-           const std::string name = "region " + std::to_string(k);
-           cloud.regions[name] = {k, k + 40};
-           scene.bodies[0].loads.push_back({.select = {.region = name}, .force = {0, 0, 0.01}});
-         }
-       },
-       2}};
+       }}};
   return all;
 }
 

@@ -14,6 +14,7 @@
 ///   f_j = Σ_k w_jk ((Q_j + Q_k) x_jk + t_j - t_k),   t = T ĉ,   Q = (T - t bᵀ) A⁻¹.
 #pragma once
 
+#include "phyxel/physics/pair_term.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -46,5 +47,29 @@ template <class Real>
 PHYXEL_HD void add_closing_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t_j, Real w_ij) {
   force = fused(w_ij, t_i - t_j, force);
 }
+
+/// The pair term of closed gradients. It sends closing stresses.
+struct ClosedGradients : PairTerm {
+  static constexpr bool sends = true;
+
+  template <class Real>
+  PHYXEL_HD static void change_gradient(Mat3<Real>& grad_u, const Mat3<Real>& fit,
+                                        const NeighbourSums<Real>& sums,
+                                        const PointConstants<Real>& point) {
+    grad_u = closed_gradient(fit, sums.pull, point.moment_offset, point.closing);
+  }
+  template <class Real>
+  PHYXEL_HD static void change_stress(PointStress<Real>& result, const Mat3<Real>& stress,
+                                      const Mat3<Real>& /*fit*/, const NeighbourSums<Real>&,
+                                      const PointConstants<Real>& point) {
+    result.closing_stress = closing_stress(point.volume, stress, point.closing);
+    result.pair_stress = closed_pair_stress(result.pair_stress, result.closing_stress,
+                                            point.moment_offset, point.inverse_moment);
+  }
+  template <class Real>
+  PHYXEL_HD static void add_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t_j, Real w_ij) {
+    add_closing_force(force, t_i, t_j, w_ij);
+  }
+};
 
 }  // namespace phyxel

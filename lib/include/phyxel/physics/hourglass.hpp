@@ -12,6 +12,7 @@
 /// for it.
 #pragma once
 
+#include "phyxel/physics/pair_term.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -30,12 +31,6 @@ inline double hourglass_stiffness(double strength, double young, double volume, 
          (sphere * integral * support * support * support);
 }
 
-/// Adds one neighbour's term to Σ_j w_ij (u_j - u_i) [m].
-template <class Real>
-PHYXEL_HD void add_pull(Vec3<Real>& sum, Vec3<Real> u_ij, Real w) {
-  sum = fused(w, u_ij, sum);
-}
-
 /// The force 2 κ Σ_j w_ij (u_j - u_i) [N] of hourglass control. @param pull the sum [m]
 template <class Real>
 PHYXEL_HD Vec3<Real> pull_force(Real kappa, Vec3<Real> pull) {
@@ -48,6 +43,17 @@ PHYXEL_HD Mat3<Real> with_hourglass(const Mat3<Real>& pair_stress, Real kappa,
                                     const Mat3<Real>& grad_u) {
   return fused(-kappa, grad_u, pair_stress);
 }
+
+/// The pair term of hourglass control.
+struct HourglassControl : PairTerm {
+  template <class Real>
+  PHYXEL_HD static void change_stress(PointStress<Real>& result, const Mat3<Real>& /*stress*/,
+                                      const Mat3<Real>& fit, const NeighbourSums<Real>& sums,
+                                      const PointConstants<Real>& point) {
+    result.pair_stress = with_hourglass(result.pair_stress, point.hourglass, fit);
+    result.hourglass_force = pull_force(point.hourglass, sums.pull);
+  }
+};
 
 /// Adds one neighbour's term to Σ_j w_ij |r_ij|² [m²].
 template <class Real>
