@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Compares the speed of two commits: builds both and runs them in turn, so that other load affects both alike.
 
-    scripts/compare_commits.py main~5 main [--rounds 5] [--preset cpu] [-- options of phyxel bench step]
+    scripts/compare_commits.py main~5 main [--rounds 5] [--preset cpu] [--csv table.csv] [-- options of phyxel bench step]
 
 Each is built in build/commits/, once. The table shows medians of the rounds; a difference within their spread is
-called none.
+called none. With --csv, it is added to a file of comparisons, which is made if there is none.
 """
 import argparse
 import csv
@@ -50,6 +50,7 @@ def main():
     parser.add_argument("after")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--preset", default="cpu")
+    parser.add_argument("--csv", type=pathlib.Path)
     words = sys.argv[1:]
     options = words[words.index("--") + 1:] if "--" in words else []
     asked = parser.parse_args(words[:words.index("--")] if "--" in words else words)
@@ -60,6 +61,7 @@ def main():
             for key, speed in measured(programs[side][1], options).items():
                 speeds[side].setdefault(key, []).append(speed)
     print(f"{asked.rounds} rounds; phyxel-steps/s of {programs[0][0]} and {programs[1][0]}")
+    rows = []
     for key in speeds[0]:
         if key not in speeds[1]:
             print(f"  {' '.join(key):48} only before")
@@ -69,6 +71,16 @@ def main():
         change = after / before - 1
         verdict = "none" if abs(change) <= spread else f"{change:+.1%}"
         print(f"  {' '.join(key):48} {before:.4g} {after:.4g}  {verdict:>7} (spread {spread:.1%})")
+        rows.append([programs[0][0], programs[1][0], asked.rounds, *key, f"{before:.4g}", f"{after:.4g}",
+                     f"{after / before:.4f}", f"{spread:.4f}"])
+    if asked.csv:
+        is_new = not asked.csv.exists()
+        with open(asked.csv, "a", newline="") as file:
+            table = csv.writer(file, lineterminator="\n")
+            if is_new:
+                table.writerow(["before", "after", "rounds", *KEYS, "phyxel_steps_per_s_before", "phyxel_steps_per_s_after",
+                                "ratio", "spread"])
+            table.writerows(rows)
 
 
 if __name__ == "__main__":
