@@ -138,9 +138,12 @@ __device__ __forceinline__ bool stands_by(int number) {
   return false;
 }
 
-/// The weights that a block keeps whose terms send nothing.
+/// The weights that a block keeps. @param weighted whether terms need those of the first pass
+template <class Terms>
 __device__ __forceinline__ KeptWeights weights_kept(bool weighted) {
-  return weighted ? KeptWeights::first_pass : KeptWeights::none;
+  return Terms::sends ? KeptWeights::both_passes
+         : weighted   ? KeptWeights::first_pass
+                      : KeptWeights::none;
 }
 
 /// Lets the next launch begin, and waits until the last one has written the state.
@@ -281,9 +284,8 @@ __global__ void __launch_bounds__(Channel::threads)
   const Slice& slice = r.slices[number];
   const int thread = static_cast<int>(threadIdx.x);
   const bool weighted = Terms::sends || (Terms::pulls && r.weights != nullptr);
-  const ResidentMemory<Real> memory(
-      shared, r, stress_packets<Real, Terms::sends>,
-      Terms::sends ? KeptWeights::both_passes : weights_kept(weighted));
+  const ResidentMemory<Real> memory(shared, r, stress_packets<Real, Terms::sends>,
+                                    weights_kept<Terms>(weighted));
   const TileConstants<Real, StateReal> body = f.tiles[slice.first_place / tile_size];
   fetch_tables<Terms>(r, slice, memory, weighted);
   const bool owner = thread < slice_size;
@@ -333,8 +335,7 @@ __global__ void __launch_bounds__(Channel::threads)
       spread = Terms::stresses(stress, fit, sums, constants);
     }
     if (step == steps) break;
-    const Mat3<Real>& q = spread.pair_stress;
-    const Vec3<Real> t = spread.closing_stress;
+    const auto& [q, hourglass_force, t] = spread;
     const Real numbers[] = {q(0, 0), q(0, 1), q(0, 2), q(1, 0), q(1, 1), q(1, 2),
                             q(2, 0), q(2, 1), q(2, 2), t.x,     t.y,     t.z};
     exchange<stress_packets<Real, Terms::sends>>(channel, 1, memory.stresses, place, somebody,
@@ -343,7 +344,7 @@ __global__ void __launch_bounds__(Channel::threads)
       Vec3<Real> sum =
           find_force<Terms>(memory, thread, second_length, constants.moment_offset, q, t);
       if (inverse_mass > Real(0)) {
-        if constexpr (Terms::template has<HourglassControl>) sum += spread.hourglass_force;
+        if constexpr (Terms::template has<HourglassControl>) sum += hourglass_force;
         if (f.load) sum += load;
         velocity = velocity_after(velocity, sum, inverse_mass, f, dt, body);
         displacement = fused(dt, velocity, displacement);

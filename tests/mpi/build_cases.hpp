@@ -1,0 +1,217 @@
+/// Scenes whose shares ranks build together: one for each kind of body that is made in a way of its
+/// own.
+#pragma once
+
+#include <algorithm>
+#include <ostream>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "../partition/bodies.hpp"
+
+namespace phyxel {
+
+struct BuildCase {
+  const char* name;
+  Scene scene;
+  std::vector<Cloud> clouds;  ///< Empty: from the scene's sources.
+};
+inline void PrintTo(const BuildCase& c, std::ostream* out) { *out << c.name; }
+
+inline BodyRequest shape(const char* name, double spacing) {
+  BodyRequest body;
+  body.name = name;
+  body.where = "test";
+  body.source.shape.name = name;
+  body.source.shape.spacing = spacing;
+  body.source.shape.size = {3, 1, 1};
+  body.source.shape.radius = 1;
+  body.source.shape.jitter = 0.2;
+  body.material = testing::rubber();
+  return body;
+}
+
+inline BuildCase beam() {
+  BodyRequest body = shape("beam", 0.09);
+  body.rotation = {10, 20, 30};
+  body.scale = 1.5;
+  body.translation = {1, 2, 3};
+  body.fixed.push_back({.select = {.region = "x-"}});
+  body.motions.push_back(
+      {.select = {.indices = std::vector<Index>{7, 1500, 2000}}, .velocity = {0.1, 0, 0}});
+  body.loads.push_back({.select = {.region = "x+"}, .force = {3, 0, 1}, .ramp = 0.01});
+  body.loads.push_back({.select = {.ball = Selection::Ball{{1, 2, 3}, 2}}, .force = {0, 0.1, 0}});
+  body.loads.push_back({.select = {.all = true}, .force_density = {0, 0, 2}});
+  return {"Beam", {.bodies = {body}}, {}};
+}
+/// One of each shape and rule.
+inline BuildCase rules() {
+  BuildCase c{"Rules", {}, {}};
+  c.scene.bodies = {shape("sphere", 0.17), shape("cylinder", 0.2), shape("block", 0.21),
+                    shape("horn_bug", 0), shape("beam", 0.16)};
+  c.scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  c.scene.bodies[0].volume_rule = VolumeRule::kernel;
+  c.scene.bodies[1].source.shape.length = 2;
+  c.scene.bodies[2].neighbourhood.radius = 0.4;
+  c.scene.bodies[2].volume_rule = VolumeRule::kernel;
+  c.scene.bodies[2].neighbourhood.nearest = 30;
+  c.scene.bodies[3].fixed.push_back({.select = {.indices = std::vector<Index>{0, 1, 100}}});
+  c.scene.bodies[4].neighbourhood.nearest = 100;
+  return c;
+}
+inline BuildCase nearest() {
+  BuildCase c{"Nearest", {}, {}};
+  c.scene.bodies = {shape("sphere", 0.15), shape("block", 0.2)};
+  c.scene.bodies[0].neighbourhood.max_neighbours = 20;
+  c.scene.bodies[1].volume_rule = VolumeRule::kernel;
+  return c;
+}
+inline Scene plain(std::size_t bodies = 1) {
+  Scene scene = testing::one_body();
+  scene.bodies.resize(bodies, scene.bodies[0]);
+  return scene;
+}
+inline BuildCase small() {
+  return {"Small",
+          plain(4),
+          {testing::lattice(5, 1, 1, 0.1), testing::lattice(1, 1, 1, 0.1),
+           testing::lattice(2, 1, 1, 0.1), testing::lattice(20, 12, 9, 0.1, 0.3)}};
+}
+/// Flat, and some twice at one place.
+inline BuildCase degenerate() {
+  Cloud sheet = testing::lattice(30, 20, 1, 0.1);
+  for (const Index i : {3, 50, 420}) {
+    sheet.position.push_back(sheet.position[i]);
+    sheet.volume.push_back(sheet.volume[i]);
+  }
+  return {"Degenerate", plain(), {sheet}};
+}
+/// Neighbours exactly as far as the support, where only rounding says who is one.
+inline BuildCase lattice() {
+  BuildCase c{"Lattice", {}, {}};
+  c.scene.bodies = {shape("beam", 0.13), shape("block", 0.37)};
+  for (BodyRequest& body : c.scene.bodies) {
+    body.source.shape.jitter = 0;
+    body.translation = {1.8, 6.7, 0.908358};
+  }
+  c.scene.bodies[0].source.shape.size = {30 * 0.13, 7 * 0.13, 5 * 0.13};
+  c.scene.bodies[0].neighbourhood.radius = 0.13;
+  c.scene.bodies[1].source.shape.size = {20 * 0.37, 9 * 0.37, 8 * 0.37};
+  c.scene.bodies[1].neighbourhood.radius = 2 * 0.37;
+  return c;
+}
+/// Two lumps, the spacing of one ten times the other's, with surfels, some of them far away.
+inline BuildCase lumps() {
+  Cloud cloud = testing::lattice(14, 14, 14, 0.1, 0.2);
+  for (const Vec3d& p : testing::lattice(6, 6, 6, 1, 0.2).position) {
+    cloud.position.push_back(p + Vec3d{40, 0, 0});
+    cloud.volume.push_back(1);
+  }
+  for (int k = 0; k < 300; ++k) {
+    cloud.surface.position.push_back({0.15 * k, 0.6 + 0.001 * k, 0.7});
+    cloud.surface.normal.push_back({0, 0, 1});
+  }
+  return {"Lumps", plain(), {cloud}};
+}
+
+/// A body whose surfels all lie on the phyxels of the next one, which do not carry them.
+inline BuildCase astray() {
+  std::vector<Cloud> clouds{testing::lattice(6, 6, 6, 0.1, 0.2),
+                            testing::lattice(5, 5, 5, 0.1, 0.2),
+                            testing::lattice(4, 4, 4, 0.1, 0.2)};
+  for (Vec3d& p : clouds[1].position) p += Vec3d{7, 0, 0};
+  clouds[0].surface.position = clouds[1].position;
+  clouds[0].surface.normal.assign(clouds[1].position.size(), {0, 0, 1});
+  return {"Astray", plain(3), clouds};
+}
+
+/// Two materials in one body, on which something pulls, beside another body.
+inline BuildCase included() {
+  BodyRequest body = shape("block", 0.17);
+  Material stiff = body.material;
+  stiff.young *= 10;
+  stiff.density *= 3;
+  body.inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0.4, 0, 0}, 0.45}}, .material = stiff});
+  body.fixed.push_back({.select = {.region = "x-"}});
+  body.loads.push_back({.select = {.region = "x+"}, .force = {3, 0, 1}});
+  return {"Included", {.bodies = {body, shape("beam", 0.2)}}, {}};
+}
+/// Closed gradients in a body of two materials, beside a body that has none.
+inline BuildCase closed() {
+  BuildCase c = included();
+  c.name = "Closed";
+  c.scene.bodies[0].closure = 1e-3;
+  c.scene.bodies[0].loads.push_back({.select = {.all = true}, .force_density = {0, 0, 2}});
+  return c;
+}
+
+/// Inclusions of which one covers another whole, and boundaries that list phyxels by number, which
+/// are those of the cloud whatever the order by material.
+inline BuildCase mixed() {
+  BuildCase c{"Mixed", {.bodies = {shape("beam", 0.2), shape("block", 0.19)}}, {}};
+  BodyRequest& body = c.scene.bodies[1];
+  Material soft = body.material, stiff = body.material;
+  soft.young /= 3;
+  stiff.young *= 2;
+  stiff.density *= 5;
+  body.inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0, 0, 0}, 0.2}}, .material = soft});
+  body.inclusions.push_back(
+      {.select = {.indices = std::vector<Index>{2, 390, 3, 77}}, .material = soft});
+  body.inclusions.push_back(
+      {.select = {.box = Selection::Box{{-0.4, -0.4, -0.4}, {2, 2, 2}}}, .material = stiff});
+  body.fixed.push_back(
+      {.select = {.indices = std::vector<Index>{390, 0, 5}}, .axes = {true, false, false}});
+  body.fixed.push_back({.select = {.region = "x-"}, .axes = {false, true, false}});
+  body.motions.push_back(
+      {.select = {.indices = std::vector<Index>{77, 150}}, .velocity = {0.1, 0, 0}});
+  body.loads.push_back({.select = {.region = "x-"}, .force = {3, 0, 1}});
+  body.loads.push_back({.select = {.ball = Selection::Ball{{1, 0, 0}, 0.8}}, .force = {0, 1, 1}});
+  // Of which each rank takes a piece with phyxels of all materials.
+  for (const BodyRequest& request : c.scene.bodies) c.clouds.push_back(make_cloud(request));
+  return c;
+}
+/// A hundred regions that overlap, in bodies of one and of two materials.
+inline BuildCase many_regions() {
+  BuildCase c{"ManyRegions", {.bodies = {shape("beam", 0.2), shape("block", 0.19)}}, {}};
+  Material stiff = c.scene.bodies[1].material;
+  stiff.young *= 2;
+  c.scene.bodies[1].inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0, 0, 0}, 0.4}}, .material = stiff});
+  for (BodyRequest& body : c.scene.bodies) {
+    Cloud cloud = make_cloud(body);
+    const auto size = static_cast<Index>(cloud.position.size());
+    for (Index k = 0; k < 100; ++k) {
+      const std::string name = "region " + std::to_string(k);
+      const std::set<Index> members{k, (k * k) % size, (7 * k) % size, size - 1 - k};
+      cloud.regions[name].assign(members.begin(), members.end());
+      body.loads.push_back({.select = {.region = name}, .force = {0, 0, 1.0 + k}});
+    }
+    c.clouds.push_back(std::move(cloud));
+  }
+  return c;
+}
+/// Closed bodies of every kind of volume, one of which has a spike that no phyxel reaches.
+inline BuildCase closed_alone() {
+  BuildCase c{"ClosedAlone", {.bodies = {shape("sphere", 0.25), shape("beam", 0.25)}}, {}};
+  for (BodyRequest& body : c.scene.bodies) body.closure = 1e-2;
+  c.scene.bodies[1].volume_rule = VolumeRule::kernel;
+  c.scene.bodies[1].loads.push_back({.select = {.region = "x+"}, .force_density = {1, 0, 2}});
+  for (const BodyRequest& body : c.scene.bodies) c.clouds.push_back(make_cloud(body));
+  Surface& surface = c.clouds[0].surface;
+  const auto top = std::max_element(surface.position.begin(), surface.position.end(),
+                                    [](Vec3d a, Vec3d b) { return a.z < b.z; });
+  top->z += 1.5;
+  return c;
+}
+
+inline const std::vector<BuildCase>& build_cases() {
+  static const std::vector<BuildCase> cases{
+      beam(),    rules(),    nearest(), small(), degenerate(),   lumps(),       astray(),
+      lattice(), included(), closed(),  mixed(), closed_alone(), many_regions()};
+  return cases;
+}
+
+}  // namespace phyxel
