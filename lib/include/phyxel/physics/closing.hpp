@@ -52,12 +52,14 @@ PHYXEL_HD void add_closing_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t
 struct ClosedGradients : PairTerm {
   static constexpr bool sends = true;
 
+  /// Replaces the fit by the closed gradient.
   template <class Real>
   PHYXEL_HD static void change_gradient(Mat3<Real>& grad_u, const Mat3<Real>& fit,
                                         const NeighbourSums<Real>& sums,
                                         const PointConstants<Real>& point) {
     grad_u = closed_gradient(fit, sums.pull, point.moment_offset, point.closing);
   }
+  /// Sets the closing stress, and makes the pair stress that of closed gradients.
   template <class Real>
   PHYXEL_HD static void change_stress(PointStress<Real>& result, const Mat3<Real>& stress,
                                       const Mat3<Real>& /*fit*/, const NeighbourSums<Real>&,
@@ -66,6 +68,7 @@ struct ClosedGradients : PairTerm {
     result.pair_stress = closed_pair_stress(result.pair_stress, result.closing_stress,
                                             point.moment_offset, point.inverse_moment);
   }
+  /// Adds the force of the closing stresses of two neighbours.
   template <class Real>
   PHYXEL_HD static void add_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t_j, Real w_ij) {
     add_closing_force(force, t_i, t_j, w_ij);

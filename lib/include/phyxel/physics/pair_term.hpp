@@ -51,21 +51,27 @@ struct PairTerm {
   /// True if the second pass needs the term's vector in `PointStress` of each neighbour.
   static constexpr bool sends = false;
 
-  /// Changes the displacement gradient ∇u that the law is given. @param fit the linear fit of the
-  /// neighbours' displacements
+  /// Changes the displacement gradient ∇u that the law is given.
+  /// @param fit the linear fit of the neighbours' displacements
   template <class Real>
-  PHYXEL_HD static void change_gradient(Mat3<Real>& /*grad_u*/, const Mat3<Real>& /*fit*/,
-                                        const NeighbourSums<Real>&, const PointConstants<Real>&) {}
-  /// Changes the stresses of a phyxel. @param stress P [Pa] of the law
+  PHYXEL_HD static void change_gradient([[maybe_unused]] Mat3<Real>& grad_u,
+                                        [[maybe_unused]] const Mat3<Real>& fit,
+                                        [[maybe_unused]] const NeighbourSums<Real>& sums,
+                                        [[maybe_unused]] const PointConstants<Real>& point) {}
+  /// Changes the stresses of a phyxel.
+  /// @param stress P [Pa] of the law. @param fit as above
   template <class Real>
-  PHYXEL_HD static void change_stress(PointStress<Real>&, const Mat3<Real>& /*stress*/,
-                                      const Mat3<Real>& /*fit*/, const NeighbourSums<Real>&,
-                                      const PointConstants<Real>&) {}
-  /// Adds to the force on phyxel i [N] that of its neighbour j. @param sent_i,sent_j what the term
-  /// sends
+  PHYXEL_HD static void change_stress([[maybe_unused]] PointStress<Real>& result,
+                                      [[maybe_unused]] const Mat3<Real>& stress,
+                                      [[maybe_unused]] const Mat3<Real>& fit,
+                                      [[maybe_unused]] const NeighbourSums<Real>& sums,
+                                      [[maybe_unused]] const PointConstants<Real>& point) {}
+  /// Adds to the force on phyxel i [N] that of its neighbour j.
+  /// @param sent_i,sent_j what the term sends
   template <class Real>
-  PHYXEL_HD static void add_force(Vec3<Real>& /*force*/, Vec3<Real> /*sent_i*/,
-                                  Vec3<Real> /*sent_j*/, Real /*w_ij*/) {}
+  PHYXEL_HD static void add_force([[maybe_unused]] Vec3<Real>& force,
+                                  [[maybe_unused]] Vec3<Real> sent_i,
+                                  [[maybe_unused]] Vec3<Real> sent_j, [[maybe_unused]] Real w_ij) {}
 };
 
 }  // namespace phyxel

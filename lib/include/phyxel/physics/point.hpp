@@ -50,10 +50,14 @@ struct PairTerms {
   }
 };
 
-// The lists for which kernels are compiled. That of closed gradients includes hourglass control,
-// which costs it nothing: κ is zero without.
+// The lists for which kernels are compiled.
+
+/// The list without a term.
 using NoPairTerms = PairTerms<>;
+/// The list of hourglass control alone.
 using WithHourglass = PairTerms<HourglassControl>;
+/// The list of closed gradients. It includes hourglass control, which costs nothing beside them; κ
+/// is zero without.
 using WithClosing = PairTerms<ClosedGradients, HourglassControl>;
 
 /// The stresses of a phyxel.
