@@ -1,5 +1,5 @@
-/// The sets of regions that phyxels are in, numbered, so that a phyxel carries one number however
-/// many regions a scene names.
+/// Numbered sets of the regions of a scene: a phyxel carries the number of its set, however many
+/// regions contain it.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +12,7 @@
 
 namespace phyxel {
 
+/// The sets of regions of the phyxels of one body.
 class RegionSets {
  public:
   /// The regions of one set, ascending.
@@ -20,13 +21,14 @@ class RegionSets {
   /// The number of the set without regions.
   static constexpr std::uint32_t none = 0;
 
-  /// Returns the number of a set with one region more. @param region not in the set, and not below
-  /// those that are
+  /// Returns the number of a set with one more region.
+  /// @param region a number that no region of the set exceeds
   std::uint32_t with(std::uint32_t set, Index region);
+  /// True if the set has the region.
   bool contains(std::uint32_t set, Index region) const;
 
-  /// Gives the sets of all ranks the same numbers on each of them. Collective.
-  /// @param sets of each body. Returns the new number of each old one, for each body.
+  /// Numbers the sets of all ranks alike on every rank, and returns the new number of each of this
+  /// rank's sets, by body and former number. Collective. @param sets those of each body
   static std::vector<std::vector<std::uint32_t>> agree(const MpiCommunicator& ranks,
                                                        std::vector<RegionSets>& sets);
 

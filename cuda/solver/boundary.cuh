@@ -15,7 +15,8 @@ struct AffineField {
 
 /// Sets displacements and velocities of phyxels with a prescribed motion, along its axes, after
 /// each step. One thread per phyxel.
-/// @param position of the moved phyxels relative to the body's origin [m]; null if all move alike
+/// @param position of the moved phyxels relative to the body's origin [m]; null for
+/// phyxels whose displacements do not depend on it
 template <class Real, class StateReal>
 __global__ void follow(Fields<Real, StateReal> f, const Index* place,
                        const Vec3<StateReal>* position, int count, Axes axes,
@@ -121,8 +122,8 @@ class Boundary {
     const Motion* of;
     Vec3d origin;  ///< Origin of their body.
     DeviceArray<Index> places;
-    /// Positions relative to `origin` [m]: those of the tiles are float in mixed precision, and
-    /// prescribed displacements are not.
+    /// Positions relative to `origin` [m] in the precision of displacements: in mixed precision the
+    /// tiles have positions in float.
     DeviceArray<Vec3<StateReal>> positions;
   };
   struct Loading {

@@ -1,5 +1,5 @@
-/// Scenes whose shares ranks build together: one for each kind of body that is made in a way of its
-/// own.
+/// Scenes whose shares ranks build together. Each has bodies that take another path through the
+/// set-up.
 #pragma once
 
 #include <algorithm>

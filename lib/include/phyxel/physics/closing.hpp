@@ -50,9 +50,10 @@ PHYXEL_HD void add_closing_force(Vec3<Real>& force, Vec3<Real> t_i, Vec3<Real> t
 
 /// The pair term of closed gradients. It sends closing stresses.
 struct ClosedGradients : PairTerm {
+  static constexpr bool pulls = true;
   static constexpr bool sends = true;
 
-  /// Replaces the fit by the closed gradient.
+  /// Replaces ∇u by the closed gradient: no term before this one may change ∇u.
   template <class Real>
   PHYXEL_HD static void change_gradient(Mat3<Real>& grad_u, const Mat3<Real>& fit,
                                         const NeighbourSums<Real>& sums,

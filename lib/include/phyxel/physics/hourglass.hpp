@@ -46,6 +46,8 @@ PHYXEL_HD Mat3<Real> with_hourglass(const Mat3<Real>& pair_stress, Real kappa,
 
 /// The pair term of hourglass control.
 struct HourglassControl : PairTerm {
+  static constexpr bool pulls = true;
+
   /// Takes κ ∇u from the pair stress, and sets the hourglass force.
   template <class Real>
   PHYXEL_HD static void change_stress(PointStress<Real>& result, const Mat3<Real>& /*stress*/,

@@ -48,7 +48,9 @@ struct PointStress {
 
 /// The hooks of a pair term, all of which do nothing.
 struct PairTerm {
-  /// True if the second pass needs the term's vector in `PointStress` of each neighbour.
+  /// True if the term needs `NeighbourSums::pull`.
+  static constexpr bool pulls = false;
+  /// True if the second pass needs the closing stresses of neighbours (`PointStress`).
   static constexpr bool sends = false;
 
   /// Changes the displacement gradient ∇u that the law is given.
@@ -67,7 +69,7 @@ struct PairTerm {
                                       [[maybe_unused]] const NeighbourSums<Real>& sums,
                                       [[maybe_unused]] const PointConstants<Real>& point) {}
   /// Adds to the force on phyxel i [N] that of its neighbour j.
-  /// @param sent_i,sent_j what the term sends
+  /// @param sent_i,sent_j closing stresses of the two, if the term sends them
   template <class Real>
   PHYXEL_HD static void add_force([[maybe_unused]] Vec3<Real>& force,
                                   [[maybe_unused]] Vec3<Real> sent_i,

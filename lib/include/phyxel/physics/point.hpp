@@ -18,8 +18,11 @@ namespace phyxel {
 template <class... Terms>
 struct PairTerms {
   /// True if a term needs `NeighbourSums::pull`.
-  static constexpr bool pulls = sizeof...(Terms) > 0;
+  static constexpr bool pulls = (Terms::pulls || ...);
+  /// True if a term sends closing stresses.
   static constexpr bool sends = (Terms::sends || ...);
+  static_assert((0 + ... + int{Terms::sends}) <= 1, "neighbours are sent one vector");
+  /// True if `Term` is in the list.
   template <class Term>
   static constexpr bool has = (std::is_same_v<Term, Terms> || ...);
 
@@ -42,7 +45,7 @@ struct PairTerms {
     (Terms::change_stress(result, stress, fit, sums, point), ...);
     return result;
   }
-  /// Adds to the force on phyxel i [N] what the terms' vectors of i and its neighbour j give.
+  /// Adds to the force on phyxel i [N] the forces of all terms between it and its neighbour j.
   template <class Real>
   PHYXEL_HD static void add_forces(Vec3<Real>& force, Vec3<Real> sent_i, Vec3<Real> sent_j,
                                    Real w_ij) {
