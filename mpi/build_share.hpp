@@ -15,7 +15,7 @@ class ShareSurveyor;
 struct ShareOptions {
   std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
                                       Partitioner::metis};
-  /// Phyxels along Hilbert's curve that stay together, each body's counted from its start: a GPU's
+  /// Phyxels along Hilbert's curve that stay together, counted from the start of each part: a GPU's
   /// tile. 0: none need to.
   int tile = 0;
   /// Who searches, if no lists shall be made on the host; null: the host.
@@ -37,7 +37,7 @@ struct BuiltShare {
 };
 
 /// This rank's share of `build_model(scene)`, to the last bit what `share_of` would take out of the
-/// whole (but for moments of ghosts that only carry surfels, which nobody reads). Lattices are made
+/// whole (but for moments of ghosts that only carry surfels, which no step reads). Lattices are made
 /// piece by piece, other bodies are made or read by every rank, and cut; surfaces are held whole.
 /// Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to their
 /// owners, which ask the others for what is around. Closing vectors are found by all ranks

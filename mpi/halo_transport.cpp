@@ -70,9 +70,11 @@ class Timed {
 void MpiHaloTransport::start(const PeerBytes& outgoing, const PeerBytes& incoming) {
   const Timed timed(traffic_.seconds);
   const std::vector<HaloPlan::Peer>& peers = plan_->peers;
-  for (std::size_t p = 0; p < peers.size(); ++p) transfers_.receive(peers[p].rank, incoming[p]);
   for (std::size_t p = 0; p < peers.size(); ++p) {
-    transfers_.send(peers[p].rank, outgoing[p]);
+    if (!incoming[p].empty()) transfers_.receive(peers[p].rank, incoming[p]);
+  }
+  for (std::size_t p = 0; p < peers.size(); ++p) {
+    if (!outgoing[p].empty()) transfers_.send(peers[p].rank, outgoing[p]);
     traffic_.bytes_sent += static_cast<std::int64_t>(outgoing[p].size());
   }
 }
@@ -84,10 +86,11 @@ void MpiHaloTransport::start(const Records& records) {
     under_way_ = records;
     for (std::size_t p = 0; p < plan_->peers.size(); ++p) {
       const HaloPlan::Peer& peer = plan_->peers[p];
-      packed_->incoming[p].resize(peer.receive.size() * records.bytes);
-      packed_->outgoing[p].resize(peer.send.size() * records.bytes);
+      const std::span<const Index> sent = records.chosen(peer.send);
+      packed_->incoming[p].resize(records.chosen(peer.receive).size() * records.bytes);
+      packed_->outgoing[p].resize(sent.size() * records.bytes);
       std::byte* to = packed_->outgoing[p].data();
-      for (const Index i : peer.send) {
+      for (const Index i : sent) {
         std::memcpy(to, records.of(i), records.bytes);
         to += records.bytes;
       }
@@ -111,7 +114,7 @@ void MpiHaloTransport::finish() {
   if (!under_way_.base) return;
   for (std::size_t p = 0; p < plan_->peers.size(); ++p) {
     const std::byte* from = packed_->incoming[p].data();
-    for (const Index i : plan_->peers[p].receive) {
+    for (const Index i : under_way_.chosen(plan_->peers[p].receive)) {
       std::memcpy(under_way_.of(i), from, under_way_.bytes);
       from += under_way_.bytes;
     }

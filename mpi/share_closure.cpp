@@ -85,6 +85,7 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
     const Surface& surface = whole.surfaces[b];
     const std::vector<Facet> facets =
         facets_of(surface.position, surface.triangle, 0, longest_edge(whole.bodies[b].reach));
+    check_alike(setup.ranks, facets.size());
     whole.bodies[b].enclosed = enclosed_by(facets).volume;
     const NearFacets here = facets_near(setup, whole, local, b, facets);
     const Range& body = local.bodies[b];
@@ -98,16 +99,19 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
 
 void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
                  const std::vector<Vec3d>& areas) {
+  std::vector<double> before;  // volumes
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     if (!closes(setup, whole, b)) continue;
-    share.closing.resize(static_cast<std::size_t>(share.size()));
+    if (before.empty()) before = share.volume;
     const std::size_t first = whole.bodies[b].first_part;
     const std::size_t count = share.parts_of_body(share.parts[first]).size();
+    const std::span<Part> parts = std::span(share.parts).subspan(first, count);
     const std::optional<std::string> refusal =
-        close_body(share, std::span(share.parts).subspan(first, count), whole.bodies[b].enclosed,
-                   areas.empty() ? std::vector<Vec3d>(share.closing.size()) : areas);
+        close_body(share, parts, whole.bodies[b].enclosed,
+                   {areas.begin() + parts.front().begin, areas.begin() + parts.back().end});
     if (refusal) throw AgreedError(ExitCode::bad_input, *refusal);
   }
+  if (!before.empty()) loads_follow_volumes(share, before);
 }
 
 }  // namespace phyxel

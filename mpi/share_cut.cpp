@@ -82,6 +82,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
     return global_id_of(whole, local, share.global_id[k]);
   });
   for (Index& surfel : share.global_surfel_id) surfel = local.surfel_id[surfel];
+  local = LocalModel();  // makes room for what closing gradients takes
   connect(setup.ranks, made);
   const auto from_owners = [&](auto& values) {
     constexpr std::size_t bytes = sizeof(values[0]);

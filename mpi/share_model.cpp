@@ -239,15 +239,15 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   }
   total(setup.ranks, all);
   const std::vector<ListLengths> of_ranks = setup.ranks.gathered(std::span(std::as_const(lists)));
+  std::vector<BodySums> of_bodies(whole.bodies.size());
+  for (std::size_t q = 0; q < m.parts.size(); ++q) {
+    of_bodies[static_cast<std::size_t>(m.parts[q].body)].add(sums[q]);
+  }
   for (std::size_t q = 0; q < m.parts.size(); ++q) {
     Part& part = m.parts[q];
     sums[q].tell(part);
-    BodySums all_parts;
-    for (std::size_t other = 0; other < m.parts.size(); ++other) {
-      if (m.parts[other].body == part.body) all_parts.add(sums[other]);
-    }
     Part body;
-    all_parts.tell(body);
+    of_bodies[static_cast<std::size_t>(part.body)].tell(body);
     part.centre = body.centre;
     part.lists.fewest = whole.bodies[static_cast<std::size_t>(part.body)].size;
     for (std::size_t k = q; k < of_ranks.size(); k += m.parts.size()) {

@@ -96,7 +96,14 @@ struct MaterialCount {
   std::int64_t size, selected;
 };
 
-/// Finds the parts of all bodies. @param counts of all ranks
+/// Counts of one body.
+std::span<const MaterialCount> of_body(const std::vector<MaterialCount>& counts, std::size_t b) {
+  const auto [first, last] = std::ranges::equal_range(counts, static_cast<Index>(b), {},
+                                                      &MaterialCount::body);
+  return {first, last};
+}
+
+/// Finds the parts of all bodies. @param counts of all ranks, body by body
 void find_parts(const ShareSetup& setup, const std::vector<MaterialCount>& counts,
                 WholeBodies& whole) {
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
@@ -104,8 +111,7 @@ void find_parts(const ShareSetup& setup, const std::vector<MaterialCount>& count
     std::vector<std::int64_t> size(request.inclusions.size() + 1, 0);
     std::vector<std::int64_t> selected(request.inclusions.size(), 0);
     if (request.inclusions.empty()) size[0] = whole.bodies[b].size;
-    for (const MaterialCount& count : counts) {
-      if (count.body != static_cast<Index>(b)) continue;
+    for (const MaterialCount& count : of_body(counts, b)) {
       size[count.material] += count.size;
       if (count.material > 0) selected[count.material - 1] += count.selected;
     }
@@ -128,16 +134,17 @@ void number_by_material(const ShareSetup& setup, const std::vector<PieceMaterial
                       piece.choice.size[k], k > 0 ? piece.choice.selected[k - 1] : 0});
     }
   }
-  const std::vector<MaterialCount> all = setup.ranks.gathered(std::span(std::as_const(here)));
+  std::vector<MaterialCount> all = setup.ranks.gathered(std::span(std::as_const(here)));
+  std::ranges::stable_sort(all, {}, &MaterialCount::body);
   setup.ranks.collectively([&] { find_parts(setup, all, whole); });
   for (const PieceMaterials& piece : pieces) {
     std::vector<Index> next(piece.choice.size.size(), 0);  // number in the body, of each material
-    for (const WholePart& part : whole.parts) {
-      if (part.body == piece.body) next[part.material.which] = part.material.begin;
+    for (std::size_t q = whole.bodies[piece.body].first_part;
+         q < whole.parts.size() && whole.parts[q].body == piece.body; ++q) {
+      next[whole.parts[q].material.which] = whole.parts[q].material.begin;
     }
-    for (const MaterialCount& count : all) {
-      if (count.body != static_cast<Index>(piece.body) || count.first >= piece.first) continue;
-      next[count.material] += static_cast<Index>(count.size);
+    for (const MaterialCount& count : of_body(all, piece.body)) {
+      if (count.first < piece.first) next[count.material] += static_cast<Index>(count.size);
     }
     const std::vector<Index>& material_of = piece.choice.material_of;
     for (std::size_t i = 0; i < material_of.size(); ++i) {
@@ -246,7 +253,8 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
 void count_bodies(const ShareSetup& setup, WholeBodies& whole) {
   Offset size = 0;
   for (const WholeBody& body : whole.bodies) size += body.size;
-  // At any time, with lists: those around and the copy that a share is included.
+  // At any time, with lists: those around and the copy that a share is included. Closing gradients
+  // takes less than was released before.
   setup.ranks.collectively([&] {
     require_host_memory("the scene", static_cast<double>(size),
                         (setup.options.surveyor ? 280.0 : 1700.0) / setup.ranks.size());

@@ -98,7 +98,8 @@ class DeviceHalo {
     return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : packed_.describe();
   }
   Traffic traffic() const {
-    return {bytes_sent_, direct_ ? direct_->waited_seconds() : halo().traffic().seconds};
+    return {bytes_sent_, direct_ ? direct_->waited_seconds()
+                                 : halo().traffic().seconds - seconds_before_};
   }
   std::size_t bytes() const {
     return send_.on_device.bytes() + receive_.on_device.bytes() + packed_.bytes() +
@@ -218,6 +219,7 @@ class DeviceHalo {
   std::unique_ptr<DirectExchange<Real, StateReal>> direct_;
   mutable bool under_way_[kinds_sent]{};
   mutable std::int64_t bytes_sent_ = 0;
+  double seconds_before_ = halo().traffic().seconds;  ///< Of exchanges of the set-up [s].
 };
 
 }  // namespace phyxel::cuda

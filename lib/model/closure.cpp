@@ -42,17 +42,41 @@ void add(Unknown& to, double s, const Unknown& x) {
   to.volume += s * x.volume;
 }
 
+/// A value of each phyxel of a body.
+template <class T>
+class BodyVector {
+ public:
+  explicit BodyVector(const OwnedVectors& own, const T& value = {})
+      : BodyVector(own, std::vector<T>(static_cast<std::size_t>(own.end() - own.begin()), value)) {}
+  BodyVector(const OwnedVectors& own, std::vector<T> values)
+      : begin_(own.begin()), values_(std::move(values)) {}
+
+  /// The value of phyxel i of the model.
+  T& operator[](Index i) { return values_[static_cast<std::size_t>(i - begin_)]; }
+  const T& operator[](Index i) const { return values_[static_cast<std::size_t>(i - begin_)]; }
+  std::span<T> all() { return values_; }
+
+ private:
+  Index begin_;
+  std::vector<T> values_;
+};
+using Unknowns = BodyVector<Unknown>;
+using Vectors = BodyVector<Vec3d>;
+
 /// The sums of one body, per s², as a linear function of the unknowns:
 ///   R_j = Σ_k w_jk (c_k (1 + a_k x_jk) - M_k x_jk (1 + σ_k)) - c_j Σ_k w_jk (1 - a_j x_jk)
 ///         - M_j b_j (1 + σ_j) - S_j (1 + y_j),   M = v A⁻¹, a = A⁻¹ b.
 /// Of the changes σ only what leaves the whole volume as it is counts: by Σ x Sᵀ = V I, areas of
-/// whole faces stay, too. Vectors have a value for each phyxel of the model, of which ranks hold
-/// their shares.
+/// whole faces stay, too. Ranks hold their shares of all vectors.
 class Sums {
  public:
-  /// @param areas S of each phyxel of the model, those of ghosts undefined [m²]
+  /// @param areas S of each phyxel of the body, those of ghosts undefined [m²]
   Sums(const Model& model, std::span<const Part> parts, std::vector<Vec3d> areas)
-      : model_(model), own_(model, parts, omp_get_max_threads()), areas_(std::move(areas)) {
+      : model_(model),
+        own_(model, parts, omp_get_max_threads()),
+        areas_(own_, std::move(areas)),
+        tilt_(own_),
+        weight_(own_) {
     double volume = 0;
     Index size = 0;
     for (const Part& part : parts) {
@@ -63,11 +87,8 @@ class Sums {
     unit_ = spacing * spacing;
     whole_ = own_.sum([&](Index i) { return model_.volume[i]; });
     own_.for_each([&](Index i) { areas_[i] = areas_[i] / unit_; });
-    tilt_.resize(areas_.size());
-    weight_.resize(areas_.size());
-    const Index begin = parts.front().begin, end = parts.back().end;
 #pragma omp parallel for schedule(static)
-    for (Index i = begin; i < end; ++i) {
+    for (Index i = own_.begin(); i < own_.end(); ++i) {
       tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
     }
     own_.for_each([&](Index i) {
@@ -78,28 +99,27 @@ class Sums {
   }
   double unit() const { return unit_; }
   const OwnedVectors& own() const { return own_; }
-  const std::vector<Vec3d>& areas() const { return areas_; }
-  std::size_t size() const { return areas_.size(); }
+  const Vectors& areas() const { return areas_; }
 
   /// The sums without closing, as they are to be 0.
-  std::vector<Vec3d> open() const {
-    std::vector<Vec3d> sums(size());
-    const std::vector<Unknown> ones(size(), {{}, 1 / ease_area, 1 / ease_volume});
+  Vectors open() const {
+    Vectors sums(own_);
+    const Unknowns ones(own_, {{}, 1 / ease_area, 1 / ease_volume});
     apply(ones, 0, sums);
     return sums;
   }
   /// @param x its ghosts receive their owners' values
-  void apply(std::vector<Unknown>& x, std::vector<Vec3d>& sums) const {
-    own_.refresh_ghosts(x);
+  void apply(Unknowns& x, Vectors& sums) const {
+    own_.refresh_ghosts(x.all());
     apply(x, mean_volume(x), sums);
   }
   /// The change of all volumes that takes no part [over `ease_volume`].
-  double mean_volume(const std::vector<Unknown>& x) const {
+  double mean_volume(const Unknowns& x) const {
     return own_.sum([&](Index i) { return model_.volume[i] * x[i].volume; }) / whole_;
   }
   /// @param sums their ghosts receive their owners' values
-  void apply_transpose(std::vector<Vec3d>& sums, std::vector<Unknown>& x) const {
-    own_.refresh_ghosts(sums);
+  void apply_transpose(Vectors& sums, Unknowns& x) const {
+    own_.refresh_ghosts(sums.all());
     own_.for_each([&](Index i) {
       Unknown out;
       visit(i, [&](Index k, Vec3d x_ik, double w) {
@@ -116,7 +136,7 @@ class Sums {
   }
 
  private:
-  void apply(const std::vector<Unknown>& x, double mean, std::vector<Vec3d>& sums) const {
+  void apply(const Unknowns& x, double mean, Vectors& sums) const {
     own_.for_each([&](Index j) {
       Vec3d sum = -weight_[j] * x[j].closing - ease_area * x[j].area * areas_[j] -
                   ease_volume * (x[j].volume - mean) * own_share(j, model_.moment_offset[j]);
@@ -142,9 +162,9 @@ class Sums {
 
   const Model& model_;
   OwnedVectors own_;
-  std::vector<Vec3d> areas_;     ///< S / s²
-  std::vector<Vec3d> tilt_;      ///< a
-  std::vector<double> weight_;   ///< Σ_k w_jk (1 - a_j x_jk)
+  Vectors areas_;                ///< S / s²
+  Vectors tilt_;                 ///< a
+  BodyVector<double> weight_;    ///< Σ_k w_jk (1 - a_j x_jk)
   double unit_ = 1, whole_ = 1;  ///< s² [m²], all volumes [m³]
 };
 
@@ -153,24 +173,24 @@ class Sums {
 /// iterations do most of what can be done.
 /// @param tolerance share of the areas
 struct Solution {
-  std::vector<Unknown> x;
+  Unknowns x;
   int iterations = 0;
   double left = 0;  ///< Root mean square of the sums over that of the areas, summed anew.
 };
 Solution close(const Sums& sums, double tolerance) {
   Stage stage("closed gradients");
   const OwnedVectors& own = sums.own();
-  Solution solution{std::vector<Unknown>(sums.size())};
+  Solution solution{Unknowns(own)};
   const auto squares = [&](const auto& values) {
     return own.sum([&](Index i) { return dot(values[i], values[i]); });
   };
   const double areas = squares(sums.areas());
-  const std::vector<Vec3d> open = sums.open();
-  std::vector<Vec3d> residual(sums.size()), image(sums.size());
+  const Vectors open = sums.open();
+  Vectors residual(own), image(own);
   own.for_each([&](Index i) { residual[i] = -open[i]; });
-  std::vector<Unknown> slope(sums.size()), direction;
+  Unknowns slope(own);
   sums.apply_transpose(residual, slope);
-  direction = slope;
+  Unknowns direction = slope;
   double left_before = HUGE_VAL, left_first = 0;
   double steepness = squares(slope);
   for (;; ++solution.iterations) {
@@ -209,7 +229,8 @@ Solution close(const Sums& sums, double tolerance) {
 
 /// The first phyxel of all ranks whose volume would have to change too far, and how far.
 struct Excess {
-  double phyxel = HUGE_VAL, change = 0;  ///< Index in the whole model; infinite: none.
+  double phyxel = HUGE_VAL;  ///< Index in the whole model; infinite: none.
+  double change = 0;         ///< Relative; infinite: it is no number.
 };
 /// @param change(i) relative change of the volume of phyxel i
 template <class Change>
@@ -219,15 +240,15 @@ Excess first_excess(const Model& model, std::span<const Part> parts, Change&& ch
     for (Index i = part.begin; i < part.owned_end() && first.phyxel == HUGE_VAL; ++i) {
       // Half is far beyond what closes clouds that are any good; NaN is none of these.
       if (std::abs(change(i)) < 0.5) continue;
-      first = {static_cast<double>(model.global_id(i)), change(i)};
+      first.phyxel = static_cast<double>(model.global_id(i));
+      // A NaN would get lost among ranks.
+      first.change = std::isnan(change(i)) ? HUGE_VAL : change(i);
     }
   }
   if (!model.share) return first;
   const Communicator& ranks = *model.share->communicator;
   const double phyxel = ranks.smallest(first.phyxel);
-  // A NaN would get lost among the ranks.
-  const bool known = first.phyxel == phyxel && !std::isnan(first.change);
-  return {phyxel, ranks.smallest(known ? first.change : HUGE_VAL)};
+  return {phyxel, ranks.smallest(first.phyxel == phyxel ? first.change : HUGE_VAL)};
 }
 
 /// The surface of a body in a model that is no share. Triangles stand body by body.
@@ -250,13 +271,13 @@ std::optional<std::string> close_body(Model& model, std::span<Part> parts, doubl
                                       std::vector<Vec3d> areas) {
   const Phase phase("closing gradients");
   const Part& first = parts.front();
-  const auto begin = static_cast<std::size_t>(first.begin),
-             end = static_cast<std::size_t>(parts.back().end);
-  const std::vector<double> before(model.volume.begin() + first.begin,
-                                   model.volume.begin() + parts.back().end);
+  const auto of_body = [&](auto& values) {
+    return std::span(values).subspan(static_cast<std::size_t>(first.begin),
+                                     static_cast<std::size_t>(parts.back().end - first.begin));
+  };
   double volume = 0;
   for (const Part& part : parts) volume += part.volume;
-  for (std::size_t i = begin; i < end; ++i) model.volume[i] *= enclosed / volume;
+  for (double& v : of_body(model.volume)) v *= enclosed / volume;
   const Sums sums(model, parts, std::move(areas));
   const OwnedVectors& own = sums.own();
   const Solution solution = close(sums, first.closure);
@@ -269,26 +290,22 @@ std::optional<std::string> close_body(Model& model, std::span<Part> parts, doubl
     }
     return fmt::format(
         "body \"{}\": gradients cannot be closed (closure = {:g}): phyxel {} would have to change "
-        "its volume by {:.0f}%; allowed are more phyxels where the body is thin, or closure = 0",
-        first.name, first.closure, number, 100 * excess.change);
+        "its volume {}; allowed are more phyxels where the body is thin, or closure = 0",
+        first.name, first.closure, number,
+        std::isfinite(excess.change) ? fmt::format("by {:.0f}%", 100 * excess.change)
+                                     : "beyond all bounds");
   }
+  model.closing.resize(model.volume.size());
   own.for_each([&](Index i) {
     model.volume[i] *= 1 + change(i);
     model.closing[i] = (sums.unit() / model.volume[i]) * solution.x[i].closing;
   });
-  own.refresh_ghosts(model.volume);
-  own.refresh_ghosts(model.closing);
+  own.refresh_ghosts(of_body(model.volume));
+  own.refresh_ghosts(of_body(model.closing));
   for (Part& part : parts) {
     part.volume = OwnedVectors(model, {&part, 1}, omp_get_max_threads()).sum([&](Index i) {
       return model.volume[i];
     });
-  }
-  for (Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      const auto i = static_cast<std::size_t>(load.phyxels[k]);
-      if (i < begin || i >= end) continue;
-      load.force[k] += (model.volume[i] - before[i - begin]) * load.density;
-    }
   }
   if (!(solution.left <= first.closure)) {
     model.warnings.push_back(fmt::format(
@@ -299,11 +316,21 @@ std::optional<std::string> close_body(Model& model, std::span<Part> parts, doubl
   return std::nullopt;
 }
 
+void loads_follow_volumes(Model& model, const std::vector<double>& before) {
+  for (Load& load : model.loads) {
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      const Index i = load.phyxels[k];
+      load.force[k] += (model.volume[i] - before[i]) * load.density;
+    }
+  }
+}
+
 void close_gradients(Model& model) {
+  const std::vector<double> before = model.volume;
   for (auto part = model.parts.begin(); part != model.parts.end();) {
     const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
     if (part->closure > 0 && part->begin < part->end) {
-      const auto n = static_cast<std::size_t>(model.with_lists().size());
+      model.with_lists();
       const auto begin = static_cast<std::size_t>(part->begin),
                  count = static_cast<std::size_t>((next - 1)->end) - begin;
       const std::span<const Vec3d> position = std::span(model.position).subspan(begin, count);
@@ -312,17 +339,14 @@ void close_gradients(Model& model) {
       const std::vector<Facet> facets = facets_of(model, *part);
       std::vector<Vec3d> centroids;
       for (const Facet& f : facets) centroids.push_back(f.centroid);
-      const std::vector<Vec3d> areas =
-          areas_of_phyxels(facets, phyxels_near(centroids, position, support), position, support);
-      std::vector<Vec3d> all(n);
-      std::copy(areas.begin(), areas.end(), all.begin() + part->begin);
-      model.closing.resize(n);
-      const std::optional<std::string> refusal =
-          close_body(model, {part, next}, enclosed_by(facets).volume, std::move(all));
+      const std::optional<std::string> refusal = close_body(
+          model, {part, next}, enclosed_by(facets).volume,
+          areas_of_phyxels(facets, phyxels_near(centroids, position, support), position, support));
       if (refusal) throw InputError(*refusal);
     }
     part = next;
   }
+  loads_follow_volumes(model, before);
 }
 
 }  // namespace phyxel

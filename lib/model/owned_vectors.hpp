@@ -22,6 +22,10 @@ class OwnedVectors {
   OwnedVectors(const Model& model, std::span<const Part> parts, int threads)
       : model_(model), parts_(parts), threads_(threads) {}
 
+  /// The first phyxel of the parts, and the end of the last: parts stand one after the other.
+  Index begin() const { return parts_.empty() ? 0 : parts_.front().begin; }
+  Index end() const { return parts_.empty() ? 0 : parts_.back().end; }
+
   Vector make() const { return Vector(static_cast<std::size_t>(model_.size())); }
 
   /// Calls each(i) for the phyxels that are not ghosts.
@@ -67,12 +71,18 @@ class OwnedVectors {
   }
 
   /// Copies the owners' values to ghosts. Collective.
+  /// @param values of the phyxels from `begin` to `end`. Parts must be those of whole bodies.
   template <class T>
-  void refresh_ghosts(std::vector<T>& values) const {
+  void refresh_ghosts(std::span<T> values) const {
     if (!model_.share) return;
     HaloTransport& halo = *model_.share->transport;
-    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr});
+    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr, begin(),
+                end()});
     halo.finish();
+  }
+  template <class T>
+  void refresh_ghosts(std::vector<T>& values) const {
+    refresh_ghosts(std::span(values));
   }
 
   /// The smallest support of the phyxels of all ranks [m]; infinite if there is none. Collective.

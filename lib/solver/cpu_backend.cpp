@@ -164,7 +164,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
 
   std::optional<Exchanges> exchanges() const override {
     if (!model_.share) return std::nullopt;
-    return Exchanges{"MPI", model_.share->transport->traffic()};
+    return Exchanges{"MPI", model_.share->transport->traffic() - traffic_before_};
   }
 
   std::vector<ArrayBytes> memory() const override {
@@ -190,6 +190,9 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::pull_;
   using Passes::threads_;
   using Passes::velocity_;
+
+  /// Exchanges of the set-up.
+  const Traffic traffic_before_ = model_.share ? model_.share->transport->traffic() : Traffic{};
 
   /// Runs pass 1 for all phyxels.
   void find_stresses(HistoryUse use) {

@@ -327,9 +327,14 @@ double status_bytes(const std::string& key) {
 
 /// A share is refused before it is built if it would not fit: a rank asks for about as much memory
 /// as it then takes at most, whatever the number of ranks.
-TEST(BuiltShare, AsksForTheMemoryThatItTakes) {
-  Scene scene{.bodies = {shape("beam", 0.05)}};  // 24,000 phyxels: tens of MB
+/// 24,000 phyxels: tens of MB.
+class MemoryOfBuiltShare : public ::testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Closure, MemoryOfBuiltShare, ::testing::Values(0, 1e-2));
+
+TEST_P(MemoryOfBuiltShare, IsWhatItAsksFor) {
+  Scene scene{.bodies = {shape("beam", 0.05)}};
   scene.bodies[0].neighbourhood.nearest = 20;
+  scene.bodies[0].closure = GetParam();
   // Few groups, as bodies have that are large enough to fill a machine.
   const ShareOptions options{{Partitioner::metis}, 0, nullptr, 60, 400};
   malloc_trim(0);

@@ -1,8 +1,10 @@
 /// The exchange of values between the ranks that own phyxels and those that have them as ghosts.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -14,11 +16,21 @@ namespace phyxel {
 struct Records {
   std::byte* base = nullptr;
   std::size_t stride = 0, bytes = 0;
-  const Index* slot = nullptr;  ///< Slot of each phyxel; null if phyxel i is in slot i.
+  const Index* slot = nullptr;  ///< Slot of each phyxel; null if phyxel i is in slot i - begin.
+  /// The phyxels [begin, end) of whole bodies that have values.
+  Index begin = 0, end = std::numeric_limits<Index>::max();
 
   /// The address of the values of phyxel i.
   std::byte* of(Index i) const {
-    return base + static_cast<std::size_t>(slot ? slot[i] : i) * stride;
+    return base + static_cast<std::size_t>(slot ? slot[i] : i - begin) * stride;
+  }
+  /// The phyxels of a list of a halo plan that have values.
+  std::span<const Index> chosen(const std::vector<Index>& list) const {
+    // Lists are in the order of global ids, hence body by body.
+    const auto first_from = [&](Index bound) {
+      return std::partition_point(list.begin(), list.end(), [&](Index i) { return i < bound; });
+    };
+    return {first_from(begin), first_from(end)};
   }
 };
 
@@ -26,6 +38,10 @@ struct Records {
 struct Traffic {
   std::int64_t bytes_sent = 0;
   double seconds = 0;  ///< Time for packing, waiting and unpacking [s].
+
+  friend Traffic operator-(const Traffic& a, const Traffic& b) {
+    return {a.bytes_sent - b.bytes_sent, a.seconds - b.seconds};
+  }
 };
 
 /// Send and receive lists of a share: the phyxels that are ghosts of other ranks, and the share's

@@ -47,8 +47,8 @@ struct PairTerms {
   }
   /// Adds to the force on phyxel i [N] the forces of all terms between it and its neighbour j.
   template <class Real>
-  PHYXEL_HD static void add_forces(Vec3<Real>& force, Vec3<Real> sent_i, Vec3<Real> sent_j,
-                                   Real w_ij) {
+  PHYXEL_HD static void add_forces(Vec3<Real>& force, [[maybe_unused]] Vec3<Real> sent_i,
+                                   [[maybe_unused]] Vec3<Real> sent_j, [[maybe_unused]] Real w_ij) {
     (Terms::add_force(force, sent_i, sent_j, w_ij), ...);
   }
 };
