@@ -37,10 +37,10 @@ struct BuiltShare {
 };
 
 /// This rank's share of `build_model(scene)`, to the last bit what `share_of` would take out of the
-/// whole (but for moments of ghosts that only carry surfels, which no step reads). Lattices are made
-/// piece by piece, other bodies are made or read by every rank, and cut; surfaces are held whole.
-/// Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to their
-/// owners, which ask the others for what is around. Closing vectors are found by all ranks
+/// whole (but for moments of ghosts that only carry surfels, which no step reads). Lattices are
+/// made piece by piece, other bodies are made or read by every rank, and cut; surfaces are held
+/// whole. Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to
+/// their owners, which ask the others for what is around. Closing vectors are found by all ranks
 /// together, from lists on the host. Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,

@@ -98,20 +98,17 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
 }
 
 void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
-                 const std::vector<Vec3d>& areas) {
-  std::vector<double> before;  // volumes
+                 std::vector<Vec3d> areas) {
+  std::vector<ClosedBody> closed;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     if (!closes(setup, whole, b)) continue;
-    if (before.empty()) before = share.volume;
     const std::size_t first = whole.bodies[b].first_part;
     const std::size_t count = share.parts_of_body(share.parts[first]).size();
-    const std::span<Part> parts = std::span(share.parts).subspan(first, count);
-    const std::optional<std::string> refusal =
-        close_body(share, parts, whole.bodies[b].enclosed,
-                   {areas.begin() + parts.front().begin, areas.begin() + parts.back().end});
-    if (refusal) throw AgreedError(ExitCode::bad_input, *refusal);
+    closed.push_back({std::span(share.parts).subspan(first, count), whole.bodies[b].enclosed});
   }
-  if (!before.empty()) loads_follow_volumes(share, before);
+  if (const auto refusal = close_bodies(share, closed, std::move(areas))) {
+    throw AgreedError(ExitCode::bad_input, *refusal);
+  }
 }
 
 }  // namespace phyxel

@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <utility>
 
-#include "exact_sum.hpp"
 #include "model/assembly.hpp"
 #include "model/closing_areas.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/share_surveyor.hpp"
 #include "mpi/share_pipeline.hpp"
+#include "rank_sums.hpp"
 #include "scene/scene_error.hpp"
 #include "tabulated.hpp"
 
@@ -57,21 +57,6 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
 }
 
 namespace {
-
-/// Adds the sums of all ranks, in place.
-void total(const MpiCommunicator& ranks, const std::vector<ExactSum*>& sums) {
-  std::vector<std::int64_t> words;
-  for (ExactSum* sum : sums) {
-    const std::span<std::int64_t> ready = sum->ready();
-    words.insert(words.end(), ready.begin(), ready.end());
-  }
-  ranks.add(words);
-  const std::int64_t* from = words.data();
-  for (ExactSum* sum : sums) {
-    std::copy_n(from, ExactSum::words, sum->ready().begin());
-    from += ExactSum::words;
-  }
-}
 
 /// The parts of a body.
 std::span<const Part> model_parts_of(const WholeBodies& whole, const LocalModel& local,
@@ -142,7 +127,7 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   }
   std::vector<ExactSum*> all;
   for (ExactSum& sum : sums) all.push_back(&sum);
-  total(setup.ranks, all);
+  add_over_ranks(setup.ranks, all);
   std::vector<Masses> made;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     const Range& body = local.bodies[b];
@@ -237,7 +222,7 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
     BodySums& s = sums[q];
     all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z});
   }
-  total(setup.ranks, all);
+  add_over_ranks(setup.ranks, all);
   const std::vector<ListLengths> of_ranks = setup.ranks.gathered(std::span(std::as_const(lists)));
   std::vector<BodySums> of_bodies(whole.bodies.size());
   for (std::size_t q = 0; q < m.parts.size(); ++q) {
@@ -334,7 +319,7 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   setup.ranks.add(counts);
   std::vector<ExactSum*> sums;
   for (ExactSum& mass : masses) sums.push_back(&mass);
-  total(setup.ranks, sums);
+  add_over_ranks(setup.ranks, sums);
   setup.ranks.collectively([&] {
     auto count = counts.begin();
     auto mass = masses.begin();

@@ -98,8 +98,8 @@ struct MaterialCount {
 
 /// Counts of one body.
 std::span<const MaterialCount> of_body(const std::vector<MaterialCount>& counts, std::size_t b) {
-  const auto [first, last] = std::ranges::equal_range(counts, static_cast<Index>(b), {},
-                                                      &MaterialCount::body);
+  const auto [first, last] =
+      std::ranges::equal_range(counts, static_cast<Index>(b), {}, &MaterialCount::body);
   return {first, last};
 }
 

@@ -136,7 +136,7 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
 /// @param areas of each phyxel of the share [m²]; empty if none asks
 /// @throws AgreedError for what `close_gradients` refuses
 void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
-                 const std::vector<Vec3d>& areas);
+                 std::vector<Vec3d> areas);
 
 /// For points that no support reaches: the nearest phyxel.
 struct Unreached {

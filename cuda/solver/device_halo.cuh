@@ -98,8 +98,8 @@ class DeviceHalo {
     return direct_ ? "stores into other GPUs' memory (CUDA IPC)" : packed_.describe();
   }
   Traffic traffic() const {
-    return {bytes_sent_, direct_ ? direct_->waited_seconds()
-                                 : halo().traffic().seconds - seconds_before_};
+    return {bytes_sent_,
+            direct_ ? direct_->waited_seconds() : halo().traffic().seconds - seconds_before_};
   }
   std::size_t bytes() const {
     return send_.on_device.bytes() + receive_.on_device.bytes() + packed_.bytes() +

@@ -1,18 +1,16 @@
 #include "model/closure.hpp"
 
 #include <fmt/format.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "exact_sum.hpp"
 #include "model/closing_areas.hpp"
-#include "model/owned_vectors.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "rank_sums.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -42,107 +40,176 @@ void add(Unknown& to, double s, const Unknown& x) {
   to.volume += s * x.volume;
 }
 
-/// A value of each phyxel of a body.
-template <class T>
-class BodyVector {
- public:
-  explicit BodyVector(const OwnedVectors& own, const T& value = {})
-      : BodyVector(own, std::vector<T>(static_cast<std::size_t>(own.end() - own.begin()), value)) {}
-  BodyVector(const OwnedVectors& own, std::vector<T> values)
-      : begin_(own.begin()), values_(std::move(values)) {}
+/// A body whose gradients are closed, and where its search stands.
+struct Body {
+  std::span<Part> parts;
+  double tolerance = 0;
+  double unit = 1, whole = 1;  ///< s² [m²], all volumes [m³]
+  double areas = 0;            ///< Σ S², per s⁴.
+  double squares = 0;          ///< Of what is left of the sums.
+  double steepness = 0, next_steepness = 0, length = 0;
+  double sum = 0, mean = 0;  ///< Of changes of volume.
+  double left = 0, left_first = 0, left_before = HUGE_VAL;
+  int iterations = 0;
 
-  /// The value of phyxel i of the model.
-  T& operator[](Index i) { return values_[static_cast<std::size_t>(i - begin_)]; }
-  const T& operator[](Index i) const { return values_[static_cast<std::size_t>(i - begin_)]; }
-  std::span<T> all() { return values_; }
+  Index begin() const { return parts.front().begin; }
+  Index end() const { return parts.back().end; }
+};
+
+/// Bodies in the order of their phyxels, and the loops over them. Every rank has the same.
+class Bodies {
+ public:
+  Bodies(const Model& model, std::span<Body> bodies) : model_(model) {
+    for (Body& body : bodies) list_.push_back(&body);
+  }
+  bool empty() const { return list_.empty(); }
+  auto begin() const { return list_.begin(); }
+  auto end() const { return list_.end(); }
+  /// Leaves out bodies for which done(body).
+  template <class Done>
+  void erase_if(Done&& done) {
+    std::erase_if(list_, [&](Body* body) { return done(*body); });
+  }
+
+  /// Calls each(body, i) for the phyxels that are not ghosts.
+  template <class Each>
+  void for_each(Each&& each) const {
+#pragma omp parallel
+    for (Body* body : list_) {
+      for (const Part& part : body->parts) {
+#pragma omp for schedule(static) nowait
+        for (Index i = part.begin; i < part.owned_end(); ++i) each(*body, i);
+      }
+    }
+  }
+  /// Sets a member of each body to Σ term(body, i) over its phyxels of all ranks, rounded once.
+  /// Collective.
+  template <class Term>
+  void sum(double Body::*into, Term&& term) const {
+    std::vector<ExactSum> sums(list_.size());
+#pragma omp parallel
+    for (std::size_t b = 0; b < list_.size(); ++b) {
+      ExactSum own;
+      bool any = false;
+      for (const Part& part : list_[b]->parts) {
+#pragma omp for schedule(static) nowait
+        for (Index i = part.begin; i < part.owned_end(); ++i) {
+          own.add(term(*list_[b], i));
+          any = true;
+        }
+      }
+      if (!any) continue;
+#pragma omp critical
+      sums[b].add(own);
+    }
+    if (model_.share) {
+      std::vector<ExactSum*> all;
+      for (ExactSum& sum : sums) all.push_back(&sum);
+      add_over_ranks(*model_.share->communicator, all);
+    }
+    for (std::size_t b = 0; b < list_.size(); ++b) list_[b]->*into = sums[b].value();
+  }
+  /// Copies the owners' values to the ghosts of the bodies. Collective.
+  template <class T>
+  void refresh_ghosts(std::vector<T>& values) const {
+    if (!model_.share || empty()) return;
+    const Index begin = list_.front()->begin(), end = list_.back()->end();
+    HaloTransport& halo = *model_.share->transport;
+    halo.start({reinterpret_cast<std::byte*>(values.data() + begin), sizeof(T), sizeof(T), nullptr,
+                begin, end});
+    halo.finish();
+  }
 
  private:
-  Index begin_;
-  std::vector<T> values_;
+  const Model& model_;
+  std::vector<Body*> list_;
 };
-using Unknowns = BodyVector<Unknown>;
-using Vectors = BodyVector<Vec3d>;
 
-/// The sums of one body, per s², as a linear function of the unknowns:
+/// The sums of bodies, per s², as a linear function of the unknowns:
 ///   R_j = Σ_k w_jk (c_k (1 + a_k x_jk) - M_k x_jk (1 + σ_k)) - c_j Σ_k w_jk (1 - a_j x_jk)
 ///         - M_j b_j (1 + σ_j) - S_j (1 + y_j),   M = v A⁻¹, a = A⁻¹ b.
-/// Of the changes σ only what leaves the whole volume as it is counts: by Σ x Sᵀ = V I, areas of
-/// whole faces stay, too. Ranks hold their shares of all vectors.
+/// Of the changes σ only what leaves a body's volume as it is counts: by Σ x Sᵀ = V I, areas of
+/// whole faces stay, too. Vectors have a value for each phyxel of the model, of which ranks hold
+/// their shares.
 class Sums {
  public:
-  /// @param areas S of each phyxel of the body, those of ghosts undefined [m²]
-  Sums(const Model& model, std::span<const Part> parts, std::vector<Vec3d> areas)
-      : model_(model),
-        own_(model, parts, omp_get_max_threads()),
-        areas_(own_, std::move(areas)),
-        tilt_(own_),
-        weight_(own_) {
-    double volume = 0;
-    Index size = 0;
-    for (const Part& part : parts) {
-      volume += part.volume;
-      size += part.size;
-    }
-    const double spacing = std::cbrt(volume / size);
-    unit_ = spacing * spacing;
-    whole_ = own_.sum([&](Index i) { return model_.volume[i]; });
-    own_.for_each([&](Index i) { areas_[i] = areas_[i] / unit_; });
+  /// @param areas S of each phyxel of the model, those of ghosts undefined [m²]
+  Sums(const Model& model, const Bodies& bodies, std::vector<Vec3d> areas)
+      : model_(model), areas_(std::move(areas)), tilt_(areas_.size()), weight_(areas_.size()) {
+    for (Body* body : bodies) {
+      double volume = 0;
+      Index size = 0;
+      for (const Part& part : body->parts) {
+        volume += part.volume;
+        size += part.size;
+      }
+      const double spacing = std::cbrt(volume / size);
+      body->unit = spacing * spacing;
 #pragma omp parallel for schedule(static)
-    for (Index i = own_.begin(); i < own_.end(); ++i) {
-      tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
+      for (Index i = body->begin(); i < body->end(); ++i) {
+        tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
+      }
     }
-    own_.for_each([&](Index i) {
+    bodies.sum(&Body::whole, [&](const Body&, Index i) { return model_.volume[i]; });
+    bodies.for_each([&](const Body& body, Index i) {
+      areas_[i] = areas_[i] / body.unit;
       double sum = 0;
       visit(i, [&](Index, Vec3d, double w) { sum += w; });
       weight_[i] = sum - dot(tilt_[i], model_.moment_offset[i]);
     });
+    bodies.sum(&Body::areas, [&](const Body&, Index i) { return dot(areas_[i], areas_[i]); });
   }
-  double unit() const { return unit_; }
-  const OwnedVectors& own() const { return own_; }
-  const Vectors& areas() const { return areas_; }
 
   /// The sums without closing, as they are to be 0.
-  Vectors open() const {
-    Vectors sums(own_);
-    const Unknowns ones(own_, {{}, 1 / ease_area, 1 / ease_volume});
-    apply(ones, 0, sums);
+  std::vector<Vec3d> open(const Bodies& bodies) const {
+    std::vector<Vec3d> sums(areas_.size());
+    const std::vector<Unknown> ones(areas_.size(), {{}, 1 / ease_area, 1 / ease_volume});
+    for (Body* body : bodies) body->mean = 0;
+    apply_local(bodies, ones, sums);
     return sums;
   }
   /// @param x its ghosts receive their owners' values
-  void apply(Unknowns& x, Vectors& sums) const {
-    own_.refresh_ghosts(x.all());
-    apply(x, mean_volume(x), sums);
+  void apply(const Bodies& bodies, std::vector<Unknown>& x, std::vector<Vec3d>& sums) const {
+    bodies.refresh_ghosts(x);
+    find_means(bodies, x);
+    apply_local(bodies, x, sums);
   }
-  /// The change of all volumes that takes no part [over `ease_volume`].
-  double mean_volume(const Unknowns& x) const {
-    return own_.sum([&](Index i) { return model_.volume[i] * x[i].volume; }) / whole_;
+  /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
+  void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
+    bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
+    for (Body* body : bodies) body->mean /= body->whole;
   }
   /// @param sums their ghosts receive their owners' values
-  void apply_transpose(Vectors& sums, Unknowns& x) const {
-    own_.refresh_ghosts(sums.all());
-    own_.for_each([&](Index i) {
+  void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums,
+                       std::vector<Unknown>& x) const {
+    bodies.refresh_ghosts(sums);
+    bodies.for_each([&](const Body& body, Index i) {
       Unknown out;
       visit(i, [&](Index k, Vec3d x_ik, double w) {
         const Vec3d difference = sums[k] - sums[i];
         out.closing += (w * (1 - dot(tilt_[i], x_ik))) * difference;
-        out.volume += w * dot(own_share(i, x_ik), difference);
+        out.volume += w * dot(own_share(body, i, x_ik), difference);
       });
       out.volume *= ease_volume;
       out.area = -ease_area * dot(areas_[i], sums[i]);
       x[i] = out;
     });
-    const double all = own_.sum([&](Index i) { return x[i].volume; });
-    own_.for_each([&](Index i) { x[i].volume -= model_.volume[i] / whole_ * all; });
+    bodies.sum(&Body::sum, [&](const Body&, Index i) { return x[i].volume; });
+    bodies.for_each([&](const Body& body, Index i) {
+      x[i].volume -= model_.volume[i] / body.whole * body.sum;
+    });
   }
 
  private:
-  void apply(const Unknowns& x, double mean, Vectors& sums) const {
-    own_.for_each([&](Index j) {
-      Vec3d sum = -weight_[j] * x[j].closing - ease_area * x[j].area * areas_[j] -
-                  ease_volume * (x[j].volume - mean) * own_share(j, model_.moment_offset[j]);
+  void apply_local(const Bodies& bodies, const std::vector<Unknown>& x,
+                   std::vector<Vec3d>& sums) const {
+    bodies.for_each([&](const Body& body, Index j) {
+      Vec3d sum =
+          -weight_[j] * x[j].closing - ease_area * x[j].area * areas_[j] -
+          ease_volume * (x[j].volume - body.mean) * own_share(body, j, model_.moment_offset[j]);
       visit(j, [&](Index k, Vec3d x_jk, double w) {
         sum += w * ((1 + dot(tilt_[k], x_jk)) * x[k].closing -
-                    (ease_volume * (x[k].volume - mean)) * own_share(k, x_jk));
+                    (ease_volume * (x[k].volume - body.mean)) * own_share(body, k, x_jk));
       });
       sums[j] = sum;
     });
@@ -156,75 +223,86 @@ class Sums {
     }
   }
   /// M_i x per s².
-  Vec3d own_share(Index i, Vec3d x) const {
-    return (model_.volume[i] / unit_) * (model_.inverse_moment[i] * x);
+  Vec3d own_share(const Body& body, Index i, Vec3d x) const {
+    return (model_.volume[i] / body.unit) * (model_.inverse_moment[i] * x);
   }
 
   const Model& model_;
-  OwnedVectors own_;
-  Vectors areas_;                ///< S / s²
-  Vectors tilt_;                 ///< a
-  BodyVector<double> weight_;    ///< Σ_k w_jk (1 - a_j x_jk)
-  double unit_ = 1, whole_ = 1;  ///< s² [m²], all volumes [m³]
+  std::vector<Vec3d> areas_;    ///< S / s²
+  std::vector<Vec3d> tilt_;     ///< a
+  std::vector<double> weight_;  ///< Σ_k w_jk (1 - a_j x_jk)
 };
 
+/// Looks whether a body's sums are as closed as is asked or as they get.
+bool is_done(Body& body) {
+  body.left = std::sqrt(body.squares / body.areas);
+  if (body.iterations == 0) body.left_first = body.left;
+  if (!(body.left > body.tolerance) || !(body.steepness > 0) ||
+      body.iterations == most_iterations) {
+    return true;
+  }
+  if (body.iterations % patience != 0) return false;
+  const bool slow = !(body.left < 0.9 * body.left_before);
+  body.left_before = body.left;
+  return slow;
+}
+
+/// The share of the way to its tolerance that a body has come.
+double way_of(const Body& body) {
+  return std::log(body.left_first / body.left) / std::log(body.left_first / body.tolerance);
+}
+
 /// The smallest unknowns that close the sums: conjugate gradients for least squares (Björck 1996,
-/// algorithm 7.4.1). Smooth unknowns, which take the most of them, matter the least: a few
-/// iterations do most of what can be done.
-/// @param tolerance share of the areas
-struct Solution {
-  Unknowns x;
-  int iterations = 0;
-  double left = 0;  ///< Root mean square of the sums over that of the areas, summed anew.
-};
-Solution close(const Sums& sums, double tolerance) {
+/// algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns, which take
+/// the most of them, matter the least: a few iterations do most of what can be done. What is left
+/// of each body's sums is summed anew at the end.
+std::vector<Unknown> close(const Sums& sums, const Bodies& all) {
   Stage stage("closed gradients");
-  const OwnedVectors& own = sums.own();
-  Solution solution{Unknowns(own)};
-  const auto squares = [&](const auto& values) {
-    return own.sum([&](Index i) { return dot(values[i], values[i]); });
-  };
-  const double areas = squares(sums.areas());
-  const Vectors open = sums.open();
-  Vectors residual(own), image(own);
-  own.for_each([&](Index i) { residual[i] = -open[i]; });
-  Unknowns slope(own);
-  sums.apply_transpose(residual, slope);
-  Unknowns direction = slope;
-  double left_before = HUGE_VAL, left_first = 0;
-  double steepness = squares(slope);
-  for (;; ++solution.iterations) {
-    const double left = std::sqrt(squares(residual) / areas);
-    if (solution.iterations == 0) left_first = left;
-    stage.reach(std::log(left_first / left) / std::log(left_first / tolerance));
-    if (!(left > tolerance) || !(steepness > 0) || solution.iterations == most_iterations) break;
-    if (solution.iterations % patience == 0) {
-      if (!(left < 0.9 * left_before)) break;
-      left_before = left;
-    }
-    sums.apply(direction, image);
-    const double length = squares(image);
-    if (!(length > 0)) break;
-    const double step = steepness / length;
-    own.for_each([&](Index i) {
-      add(solution.x[i], step, direction[i]);
+  const std::vector<Vec3d> open = sums.open(all);
+  const std::size_t n = open.size();
+  std::vector<Unknown> x(n), slope(n), direction(n);
+  std::vector<Vec3d> residual(n), image(n);
+  const auto residual_squares = [&](const Body&, Index i) { return dot(residual[i], residual[i]); };
+  const auto slope_squares = [&](const Body&, Index i) { return dot(slope[i], slope[i]); };
+  all.for_each([&](const Body&, Index i) { residual[i] = -open[i]; });
+  all.sum(&Body::squares, residual_squares);
+  sums.apply_transpose(all, residual, slope);
+  all.sum(&Body::steepness, slope_squares);
+  all.for_each([&](const Body&, Index i) { direction[i] = slope[i]; });
+  Bodies active = all;
+  for (;;) {
+    active.erase_if(is_done);
+    if (active.empty()) break;
+    double way = 1;
+    for (const Body* body : active) way = std::min(way, way_of(*body));
+    stage.reach(way);
+    sums.apply(active, direction, image);
+    active.sum(&Body::length, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+    active.erase_if([](const Body& body) { return !(body.length > 0); });
+    active.for_each([&](const Body& body, Index i) {
+      const double step = body.steepness / body.length;
+      add(x[i], step, direction[i]);
       residual[i] -= step * image[i];
     });
-    sums.apply_transpose(residual, slope);
-    const double next = squares(slope);
-    const double keep = next / steepness;
-    own.for_each([&](Index i) {
+    active.sum(&Body::squares, residual_squares);
+    sums.apply_transpose(active, residual, slope);
+    active.sum(&Body::next_steepness, slope_squares);
+    active.for_each([&](const Body& body, Index i) {
       Unknown turned = slope[i];
-      add(turned, keep, direction[i]);
+      add(turned, body.next_steepness / body.steepness, direction[i]);
       direction[i] = turned;
     });
-    steepness = next;
+    for (Body* body : active) {
+      body->steepness = body->next_steepness;
+      ++body->iterations;
+    }
   }
-  sums.apply(solution.x, image);
-  own.for_each([&](Index i) { image[i] += open[i]; });
-  solution.left = std::sqrt(squares(image) / areas);
+  sums.apply(all, x, image);
+  all.for_each([&](const Body&, Index i) { image[i] += open[i]; });
+  all.sum(&Body::squares, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+  for (Body* body : all) body->left = std::sqrt(body->squares / body->areas);
   stage.finish();
-  return solution;
+  return x;
 }
 
 /// The first phyxel of all ranks whose volume would have to change too far, and how far.
@@ -232,23 +310,63 @@ struct Excess {
   double phyxel = HUGE_VAL;  ///< Index in the whole model; infinite: none.
   double change = 0;         ///< Relative; infinite: it is no number.
 };
-/// @param change(i) relative change of the volume of phyxel i
+/// @param change(body, i) relative change of the volume of phyxel i
 template <class Change>
-Excess first_excess(const Model& model, std::span<const Part> parts, Change&& change) {
+Excess first_excess(const Model& model, const Bodies& bodies, Change&& change) {
   Excess first;
-  for (const Part& part : parts) {
-    for (Index i = part.begin; i < part.owned_end() && first.phyxel == HUGE_VAL; ++i) {
-      // Half is far beyond what closes clouds that are any good; NaN is none of these.
-      if (std::abs(change(i)) < 0.5) continue;
-      first.phyxel = static_cast<double>(model.global_id(i));
-      // A NaN would get lost among ranks.
-      first.change = std::isnan(change(i)) ? HUGE_VAL : change(i);
+  for (const Body* body : bodies) {
+    for (const Part& part : body->parts) {
+      for (Index i = part.begin; i < part.owned_end(); ++i) {
+        // Half is far beyond what closes clouds that are any good; NaN is none of these.
+        const double found = change(*body, i);
+        if (std::abs(found) < 0.5 || model.global_id(i) >= first.phyxel) continue;
+        // A NaN would get lost among ranks.
+        first = {static_cast<double>(model.global_id(i)), std::isnan(found) ? HUGE_VAL : found};
+      }
     }
   }
   if (!model.share) return first;
   const Communicator& ranks = *model.share->communicator;
   const double phyxel = ranks.smallest(first.phyxel);
   return {phyxel, ranks.smallest(first.phyxel == phyxel ? first.change : HUGE_VAL)};
+}
+
+/// Says which body cannot be closed.
+std::string refusal_of(const Model& model, const Excess& excess) {
+  const Part* body = model.parts.data();  // the first part of the phyxel's body
+  double first = 0, end = 0;              // its first phyxel, and the end of the part
+  for (const Part& part : model.parts) {
+    if (part.body != body->body) {
+      body = &part;
+      first = end;
+    }
+    end += part.size;
+    if (excess.phyxel < end) break;
+  }
+  return fmt::format(
+      "body \"{}\": gradients cannot be closed (closure = {:g}): phyxel {} would have to change "
+      "its volume {}; allowed are more phyxels where the body is thin, or closure = 0",
+      body->name, body->closure, excess.phyxel - first,
+      std::isfinite(excess.change) ? fmt::format("by {:.0f}%", 100 * excess.change)
+                                   : "beyond all bounds");
+}
+
+void warn_of(Model& model, const Body& body) {
+  if (body.left <= body.tolerance) return;
+  model.warnings.push_back(fmt::format(
+      "body \"{}\": sums over neighbourhoods are closed to {:.2g} after {} iterations, asked was "
+      "{:g}; more phyxels across its thinnest places help",
+      body.parts.front().name, body.left, body.iterations, body.tolerance));
+}
+
+/// Adds to loads by volume what volumes have changed. @param before volume of each phyxel [m³]
+void follow_volumes(Model& model, const std::vector<double>& before) {
+  for (Load& load : model.loads) {
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+      const Index i = load.phyxels[k];
+      load.force[k] += (model.volume[i] - before[i]) * load.density;
+    }
+  }
 }
 
 /// The surface of a body in a model that is no share. Triangles stand body by body.
@@ -267,66 +385,47 @@ std::vector<Facet> facets_of(const Model& model, const Part& part) {
 
 }  // namespace
 
-std::optional<std::string> close_body(Model& model, std::span<Part> parts, double enclosed,
-                                      std::vector<Vec3d> areas) {
+std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBody>& wanted,
+                                        std::vector<Vec3d> areas) {
+  if (wanted.empty()) return std::nullopt;
   const Phase phase("closing gradients");
-  const Part& first = parts.front();
-  const auto of_body = [&](auto& values) {
-    return std::span(values).subspan(static_cast<std::size_t>(first.begin),
-                                     static_cast<std::size_t>(parts.back().end - first.begin));
-  };
-  double volume = 0;
-  for (const Part& part : parts) volume += part.volume;
-  for (double& v : of_body(model.volume)) v *= enclosed / volume;
-  const Sums sums(model, parts, std::move(areas));
-  const OwnedVectors& own = sums.own();
-  const Solution solution = close(sums, first.closure);
-  const double mean = sums.mean_volume(solution.x);
-  const auto change = [&](Index i) { return ease_volume * (solution.x[i].volume - mean); };
-  if (const Excess excess = first_excess(model, parts, change); excess.phyxel < HUGE_VAL) {
-    double number = excess.phyxel;  // in the body
-    for (const Part& part : model.parts) {
-      if (part.body < first.body) number -= part.size;
+  const std::vector<double> before = model.volume;
+  std::vector<Body> list, parts;
+  for (const auto& [of_body, enclosed] : wanted) {
+    Body& body = list.emplace_back(Body{.parts = of_body, .tolerance = of_body.front().closure});
+    double volume = 0;
+    for (Part& part : of_body) {
+      volume += part.volume;
+      parts.push_back({.parts = {&part, 1}});
     }
-    return fmt::format(
-        "body \"{}\": gradients cannot be closed (closure = {:g}): phyxel {} would have to change "
-        "its volume {}; allowed are more phyxels where the body is thin, or closure = 0",
-        first.name, first.closure, number,
-        std::isfinite(excess.change) ? fmt::format("by {:.0f}%", 100 * excess.change)
-                                     : "beyond all bounds");
+    for (Index i = body.begin(); i < body.end(); ++i) model.volume[i] *= enclosed / volume;
   }
+  const Bodies bodies(model, list);
+  const Sums sums(model, bodies, std::move(areas));
+  const std::vector<Unknown> found = close(sums, bodies);
+  sums.find_means(bodies, found);
+  const auto change = [&](const Body& body, Index i) {
+    return ease_volume * (found[i].volume - body.mean);
+  };
+  const Excess excess = first_excess(model, bodies, change);
+  if (excess.phyxel < HUGE_VAL) return refusal_of(model, excess);
   model.closing.resize(model.volume.size());
-  own.for_each([&](Index i) {
-    model.volume[i] *= 1 + change(i);
-    model.closing[i] = (sums.unit() / model.volume[i]) * solution.x[i].closing;
+  bodies.for_each([&](const Body& body, Index i) {
+    model.volume[i] *= 1 + change(body, i);
+    model.closing[i] = (body.unit / model.volume[i]) * found[i].closing;
   });
-  own.refresh_ghosts(of_body(model.volume));
-  own.refresh_ghosts(of_body(model.closing));
-  for (Part& part : parts) {
-    part.volume = OwnedVectors(model, {&part, 1}, omp_get_max_threads()).sum([&](Index i) {
-      return model.volume[i];
-    });
-  }
-  if (!(solution.left <= first.closure)) {
-    model.warnings.push_back(fmt::format(
-        "body \"{}\": sums over neighbourhoods are closed to {:.2g} after {} iterations, asked was "
-        "{:g}; more phyxels across its thinnest places help",
-        first.name, solution.left, solution.iterations, first.closure));
-  }
+  bodies.refresh_ghosts(model.volume);
+  bodies.refresh_ghosts(model.closing);
+  Bodies(model, parts).sum(&Body::whole, [&](const Body&, Index i) { return model.volume[i]; });
+  for (const Body& part : parts) part.parts.front().volume = part.whole;
+  follow_volumes(model, before);
+  for (const Body& body : list) warn_of(model, body);
   return std::nullopt;
 }
 
-void loads_follow_volumes(Model& model, const std::vector<double>& before) {
-  for (Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      const Index i = load.phyxels[k];
-      load.force[k] += (model.volume[i] - before[i]) * load.density;
-    }
-  }
-}
-
 void close_gradients(Model& model) {
-  const std::vector<double> before = model.volume;
+  std::vector<ClosedBody> closed;
+  std::vector<Vec3d> areas;
   for (auto part = model.parts.begin(); part != model.parts.end();) {
     const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
     if (part->closure > 0 && part->begin < part->end) {
@@ -339,14 +438,17 @@ void close_gradients(Model& model) {
       const std::vector<Facet> facets = facets_of(model, *part);
       std::vector<Vec3d> centroids;
       for (const Facet& f : facets) centroids.push_back(f.centroid);
-      const std::optional<std::string> refusal = close_body(
-          model, {part, next}, enclosed_by(facets).volume,
-          areas_of_phyxels(facets, phyxels_near(centroids, position, support), position, support));
-      if (refusal) throw InputError(*refusal);
+      const std::vector<Vec3d> of_body =
+          areas_of_phyxels(facets, phyxels_near(centroids, position, support), position, support);
+      areas.resize(model.position.size());
+      std::copy(of_body.begin(), of_body.end(), areas.begin() + part->begin);
+      closed.push_back({{part, next}, enclosed_by(facets).volume});
     }
     part = next;
   }
-  loads_follow_volumes(model, before);
+  if (const auto refusal = close_bodies(model, closed, std::move(areas))) {
+    throw InputError(*refusal);
+  }
 }
 
 }  // namespace phyxel

@@ -17,21 +17,14 @@ class OwnedVectors {
  public:
   using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; values of ghosts are undefined
 
-  OwnedVectors(const Model& model, int threads) : OwnedVectors(model, model.parts, threads) {}
-  /// @param parts those of the model whose phyxels loops and sums are about
-  OwnedVectors(const Model& model, std::span<const Part> parts, int threads)
-      : model_(model), parts_(parts), threads_(threads) {}
-
-  /// The first phyxel of the parts, and the end of the last: parts stand one after the other.
-  Index begin() const { return parts_.empty() ? 0 : parts_.front().begin; }
-  Index end() const { return parts_.empty() ? 0 : parts_.back().end; }
+  OwnedVectors(const Model& model, int threads) : model_(model), threads_(threads) {}
 
   Vector make() const { return Vector(static_cast<std::size_t>(model_.size())); }
 
   /// Calls each(i) for the phyxels that are not ghosts.
   template <class Each>
   void for_each(Each&& each) const {
-    for (const Part& part : parts_) {
+    for (const Part& part : model_.parts) {
 #pragma omp parallel for schedule(static) num_threads(threads_)
       for (Index i = part.begin; i < part.owned_end(); ++i) each(i);
     }
@@ -44,7 +37,7 @@ class OwnedVectors {
 #pragma omp parallel num_threads(threads_)
     {
       ExactSum own;
-      for (const Part& part : parts_) {
+      for (const Part& part : model_.parts) {
 #pragma omp for schedule(static) nowait
         for (Index i = part.begin; i < part.owned_end(); ++i) own.add(term(i));
       }
@@ -62,7 +55,7 @@ class OwnedVectors {
   template <class Value>
   double largest(Value&& value) const {
     double largest = 0;
-    for (const Part& part : parts_) {
+    for (const Part& part : model_.parts) {
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         largest = std::max(largest, value(i));
       }
@@ -71,18 +64,12 @@ class OwnedVectors {
   }
 
   /// Copies the owners' values to ghosts. Collective.
-  /// @param values of the phyxels from `begin` to `end`. Parts must be those of whole bodies.
-  template <class T>
-  void refresh_ghosts(std::span<T> values) const {
-    if (!model_.share) return;
-    HaloTransport& halo = *model_.share->transport;
-    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr, begin(),
-                end()});
-    halo.finish();
-  }
   template <class T>
   void refresh_ghosts(std::vector<T>& values) const {
-    refresh_ghosts(std::span(values));
+    if (!model_.share) return;
+    HaloTransport& halo = *model_.share->transport;
+    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr});
+    halo.finish();
   }
 
   /// The smallest support of the phyxels of all ranks [m]; infinite if there is none. Collective.
@@ -97,7 +84,6 @@ class OwnedVectors {
 
  private:
   const Model& model_;
-  std::span<const Part> parts_;
   int threads_;
 };
 

@@ -1,0 +1,28 @@
+/// Exact sums over ranks.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "phyxel/communicator.hpp"
+
+namespace phyxel {
+
+/// Adds the sums of all ranks, in place. Collective; every rank has as many.
+inline void add_over_ranks(const Communicator& ranks, const std::vector<ExactSum*>& sums) {
+  std::vector<std::int64_t> words;
+  for (ExactSum* sum : sums) {
+    const std::span<std::int64_t> ready = sum->ready();
+    words.insert(words.end(), ready.begin(), ready.end());
+  }
+  ranks.add(words);
+  const std::int64_t* from = words.data();
+  for (ExactSum* sum : sums) {
+    std::copy_n(from, ExactSum::words, sum->ready().begin());
+    from += ExactSum::words;
+  }
+}
+
+}  // namespace phyxel
