@@ -329,7 +329,7 @@ class Physics {
     const bool strained = !rests || !row_.is(boundary, "free") || row_.has(external);
     EXPECT_EQ(d.strain_energy > 0, strained);
     EXPECT_EQ(d.volume_energy > 0, strained && row_.has(volume));
-    EXPECT_EQ(d.hourglass_energy > 0, strained && row_.has(hourglass));
+    EXPECT_EQ(d.hourglass_energy > 0, strained && row_.has_hourglass());
     EXPECT_EQ(d.viscous_work != 0, !rests && row_.has(viscosity));
     bool remembers = false;
     for (const HistoryColumn& column : course_.after.history) {
@@ -339,7 +339,7 @@ class Physics {
     if (!rests) {
       EXPECT_EQ(remembers, has_law_with_history() || row_.has(viscosity));
     }
-    EXPECT_EQ(whole_.closing.empty(), !row_.has(closure));
+    EXPECT_EQ(whole_.closing.empty(), !row_.is_closed());
     EXPECT_EQ(whole_.parts.size(), row_.has(inclusions) ? 2u : 1u);
     EXPECT_EQ(whole_.neighbourhood.symmetric, row_.is(supports, "one support"));
   }
