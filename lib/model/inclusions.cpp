@@ -53,7 +53,8 @@ void refuse_inclusions(const BodyRequest& request, const char* why, const char* 
 
 void refuse_kernel_volumes(const BodyRequest& request) {
   if (request.inclusions.empty()) return;
-  refuse_inclusions(request, "whose volumes the kernel cannot tell", "volumes = \"geometry\"");
+  refuse_inclusions(request, "whose volumes the kernel cannot tell",
+                    "volumes = \"geometry\" and a body that carries volumes");
 }
 
 SortedCloud sort_by_material(const BodyRequest& request, const Cloud& cloud) {

@@ -18,9 +18,8 @@ namespace phyxel::testing {
 enum Factor {
   device,
   law,
-  closure,
+  pair_terms,
   inclusions,
-  hourglass,
   volume,
   viscosity,
   damping,
@@ -41,9 +40,12 @@ struct FactorEntry {
 
 inline constexpr const char *on_cpu = "cpu", *by_tiles = "GPU by tiles",
                             *in_residence = "GPU in residence";
+inline constexpr const char *hourglass = "hourglass control", *closed = "closed gradients",
+                            *hourglass_and_closed = "hourglass control and closed gradients";
 inline constexpr const char *custom = "custom law", *custom_history = "custom law with history";
 
-/// All factors. Laws are those of `law_table()`, and two of a caller's own.
+/// All factors. Laws are those of `law_table()`, and two of a caller's own. Pair terms are one
+/// factor, so that each combination of them meets each value of the others.
 inline const std::vector<FactorEntry>& factors() {
   static const std::vector<FactorEntry> all = [] {
     std::vector<std::string> laws;
@@ -52,9 +54,8 @@ inline const std::vector<FactorEntry>& factors() {
     return std::vector<FactorEntry>{
         {"device", {on_cpu, by_tiles, in_residence}},
         {"law", laws},
-        {"closure", {"", "closed gradients"}},
+        {"pair terms", {"", hourglass, closed, hourglass_and_closed}},
         {"inclusions", {"", "inclusions"}},
-        {"hourglass", {"", "hourglass control"}},
         {"volume", {"", "volume conservation"}},
         {"viscosity", {"", "viscosity"}},
         {"damping", {"", "damping"}},
@@ -80,7 +81,7 @@ inline const std::string& value_name(int factor, int level) {
   return factors()[factor].values[level];
 }
 
-/// "law = j2 with closure = closed gradients"
+/// "law = j2 with pair terms = closed gradients"
 inline std::string describe(const LevelPair& pair) {
   const auto one = [](int factor, int level) {
     const std::string& value = value_name(factor, level);
@@ -98,6 +99,10 @@ struct Combination {
   bool is(Factor factor, const std::string& wanted) const { return value(factor) == wanted; }
   /// True if a term is in use.
   bool has(Factor term) const { return levels[term] > 0; }
+  bool has_hourglass() const {
+    return is(pair_terms, hourglass) || is(pair_terms, hourglass_and_closed);
+  }
+  bool is_closed() const { return is(pair_terms, closed) || is(pair_terms, hourglass_and_closed); }
   bool on_gpu() const { return !is(device, on_cpu); }
   Precision working_precision() const { return *precision_named(value(precision)); }
   Method time_method() const { return *method_named(value(method)); }

@@ -52,7 +52,7 @@ inline Material with_terms(const Combination& row, Material material) {
   material.volume_stiffness = row.has(volume) ? 5e4 : 0;
   material.viscosity = row.has(viscosity) ? 1e-3 : 0;
   material.damping = row.has(damping) ? 3 : 0;
-  material.hourglass = row.has(hourglass) ? 0.1 : 0;
+  material.hourglass = row.has_hourglass() ? 0.1 : 0;
   return material;
 }
 
@@ -140,7 +140,7 @@ inline Scene scene_of(const Combination& row) {
   scene.solver.precision = row.working_precision();
   BodyRequest& body = scene.bodies.emplace_back(shape_of(row));
   body.material = with_terms(row, own_law(row));
-  body.closure = row.has(closure) ? 1e-3 : 0;
+  body.closure = row.is_closed() ? 1e-3 : 0;
   body.velocity = {0.3, -0.2, 0.1};
   body.spin = {1, 2, 3};
   if (row.is(supports, "adaptive supports")) {
