@@ -139,9 +139,8 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
                             density)
             : geometric_masses(values_of(local, body, &MigratingPhyxel::volume), density);
     for (const Part& part : model_parts_of(whole, local, b).subspan(1)) {
-      for (Index i = part.begin; i < part.end; ++i) {
-        masses.mass[i - body.begin] = masses.volume[i - body.begin] * part.material.density;
-      }
+      give_density(masses, part.begin - body.begin, part.end - body.begin, part.material.density,
+                   setup.scene.bodies[b], whole.bodies[b].kernel_volumes);
     }
     made.push_back(std::move(masses));
   }

@@ -243,7 +243,6 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));
-      if (whole.bodies[b].kernel_volumes) refuse_kernel_volumes(setup.scene.bodies[b]);
     }
   });
   return own;

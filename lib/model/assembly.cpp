@@ -131,6 +131,14 @@ Masses geometric_masses(const std::vector<double>& volume, double density) {
   return {tabulated(volume.size(), [&](std::size_t i) { return volume[i] * density; }), volume};
 }
 
+void give_density(Masses& masses, Index begin, Index end, double density,
+                  const BodyRequest& request, bool kernel_volumes) {
+  const double ratio = density / request.material.density;
+  for (Index i = begin; i < end; ++i) {
+    masses.mass[i] = kernel_volumes ? masses.mass[i] * ratio : masses.volume[i] * density;
+  }
+}
+
 std::string in_words(const NeighbourhoodRule& rule) {
   std::string words;
   if (rule.radius) {

@@ -51,12 +51,6 @@ void refuse_inclusions(const BodyRequest& request, const char* why, const char* 
                                request.inclusions[0].select.where, request.name, why, allowed));
 }
 
-void refuse_kernel_volumes(const BodyRequest& request) {
-  if (request.inclusions.empty()) return;
-  refuse_inclusions(request, "whose volumes the kernel cannot tell",
-                    "volumes = \"geometry\" and a body that carries volumes");
-}
-
 SortedCloud sort_by_material(const BodyRequest& request, const Cloud& cloud) {
   const std::size_t n = cloud.position.size();
   const MaterialChoice choice = choose_materials(request, {cloud, {}, static_cast<Index>(n)});

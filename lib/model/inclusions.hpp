@@ -43,8 +43,6 @@ std::vector<MaterialGroup> material_groups(const BodyRequest& request,
 /// @throws InputError naming the first inclusion's line, why, and what is allowed
 [[noreturn]] void refuse_inclusions(const BodyRequest& request, const char* why,
                                     const char* allowed);
-/// @throws InputError for a body with inclusions
-void refuse_kernel_volumes(const BodyRequest& request);
 
 /// A cloud and the order its phyxels are in by now.
 struct SortedCloud {

@@ -131,9 +131,7 @@ Masses masses_of(const BodyRequest& request, const Cloud& cloud, const Survey& s
                           kernel_sum.value() / static_cast<double>(survey.spacing.size()), density)
           : geometric_masses(cloud.volume, density);
   for (const MaterialGroup& group : groups.subspan(1)) {
-    for (Index i = group.begin; i < group.end; ++i) {
-      masses.mass[i] = masses.volume[i] * group.material.density;
-    }
+    give_density(masses, group.begin, group.end, group.material.density, request, kernel_volumes);
   }
   check_masses(request, masses);
   return masses;
@@ -230,7 +228,6 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   if (surveyor) check_surveyable(request);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
-  if (kernel_volumes) refuse_kernel_volumes(request);
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   const Survey survey = add_neighbours(model, request, cloud, surveyor, kernel_volumes);

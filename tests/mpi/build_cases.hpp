@@ -152,6 +152,7 @@ inline BuildCase closed() {
 inline BuildCase mixed() {
   BuildCase c{"Mixed", {.bodies = {shape("beam", 0.2), shape("block", 0.19)}}, {}};
   BodyRequest& body = c.scene.bodies[1];
+  body.volume_rule = VolumeRule::kernel;
   Material soft = body.material, stiff = body.material;
   soft.young /= 3;
   stiff.young *= 2;

@@ -262,7 +262,7 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
   }
   wrong[8].inclusions[0].select.region = "nowhere";
   wrong[9].inclusions[0].select = {.all = true};
-  wrong[10].volume_rule = VolumeRule::kernel;
+  wrong[10].inclusions[0].select = {.indices = std::vector<Index>{99999}, .where = "test"};
   // By the numbers of the cloud, which has its inclusion at its start.
   wrong[11].fixed.push_back({.select = {.region = "x-"}});
   wrong[11].fixed.push_back({.select = {.indices = std::vector<Index>{0}}});

@@ -332,9 +332,27 @@ TEST(Inclusions, OfNothingOrOfAllAreRefused) {
   EXPECT_THAT(message(), HasSubstr("a.toml:7:1"));
   scene.bodies[0].inclusions[0].select = {.all = true, .where = "a.toml:8:1"};
   EXPECT_THAT(message(), HasSubstr("no phyxel is left of its own material"));
-  scene.bodies[0].volume_rule = VolumeRule::kernel;
-  scene.bodies[0].inclusions[0].select = {.indices = std::vector<Index>{0}, .where = "a.toml:9:1"};
-  EXPECT_THAT(message(), HasSubstr("volumes = \"geometry\""));
+}
+
+/// The kernel's volumes are those of a body of one material; masses have each material's density.
+TEST(Inclusions, HaveTheKernelsVolumes) {
+  Scene scene = one_body();
+  Cloud cloud = lattice(4, 3, 2, 0.1);
+  cloud.volume.clear();
+  const Model plain = model_of(scene, cloud);
+  Material heavy = scene.bodies[0].material;
+  heavy.density *= 3;
+  scene.bodies[0].inclusions = {
+      {.select = {.box = Selection::Box{{0.2, -1, -1}, {1, 1, 1}}}, .material = heavy}};
+  const Model model = model_of(scene, cloud);
+  ASSERT_EQ(model.parts.size(), 2u);
+  for (Index i = 0; i < model.size(); ++i) {
+    const auto at = std::find(plain.position.begin(), plain.position.end(), model.position[i]) -
+                    plain.position.begin();
+    // Sums over the same neighbours in another order.
+    EXPECT_NEAR(model.volume[i], plain.volume[at], 1e-14 * plain.volume[at]);
+    EXPECT_NEAR(model.mass[i], (i < 12 ? 1 : 3) * plain.mass[at], 1e-14 * plain.mass[at]);
+  }
 }
 
 /// One entry for each axis of a phyxel.

@@ -92,25 +92,6 @@ inline const std::vector<Condition>& conditions() {
        [](Scene& scene, Cloud&) {
          scene.bodies[0].inclusions.push_back({in_box({-9, -9, -9}, {9, 9, 9}), rubber()});
        }},
-      {"InclusionsWithKernelVolumes",
-       "inclusions with `volumes = \"kernel\"`",
-       {"has inclusions, whose volumes the kernel cannot tell",
-        "allowed is volumes = \"geometry\" and a body that carries volumes"},
-       "the rule divides masses by densities that it sums over neighbours, and so knows one "
-       "material; a rule from positions alone is not written",
-       [](Scene& scene, Cloud&) {
-         scene.bodies[0].volume_rule = VolumeRule::kernel;
-         scene.bodies[0].inclusions.push_back({in_box({0.3, -1, -1}, {0.5, 1, 1}), rubber()});
-       }},
-      {"InclusionsWithoutVolumes",
-       "inclusions in a cloud without volumes",
-       {"has inclusions, whose volumes the kernel cannot tell",
-        "allowed is volumes = \"geometry\" and a body that carries volumes"},
-       "such a cloud takes the kernel's volumes",
-       [](Scene& scene, Cloud& cloud) {
-         cloud.volume.clear();
-         scene.bodies[0].inclusions.push_back({in_box({0.3, -1, -1}, {0.5, 1, 1}), rubber()});
-       }},
       {"TwoMotionsOfAnAxis",
        "two entries of `fixed` and `motion` that hold the same axis of a phyxel",
        {"is already fixed or moved by an earlier entry", "allowed: one entry for each of its axes"},
