@@ -36,7 +36,7 @@ run_tests() {
 
 # Several checks run at a time, on different GPUs if possible: a tool needs a core more than a GPU.
 gpus=$(nvidia-smi -L | wc -l)
-most_jobs=$((4 * gpus))
+most_jobs=$(($(nproc) > 6 ? $(nproc) - 2 : 4))
 jobs_started=0
 job_logs=()
 # start <log> <what> <command>...
