@@ -84,7 +84,8 @@ run_sanitizers() {
   check paper_backend_test 'Paper/Kernels.*Gpu*:PaperGpu.TwoBodies*'
   check cuda_backend_test '*Forces*/AdaptiveEverything:*Forces*/ClosedBesideAdaptive:*Energies*/UniformEverything:*Surf*'
   # Blocks that wait for each other's packets take hours if each access is recorded for races.
-  check cuda_backend_test '*Residence*/Mail:*Residence*/ClusterAdaptive' 'memcheck initcheck synccheck'
+  check cuda_paths_test '*CudaResidence*/Mail:*CudaResidence*/ClusterAdaptive:*CudaResidence*/MailClosed' \
+    'memcheck initcheck synccheck'
   # Laws that remember: by tiles, and in residence.
   check cuda_backend_test '*Forces*/ClosedPlasticViscous'
   check history_cuda_test 'History.EvaluationsNeverCommit' 'memcheck initcheck synccheck'

@@ -165,17 +165,24 @@ class Physics {
   /// @param moved displacements of the step [m]
   void check_viscous_work(State state, const std::vector<Vec3d>& moved) {
     if (!row_.has(viscosity)) return;
+    // Strain is quadratic in displacements: the error is the change of strain, of which a tenth of
+    // the step leaves little.
+    const double share = 0.1;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+      state.displacement[i] -= (1 - share) * moved[i];
+    }
+    state.history_interval *= share;
     const std::vector<Vec3d> with = reference_forces(state);
     const double heat = diagnose(whole_, *reference_, 0, 1).viscous_work;
     state.history_interval = 0;
     const std::vector<Vec3d> without = reference_forces(state);
     const double heat_before = diagnose(whole_, *reference_, 0, 1).viscous_work;
     double work = 0;
-    for (std::size_t i = 0; i < with.size(); ++i) work += dot(with[i] - without[i], moved[i]);
+    for (std::size_t i = 0; i < with.size(); ++i) {
+      work += dot(with[i] - without[i], share * moved[i]);
+    }
     EXPECT_LT(work, 0);
-    // Strain is quadratic in displacements: the error is the change of strain in the step (seen: 2%
-    // in Verlet's steps, 5% in implicit ones).
-    EXPECT_NEAR(heat - heat_before, -work, 0.1 * -work);
+    EXPECT_NEAR(heat - heat_before, -work, 0.03 * -work);  // seen: 0.017
   }
 
   /// Internal forces have neither a sum nor, but for laws that are linear, a torque: only the
