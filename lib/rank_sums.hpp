@@ -10,7 +10,7 @@
 
 namespace phyxel {
 
-/// Adds the sums of all ranks, in place. Collective; every rank has as many.
+/// Adds the sums of all ranks, in place. Collective; the number of sums is the same on all ranks.
 inline void add_over_ranks(const Communicator& ranks, const std::vector<ExactSum*>& sums) {
   std::vector<std::int64_t> words;
   for (ExactSum* sum : sums) {

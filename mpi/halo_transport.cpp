@@ -70,11 +70,9 @@ class Timed {
 void MpiHaloTransport::start(const PeerBytes& outgoing, const PeerBytes& incoming) {
   const Timed timed(traffic_.seconds);
   const std::vector<HaloPlan::Peer>& peers = plan_->peers;
+  for (std::size_t p = 0; p < peers.size(); ++p) transfers_.receive(peers[p].rank, incoming[p]);
   for (std::size_t p = 0; p < peers.size(); ++p) {
-    if (!incoming[p].empty()) transfers_.receive(peers[p].rank, incoming[p]);
-  }
-  for (std::size_t p = 0; p < peers.size(); ++p) {
-    if (!outgoing[p].empty()) transfers_.send(peers[p].rank, outgoing[p]);
+    transfers_.send(peers[p].rank, outgoing[p]);
     traffic_.bytes_sent += static_cast<std::int64_t>(outgoing[p].size());
   }
 }

@@ -140,7 +140,7 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
             : geometric_masses(values_of(local, body, &MigratingPhyxel::volume), density);
     for (const Part& part : model_parts_of(whole, local, b).subspan(1)) {
       give_density(masses, part.begin - body.begin, part.end - body.begin, part.material.density,
-                   setup.scene.bodies[b], whole.bodies[b].kernel_volumes);
+                   density, whole.bodies[b].kernel_volumes);
     }
     made.push_back(std::move(masses));
   }

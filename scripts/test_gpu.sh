@@ -36,7 +36,7 @@ run_tests() {
 
 # Several checks run at a time, on different GPUs if possible: a tool needs a core more than a GPU.
 gpus=$(nvidia-smi -L | wc -l)
-most_jobs=$(($(nproc) > 6 ? $(nproc) - 2 : 4))
+most_jobs=$((14 * gpus < $(nproc) ? 14 * gpus : $(nproc)))
 jobs_started=0
 job_logs=()
 # start <log> <what> <command>...

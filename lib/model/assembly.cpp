@@ -131,9 +131,9 @@ Masses geometric_masses(const std::vector<double>& volume, double density) {
   return {tabulated(volume.size(), [&](std::size_t i) { return volume[i] * density; }), volume};
 }
 
-void give_density(Masses& masses, Index begin, Index end, double density,
-                  const BodyRequest& request, bool kernel_volumes) {
-  const double ratio = density / request.material.density;
+void give_density(Masses& masses, Index begin, Index end, double density, double own_density,
+                  bool kernel_volumes) {
+  const double ratio = density / own_density;
   for (Index i = begin; i < end; ++i) {
     masses.mass[i] = kernel_volumes ? masses.mass[i] * ratio : masses.volume[i] * density;
   }

@@ -55,9 +55,9 @@ void check_mass(const BodyRequest& request, Index i, double mass, double volume)
 Masses geometric_masses(const std::vector<double>& volume, double density);
 /// Gives the phyxels [begin, end) of a body their inclusion's density. Volumes stay: by both rules
 /// they follow from positions alone.
-/// @param masses of the body, all of its own material's density
-void give_density(Masses& masses, Index begin, Index end, double density,
-                  const BodyRequest& request, bool kernel_volumes);
+/// @param masses of the body, all by the density of its own material, `own_density` [kg/m³]
+void give_density(Masses& masses, Index begin, Index end, double density, double own_density,
+                  bool kernel_volumes);
 
 /// "uniform support, 1.8 x the mean distance to the 10 nearest"
 std::string in_words(const NeighbourhoodRule& rule);

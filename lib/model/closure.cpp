@@ -1,6 +1,7 @@
 #include "model/closure.hpp"
 
 #include <fmt/format.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +26,7 @@ constexpr int most_iterations = 10'000;
 constexpr int patience = 500;
 
 /// What is sought, of each phyxel: the closing vector times v / s², and the relative changes of its
-/// area and of its volume, over `ease_area` and
-/// `ease_volume`.
+/// area and of its volume, over `ease_area` and `ease_volume`.
 struct Unknown {
   Vec3d closing;
   double area = 0, volume = 0;
@@ -44,12 +44,12 @@ void add(Unknown& to, double s, const Unknown& x) {
 struct Body {
   std::span<Part> parts;
   double tolerance = 0;
-  double unit = 1, whole = 1;  ///< s² [m²], all volumes [m³]
-  double areas = 0;            ///< Σ S², per s⁴.
-  double squares = 0;          ///< Of what is left of the sums.
-  double steepness = 0, next_steepness = 0, length = 0;
-  double sum = 0, mean = 0;  ///< Of changes of volume.
-  double left = 0, left_first = 0, left_before = HUGE_VAL;
+  double unit = 1, volume = 1;  ///< s² [m²] and the volume of all phyxels [m³].
+  double areas = 0;             ///< Σ S², per s⁴.
+  double residual_squared = 0, gradient_squared = 0, next_gradient_squared = 0, image_squared = 0;
+  double sum = 0, mean = 0;  ///< Sum and mean of the changes of volumes.
+  double left = 0;           ///< Root mean square of the sums over that of the areas.
+  double left_first = 0, left_before = HUGE_VAL;
   int iterations = 0;
 
   Index begin() const { return parts.front().begin; }
@@ -74,34 +74,21 @@ class Bodies {
   /// Calls each(body, i) for the phyxels that are not ghosts.
   template <class Each>
   void for_each(Each&& each) const {
-#pragma omp parallel
-    for (Body* body : list_) {
-      for (const Part& part : body->parts) {
-#pragma omp for schedule(static) nowait
-        for (Index i = part.begin; i < part.owned_end(); ++i) each(*body, i);
-      }
-    }
+    on_threads([&](const Stretch& stretch) {
+      for (Index i = stretch.begin; i < stretch.end; ++i) each(*list_[stretch.body], i);
+    });
   }
   /// Sets a member of each body to Σ term(body, i) over its phyxels of all ranks, rounded once.
   /// Collective.
   template <class Term>
   void sum(double Body::*into, Term&& term) const {
     std::vector<ExactSum> sums(list_.size());
-#pragma omp parallel
-    for (std::size_t b = 0; b < list_.size(); ++b) {
+    on_threads([&](const Stretch& stretch) {
       ExactSum own;
-      bool any = false;
-      for (const Part& part : list_[b]->parts) {
-#pragma omp for schedule(static) nowait
-        for (Index i = part.begin; i < part.owned_end(); ++i) {
-          own.add(term(*list_[b], i));
-          any = true;
-        }
-      }
-      if (!any) continue;
-#pragma omp critical
-      sums[b].add(own);
-    }
+      for (Index i = stretch.begin; i < stretch.end; ++i) own.add(term(*list_[stretch.body], i));
+#pragma omp critical(phyxel_closure_sum)
+      sums[stretch.body].add(own);
+    });
     if (model_.share) {
       std::vector<ExactSum*> all;
       for (ExactSum& sum : sums) all.push_back(&sum);
@@ -109,7 +96,7 @@ class Bodies {
     }
     for (std::size_t b = 0; b < list_.size(); ++b) list_[b]->*into = sums[b].value();
   }
-  /// Copies the owners' values to the ghosts of the bodies. Collective.
+  /// Copies the owners' values to the ghosts of all bodies from the first to the last. Collective.
   template <class T>
   void refresh_ghosts(std::vector<T>& values) const {
     if (!model_.share || empty()) return;
@@ -121,6 +108,38 @@ class Bodies {
   }
 
  private:
+  /// Phyxels [begin, end) of one part, all of them this rank's own.
+  struct Stretch {
+    std::size_t body;
+    Index begin, end;
+  };
+  /// Calls visit(stretch) on each thread for its share of the phyxels, so that many small bodies
+  /// keep all threads busy.
+  template <class Visit>
+  void on_threads(Visit&& visit) const {
+    std::int64_t size = 0;
+    for (const Body* body : list_) {
+      for (const Part& part : body->parts) size += part.owned_end() - part.begin;
+    }
+#pragma omp parallel
+    {
+      const std::int64_t threads = omp_get_num_threads(), thread = omp_get_thread_num();
+      const std::int64_t first = size * thread / threads, last = size * (thread + 1) / threads;
+      std::int64_t at = 0;
+      for (std::size_t b = 0; b < list_.size(); ++b) {
+        for (const Part& part : list_[b]->parts) {
+          const std::int64_t length = part.owned_end() - part.begin;
+          const std::int64_t from = std::max(first - at, std::int64_t{0}),
+                             to = std::min(last - at, length);
+          if (from < to) {
+            visit({b, part.begin + static_cast<Index>(from), part.begin + static_cast<Index>(to)});
+          }
+          at += length;
+        }
+      }
+    }
+  }
+
   const Model& model_;
   std::vector<Body*> list_;
 };
@@ -150,7 +169,7 @@ class Sums {
         tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
       }
     }
-    bodies.sum(&Body::whole, [&](const Body&, Index i) { return model_.volume[i]; });
+    bodies.sum(&Body::volume, [&](const Body&, Index i) { return model_.volume[i]; });
     bodies.for_each([&](const Body& body, Index i) {
       areas_[i] = areas_[i] / body.unit;
       double sum = 0;
@@ -177,7 +196,7 @@ class Sums {
   /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
   void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
     bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
-    for (Body* body : bodies) body->mean /= body->whole;
+    for (Body* body : bodies) body->mean /= body->volume;
   }
   /// @param sums their ghosts receive their owners' values
   void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums,
@@ -196,7 +215,7 @@ class Sums {
     });
     bodies.sum(&Body::sum, [&](const Body&, Index i) { return x[i].volume; });
     bodies.for_each([&](const Body& body, Index i) {
-      x[i].volume -= model_.volume[i] / body.whole * body.sum;
+      x[i].volume -= model_.volume[i] / body.volume * body.sum;
     });
   }
 
@@ -233,11 +252,12 @@ class Sums {
   std::vector<double> weight_;  ///< Σ_k w_jk (1 - a_j x_jk)
 };
 
-/// Looks whether a body's sums are as closed as is asked or as they get.
-bool is_done(Body& body) {
-  body.left = std::sqrt(body.squares / body.areas);
+/// Updates what is left of a body's sums.
+/// @returns whether they are as closed as is asked or as they get
+bool update_and_check(Body& body) {
+  body.left = std::sqrt(body.residual_squared / body.areas);
   if (body.iterations == 0) body.left_first = body.left;
-  if (!(body.left > body.tolerance) || !(body.steepness > 0) ||
+  if (!(body.left > body.tolerance) || !(body.gradient_squared > 0) ||
       body.iterations == most_iterations) {
     return true;
   }
@@ -260,47 +280,47 @@ std::vector<Unknown> close(const Sums& sums, const Bodies& all) {
   Stage stage("closed gradients");
   const std::vector<Vec3d> open = sums.open(all);
   const std::size_t n = open.size();
-  std::vector<Unknown> x(n), slope(n), direction(n);
+  std::vector<Unknown> x(n), gradient(n), direction(n);
   std::vector<Vec3d> residual(n), image(n);
   const auto residual_squares = [&](const Body&, Index i) { return dot(residual[i], residual[i]); };
-  const auto slope_squares = [&](const Body&, Index i) { return dot(slope[i], slope[i]); };
+  const auto gradient_squares = [&](const Body&, Index i) { return dot(gradient[i], gradient[i]); };
   all.for_each([&](const Body&, Index i) { residual[i] = -open[i]; });
-  all.sum(&Body::squares, residual_squares);
-  sums.apply_transpose(all, residual, slope);
-  all.sum(&Body::steepness, slope_squares);
-  all.for_each([&](const Body&, Index i) { direction[i] = slope[i]; });
+  all.sum(&Body::residual_squared, residual_squares);
+  sums.apply_transpose(all, residual, gradient);
+  all.sum(&Body::gradient_squared, gradient_squares);
+  all.for_each([&](const Body&, Index i) { direction[i] = gradient[i]; });
   Bodies active = all;
   for (;;) {
-    active.erase_if(is_done);
+    active.erase_if(update_and_check);
     if (active.empty()) break;
     double way = 1;
     for (const Body* body : active) way = std::min(way, way_of(*body));
     stage.reach(way);
     sums.apply(active, direction, image);
-    active.sum(&Body::length, [&](const Body&, Index i) { return dot(image[i], image[i]); });
-    active.erase_if([](const Body& body) { return !(body.length > 0); });
+    active.sum(&Body::image_squared, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+    active.erase_if([](const Body& body) { return !(body.image_squared > 0); });
     active.for_each([&](const Body& body, Index i) {
-      const double step = body.steepness / body.length;
+      const double step = body.gradient_squared / body.image_squared;
       add(x[i], step, direction[i]);
       residual[i] -= step * image[i];
     });
-    active.sum(&Body::squares, residual_squares);
-    sums.apply_transpose(active, residual, slope);
-    active.sum(&Body::next_steepness, slope_squares);
+    active.sum(&Body::residual_squared, residual_squares);
+    sums.apply_transpose(active, residual, gradient);
+    active.sum(&Body::next_gradient_squared, gradient_squares);
     active.for_each([&](const Body& body, Index i) {
-      Unknown turned = slope[i];
-      add(turned, body.next_steepness / body.steepness, direction[i]);
+      Unknown turned = gradient[i];
+      add(turned, body.next_gradient_squared / body.gradient_squared, direction[i]);
       direction[i] = turned;
     });
     for (Body* body : active) {
-      body->steepness = body->next_steepness;
+      body->gradient_squared = body->next_gradient_squared;
       ++body->iterations;
     }
   }
   sums.apply(all, x, image);
   all.for_each([&](const Body&, Index i) { image[i] += open[i]; });
-  all.sum(&Body::squares, [&](const Body&, Index i) { return dot(image[i], image[i]); });
-  for (Body* body : all) body->left = std::sqrt(body->squares / body->areas);
+  all.sum(&Body::residual_squared, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+  for (Body* body : all) body->left = std::sqrt(body->residual_squared / body->areas);
   stage.finish();
   return x;
 }
@@ -359,7 +379,7 @@ void warn_of(Model& model, const Body& body) {
       body.parts.front().name, body.left, body.iterations, body.tolerance));
 }
 
-/// Adds to loads by volume what volumes have changed. @param before volume of each phyxel [m³]
+/// Makes loads by volume follow the phyxels' volumes. @param before volume of each phyxel [m³]
 void follow_volumes(Model& model, const std::vector<double>& before) {
   for (Load& load : model.loads) {
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
@@ -369,18 +389,13 @@ void follow_volumes(Model& model, const std::vector<double>& before) {
   }
 }
 
-/// The surface of a body in a model that is no share. Triangles stand body by body.
+/// The surface of a body in a model that is no share.
 std::vector<Facet> facets_of(const Model& model, const Part& part) {
-  const std::vector<Triangle>& all = model.surfels.triangle;
-  const auto before = [&](Index surfel) {
-    return std::lower_bound(all.begin(), all.end(), surfel,
-                            [](const Triangle& t, Index s) { return t[0] < s; });
-  };
   const std::span<const Vec3d> position =
       std::span(model.surfels.position)
           .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin);
-  return facets_of(position, {before(part.surfel_begin), before(part.surfel_end)},
-                   part.surfel_begin, longest_edge(model.neighbourhood.support[part.begin]));
+  return facets_of(position, model.surfels.triangles_of(part), part.surfel_begin,
+                   longest_edge(model.neighbourhood.support[part.begin]));
 }
 
 }  // namespace
@@ -416,8 +431,8 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   });
   bodies.refresh_ghosts(model.volume);
   bodies.refresh_ghosts(model.closing);
-  Bodies(model, parts).sum(&Body::whole, [&](const Body&, Index i) { return model.volume[i]; });
-  for (const Body& part : parts) part.parts.front().volume = part.whole;
+  Bodies(model, parts).sum(&Body::volume, [&](const Body&, Index i) { return model.volume[i]; });
+  for (const Body& part : parts) part.parts.front().volume = part.volume;
   follow_volumes(model, before);
   for (const Body& body : list) warn_of(model, body);
   return std::nullopt;

@@ -131,7 +131,7 @@ Masses masses_of(const BodyRequest& request, const Cloud& cloud, const Survey& s
                           kernel_sum.value() / static_cast<double>(survey.spacing.size()), density)
           : geometric_masses(cloud.volume, density);
   for (const MaterialGroup& group : groups.subspan(1)) {
-    give_density(masses, group.begin, group.end, group.material.density, request, kernel_volumes);
+    give_density(masses, group.begin, group.end, group.material.density, density, kernel_volumes);
   }
   check_masses(request, masses);
   return masses;
@@ -248,6 +248,14 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
 }
 
 }  // namespace
+
+std::span<const Triangle> Surfels::triangles_of(const Part& first_part) const {
+  const auto before = [&](Index surfel) {
+    return std::partition_point(triangle.begin(), triangle.end(),
+                                [&](const Triangle& t) { return t[0] < surfel; });
+  };
+  return {before(first_part.surfel_begin), before(first_part.surfel_end)};
+}
 
 bool Degenerate::none() const {
   return isolated.empty() && collinear.empty() && coplanar.empty() && coincident.empty();

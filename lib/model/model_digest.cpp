@@ -28,8 +28,7 @@ void add_surface(XXH3_state_t* state, const Model& model, const Part& part,
     for (const Triangle& t : surface.triangle) add_triangle(t, surface.position);
     return;
   }
-  for (const Triangle& t : model.surfels.triangle) {
-    if (t[0] < part.surfel_begin || t[0] >= part.surfel_end) continue;
+  for (const Triangle& t : model.surfels.triangles_of(part)) {
     add_triangle(t, model.surfels.position);
   }
 }

@@ -14,6 +14,8 @@
 #include "host_surveyor.hpp"
 #include "model/host_memory.hpp"
 #include "partition/share.hpp"
+#include "phyxel/backend.hpp"
+#include "phyxel/solver.hpp"
 #include "ranks.hpp"
 #include "setup/tiling.hpp"
 
@@ -286,6 +288,9 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
     scene.bodies[1].loads.push_back({.select = {.region = "x+"}, .force = {1, 0, 0}});
     EXPECT_THAT(words_of([&] { build_share(world(), scene, {}); }), ::testing::HasSubstr(expected));
   }
+  EXPECT_THAT(
+      words_of([&] { build_model({.bodies = {wrong[13]}}); }),
+      ::testing::ContainsRegex("phyxel [0-9]+ would have to change its volume by -?[0-9]+%"));
   // No volume, by the kernel: all in one place.
   Cloud heap;
   heap.position.assign(20, Vec3d{1, 1, 1});
@@ -314,6 +319,23 @@ TEST(BuiltShare, RefusesWhatOneRankWould) {
               ::testing::HasSubstr("different bodies"));
 }
 
+/// A backend counts what is exchanged in steps, and nothing of the set-up, which exchanges ghosts
+/// to close gradients.
+TEST(BuiltShare, HasSentNothingBeforeTheFirstStep) {
+  Scene scene{.bodies = {shape("beam", 0.1)}};
+  scene.bodies[0].closure = 1e-2;
+  const Model share = build_share(world(), scene, {}).model;
+  const auto backend = make_cpu_backend(share, Precision::double_, 1);
+  const auto sent = [&] { return backend->exchanges()->traffic.bytes_sent; };
+  EXPECT_EQ(sent(), 0);
+  backend->upload(initial_state(share, scene, 1e-6));
+  backend->step(0, 1e-6);
+  const std::int64_t of_one = sent();
+  EXPECT_EQ(of_one > 0, !share.share->halo->peers.empty());
+  backend->step(1, 1e-6, 3);
+  EXPECT_EQ(sent(), 4 * of_one);
+}
+
 #if !PHYXEL_SANITIZED  // whose memory holds more than the program's
 
 /// A line of this process's status, in bytes.
@@ -327,12 +349,11 @@ double status_bytes(const std::string& key) {
 
 /// A share is refused before it is built if it would not fit: a rank asks for about as much memory
 /// as it then takes at most, whatever the number of ranks.
-/// 24,000 phyxels: tens of MB.
 class MemoryOfBuiltShare : public ::testing::TestWithParam<double> {};
 INSTANTIATE_TEST_SUITE_P(Closure, MemoryOfBuiltShare, ::testing::Values(0, 1e-2));
 
 TEST_P(MemoryOfBuiltShare, IsWhatItAsksFor) {
-  Scene scene{.bodies = {shape("beam", 0.05)}};
+  Scene scene{.bodies = {shape("beam", 0.05)}};  // 24,000 phyxels: tens of MB
   scene.bodies[0].neighbourhood.nearest = 20;
   scene.bodies[0].closure = GetParam();
   // Few groups, as bodies have that are large enough to fill a machine.

@@ -108,6 +108,9 @@ struct Surfels {
   std::vector<Triangle> triangle;
   Csr carriers;         ///< Row s: phyxels near surfel s.
   Index unreached = 0;  ///< Surfels outside every support, carried by the nearest phyxel.
+
+  /// The triangles of a body, in a model that is no share: there they stand body by body.
+  std::span<const Triangle> triangles_of(const Part& first_part) const;
 };
 
 /// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never

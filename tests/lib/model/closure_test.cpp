@@ -208,18 +208,39 @@ TEST(Closure, KeepsMassAndMomenta) {
 
 /// Another body in front changes nothing.
 TEST(Closure, IsTheSameForEachBody) {
-  const Cloud cloud = make_shape(block());
-  Scene scene = scene_of(1e-3);
-  scene.bodies.push_back(scene.bodies[0]);
-  scene.bodies[0].closure = 0;
-  const std::vector<Cloud> clouds{cloud, cloud};
-  const Model two = build_model(scene, clouds), one = model_of_cloud(cloud, 1e-3);
-  ASSERT_EQ(two.size(), 2 * one.size());
-  for (Index i = 0; i < one.size(); ++i) {
-    EXPECT_EQ(two.closing[i], Vec3d{});
-    EXPECT_EQ(two.closing[one.size() + i], one.closing[i]);
-    EXPECT_EQ(two.volume[one.size() + i], one.volume[i]);
+  // Of several sizes; one is as closed at once as is asked, others take long.
+  const std::vector<double> closures{1e-3, 0, 0.9, 1e-5, 1e-2};
+  Scene scene;
+  std::vector<Cloud> clouds;
+  for (const double closure : closures) {
+    ShapeRequest request = block();
+    request.size.z += 0.2 * static_cast<double>(clouds.size());
+    request.seed = clouds.size() + 1;
+    clouds.push_back(make_shape(request));
+    scene.bodies.push_back(scene_of(closure).bodies[0]);
   }
+  const Model all = build_model(scene, clouds);
+  for (std::size_t b = 0; b < closures.size(); ++b) {
+    const Part& part = all.parts[b];
+    const Model one = model_of_cloud(clouds[b], closures[b]);
+    ASSERT_EQ(part.size, one.size());
+    EXPECT_EQ(part.volume, one.parts[0].volume);
+    for (Index i = 0; i < one.size(); ++i) {
+      EXPECT_EQ(all.closing[part.begin + i], closures[b] > 0 ? one.closing[i] : Vec3d{});
+      EXPECT_EQ(all.volume[part.begin + i], one.volume[i]);
+    }
+  }
+}
+
+/// Loads by volume are those of the volume inside the surface.
+TEST(Closure, LeavesLoadsTheirDensity) {
+  Scene scene = scene_of(1e-3);
+  scene.bodies[0].loads.push_back({.select = {.all = true}, .force_density = {0, 0, 2}});
+  const Cloud cloud = make_shape(block());
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  double force = 0;
+  for (const Vec3d& f : model.loads[0].force) force += f.z;
+  EXPECT_NEAR(force, 2 * 0.8 * 0.6 * 1.0, 1e-12);
 }
 
 std::string refusal(const Cloud& cloud, const NeighbourhoodRule& rule = {}) {

@@ -146,9 +146,6 @@ std::vector<Late> late_refusals() {
       {with_bar("[[body.inclusion]]\nbox = [[7, 7, 7], [8, 8, 8]]\nyoung = 1e6\n"),
        {":14:", "selects no phyxel"}},
       {with_bar("[[body.inclusion]]\nall = true\nyoung = 1e6\n"), {":14:", "no phyxel is left"}},
-      {still + bar + "volumes = 'kernel'\n" + material +
-           "[[body.inclusion]]\nregion = 'x-'\nyoung = 1e6\n",
-       {":15:", "volumes = \"geometry\""}},
       // Steps
       {step("1.0") + bar + material, {"time.step = 1 s", "largest stable step"}},
       {step("1e-4") + bar + material + shake, {"time.step = 0.0001 s", "frequency = 2000 Hz"}},
