@@ -13,7 +13,7 @@
 namespace phyxel {
 namespace {
 
-/// `migrate_along_curve` of all parts.
+/// Sorts the phyxels of all parts along Hilbert's curve (`migrate_along_curve`).
 MigratingPhyxels along_curve(const ShareSetup& setup, const WholeBodies& whole,
                              MigratingPhyxels own) {
   std::vector<Index> sizes;
@@ -48,8 +48,8 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
   return share;
 }
 
-/// Closing vectors are found from lists of neighbours on the host, and a device does not search
-/// among phyxels that are sorted by material.
+/// Returns options for a scene: without a surveyor if gradients are closed, which takes lists on
+/// the host, or if a body has inclusions, whose phyxels a device does not sort by material.
 ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   ShareOptions own = options;
   for (const BodyRequest& body : scene.bodies) {
@@ -58,7 +58,8 @@ ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   return own;
 }
 
-/// Bodies begin on one rank after the other, so that small ones are not all the first one's.
+/// Returns this rank's piece of a body. The first piece of each body goes to another rank, so that
+/// small bodies do not all end on the first.
 Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
   const auto size = static_cast<std::size_t>(ranks.size());
   return {static_cast<int>((static_cast<std::size_t>(ranks.rank()) + body) % size), ranks.size()};
@@ -68,7 +69,7 @@ Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
-  // Copies of a body follow one another; making one serves them all.
+  // Copies of a body follow one another and share one cloud.
   const BodySource* made = nullptr;
   Cloud rest;
   const auto piece_of_source = [&](const BodyRequest& request, Piece piece, std::uint64_t& digest) {

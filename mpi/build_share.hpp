@@ -1,4 +1,4 @@
-/// Models that ranks build together, so that none ever holds the whole.
+/// The set-up of a model by all ranks together, none of which ever holds the whole.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +15,15 @@ class ShareSurveyor;
 struct ShareOptions {
   std::vector<Partitioner> candidates{Partitioner::bisection, Partitioner::curve,
                                       Partitioner::metis};
-  /// Phyxels along Hilbert's curve that stay together, counted from the start of each part: a GPU's
-  /// tile. 0: none need to.
+  /// Number of phyxels along Hilbert's curve that stay on one rank, counted from the start of each
+  /// part: the size of a GPU's tile, or 0 without GPUs.
   int tile = 0;
-  /// Who searches, if no lists shall be made on the host; null: the host.
+  /// Neighbour search of a device that makes the lists itself; null: the host makes them.
   const ShareSurveyor* surveyor = nullptr;
-  /// What is partitioned are single phyxels, if there are no more than these, or else groups along
-  /// the curve.
+  /// Largest number of vertices of the graph that is partitioned: single phyxels if there are no
+  /// more, else groups along the curve.
   Index most_groups = 100'000;
-  /// Of more phyxels than these, only some tell whom they share edges with, for all.
+  /// Above this number of phyxels, the edges of the graph come from a random sample.
   Index most_samples = 1'000'000;
 };
 
@@ -31,21 +31,20 @@ struct BuiltShare {
   Model model;  ///< Its `share` is connected.
   Partitioner partitioner = Partitioner::metis;
   PartitionQuality quality;
-  std::vector<Surface> surfaces;  ///< Of the whole bodies, in place.
-  /// Of the whole model, as the functions of these names tell them.
+  std::vector<Surface> surfaces;  ///< Whole surfaces of the bodies, in place.
+  /// `model_digest` and `model_digest_before_4` of the whole model.
   std::uint64_t digest = 0, digest_before_4 = 0;
 };
 
-/// This rank's share of `build_model(scene)`, to the last bit what `share_of` would take out of the
-/// whole (but for moments of ghosts that only carry surfels, which no step reads). Lattices are
-/// made piece by piece, other bodies are made or read by every rank, and cut; surfaces are held
-/// whole. Phyxels then go where Hilbert's curve says, are partitioned as graph of groups, and go to
-/// their owners, which ask the others for what is around. Closing vectors are found by all ranks
-/// together, from lists on the host. Collective.
+/// Builds this rank's share of `build_model(scene)`. Its bits are those that `share_of` takes out
+/// of the whole model, but for moments of ghosts that only carry surfels, which no step reads.
+/// Lattices are made piece by piece; every rank makes or reads other bodies and surfaces whole and
+/// cuts out its piece. Phyxels are sorted along Hilbert's curve, partitioned as a graph of groups
+/// and sent to their owners, which fetch the phyxels around. Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options);
-/// The same from clouds in place, one for each body, which every rank has whole.
+/// Builds this rank's share from clouds in place, one for each body, which every rank has whole.
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options);
 

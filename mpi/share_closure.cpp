@@ -10,8 +10,8 @@
 namespace phyxel {
 namespace {
 
-/// The facets that have an own phyxel near, in the order of the surface, each with the phyxels of
-/// the local body among which it is divided.
+/// The facets near own phyxels, in the order of the surface, and the phyxels of the local body
+/// among which the area of each is divided.
 struct NearFacets {
   std::vector<Facet> facets;
   Csr near;
@@ -41,7 +41,8 @@ NearFacets facets_near(const ShareSetup& setup, const WholeBodies& whole, const 
       tabulated(which.size(), [&](std::size_t k) { return all[which[k]].centroid; });
   const Csr rows = phyxels_reaching(centroids, of_range(local.model.position, body),
                                     of_range(local.model.neighbourhood.support, body));
-  // Who owns one of the phyxels near a facet has all of them; who owns the first counts the facet.
+  // A rank that owns one of the phyxels near a facet has all of them; the owner of the first counts
+  // the facet.
   std::vector<char> reached(all.size(), 0);
   std::int64_t counted = 0;
   const auto owned = [&](Index i) { return owns(local, static_cast<std::size_t>(body.begin + i)); };

@@ -13,8 +13,8 @@
 namespace phyxel {
 namespace {
 
-/// Where own phyxels of a share are in the whole model's tiles.
-/// @param share its numbers are those of `local`
+/// Returns the slots of own phyxels in the tiles of the whole model; -1 for ghosts.
+/// @param share whose global ids are still indices of `local`
 std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
                               const LocalModel& local, const Share& share) {
   std::vector<Index> place(share.global_id.size(), -1);
@@ -22,7 +22,7 @@ std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
   const auto phyxel = [&](Index k) -> const MigratingPhyxel& {
     return local.phyxels[share.global_id[k]];
   };
-  // part, along, which of the share
+  // (part, index along the curve, index in the share)
   const std::vector<Index> owned =
       chosen(0, static_cast<Index>(place.size()), [&](Index k) { return share.owned[k]; });
   auto sorted = in_bulk(owned.size(), [&](std::size_t k) {

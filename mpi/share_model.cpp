@@ -11,7 +11,7 @@
 #include "tabulated.hpp"
 
 namespace phyxel {
-/// As far as the neighbours of ghosts, and the carriers of surfels.
+// Two supports reach the neighbours of ghosts and the carriers of surfels.
 LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
                            MigratingPhyxels own) {
   Surrounded all = surrounded(setup.ranks, own, remote_phyxels_within(setup, whole, own, 2));
@@ -58,7 +58,7 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
 
 namespace {
 
-/// The parts of a body.
+/// Returns the parts of a body.
 std::span<const Part> model_parts_of(const WholeBodies& whole, const LocalModel& local,
                                      std::size_t b) {
   return local.model.parts_of_body(local.model.parts[whole.bodies[b].first_part]);
@@ -102,7 +102,8 @@ void collect_ghost_neighbours(const ShareSetup& setup, const WholeBodies& whole,
   }
 }
 
-/// `check_masses` of own phyxels, by their numbers in the body.
+/// Checks the masses of own phyxels as `check_masses` does; messages have their numbers in the
+/// body.
 void check_own_masses(const BodyRequest& request, const LocalModel& local, const Range& body,
                       const Masses& masses) {
   for (Index i = body.begin; i < body.end; ++i) {
@@ -112,8 +113,8 @@ void check_own_masses(const BodyRequest& request, const LocalModel& local, const
   }
 }
 
-/// Of own phyxels. Others' follow from sums that only their owners have, if they are the
-/// kernel's.
+/// Finds the masses and volumes of own phyxels. With kernel volumes those of ghosts are wrong here:
+/// only their owners have the sums from which they follow.
 void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   std::vector<ExactSum> sums(whole.bodies.size());
@@ -155,7 +156,7 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   }
 }
 
-/// What is known of parts before phyxels have masses.
+/// Makes the parts, with everything that does not depend on masses.
 void begin_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
   for (std::size_t q = 0; q < whole.parts.size(); ++q) {
     const WholePart& known = whole.parts[q];
@@ -186,7 +187,7 @@ void begin_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
   }
 }
 
-/// Lengths of the lists of own phyxels of a part.
+/// Returns the number of pairs, the shortest and the longest list of own phyxels of a part.
 ListLengths own_lengths(const WholeBodies& whole, const LocalModel& local, const Part& part) {
   const auto b = static_cast<std::size_t>(part.body);
   const Index begin = local.bodies[b].begin;
@@ -204,7 +205,7 @@ ListLengths own_lengths(const WholeBodies& whole, const LocalModel& local, const
   return {pairs, fewest, most};
 }
 
-/// Finds masses, volumes, centres and lengths of lists of whole parts.
+/// Finds mass, volume, centre and list lengths of each part, over all ranks.
 void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   std::vector<BodySums> sums(m.parts.size());
@@ -242,7 +243,7 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   }
 }
 
-/// `check_closure` of each body.
+/// Checks the surfaces of all bodies with closed gradients as `check_closure` does.
 void check_surfaces(const ShareSetup& setup, const WholeBodies& whole, const LocalModel& local) {
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
@@ -258,7 +259,7 @@ void check_surfaces(const ShareSetup& setup, const WholeBodies& whole, const Loc
   });
 }
 
-/// What the boundary of a body selects among its phyxels here, own or not.
+/// Returns the local phyxels, ghosts included, that the boundary of a body selects.
 BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, const LocalModel& local,
                          std::size_t b) {
   const BodyRequest& request = setup.scene.bodies[b];
@@ -291,7 +292,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   for (std::size_t r = 0; r < body.used_regions; ++r) {
     cloud.regions[body.regions[r]] = in_region(static_cast<Index>(r));
   }
-  // No phyxel here: an empty list of numbers would mean all.
+  // An empty list of numbers would mean all phyxels.
   if (number.empty()) number.push_back(body.size);
   return naming(request, [&] { return choose_boundary(request, cloud, number, body.size); });
 }
@@ -336,7 +337,7 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   });
 }
 
-/// Of own phyxels, by their numbers in the whole; then of all ranks.
+/// Finds the degenerate phyxels of all ranks, by their global ids.
 void gather_degenerate(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
   Degenerate& d = local.model.degenerate;
   for (std::vector<Index>* kind : {&d.isolated, &d.collinear, &d.coplanar, &d.coincident}) {

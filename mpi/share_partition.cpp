@@ -15,11 +15,11 @@
 namespace phyxel {
 namespace {
 
-/// Own phyxels that stand for all, and with whom they share edges.
+/// A sample of own phyxels, and the groups of their neighbours: edges of the dual graph.
 struct Samples {
-  MigratingPhyxels phyxels;        ///< Of one group after the other.
-  std::vector<Offset> offsets{0};  ///< In `group`, of each sample.
-  std::vector<Index> group;        ///< Of who is at the other end of each edge.
+  MigratingPhyxels phyxels;        ///< Samples, group by group.
+  std::vector<Offset> offsets{0};  ///< First entry of each sample in `group`.
+  std::vector<Index> group;        ///< Group of the neighbour at the other end of each edge.
   std::span<const Index> edges(std::size_t sample) const {
     return std::span(group).subspan(
         static_cast<std::size_t>(offsets[sample]),
@@ -31,8 +31,8 @@ Index sample_stride(const ShareSetup& setup, const WholeBodies& whole) {
   return 1 + (whole.size - 1) / setup.options.most_samples;
 }
 
-/// What samples share with so many phyxels, each of which looks for the samples around it: they
-/// are few.
+/// Finds the edges of samples by a search from all phyxels for the samples around them, since
+/// samples are few.
 void find_edges(const WholeBodies& whole, std::span<const MigratingPhyxel> phyxels,
                 std::span<const MigratingPhyxel> samples, const SpatialHash& hash, double largest,
                 std::size_t first_sample, Bulk<std::pair<Index, Index>>& edges) {
@@ -56,7 +56,7 @@ void find_edges(const WholeBodies& whole, std::span<const MigratingPhyxel> phyxe
     edges.insert(edges.end(), mine.begin(), mine.end());
   }
 }
-/// Of each group the first, and then some: all if there are not too many.
+/// Chooses the first phyxel of each group and some of the others; all, if there are few enough.
 Samples samples_of(const ShareSetup& setup, const WholeBodies& whole, const MigratingPhyxels& own) {
   const RemotePhyxels others = remote_phyxels_within(setup, whole, own, 1);
   const std::vector<Index> which = chosen(0, static_cast<Index>(own.size()), [&](Index i) {
@@ -105,7 +105,7 @@ PartitionQuality quality_of_groups(const ShareSetup& setup, const WholeBodies& w
   return counts.quality();
 }
 
-/// What own groups are, as the first rank gets to know it.
+/// A rank's groups, as they are sent to the first rank.
 struct GroupRecord {
   std::int64_t weight = 0;
   Vec3d centre;
@@ -116,7 +116,7 @@ struct EdgeRecord {
   std::int64_t weight = 0;
 };
 
-/// Of all groups, on the first rank. An edge may have been seen by one end only.
+/// Makes the graph of all groups, on the first rank. An edge may be known from one end only.
 Graph gathered_graph(const MpiCommunicator& ranks, const WholeBodies& whole,
                      const Samples& samples) {
   const auto each = static_cast<std::size_t>(ranks.size());
@@ -149,7 +149,8 @@ Graph gathered_graph(const MpiCommunicator& ranks, const WholeBodies& whole,
   records = ranks.alltoallv(records);
   edges = ranks.alltoallv(edges);
   if (ranks.rank() > 0) return {};
-  // Ranks have stretches of the curve, so that their groups follow each other.
+  // Each rank has a contiguous range of the curve, so that its groups follow those of the rank
+  // before.
   Graph graph;
   std::vector<std::tuple<Index, Index, std::int64_t>> both_ways;
   for (std::size_t r = 0; r < each; ++r) {
@@ -184,7 +185,7 @@ Graph gathered_graph(const MpiCommunicator& ranks, const WholeBodies& whole,
 
 }  // namespace
 
-/// The owner of each own phyxel. @param own along the curve
+/// Returns the new owner of each phyxel. @param own phyxels in the order of the curve
 Cut partition(const ShareSetup& setup, const WholeBodies& whole, const MigratingPhyxels& own) {
   Cut cut;
   const Samples samples = samples_of(setup, whole, own);
@@ -203,7 +204,7 @@ Cut partition(const ShareSetup& setup, const WholeBodies& whole, const Migrating
         refusal = error.what();
       }
     });
-    // METIS takes random numbers from the C library: one rank's answer serves all.
+    // METIS takes random numbers from the C library, so that only one rank runs it.
     made = setup.ranks.broadcast(made);
     if (made.empty() && whole.groups > 0) continue;
     const PartitionQuality quality = quality_of_groups(setup, whole, samples, made);

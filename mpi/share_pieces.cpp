@@ -13,9 +13,9 @@
 namespace phyxel {
 namespace {
 
-/// Makes a region of the members of a boundary's entry, and returns its number.
-/// @param name of a region, or of what stands for one. @param sets number of the set of regions of
-/// each phyxel
+/// Makes a region of the phyxels that a boundary entry selects, and returns its number.
+/// @param name of the region, or the entry's line if it has none. @param sets for each phyxel, the
+/// number of its set of regions
 int add_region(const std::string& name, std::span<const Index> members, WholeBody& body,
                std::vector<std::uint32_t>& sets) {
   const auto region = static_cast<Index>(body.regions.size());
@@ -24,7 +24,8 @@ int add_region(const std::string& name, std::span<const Index> members, WholeBod
   return region;
 }
 
-/// The numbers of a piece's phyxels in the cloud; one that no phyxel has, if the piece is empty.
+/// Returns the numbers of a piece's phyxels in the cloud; for an empty piece, one number that no
+/// phyxel has.
 std::vector<Index> numbers_of(const CloudPiece& piece) {
   std::vector<Index> number = tabulated(piece.cloud.position.size(), [&](std::size_t i) {
     return piece.first + static_cast<Index>(i);
@@ -33,9 +34,9 @@ std::vector<Index> numbers_of(const CloudPiece& piece) {
   return number;
 }
 
-/// The set of regions of each phyxel of a piece, by its number in `WholeBody::region_sets`; empty
-/// if the scene names no region. Phyxels that are sorted by material are in regions, too, where the
-/// scene gives their numbers in the cloud.
+/// Returns, for each phyxel of a piece, the number of its set of regions in
+/// `WholeBody::region_sets`; empty if the scene names no region. In bodies with inclusions, whose
+/// phyxels are renumbered by material, selections by number become regions, too.
 std::vector<std::uint32_t> find_region_sets(const BodyRequest& request, const CloudPiece& piece,
                                             WholeBody& body) {
   const Cloud& cloud = piece.cloud;
@@ -54,7 +55,7 @@ std::vector<std::uint32_t> find_region_sets(const BodyRequest& request, const Cl
       if (known != body.regions.end()) {
         region = static_cast<int>(known - body.regions.begin());
       } else if (found != cloud.regions.end()) {
-        // One that is not there is refused once phyxels are chosen.
+        // An unknown region is refused later, when phyxels are chosen.
         sets.resize(cloud.position.size(), RegionSets::none);
         region = add_region(found->first, found->second, body, sets);
       }
@@ -82,21 +83,21 @@ void agree_on_regions(const ShareSetup& setup, WholeBodies& whole, MigratingPhyx
   for (MigratingPhyxel& p : own) p.region_set = renumbered[p.body][p.region_set];
 }
 
-/// The materials of this rank's piece of a body with inclusions.
+/// The materials of the phyxels in this rank's piece of a body with inclusions.
 struct PieceMaterials {
   std::size_t body = 0;
-  std::size_t begin = 0;  ///< The first of its phyxels among this rank's own.
+  std::size_t begin = 0;  ///< Index of the piece's first phyxel among this rank's own.
   Index first = 0;        ///< Number of that phyxel in the cloud.
   MaterialChoice choice;
 };
 
-/// Phyxels of one material in a rank's piece of a body.
+/// The number of phyxels of one material in a rank's piece of a body.
 struct MaterialCount {
   Index body, first, material;  ///< `first`: the number of the piece's first phyxel in the cloud.
   std::int64_t size, selected;
 };
 
-/// Counts of one body.
+/// Returns the counts of one body. @param counts sorted by body
 std::span<const MaterialCount> of_body(const std::vector<MaterialCount>& counts, std::size_t b) {
   const auto [first, last] =
       std::ranges::equal_range(counts, static_cast<Index>(b), {}, &MaterialCount::body);
@@ -168,7 +169,7 @@ void find_origins(const ShareSetup& setup, const MigratingPhyxels& own, WholeBod
   }
 }
 
-/// Pieces of a length that hold `size`; none of no length.
+/// Returns how many pieces of a length hold `size` phyxels; 0 if the length is 0.
 static std::int64_t count_of(std::int64_t size, std::int64_t length) {
   return length > 0 ? (size + length - 1) / length : 0;
 }
@@ -248,12 +249,11 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   return own;
 }
 
-/// Numbers, groups and tiles of bodies.
 void count_bodies(const ShareSetup& setup, WholeBodies& whole) {
   Offset size = 0;
   for (const WholeBody& body : whole.bodies) size += body.size;
-  // At any time, with lists: those around and the copy that a share is included. Closing gradients
-  // takes less than was released before.
+  // Bytes in use at the peak, with lists those of the local model and its copy, the share; closing
+  // gradients comes after the local model is released and takes less.
   setup.ranks.collectively([&] {
     require_host_memory("the scene", static_cast<double>(size),
                         (setup.options.surveyor ? 280.0 : 1700.0) / setup.ranks.size());

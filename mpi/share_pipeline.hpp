@@ -18,47 +18,48 @@
 
 namespace phyxel {
 
-/// What the set-up of a share is given.
+/// The arguments of the set-up of a share.
 struct ShareSetup {
   const MpiCommunicator& ranks;
   const Scene& scene;
   const ShareOptions& options;
 };
 
-/// What all ranks know of a body.
+/// Properties of a body that all ranks know.
 struct WholeBody {
-  Index size = 0;              ///< Phyxels.
+  Index size = 0;              ///< Number of phyxels.
   Index base = 0;              ///< Global id of its first phyxel.
-  std::size_t first_part = 0;  ///< Its own material; its inclusions follow.
-  Vec3d origin;                ///< Its first phyxel at rest [m].
+  std::size_t first_part = 0;  ///< Part of the body's own material; its inclusions follow.
+  Vec3d origin;                ///< Rest position of the first phyxel [m].
   bool kernel_volumes = false;
-  std::vector<std::string> regions;  ///< Names; those used have the first numbers.
+  std::vector<std::string> regions;  ///< Names of its regions, those that the scene uses first.
   std::size_t used_regions = 0;
-  RegionSets region_sets;  ///< Of its phyxels.
-  /// The region of each entry of its boundary, or -1 if its place tells; empty for bodies of one
-  /// material.
+  RegionSets region_sets;  ///< Sets of regions that its phyxels are in.
+  /// For bodies with inclusions: the region of each boundary entry, or -1 for an entry that selects
+  /// by position. Empty for bodies of one material.
   std::vector<int> region_of_entry;
-  double reach = 0;     ///< The largest support [m].
+  double reach = 0;     ///< Largest support [m].
   double enclosed = 0;  ///< Volume inside its surface, if its gradients are closed [m³].
 };
-/// What all ranks know of a part, which is of one material.
+/// Properties of a part, which has one material, that all ranks know.
 struct WholePart {
   std::size_t body = 0;
-  MaterialGroup material;  ///< With the numbers of its phyxels in the body.
-  Index group = 0;         ///< Group of its first phyxel along the curve.
-  Index tile = 0;          ///< Tile of that phyxel.
+  MaterialGroup material;  ///< Its material, and the numbers of its phyxels in the body.
+  Index group = 0;         ///< First group along the curve.
+  Index tile = 0;          ///< First tile.
   Index size() const { return material.end - material.begin; }
 };
 
-/// What all ranks know of all bodies.
+/// Properties of all bodies that all ranks know.
 struct WholeBodies {
   std::vector<WholeBody> bodies;
-  std::vector<WholePart> parts;       ///< Of all bodies.
-  std::vector<Box> boxes;             ///< Of the phyxels of each body.
-  std::vector<Surface> surfaces;      ///< Of each body, whole.
-  std::vector<std::string> warnings;  ///< Of the clouds, which every rank makes: alike on all.
-  Index size = 0;                     ///< Phyxels of the whole model.
-  Index groups = 0, group_size = 1;   ///< Phyxels along the curve that stay together.
+  std::vector<WholePart> parts;       ///< Parts of all bodies.
+  std::vector<Box> boxes;             ///< Bounding box of the phyxels of each body.
+  std::vector<Surface> surfaces;      ///< Whole surface of each body.
+  std::vector<std::string> warnings;  ///< Warnings of the clouds; the same on all ranks.
+  Index size = 0;                     ///< Number of phyxels of the whole model.
+  /// Number of groups of phyxels along the curve that stay together, and their size.
+  Index groups = 0, group_size = 1;
 
   /// The part of a phyxel, once phyxels are numbered by material.
   std::size_t part_of(const MigratingPhyxel& p) const {
@@ -77,25 +78,27 @@ struct Range {
   Index begin = 0, end = 0;
 };
 
-/// Who owns each own phyxel from now on, and how well that cuts the model.
+/// A partition: the new owner of each own phyxel, and the quality of the cut.
 struct Cut {
   Bulk<int> owner;
   Partitioner partitioner = Partitioner::metis;
   PartitionQuality quality;
 };
 
-/// A rank's own phyxels and all around them: the whole model, as far as `share_of` is concerned.
-/// Lists, unless they are left to a device, are whole for own phyxels and for their neighbours.
+/// A rank's own phyxels and those around them, from which `share_of` takes the share as from the
+/// whole model. Neighbour lists, unless a device makes them, are complete for own phyxels and for
+/// their neighbours.
 struct LocalModel {
   MigratingPhyxels phyxels;
-  std::vector<int> owner;     ///< The rank of each phyxel.
-  std::vector<Range> bodies;  ///< Whose parts `model` has, in the same order.
+  std::vector<int> owner;     ///< Rank of each phyxel.
+  std::vector<Range> bodies;  ///< Range of each body.
   Model model;
-  std::vector<Around> around;    ///< [body]
-  std::vector<Index> surfel_id;  ///< Global ids of the surfels that this rank moves.
+  std::vector<Around> around;  ///< Neighbourhoods of own phyxels of each body.
+  std::vector<Index>
+      surfel_id;  ///< Global ids of the surfels whose first carrier is an own phyxel.
   /// Areas of own phyxels, where gradients are closed (`areas_of_phyxels`) [m²]; empty if none are.
   std::vector<Vec3d> areas;
-  int rank = 0;  ///< This one.
+  int rank = 0;  ///< This rank.
 };
 /// True if phyxel i is no ghost.
 inline bool owns(const LocalModel& local, std::size_t i) { return local.owner[i] == local.rank; }
@@ -104,26 +107,27 @@ inline Index global_id_of(const WholeBodies& whole, const LocalModel& local, Ind
   return whole.bodies[local.phyxels[i].body].base + local.phyxels[i].number;
 }
 
-/// Makes this rank's piece of a body. @param digest of the whole cloud, if this rank has it
+/// A function that makes this rank's piece of a body. @param digest updated by that of the whole
+/// cloud, if this rank has it
 using Pieces = std::function<CloudPiece(std::size_t body, std::uint64_t& digest)>;
 
-/// The phyxels of this rank's pieces, in the order of the clouds. Sets bodies, parts, boxes,
-/// surfaces and warnings of `whole`.
+/// Returns the phyxels of this rank's pieces, in the order of the clouds. Sets bodies, parts,
+/// boxes, surfaces and warnings of `whole`.
 /// @throws AgreedError for what `build_model` refuses, and for bodies that differ between ranks
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole);
 /// Numbers the phyxels, groups and tiles of bodies and parts.
 void count_bodies(const ShareSetup& setup, WholeBodies& whole);
 
-/// Finds the spacing of own phyxels: asks farther and farther around until the nearest are there.
+/// Finds the spacing of own phyxels, from phyxels of other ranks within a growing distance.
 void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels& own);
 /// Finds the support of own phyxels, and the largest of each body.
 void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own);
 
-/// Partitions the groups of phyxels. @param own along the curve
+/// Partitions the groups of phyxels. @param own phyxels in the order of the curve
 Cut partition(const ShareSetup& setup, const WholeBodies& whole, const MigratingPhyxels& own);
 
-/// Adds what surrounds own phyxels, as far as the neighbours of ghosts and the carriers of surfels,
-/// and finds the lists.
+/// Adds the phyxels of other ranks around own ones, as far as the neighbours of ghosts and the
+/// carriers of surfels, and makes the neighbour lists.
 LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels own);
 /// Finds masses, moments, boundary conditions, surfels and the areas that close gradients.
 void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
@@ -138,17 +142,18 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
 void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
                  std::vector<Vec3d> areas);
 
-/// For points that no support reaches: the nearest phyxel.
+/// The phyxels nearest to points that no support reaches.
 struct Unreached {
-  Index points = 0;             ///< Of all ranks.
-  std::vector<Index> carriers;  ///< Of each point: that phyxel, if this rank owns it; else -1.
+  Index points = 0;             ///< Number of such points, over all ranks.
+  std::vector<Index> carriers;  ///< Nearest phyxel of each point if this rank owns it, else -1.
 };
-/// @param reached whether each point is within the support of an own phyxel. Collective
+/// Finds the nearest phyxel of each point that no support reaches. Collective.
+/// @param reached for each point, whether it is within the support of an own phyxel
 Unreached nearest_to_unreached(const ShareSetup& setup, const WholeBodies& whole,
                                const LocalModel& local, std::size_t b,
                                std::span<const Vec3d> points, const std::vector<char>& reached);
 
-/// Takes the share out of the local model, and connects it with the other ranks.
+/// Takes the share out of the local model, which it releases, and connects it with the other ranks.
 BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& cut,
                         LocalModel& local);
 
@@ -157,12 +162,12 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
 /// @throws AgreedError
 void check_alike(const MpiCommunicator& ranks, std::uint64_t digest);
 
-/// Other ranks' phyxels within so many supports of own ones.
+/// Returns the phyxels of other ranks within a number of supports of own ones.
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
                                     const MigratingPhyxels& own, double supports);
-/// The phyxels of one body. @param phyxels in the order of bodies
+/// Returns the phyxels of one body. @param phyxels sorted by body
 std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::size_t b);
-/// The values of the phyxels of a body or a part.
+/// Returns the values of the phyxels of a body or a part.
 template <class T, class R>
 std::span<const typename T::value_type> of_range(const T& values, const R& range) {
   return std::span(values).subspan(static_cast<std::size_t>(range.begin),

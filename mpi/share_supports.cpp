@@ -10,7 +10,7 @@
 namespace phyxel {
 namespace {
 
-/// A little more than asked for, so that rounding leaves nothing out.
+/// Returns a slightly larger distance, so that rounding leaves no phyxel out.
 constexpr double margin = 1 + 1e-9;
 
 }  // namespace
@@ -24,7 +24,6 @@ std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::s
   return {first_from(b), first_from(b + 1)};
 }
 
-/// Asks farther and farther around until the nearest are there for sure.
 void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels& own) {
   const std::size_t n = whole.bodies.size();
   const auto wants = [&](std::size_t b) {
@@ -35,7 +34,7 @@ void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingP
   for (std::size_t b = 0; b < n; ++b) {
     if (!wants(b) || whole.bodies[b].size < 2) continue;
     any = true;
-    // Of evenly spread phyxels that would be half as far again as is needed.
+    // For evenly spread phyxels, one and a half times the distance needed.
     reach[b] = roomy_cell_size(whole.boxes[b].low, whole.boxes[b].high,
                                static_cast<std::size_t>(whole.bodies[b].size)) *
                1.6 * std::cbrt(setup.scene.bodies[b].neighbourhood.nearest / 10.0);

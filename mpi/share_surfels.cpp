@@ -21,7 +21,7 @@ Unreached nearest_to_unreached(const ShareSetup& setup, const WholeBodies& whole
   }
   struct Nearest {
     double squared;
-    std::int64_t number;  ///< In the whole model.
+    std::int64_t number;  ///< Global id.
     bool operator<(const Nearest& other) const {
       return squared != other.squared ? squared < other.squared : number < other.number;
     }
@@ -50,7 +50,7 @@ Unreached nearest_to_unreached(const ShareSetup& setup, const WholeBodies& whole
   return found;
 }
 
-/// Surfels that this rank moves.
+/// The surfels whose first carrier this rank owns.
 void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   Index base = 0;
@@ -63,7 +63,7 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
       const auto begin = static_cast<std::size_t>(body.begin);
       const Csr rows = phyxels_reaching(surface.position, of_range(m.position, body),
                                         of_range(m.neighbourhood.support, body));
-      // Who has a surfel's first carrier knows all of them.
+      // The owner of a surfel's first carrier has all carriers.
       std::vector<char> here(static_cast<std::size_t>(all), 0);
       std::int64_t found = 0;
       for (Index s = 0; s < all; ++s) {
@@ -93,7 +93,7 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
             static_cast<Offset>(m.surfels.carriers.indices.size()));
       }
     }
-    // The first part of a body has its surfels.
+    // A body's surfels belong to its first part.
     for (std::size_t q = whole.bodies[b].first_part;
          q < m.parts.size() && m.parts[q].body == static_cast<Index>(b); ++q) {
       m.parts[q].surfel_end = static_cast<Index>(local.surfel_id.size());

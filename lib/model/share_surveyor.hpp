@@ -1,5 +1,5 @@
-/// What a device finds out for ranks that build a model together (`build_share`), so that no lists
-/// are made on the host.
+/// Neighbour search by devices for ranks that build a model together (`build_share`), so that no
+/// lists are made on the host.
 #pragma once
 
 #include <span>
@@ -9,30 +9,34 @@
 
 namespace phyxel {
 
-/// What is known of the neighbourhoods of own phyxels, one body's, among points around them.
+/// A summary of the neighbourhoods of own phyxels of one body among the points around them.
 struct Around {
-  std::vector<char> needed;        ///< Whether a point is in an own list, or has an own one in its.
-  std::vector<Index> length;       ///< Of own lists; 0 for others.
-  std::vector<double> kernel_sum;  ///< Of own ones, where spacings were given (see `Survey`).
-  Degenerate degenerate;           ///< Own ones.
+  /// For each point, whether it neighbours an own phyxel, in either direction.
+  std::vector<char> needed;
+  std::vector<Index> length;       ///< Length of each own list; 0 for other points.
+  std::vector<double> kernel_sum;  ///< Kernel sums of own phyxels (`Survey`), if asked for.
+  Degenerate degenerate;           ///< Degenerate own phyxels.
 };
 
-/// What lists tell: who is needed, and the lengths.
-/// @param begin the first point of the body in the neighbourhood. @param own of the body's points
+/// Makes the summary from lists.
+/// @param begin first point of the body in the neighbourhood. @param own for each point of the
+/// body, whether this rank owns it
 Around around_by_lists(const Neighbourhood& hood, Index begin, std::span<const char> own);
 
+/// A neighbour search on a device.
 class ShareSurveyor {
  public:
   virtual ~ShareSurveyor() = default;
 
-  /// As the function of that name in neighbour_search.hpp.
+  /// Returns the mean distance to the nearest points, as the function of neighbour_search.hpp does.
   virtual std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest,
                                            double* farthest) const = 0;
 
-  /// @param position of one body's points, in the order of their numbers
-  /// @param spacing empty: no kernel sums are wanted
-  /// @param own whether each point is
-  /// @param one_sided whether a point may have another in its list that has not it
+  /// Searches the neighbours of own points of one body.
+  /// @param position of the body's points, in the order of their numbers
+  /// @param spacing of each point; empty if no kernel sums are wanted
+  /// @param own for each point, whether this rank owns it
+  /// @param one_sided true if a point may list another that does not list it
   virtual Around around(std::span<const Vec3d> position, std::span<const double> support,
                         std::span<const double> spacing, std::span<const char> own,
                         bool one_sided) const = 0;
