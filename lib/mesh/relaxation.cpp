@@ -1,10 +1,13 @@
 #include "mesh/relaxation.hpp"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 
+#include "mesh/nearest_points.hpp"
 #include "mesh/random_bits.hpp"
 #include "stage.hpp"
 
@@ -170,6 +173,29 @@ SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
 NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
     : hash_(hash_of(site, spacing)) {}
 
+/// The vector from `place` to the site nearest to it.
+Vec3d NearestSite::nearest_to(Vec3d place) const {
+  double nearest2 = HUGE_VAL;
+  Vec3d nearest;
+  const double cell = hash_.cell_size();
+  const auto compare = [&](const SpatialHash::Entry& entry) {
+    const Vec3d d = entry.position - place;
+    if (dot(d, d) >= nearest2) return;
+    nearest2 = dot(d, d);
+    nearest = d;
+  };
+  const int farthest = hash_.farthest_ring(place);
+  for (int ring = 0; ring <= farthest; ++ring) {
+    if (ring > 4) {  // rare: the block is far from every site
+      hash_.visit_all(compare);
+      break;
+    }
+    hash_.visit_ring(place, ring, compare);
+    if (nearest2 <= ring * cell * ring * cell) break;
+  }
+  return nearest;
+}
+
 void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   const std::size_t n = block.offset.size();
   s.x.resize(n);
@@ -184,60 +210,35 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
     ball = std::max(ball, norm({p.x, p.y, p.z}));
   }
 
-  double nearest2 = HUGE_VAL;
-  Vec3d nearest;
-  const double cell = hash_.cell_size();
-  const auto compare = [&](const SpatialHash::Entry& entry) {
-    const Vec3d d = entry.position - block.centre;
-    if (dot(d, d) >= nearest2) return;
-    nearest2 = dot(d, d);
-    nearest = d;
-  };
-  const int farthest = hash_.farthest_ring(block.centre);
-  for (int ring = 0; ring <= farthest; ++ring) {
-    if (ring > 4) {  // rare: the block is far from every site
-      hash_.visit_all(compare);
-      break;
-    }
-    hash_.visit_ring(block.centre, ring, compare);
-    if (nearest2 <= ring * cell * ring * cell) break;
-  }
+  const Vec3d nearest = nearest_to(block.centre);
+  const double nearest2 = dot(nearest, nearest);
   // A site can be nearest to some point of the ball only if the plane half-way between it and the
   // site nearest to the centre cuts the ball; hence also only if it is within the reach below.
   const double slack = 1 + 1e-6;
   const double reach = (std::sqrt(nearest2) + 2 * ball) * slack;
   s.candidate.clear();
-  s.candidate_offset.clear();
-  hash_.visit_near(
-      block.centre, static_cast<int>(std::ceil(reach / cell)),
-      [&](const SpatialHash::Entry& entry) {
-        const Vec3d d = entry.position - block.centre;
-        const Vec3d apart = d - nearest;
-        const double beyond = dot(d, d) - nearest2;
-        if (beyond > 0 && beyond * beyond > 4 * ball * ball * slack * dot(apart, apart)) {
-          return;
-        }
-        s.candidate.push_back(entry.index);
-        s.candidate_offset.push_back(
-            {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)});
-      });
-
-  s.best.assign(n, std::numeric_limits<float>::max());
-  s.slot.assign(n, 0);
-  float* const best = s.best.data();
-  std::int32_t* const slot = s.slot.data();
-  const float *const x = s.x.data(), *const y = s.y.data(), *const z = s.z.data();
-  for (std::size_t c = 0; c < s.candidate.size(); ++c) {
-    const Vec3<float> q = s.candidate_offset[c];
-    const auto number = static_cast<std::int32_t>(c);
-#pragma omp simd
-    for (std::size_t k = 0; k < n; ++k) {
-      const float dx = x[k] - q.x, dy = y[k] - q.y, dz = z[k] - q.z;
-      const float d2 = dx * dx + dy * dy + dz * dz;
-      slot[k] = d2 < best[k] ? number : slot[k];
-      best[k] = d2 < best[k] ? d2 : best[k];
+  s.candidate_x.clear();
+  s.candidate_y.clear();
+  s.candidate_z.clear();
+  hash_.visit_ball(block.centre, reach, [&](const SpatialHash::Entry& entry) {
+    const Vec3d d = entry.position - block.centre;
+    const Vec3d apart = d - nearest;
+    const double beyond = dot(d, d) - nearest2;
+    if (beyond > 0 && beyond * beyond > 4 * ball * ball * slack * dot(apart, apart)) {
+      return;
     }
-  }
+    s.candidate.push_back(entry.index);
+    s.candidate_x.push_back(static_cast<float>(d.x));
+    s.candidate_y.push_back(static_cast<float>(d.y));
+    s.candidate_z.push_back(static_cast<float>(d.z));
+  });
+
+  s.best.resize(n);
+  s.slot.resize(n);
+  find_nearest(
+      {n, s.x.data(), s.y.data(), s.z.data()},
+      {s.candidate.size(), s.candidate_x.data(), s.candidate_y.data(), s.candidate_z.data()},
+      s.best.data(), s.slot.data());
   s.owner.resize(n);
   for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
 }
@@ -264,6 +265,31 @@ void SampledVoronoi::assign(const std::vector<Vec3d>& site, double spacing) {
   }
 }
 
+void SampledVoronoi::add_up_cells(Vec3d origin, std::vector<Vec3d>& sum,
+                                  std::vector<Offset>& count) const {
+  // Each thread has a range of the sites and goes through all samples, so that the rounding of the
+  // sums does not depend on the number of threads.
+#pragma omp parallel
+  {
+    const auto thread = static_cast<std::size_t>(omp_get_thread_num()),
+               threads = static_cast<std::size_t>(omp_get_num_threads());
+    const auto first = static_cast<Index>(sum.size() * thread / threads),
+               last = static_cast<Index>(sum.size() * (thread + 1) / threads);
+    std::fill(sum.begin() + first, sum.begin() + last, Vec3d{});
+    std::fill(count.begin() + first, count.begin() + last, 0);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const SampleBlock& block = blocks_[b];
+      const Index* const owner = owner_.data() + first_[b];
+      for (std::size_t k = 0; k < block.offset.size(); ++k) {
+        const Index i = owner[k];
+        if (i < first || i >= last) continue;
+        sum[i] += block.position(k) - origin;
+        ++count[i];
+      }
+    }
+  }
+}
+
 void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
                            std::size_t fixed) {
   Stage stage("evening out distances");
@@ -272,16 +298,7 @@ void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
   std::vector<Offset> count(site.size());
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     assign(site, spacing);
-    std::fill(sum.begin(), sum.end(), Vec3d{});
-    std::fill(count.begin(), count.end(), 0);
-    // Serial, so that the rounding of the sums does not depend on the number of threads.
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      for (std::size_t k = 0; k < blocks_[b].offset.size(); ++k) {
-        const Index i = owner_[first_[b] + k];
-        sum[i] += blocks_[b].position(k) - origin;
-        ++count[i];
-      }
-    }
+    add_up_cells(origin, sum, count);
     bool homeless = false;
     for (std::size_t i = fixed; i < site.size(); ++i) {
       if (count[i] > 0) site[i] = origin + sum[i] / static_cast<double>(count[i]);

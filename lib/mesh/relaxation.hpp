@@ -35,11 +35,14 @@ class NearestSite {
     std::vector<std::int32_t> slot;
     std::vector<Index> owner;  ///< Result: the nearest site of each point, shape [n].
     std::vector<Index> candidate;
-    std::vector<Vec3<float>> candidate_offset;
+    std::vector<float> candidate_x, candidate_y, candidate_z;
   };
+  /// Finds the nearest site of each point of a block.
   void find(const SampleBlock& block, Scratch& scratch) const;
 
  private:
+  Vec3d nearest_to(Vec3d place) const;
+
   SpatialHash hash_;
 };
 
@@ -62,6 +65,7 @@ class SampledVoronoi {
 
  private:
   void assign(const std::vector<Vec3d>& site, double spacing);
+  void add_up_cells(Vec3d origin, std::vector<Vec3d>& sum, std::vector<Offset>& count) const;
   void settle_homeless(std::vector<Vec3d>& site, const std::vector<Offset>& count,
                        std::size_t fixed) const;
 

@@ -51,6 +51,40 @@ class SpatialHash {
     }
   }
 
+  /// Calls visit(entry) once for every point within `radius` [m] of `place`, and for others in
+  /// cells that the ball cuts, in the order of `visit_near`.
+  template <class Visit>
+  void visit_ball(Vec3d place, double radius, Visit&& visit) const {
+    const auto rings = static_cast<int>(std::ceil(radius / cell_size_));
+    if (rings > 3) {
+      visit_near(place, rings, visit);
+      return;
+    }
+    const Cell c = grid_.cell_of(place);
+    // Squares of the distances of cells along each axis, in cells; a little less, for rounding.
+    const Vec3d within = grid_.inverse_cell_size * (place - grid_.low) -
+                         Vec3d{double(c.x), double(c.y), double(c.z)};
+    const double most = radius * grid_.inverse_cell_size * (1 + 1e-6) + 1e-6;
+    const auto gap2 = [&](std::int64_t d, double at) {
+      const double gap = d > 0   ? static_cast<double>(d) - at
+                         : d < 0 ? at - static_cast<double>(d + 1)
+                                 : 0;
+      return gap * gap;
+    };
+    for (std::int64_t z = -rings; z <= rings; ++z) {
+      const double z2 = gap2(z, within.z);
+      if (z2 > most * most) continue;
+      for (std::int64_t y = -rings; y <= rings; ++y) {
+        const double yz2 = z2 + gap2(y, within.y);
+        if (yz2 > most * most) continue;
+        for (std::int64_t x = -rings; x <= rings; ++x) {
+          if (yz2 + gap2(x, within.x) > most * most) continue;
+          visit_cell({c.x + x, c.y + y, c.z + z}, visit);
+        }
+      }
+    }
+  }
+
   /// The same for the cells exactly `ring` cells away.
   template <class Visit>
   void visit_ring(Vec3d place, int ring, Visit&& visit) const {

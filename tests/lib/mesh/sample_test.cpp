@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "mesh/nearest_points.hpp"
 #include "mesh/winding_number.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -55,6 +56,34 @@ std::vector<double> nearest_distances(const std::vector<Vec3d>& points) {
 
 double sum(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+/// Of candidates at the same distance, the first is found.
+TEST(Sample, NearestCandidatesAreThoseOfAllPairs) {
+  std::mt19937_64 engine(3);
+  const auto coordinates = [&](std::size_t n) {  // of a coarse grid, so that many are as near
+    std::vector<float> values(3 * n);
+    for (float& v : values) v = static_cast<float>(engine() % 5);
+    return values;
+  };
+  for (const std::size_t n : {0u, 1u, 7u, 64u, 65u}) {
+    const std::size_t m = 40;
+    const std::vector<float> p = coordinates(n), q = coordinates(m);
+    std::vector<float> distance2(n);
+    std::vector<std::int32_t> nearest(n);
+    find_nearest({n, p.data(), p.data() + n, p.data() + 2 * n},
+                 {m, q.data(), q.data() + m, q.data() + 2 * m}, distance2.data(), nearest.data());
+    for (std::size_t k = 0; k < n; ++k) {
+      const auto distance = [&](std::size_t c) {
+        return std::hypot(p[k] - q[c], p[n + k] - q[m + c], p[2 * n + k] - q[2 * m + c]);
+      };
+      std::size_t best = 0;
+      for (std::size_t c = 1; c < m; ++c) {
+        if (distance(c) < distance(best)) best = c;
+      }
+      EXPECT_EQ(nearest[k], static_cast<std::int32_t>(best));
+    }
+  }
 }
 
 TEST(Sample, CountIsExactAllAreInsideAndVolumesSumToTheEnclosedVolume) {

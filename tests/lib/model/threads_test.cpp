@@ -74,6 +74,34 @@ TEST_P(Threads, HashPointsAsOne) {
   for (Index i = 0; i < 5000; ++i) EXPECT_EQ(all[i], i);
 }
 
+/// Of clouds with rings of cells around them that hold no point, too.
+TEST(SpatialHash, VisitsEachPointOfABallOnce) {
+  std::mt19937_64 engine(4);
+  std::uniform_real_distribution<double> anywhere(-0.3, 1.3), size(0, 0.5);
+  std::vector<Vec3d> points(3000);
+  for (Vec3d& p : points) p = {anywhere(engine), anywhere(engine), 0.1 * anywhere(engine)};
+  const SpatialHash hash(points, 0.1);
+  std::size_t visited = 0, inside = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Vec3d place{anywhere(engine), anywhere(engine), anywhere(engine)};
+    const double radius = size(engine);
+    std::vector<int> times(points.size(), 0);
+    hash.visit_ball(place, radius, [&](const SpatialHash::Entry& e) {
+      ++times[e.index];
+      ++visited;
+    });
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const bool near = norm(points[i] - place) <= radius;
+      EXPECT_LE(times[i], 1);
+      if (near) {
+        EXPECT_EQ(times[i], 1);
+      }
+      inside += near;
+    }
+  }
+  EXPECT_LT(visited, 4 * inside);  // cells of a fifth of the largest ball
+}
+
 TEST_P(Threads, FillAndAddAsOne) {
   const auto squares = tabulated(1000, [](std::size_t k) { return k * k; });
   ASSERT_EQ(squares.size(), 1000U);
