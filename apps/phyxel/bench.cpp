@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "bench_body.hpp"
+#include "bench_sample.hpp"
 #include "bench_scaling.hpp"
 #include "cantilever.hpp"
 #include "command.hpp"
@@ -341,11 +342,13 @@ void add_bench(CLI::App& program) {
   add_bench_step(*bench);
   add_bench_cantilever(*bench);
   add_bench_scaling(*bench);
+  add_bench_sample(*bench);
   bench->footer(
       "Examples:\n"
       "  phyxel bench step\n"
       "  phyxel bench cantilever --across 4,8\n"
       "  mpirun -n 2 phyxel bench scaling\n"
+      "  phyxel bench sample bunny.obj\n"
       "More: phyxel bench step --help");
 }
 

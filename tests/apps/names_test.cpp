@@ -55,6 +55,8 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
   json_of({"info", scene, "--partition", "2"});
   json_of({"bench", "step", "--phyxels", "27", "--precision", "float", "--terms", "green",
            "--threads", "1", "--seconds", "0.01", "--repeat", "1", "--csv", odd + ".csv"});
+  EXPECT_EQ(json_of({"bench", "sample", odd + ".obj", "--phyxels", "20"})["rows"][0]["mesh"],
+            shown + ".obj");
   fs::create_directory(folder_ / (odd + "_p"));
   write(odd + "_p/frames.csv",
         "body,phyxels,surfels,program,cores,threads,objects,with_surfels,"

@@ -1,0 +1,179 @@
+#include "bench_sample.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include "bench_body.hpp"
+#include "command.hpp"
+#include "kind.hpp"
+#include "model/neighbour_search.hpp"
+#include "phyxel/mesh.hpp"
+#include "phyxel/phyxel.hpp"
+#include "printed_table.hpp"
+#include "stopwatch.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct BenchSampleOptions {
+  std::vector<std::string> meshes;
+  std::vector<Index> sizes = {1000, 10000, 100000};
+  std::vector<int> threads = {omp_get_num_procs()};
+  int repeats = 1, relaxations = SampleRequest{}.relaxations;
+  TableOptions table;
+};
+
+/// Stages of the sampler, and the columns of their times.
+const std::vector<std::pair<std::string, std::string>> stages = {
+    {"inspecting the surface", "inspect_s"},
+    {"filling the surface", "fill_s"},
+    {"placing phyxels", "place_s"},
+    {"evening out distances", "relax_s"},
+    {"volumes of phyxels", "volumes_s"}};
+
+/// Time spent in each stage [s].
+class StageTimes {
+ public:
+  StageTimes() : observe_([this](std::string_view stage, double share) { hear(stage, share); }) {}
+  double of(const std::string& stage) const {
+    const auto found = seconds_.find(stage);
+    return found == seconds_.end() ? 0 : found->second;
+  }
+
+ private:
+  void hear(std::string_view stage, double share) {
+    if (share == 0) start_ = Clock::now();
+    if (share == 1) seconds_[std::string(stage)] += seconds_since(start_);
+  }
+  std::map<std::string, double> seconds_;
+  Clock::time_point start_;
+  ObserveStages observe_;
+};
+
+/// The largest memory that this process has used since the peak was last reset, and what it uses
+/// now [bytes].
+class MemoryPeak {
+ public:
+  MemoryPeak() {
+    std::ofstream("/proc/self/clear_refs") << 5;
+    before_ = status_bytes("VmRSS:");
+  }
+  double more() const { return status_bytes("VmHWM:") - before_; }
+
+ private:
+  static double status_bytes(const std::string& key) {
+    std::ifstream lines("/proc/self/status");
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with(key)) return 1024 * std::atof(line.c_str() + key.size());
+    }
+    return 0;
+  }
+  double before_ = 0;
+};
+
+/// Standard deviation over mean.
+double spread_of(const std::vector<double>& values) {
+  double sum = 0, squares = 0;
+  for (const double v : values) sum += v;
+  const double mean = sum / static_cast<double>(values.size());
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return std::sqrt(squares / static_cast<double>(values.size())) / mean;
+}
+
+void bench_sample(const BenchSampleOptions& options) {
+  for (const std::string& mesh : options.meshes) expect_kind(mesh, {Kind::mesh});
+  std::vector<std::string> columns = {"mesh",       "triangles", "threads", "phyxels",
+                                      "on_surface", "seconds",   "spread",  "phyxels_per_s"};
+  for (const auto& [stage, column] : stages) columns.push_back(column);
+  for (const char* column : {"bytes_per_phyxel", "smallest_gap", "gap_spread", "volume_spread"}) {
+    columns.emplace_back(column);
+  }
+  PrintedTable table(options.table, columns);
+  const int threads_before = omp_get_max_threads();
+  for (const std::string& mesh : options.meshes) {
+    const Surface surface = read_mesh(mesh);
+    for (const int threads : options.threads) {
+      omp_set_num_threads(threads);
+      for (const Index size : options.sizes) {
+        std::vector<double> seconds;
+        std::map<std::string, double> of_stage;  // of the last repeat
+        SampleReport report;
+        Cloud cloud;
+        double bytes = 0;
+        for (int repeat = 0; repeat < options.repeats; ++repeat) {
+          cloud = {};
+          const MemoryPeak memory;
+          const StageTimes times;
+          const auto start = Clock::now();
+          try {
+            cloud = sample_surface(surface, {.phyxels = size, .relaxations = options.relaxations},
+                                   &report);
+          } catch (const InputError& error) {
+            throw InputError(fmt::format("{}: {}", mesh, error.what()));
+          }
+          seconds.push_back(seconds_since(start));
+          bytes = memory.more();
+          for (const auto& [stage, column] : stages) of_stage[stage] = times.of(stage);
+        }
+        const Median median = median_of(seconds);
+        std::vector<std::string> row = {std::filesystem::path(mesh).filename().string(),
+                                        std::to_string(surface.triangle.size()),
+                                        std::to_string(threads),
+                                        std::to_string(size),
+                                        std::to_string(report.on_surface),
+                                        fmt::format("{:.4g}", median.value),
+                                        fmt::format("{:.3f}", median.spread),
+                                        fmt::format("{:.4g}", size / median.value)};
+        for (const auto& [stage, column] : stages) {
+          row.push_back(fmt::format("{:.4g}", of_stage[stage]));
+        }
+        row.push_back(fmt::format("{:.0f}", bytes / size));
+        row.push_back(fmt::format("{:.3f}", report.smallest_gap / report.spacing));
+        row.push_back(
+            fmt::format("{:.3f}", size > 1 ? spread_of(mean_spacing(cloud.position, 1)) : 0.0));
+        row.push_back(fmt::format("{:.3f}", spread_of(cloud.volume)));
+        table.row(row);
+      }
+    }
+  }
+  omp_set_num_threads(threads_before);
+}
+
+}  // namespace
+
+void add_bench_sample(CLI::App& bench) {
+  CLI::App* command = bench.add_subcommand(
+      "sample",
+      "Measure how fast meshes are filled with phyxels, stage by stage, and how even the clouds "
+      "are");
+  auto options = std::make_shared<BenchSampleOptions>();
+  command->add_option("mesh", options->meshes, "Surfaces in metres: OBJ, PLY or STL")->required();
+  command->add_option("--phyxels", options->sizes, "Numbers of phyxels, comma separated")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 2'000'000'000));
+  command->add_option("--repeat", options->repeats, "Number of repeats; the median is reported")
+      ->check(CLI::Range(1, 1000));
+  command
+      ->add_option("--relaxations", options->relaxations,
+                   "Sweeps of Lloyd's relaxation; 0 for none")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
+  add_thread_counts(*command, options->threads);
+  add_table_options(*command, options->table);
+  command->footer(
+      "Columns: *_s are the seconds of each stage, bytes_per_phyxel is the most memory in use at "
+      "a\n"
+      "time, the cloud included; smallest_gap is the smallest distance to the nearest phyxel over\n"
+      "the mean one; gap_spread and volume_spread are standard deviations over means.\n"
+      "Examples:\n"
+      "  phyxel bench sample bunny.obj\n"
+      "  phyxel bench sample bunny.obj --phyxels 10000,100000 --threads 1,2 --csv sample.csv");
+  command->callback([options] { bench_sample(*options); });
+}
+
+}  // namespace phyxel::app

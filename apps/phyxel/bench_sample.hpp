@@ -1,0 +1,10 @@
+/// phyxel bench sample: how fast meshes are filled, and how good the clouds are.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace phyxel::app {
+
+void add_bench_sample(CLI::App& bench);
+
+}  // namespace phyxel::app
