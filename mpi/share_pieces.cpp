@@ -99,9 +99,12 @@ struct MaterialCount {
 
 /// Returns the counts of one body. @param counts sorted by body
 std::span<const MaterialCount> of_body(const std::vector<MaterialCount>& counts, std::size_t b) {
-  const auto [first, last] =
-      std::ranges::equal_range(counts, static_cast<Index>(b), {}, &MaterialCount::body);
-  return {first, last};
+  const auto first_from = [&](std::size_t body) {
+    return std::partition_point(counts.begin(), counts.end(), [&](const MaterialCount& count) {
+      return count.body < static_cast<Index>(body);
+    });
+  };
+  return {first_from(b), first_from(b + 1)};
 }
 
 /// Finds the parts of all bodies. @param counts of all ranks, body by body
@@ -136,7 +139,8 @@ void number_by_material(const ShareSetup& setup, const std::vector<PieceMaterial
     }
   }
   std::vector<MaterialCount> all = setup.ranks.gathered(std::span(std::as_const(here)));
-  std::ranges::stable_sort(all, {}, &MaterialCount::body);
+  std::stable_sort(all.begin(), all.end(),
+                   [](const MaterialCount& x, const MaterialCount& y) { return x.body < y.body; });
   setup.ranks.collectively([&] { find_parts(setup, all, whole); });
   for (const PieceMaterials& piece : pieces) {
     std::vector<Index> next(piece.choice.size.size(), 0);  // number in the body, of each material
