@@ -1,6 +1,10 @@
 /// The compiled part of the Python module; `phyxel/__init__.py` is the other part.
+#include <fmt/format.h>
 #include <omp.h>
 #include <pthread.h>
+
+#include <cstdlib>
+#include <string>
 
 #include "arrays.hpp"
 #include "version.hpp"
@@ -48,6 +52,18 @@ const Exceptions& add_exceptions(py::module_& module) {
   return e;
 }
 
+/// Refuses to load where arrays would have wrong values: pybind11 before 2.12 reads the description
+/// of an array's type as NumPy 1 lays it out.
+void check_numpy() {
+  if (PYBIND11_VERSION_HEX >= 0x020C0000) return;
+  const auto version = py::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (std::atoi(version.c_str()) < 2) return;
+  throw py::import_error(fmt::format(
+      "NumPy {} is installed, but phyxel was built with pybind11 {}.{}, which knows NumPy 1 only: "
+      "allowed are NumPy 1, or phyxel built with pybind11 2.12 or later",
+      version, PYBIND11_VERSION_MAJOR, PYBIND11_VERSION_MINOR));
+}
+
 /// Ends the waiting OpenMP threads before a fork, which copies the calling thread only: the child
 /// would wait for the other threads for ever. Parent and child start new threads when they need
 /// them.
@@ -58,6 +74,7 @@ void end_waiting_threads() { omp_pause_resource_all(omp_pause_hard); }
 
 PYBIND11_MODULE(_phyxel, module) {
   namespace py = pybind11;
+  phyxel::python::check_numpy();
   static const phyxel::python::Exceptions& exceptions = phyxel::python::add_exceptions(module);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
@@ -68,6 +85,7 @@ PYBIND11_MODULE(_phyxel, module) {
   });
   pthread_atfork(phyxel::python::end_waiting_threads, nullptr, nullptr);
   module.attr("version") = phyxel::program_version();
+  module.attr("pybind11_version") = py::make_tuple(PYBIND11_VERSION_MAJOR, PYBIND11_VERSION_MINOR);
   phyxel::python::add_clouds(module);
   phyxel::python::add_files(module);
   phyxel::python::add_simulation(module);

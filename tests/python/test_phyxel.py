@@ -404,6 +404,18 @@ def test_late_refusals_begin_with_the_scene(tmp_path):
                 phyxel.Simulation(given)
 
 
+def test_numpy_2_is_refused_where_arrays_would_be_wrong(tmp_path):
+    if phyxel._phyxel.pybind11_version >= (2, 12):
+        pytest.skip("built with a pybind11 that knows NumPy 2")
+    (tmp_path / "numpy.py").write_text("__version__ = '2.0.1'\n")
+    path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    loaded = subprocess.run([sys.executable, "-c", "import phyxel"], capture_output=True, text=True,
+                            env={**os.environ, "PYTHONPATH": path})
+    assert loaded.returncode != 0
+    assert "ImportError: NumPy 2.0.1 is installed" in loaded.stderr
+    assert "allowed are NumPy 1, or phyxel built with pybind11 2.12" in loaded.stderr
+
+
 # --- trajectories --------------------------------------------------------------------------------
 
 def test_trajectories_come_back(tmp_path):
