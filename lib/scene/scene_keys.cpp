@@ -269,7 +269,8 @@ std::vector<SceneKey> body_keys() {
        .words = {"automatic", "geometry", "kernel"},
        .meaning = "Phyxel volumes: \"geometry\" takes those the body carries, \"kernel\" the rule "
            "of Müller et al. 2004 (mass over kernel density, as in Farias et al. 2008); "
-           "\"automatic\" is geometry where the body has volumes, else kernel."},
+           "\"automatic\" is geometry where the body has volumes, else kernel. Masses have each "
+           "material's density."},
       {.section = "body", .name = "closure", .fallback = "0", .range = between(0, 1),
        .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
