@@ -280,8 +280,10 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
       const auto stress_of_law = [&](const Mat3<P>& grad_u) __attribute__((always_inline)) {
         return stress_of(p, grad_u);
       };
-      const PointStress<P> stress = point_stress<Terms>(
-          sums_of<Terms::pulls>(p), constants_of<Terms>(p, kappa), stress_of_law);
+      // One after the other: constants that are loaded first take registers from the sums.
+      const NeighbourSums<P> sums = sums_of<Terms::pulls>(p);
+      const PointConstants<P> constants = constants_of<Terms>(p, kappa);
+      const PointStress<P> stress = point_stress<Terms>(sums, constants, stress_of_law);
       if constexpr (Terms::sends) this->store_closing_stress(p, stress.closing_stress);
       if constexpr (Terms::template has<HourglassControl>) {
         if (!pull_.empty()) this->store3(pull_, p, stress.hourglass_force);
