@@ -25,4 +25,11 @@ inline void add_over_ranks(const Communicator& ranks, const std::vector<ExactSum
   }
 }
 
+/// Adds the sums of all ranks, in place, of sums that stand in one vector.
+inline void add_over_ranks(const Communicator& ranks, std::vector<ExactSum>& sums) {
+  std::vector<ExactSum*> all;
+  for (ExactSum& sum : sums) all.push_back(&sum);
+  add_over_ranks(ranks, all);
+}
+
 }  // namespace phyxel

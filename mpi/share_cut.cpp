@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "model/assembly.hpp"
+#include "model/owned_vectors.hpp"
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo_transport.hpp"
 #include "mpi/share_pipeline.hpp"
@@ -84,17 +85,12 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   for (Index& surfel : share.global_surfel_id) surfel = local.surfel_id[surfel];
   local = LocalModel();  // makes room for what closing gradients takes
   connect(setup.ranks, made);
-  const auto from_owners = [&](auto& values) {
-    constexpr std::size_t bytes = sizeof(values[0]);
-    share.transport->start(Records{reinterpret_cast<std::byte*>(values.data()), bytes, bytes});
-    share.transport->finish();
-  };
   if (setup.options.tile > 0) {
-    from_owners(place);
+    refresh_ghosts(share, place);
     share.place = std::move(place);
   }
-  from_owners(made.model.mass);
-  from_owners(made.model.volume);
+  refresh_ghosts(share, made.model.mass);
+  refresh_ghosts(share, made.model.volume);
   BuiltShare built;
   built.model = model_of(std::move(made));
   std::size_t surfels = 0;

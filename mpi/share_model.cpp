@@ -126,9 +126,7 @@ void find_masses(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
       sum.add(local.around[b].kernel_sum[i - body.begin]);
     });
   }
-  std::vector<ExactSum*> all;
-  for (ExactSum& sum : sums) all.push_back(&sum);
-  add_over_ranks(setup.ranks, all);
+  add_over_ranks(setup.ranks, sums);
   std::vector<Masses> made;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     const Range& body = local.bodies[b];
@@ -317,9 +315,7 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
     }
   });
   setup.ranks.add(counts);
-  std::vector<ExactSum*> sums;
-  for (ExactSum& mass : masses) sums.push_back(&mass);
-  add_over_ranks(setup.ranks, sums);
+  add_over_ranks(setup.ranks, masses);
   setup.ranks.collectively([&] {
     auto count = counts.begin();
     auto mass = masses.begin();

@@ -97,16 +97,6 @@ struct MaterialCount {
   std::int64_t size, selected;
 };
 
-/// Returns the counts of one body. @param counts sorted by body
-std::span<const MaterialCount> of_body(const std::vector<MaterialCount>& counts, std::size_t b) {
-  const auto first_from = [&](std::size_t body) {
-    return std::partition_point(counts.begin(), counts.end(), [&](const MaterialCount& count) {
-      return count.body < static_cast<Index>(body);
-    });
-  };
-  return {first_from(b), first_from(b + 1)};
-}
-
 /// Finds the parts of all bodies. @param counts of all ranks, body by body
 void find_parts(const ShareSetup& setup, const std::vector<MaterialCount>& counts,
                 WholeBodies& whole) {

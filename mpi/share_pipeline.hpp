@@ -2,6 +2,7 @@
 /// `build_share` calls them. Every one is collective.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -165,8 +166,16 @@ void check_alike(const MpiCommunicator& ranks, std::uint64_t digest);
 /// Returns the phyxels of other ranks within a number of supports of own ones.
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
                                     const MigratingPhyxels& own, double supports);
-/// Returns the phyxels of one body. @param phyxels sorted by body
-std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::size_t b);
+/// Returns the phyxels, or other values, of one body. @param values sorted by body
+template <class T>
+std::span<const typename T::value_type> of_body(const T& values, std::size_t b) {
+  const auto first_from = [&](std::size_t body) {
+    return std::partition_point(values.begin(), values.end(), [&](const auto& value) {
+      return static_cast<std::size_t>(value.body) < body;
+    });
+  };
+  return {first_from(b), first_from(b + 1)};
+}
 /// Returns the values of the phyxels of a body or a part.
 template <class T, class R>
 std::span<const typename T::value_type> of_range(const T& values, const R& range) {

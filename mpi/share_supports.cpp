@@ -15,15 +15,6 @@ constexpr double margin = 1 + 1e-9;
 
 }  // namespace
 
-std::span<const MigratingPhyxel> of_body(const MigratingPhyxels& phyxels, std::size_t b) {
-  const auto first_from = [&](std::size_t body) {
-    return std::partition_point(phyxels.begin(), phyxels.end(), [&](const MigratingPhyxel& p) {
-      return static_cast<std::size_t>(p.body) < body;
-    });
-  };
-  return {first_from(b), first_from(b + 1)};
-}
-
 void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels& own) {
   const std::size_t n = whole.bodies.size();
   const auto wants = [&](std::size_t b) {

@@ -67,12 +67,16 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   return scene;
 }
 
+void add_repeats(CLI::App& command, int& repeats) {
+  command.add_option("--repeat", repeats, "Number of repeats; the median is reported")
+      ->check(CLI::Range(1, 1000));
+}
+
 void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats) {
   command.add_option("--phyxels", sizes, "Numbers of phyxels, comma separated (rounded to cubes)")
       ->delimiter(',')
       ->check(CLI::Range(8, 2'000'000'000));
-  command.add_option("--repeat", repeats, "Number of repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
+  add_repeats(command, repeats);
 }
 
 void add_thread_counts(CLI::App& command, std::vector<int>& threads) {

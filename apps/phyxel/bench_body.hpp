@@ -24,6 +24,7 @@ Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.
                   int bodies = 1);
 
 /// Adds the options --phyxels and --repeat of speed measurements.
+void add_repeats(CLI::App& command, int& repeats);
 void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats);
 /// Adds the option --threads of speed measurements.
 void add_thread_counts(CLI::App& command, std::vector<int>& threads);

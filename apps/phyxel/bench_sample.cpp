@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 
 #include "bench_body.hpp"
 #include "command.hpp"
 #include "kind.hpp"
+#include "model/host_memory.hpp"
 #include "model/neighbour_search.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/phyxel.hpp"
@@ -55,27 +55,6 @@ class StageTimes {
   ObserveStages observe_;
 };
 
-/// The largest memory that this process has used since the peak was last reset, and what it uses
-/// now [bytes].
-class MemoryPeak {
- public:
-  MemoryPeak() {
-    std::ofstream("/proc/self/clear_refs") << 5;
-    before_ = status_bytes("VmRSS:");
-  }
-  double more() const { return status_bytes("VmHWM:") - before_; }
-
- private:
-  static double status_bytes(const std::string& key) {
-    std::ifstream lines("/proc/self/status");
-    for (std::string line; std::getline(lines, line);) {
-      if (line.starts_with(key)) return 1024 * std::atof(line.c_str() + key.size());
-    }
-    return 0;
-  }
-  double before_ = 0;
-};
-
 /// Standard deviation over mean.
 double spread_of(const std::vector<double>& values) {
   double sum = 0, squares = 0;
@@ -83,6 +62,40 @@ double spread_of(const std::vector<double>& values) {
   const double mean = sum / static_cast<double>(values.size());
   for (const double v : values) squares += (v - mean) * (v - mean);
   return std::sqrt(squares / static_cast<double>(values.size())) / mean;
+}
+
+/// Fills a surface `repeats` times. @returns the cells of its row that follow `threads`
+std::vector<std::string> measured(const Surface& surface, Index size,
+                                  const BenchSampleOptions& options) {
+  std::vector<double> seconds;
+  std::vector<std::string> stage_cells;  // of the last repeat, as all that follows
+  SampleReport report;
+  Cloud cloud;
+  double bytes = 0;
+  for (int repeat = 0; repeat < options.repeats; ++repeat) {
+    cloud = {};
+    stage_cells.clear();
+    const MemoryGrowth memory;
+    const StageTimes times;
+    const auto start = Clock::now();
+    cloud = sample_surface(surface, {.phyxels = size, .relaxations = options.relaxations}, &report);
+    seconds.push_back(seconds_since(start));
+    bytes = memory.largest();
+    for (const auto& [stage, column] : stages) {
+      stage_cells.push_back(fmt::format("{:.4g}", times.of(stage)));
+    }
+  }
+  const Median median = median_of(seconds);
+  const double gap_spread = size > 1 ? spread_of(mean_spacing(cloud.position, 1)) : 0;
+  std::vector<std::string> cells = {
+      std::to_string(size), std::to_string(report.on_surface), fmt::format("{:.4g}", median.value),
+      fmt::format("{:.3f}", median.spread), fmt::format("{:.4g}", size / median.value)};
+  cells.insert(cells.end(), stage_cells.begin(), stage_cells.end());
+  cells.push_back(fmt::format("{:.0f}", bytes / size));
+  cells.push_back(fmt::format("{:.3f}", report.smallest_gap / report.spacing));
+  cells.push_back(fmt::format("{:.3f}", gap_spread));
+  cells.push_back(fmt::format("{:.3f}", spread_of(cloud.volume)));
+  return cells;
 }
 
 void bench_sample(const BenchSampleOptions& options) {
@@ -94,54 +107,25 @@ void bench_sample(const BenchSampleOptions& options) {
     columns.emplace_back(column);
   }
   PrintedTable table(options.table, columns);
-  const int threads_before = omp_get_max_threads();
   for (const std::string& mesh : options.meshes) {
     const Surface surface = read_mesh(mesh);
     for (const int threads : options.threads) {
       omp_set_num_threads(threads);
       for (const Index size : options.sizes) {
-        std::vector<double> seconds;
-        std::map<std::string, double> of_stage;  // of the last repeat
-        SampleReport report;
-        Cloud cloud;
-        double bytes = 0;
-        for (int repeat = 0; repeat < options.repeats; ++repeat) {
-          cloud = {};
-          const MemoryPeak memory;
-          const StageTimes times;
-          const auto start = Clock::now();
-          try {
-            cloud = sample_surface(surface, {.phyxels = size, .relaxations = options.relaxations},
-                                   &report);
-          } catch (const InputError& error) {
-            throw InputError(fmt::format("{}: {}", mesh, error.what()));
-          }
-          seconds.push_back(seconds_since(start));
-          bytes = memory.more();
-          for (const auto& [stage, column] : stages) of_stage[stage] = times.of(stage);
-        }
-        const Median median = median_of(seconds);
         std::vector<std::string> row = {std::filesystem::path(mesh).filename().string(),
                                         std::to_string(surface.triangle.size()),
-                                        std::to_string(threads),
-                                        std::to_string(size),
-                                        std::to_string(report.on_surface),
-                                        fmt::format("{:.4g}", median.value),
-                                        fmt::format("{:.3f}", median.spread),
-                                        fmt::format("{:.4g}", size / median.value)};
-        for (const auto& [stage, column] : stages) {
-          row.push_back(fmt::format("{:.4g}", of_stage[stage]));
+                                        std::to_string(threads)};
+        try {
+          for (std::string& cell : measured(surface, size, options)) {
+            row.push_back(std::move(cell));
+          }
+        } catch (const InputError& error) {
+          throw InputError(fmt::format("{}: {}", mesh, error.what()));
         }
-        row.push_back(fmt::format("{:.0f}", bytes / size));
-        row.push_back(fmt::format("{:.3f}", report.smallest_gap / report.spacing));
-        row.push_back(
-            fmt::format("{:.3f}", size > 1 ? spread_of(mean_spacing(cloud.position, 1)) : 0.0));
-        row.push_back(fmt::format("{:.3f}", spread_of(cloud.volume)));
         table.row(row);
       }
     }
   }
-  omp_set_num_threads(threads_before);
 }
 
 }  // namespace
@@ -156,8 +140,7 @@ void add_bench_sample(CLI::App& bench) {
   command->add_option("--phyxels", options->sizes, "Numbers of phyxels, comma separated")
       ->delimiter(',')
       ->check(CLI::Range(1, 2'000'000'000));
-  command->add_option("--repeat", options->repeats, "Number of repeats; the median is reported")
-      ->check(CLI::Range(1, 1000));
+  add_repeats(*command, options->repeats);
   command
       ->add_option("--relaxations", options->relaxations,
                    "Sweeps of Lloyd's relaxation; 0 for none")
@@ -166,10 +149,9 @@ void add_bench_sample(CLI::App& bench) {
   add_thread_counts(*command, options->threads);
   add_table_options(*command, options->table);
   command->footer(
-      "Columns: *_s are the seconds of each stage, bytes_per_phyxel is the most memory in use at "
-      "a\n"
-      "time, the cloud included; smallest_gap is the smallest distance to the nearest phyxel over\n"
-      "the mean one; gap_spread and volume_spread are standard deviations over means.\n"
+      "Columns: *_s are the seconds of each stage; bytes_per_phyxel is the most memory in use at\n"
+      "a time, with the cloud; smallest_gap is the smallest distance to the nearest phyxel over\n"
+      "the mean distance; gap_spread and volume_spread are standard deviations over means.\n"
       "Examples:\n"
       "  phyxel bench sample bunny.obj\n"
       "  phyxel bench sample bunny.obj --phyxels 10000,100000 --threads 1,2 --csv sample.csv");

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "model/closing_areas.hpp"
+#include "model/owned_vectors.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -89,22 +90,14 @@ class Bodies {
 #pragma omp critical(phyxel_closure_sum)
       sums[stretch.body].add(own);
     });
-    if (model_.share) {
-      std::vector<ExactSum*> all;
-      for (ExactSum& sum : sums) all.push_back(&sum);
-      add_over_ranks(*model_.share->communicator, all);
-    }
+    if (model_.share) add_over_ranks(*model_.share->communicator, sums);
     for (std::size_t b = 0; b < list_.size(); ++b) list_[b]->*into = sums[b].value();
   }
   /// Copies the owners' values to the ghosts of all bodies from the first to the last. Collective.
   template <class T>
   void refresh_ghosts(std::vector<T>& values) const {
     if (!model_.share || empty()) return;
-    const Index begin = list_.front()->begin(), end = list_.back()->end();
-    HaloTransport& halo = *model_.share->transport;
-    halo.start({reinterpret_cast<std::byte*>(values.data() + begin), sizeof(T), sizeof(T), nullptr,
-                begin, end});
-    halo.finish();
+    phyxel::refresh_ghosts(*model_.share, values, list_.front()->begin(), list_.back()->end());
   }
 
  private:

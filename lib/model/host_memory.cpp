@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 
@@ -21,6 +22,15 @@ double limit_in(const char* file) {
   return std::ifstream(file) >> bytes ? bytes : HUGE_VAL;
 }
 
+/// A line of this process's status, in bytes.
+double status_bytes(const std::string& key) {
+  std::ifstream lines("/proc/self/status");
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind(key + ":", 0) == 0) return 1024 * std::atof(line.c_str() + key.size() + 1);
+  }
+  return 0;
+}
+
 int programs_of_host = 1;
 
 }  // namespace
@@ -34,6 +44,12 @@ double usable_memory() {
                                 limit_in("/sys/fs/cgroup/memory/memory.limit_in_bytes")});
   return host / programs_of_host;
 }
+
+MemoryGrowth::MemoryGrowth() : before_(status_bytes("VmRSS")) {
+  std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
+}
+
+double MemoryGrowth::largest() const { return status_bytes("VmHWM") - before_; }
 
 double peak_memory() {
   rusage usage{};

@@ -13,6 +13,17 @@
 
 namespace phyxel {
 
+/// Copies the owners' values to ghosts. Collective.
+/// @param values of each phyxel of the share. @param begin,end phyxels [begin, end) of whole
+/// bodies, to which the exchange is limited
+template <class T>
+void refresh_ghosts(const Share& share, std::vector<T>& values, Index begin = 0,
+                    Index end = std::numeric_limits<Index>::max()) {
+  share.transport->start({reinterpret_cast<std::byte*>(values.data() + begin), sizeof(T), sizeof(T),
+                          nullptr, begin, end});
+  share.transport->finish();
+}
+
 class OwnedVectors {
  public:
   using Vector = std::vector<Vec3d>;  ///< shape [n, 3]; values of ghosts are undefined
@@ -66,10 +77,7 @@ class OwnedVectors {
   /// Copies the owners' values to ghosts. Collective.
   template <class T>
   void refresh_ghosts(std::vector<T>& values) const {
-    if (!model_.share) return;
-    HaloTransport& halo = *model_.share->transport;
-    halo.start({reinterpret_cast<std::byte*>(values.data()), sizeof(T), sizeof(T), nullptr});
-    halo.finish();
+    if (model_.share) phyxel::refresh_ghosts(*model_.share, values);
   }
 
   /// The smallest support of the phyxels of all ranks [m]; infinite if there is none. Collective.

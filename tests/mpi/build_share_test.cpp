@@ -338,15 +338,6 @@ TEST(BuiltShare, HasSentNothingBeforeTheFirstStep) {
 
 #if !PHYXEL_SANITIZED  // whose memory holds more than the program's
 
-/// A line of this process's status, in bytes.
-double status_bytes(const std::string& key) {
-  std::ifstream lines("/proc/self/status");
-  for (std::string line; std::getline(lines, line);) {
-    if (line.rfind(key + ":", 0) == 0) return 1024 * std::atof(line.c_str() + key.size() + 1);
-  }
-  return 0;
-}
-
 /// A share is refused before it is built if it would not fit: a rank asks for about as much memory
 /// as it then takes at most, whatever the number of ranks.
 class MemoryOfBuiltShare : public ::testing::TestWithParam<double> {};
@@ -359,11 +350,10 @@ TEST_P(MemoryOfBuiltShare, IsWhatItAsksFor) {
   // Few groups, as bodies have that are large enough to fill a machine.
   const ShareOptions options{{Partitioner::metis}, 0, nullptr, 60, 400};
   malloc_trim(0);
-  const double before = status_bytes("VmRSS");
-  std::ofstream("/proc/self/clear_refs") << 5;  // the peak begins anew
+  const MemoryGrowth growth;
   const Index phyxels = build_share(world(), scene, options).model.global_count();
-  const auto taken = static_cast<double>(
-      world().largest(static_cast<std::int64_t>(status_bytes("VmHWM") - before)));
+  const auto taken =
+      static_cast<double>(world().largest(static_cast<std::int64_t>(growth.largest())));
   ASSERT_GT(taken, 100.0 * phyxels / world().size());  // positions, lists and moments alone
 
   const double usable = usable_memory();
