@@ -219,7 +219,7 @@ class DeviceHalo {
   std::unique_ptr<DirectExchange<Real, StateReal>> direct_;
   mutable bool under_way_[kinds_sent]{};
   mutable std::int64_t bytes_sent_ = 0;
-  double seconds_before_ = halo().traffic().seconds;  ///< Of exchanges of the set-up [s].
+  double seconds_before_ = halo().traffic().seconds;  ///< Of the set-up: left out of `traffic` [s].
 };
 
 }  // namespace phyxel::cuda

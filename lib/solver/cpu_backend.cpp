@@ -191,7 +191,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::threads_;
   using Passes::velocity_;
 
-  /// Exchanges of the set-up.
+  /// Traffic of the set-up, which `exchanges` leaves out.
   const Traffic traffic_before_ = model_.share ? model_.share->transport->traffic() : Traffic{};
 
   /// Runs pass 1 for all phyxels.
