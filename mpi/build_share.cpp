@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "model/assembly.hpp"
+#include "model/closing_areas.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "scene/scene_error.hpp"
 #include "shapes/lattice_shapes.hpp"
@@ -48,12 +49,12 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
   return share;
 }
 
-/// Returns options for a scene: without a surveyor if gradients are closed, which takes lists on
+/// Returns options for a scene: without a surveyor if gradients may be closed, which takes lists on
 /// the host, or if a body has inclusions, whose phyxels a device does not sort by material.
 ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   ShareOptions own = options;
   for (const BodyRequest& body : scene.bodies) {
-    if (body.closure > 0 || !body.inclusions.empty()) own.surveyor = nullptr;
+    if (may_close(body) || !body.inclusions.empty()) own.surveyor = nullptr;
   }
   return own;
 }

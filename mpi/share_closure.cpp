@@ -74,15 +74,15 @@ NearFacets facets_near(const ShareSetup& setup, const WholeBodies& whole, const 
   return found;
 }
 
-bool closes(const ShareSetup& setup, const WholeBodies& whole, std::size_t b) {
-  return setup.scene.bodies[b].closure > 0 && whole.bodies[b].size > 0;
+bool closes(const WholeBodies& whole, std::size_t b) {
+  return whole.bodies[b].closure > 0 && whole.bodies[b].size > 0;
 }
 
 }  // namespace
 
 void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    if (!closes(setup, whole, b)) continue;
+    if (!closes(whole, b)) continue;
     const Surface& surface = whole.surfaces[b];
     const std::vector<Facet> facets =
         facets_of(surface.position, surface.triangle, 0, longest_edge(whole.bodies[b].reach));
@@ -102,7 +102,7 @@ void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share
                  std::vector<Vec3d> areas) {
   std::vector<ClosedBody> closed;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-    if (!closes(setup, whole, b)) continue;
+    if (!closes(whole, b)) continue;
     const std::size_t first = whole.bodies[b].first_part;
     const std::size_t count = share.parts_of_body(share.parts[first]).size();
     closed.push_back({std::span(share.parts).subspan(first, count), whole.bodies[b].enclosed});

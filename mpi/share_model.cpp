@@ -175,7 +175,6 @@ void begin_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
     part.material.law = law_of(request, known.material.material);
     part.material.hourglass = hourglass_of(request);
     part.neighbourhood = in_words(request.neighbourhood);
-    part.closure = request.closure;
     part.kernel_volumes = body.kernel_volumes;
     part.size = known.size();
     part.surfels =
@@ -241,18 +240,25 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   }
 }
 
-/// Checks the surfaces of all bodies with closed gradients as `check_closure` does.
-void check_surfaces(const ShareSetup& setup, const WholeBodies& whole, const LocalModel& local) {
+/// Finds which bodies have closed gradients.
+void choose_closures(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       const BodyRequest& request = setup.scene.bodies[b];
-      if (whole.bodies[b].size == 0) continue;
+      WholeBody& body = whole.bodies[b];
+      if (body.size == 0) continue;
+      const std::span<Part> parts = std::span(local.model.parts)
+                                        .subspan(body.first_part, model_parts_of(whole, local, b).size());
       double volume = 0;
-      for (const Part& part : model_parts_of(whole, local, b)) volume += part.volume;
-      naming(request, [&] {
-        check_closure(request, whole.surfaces[b],
-                      whole.bodies[b].kernel_volumes ? std::nullopt : std::optional(volume));
+      for (const Part& part : parts) volume += part.volume;
+      body.closure = naming(request, [&] {
+        return closure_of(request, whole.surfaces[b], body.lattice,
+                          body.kernel_volumes ? std::nullopt : std::optional(volume));
       });
+      for (Part& part : parts) {
+        part.closure = body.closure;
+        part.automatic_closure = !request.closure;
+      }
     }
   });
 }
@@ -360,7 +366,7 @@ void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& loc
   begin_parts(setup, whole, local);
   find_masses(setup, whole, local);
   add_up_parts(setup, whole, local);
-  check_surfaces(setup, whole, local);
+  choose_closures(setup, whole, local);
   add_boundary(setup, whole, local);
   gather_degenerate(setup, whole, local);
   add_surfels(setup, whole, local);

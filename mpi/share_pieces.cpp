@@ -187,7 +187,7 @@ void check_alike(const MpiCommunicator& ranks, std::uint64_t digest) {
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole) {
   MigratingPhyxels own;
   whole.surfaces.resize(whole.bodies.size());
-  std::vector<std::int64_t> with_volumes(whole.bodies.size());
+  std::vector<std::int64_t> with_volumes(whole.bodies.size()), lattices(whole.bodies.size());
   std::vector<PieceMaterials> materials;
   std::uint64_t digest = 0;  // of what each rank has made or read for itself
   setup.ranks.collectively([&] {
@@ -201,6 +201,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       WholeBody& body = whole.bodies[b];
       body.size = made.whole;
       with_volumes[b] = !cloud.volume.empty();
+      lattices[b] = cloud.lattice;
       const BodyRequest& request = setup.scene.bodies[b];
       const std::vector<std::uint32_t> sets =
           naming(request, [&] { return find_region_sets(request, made, body); });
@@ -227,6 +228,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   });
   check_alike(setup.ranks, digest);
   setup.ranks.add(with_volumes);
+  setup.ranks.add(lattices);
   whole.boxes = boxes_of(setup.ranks, own, whole.bodies.size(),
                          [](const MigratingPhyxel& p) { return static_cast<std::size_t>(p.body); });
   agree_on_regions(setup, whole, own);
@@ -235,6 +237,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       check_terms(setup.scene.bodies[b]);
+      whole.bodies[b].lattice = lattices[b] > 0;
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));

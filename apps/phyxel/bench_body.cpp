@@ -58,7 +58,7 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   }
   if (terms == "volume") body.material.volume_stiffness = 1e6;
   if (terms == "hourglass") body.material.hourglass = 0.1;
-  if (terms == "closure") body.closure = 0.01;
+  body.closure = terms == "closure" ? 0.01 : 0;
   if (terms == "damping") body.material.damping = 0.1;
   if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
   if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;

@@ -32,6 +32,7 @@ struct BenchSampleOptions {
 const std::vector<std::pair<std::string, std::string>> stages = {
     {"inspecting the surface", "inspect_s"},
     {"filling the surface", "fill_s"},
+    {"phyxels on the surface", "surface_s"},
     {"placing phyxels", "place_s"},
     {"evening out distances", "relax_s"},
     {"volumes of phyxels", "volumes_s"}};
@@ -143,7 +144,7 @@ void add_bench_sample(CLI::App& bench) {
   add_repeats(*command, options->repeats);
   command
       ->add_option("--relaxations", options->relaxations,
-                   "Sweeps of Lloyd's relaxation; 0 for none")
+                   "Sweeps that spread the phyxels evenly; 0 for none")
       ->check(CLI::Range(0, 10000))
       ->capture_default_str();
   add_thread_counts(*command, options->threads);

@@ -146,7 +146,7 @@ void add_sample(CLI::App& program) {
       ->capture_default_str();
   command
       ->add_option("--relaxations", options->relaxations,
-                   "Sweeps of Lloyd's relaxation; 0 for none")
+                   "Sweeps that spread the phyxels evenly; 0 for none")
       ->capture_default_str();
   CLI::Option* const on_surface = command->add_flag_callback(
       "--on-surface", [options] { options->on_surface = true; },

@@ -2,6 +2,7 @@
 #include <bit>
 
 #include "device.hpp"
+#include "model/closing_areas.hpp"
 #include "model/nearest_distances.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -317,7 +318,7 @@ Surveyor cuda_surveyor(int device) {
 bool can_survey_on_cuda(const Scene& scene) {
   return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
     // The host finds closing vectors from its lists, and sorts phyxels by material.
-    return body.closure > 0 || !body.inclusions.empty() || body.neighbourhood.max_neighbours ||
+    return may_close(body) || !body.inclusions.empty() || body.neighbourhood.max_neighbours ||
            body.neighbourhood.nearest > most_nearest;
   });
 }

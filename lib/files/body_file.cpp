@@ -70,6 +70,7 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
   out.attribute("/phyxel", "version", version);
   out.attribute("/phyxel", "program", program_version());
   out.attribute("/phyxel", "units", std::string("m, m^3"));
+  if (cloud.lattice) out.attribute("/phyxel", "lattice", std::int64_t{1});
   out.vectors("/position", cloud.position, false);
   if (!cloud.volume.empty()) out.array<double>("/volume", cloud.volume);
   const Surface& surface = cloud.surface;
@@ -106,6 +107,8 @@ Cloud read_body(const std::filesystem::path& file) {
     }
   }
   if (in.has("/surface")) cloud.surface = read_surface(in);
+  cloud.lattice = in.has_attribute("/phyxel", "lattice") &&
+                  in.integer_attribute("/phyxel", "lattice") != 0;
   for (const std::string& name : in.names("/regions")) {
     const std::string path = "/regions/" + name;
     std::vector<Index> phyxels = in.array<Index>(path);

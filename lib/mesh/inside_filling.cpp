@@ -52,8 +52,10 @@ class Search {
   void collect(Stage* stage) {
     const Offset most =
         hopeless() ? most_filling_work(request_) / 100 : most_filling_work(request_);
-    filling_.tally = sampler_.collect(filling_.voxel, request_.seed, filling_.blocks, stage,
-                                      std::max<Offset>(most - filling_.work, 0));
+    filling_.tally = sampler_.collect({.voxel = filling_.voxel,
+                                       .seed = request_.seed,
+                                       .most_work = std::max<Offset>(most - filling_.work, 0)},
+                                      filling_.blocks, stage);
     swept_ = filling_.voxel;
     filling_.work += filling_.tally.work;
     ++filling_.sweeps;

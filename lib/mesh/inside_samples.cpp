@@ -10,7 +10,8 @@ namespace phyxel {
 namespace {
 
 constexpr int block_level = 2;             ///< A block has 2^2 voxels a side.
-constexpr std::size_t enough_tasks = 400;  ///< Number of tasks that balances the load of threads.
+/// Number of tasks that balances the load of threads; each of fewer cells has up to eight children.
+constexpr std::size_t enough_tasks = InsideSampler::most_tasks / 8;
 
 /// Number of triangles up to which walking from a known point is faster than the winding number
 /// of a compact surface, which visits few of its triangles.
@@ -44,6 +45,18 @@ bool parted_by_an_edge(Vec3d a, Vec3d b, Vec3d c, double half) {
 bool is_doubtful(double winding) { return std::abs(winding - std::round(winding)) > 0.1; }
 
 }  // namespace
+
+InsideSampler::Grid::Grid(const InsideSampler& sampler, const SampleSweep& asked, int levels)
+    : sweep(asked), voxel(asked.voxel), back(transpose(asked.turn)) {
+  const double half = 0.5 * static_cast<double>(std::int64_t{1} << levels);
+  double x = half, y = half, z = half;
+  if (!sweep.at_random) {
+    const std::uint64_t bits = mix_bits(sweep.seed);
+    x -= unit_fraction(bits), y -= unit_fraction(bits >> 21), z -= unit_fraction(bits >> 42);
+  }
+  origin = sampler.middle_;
+  origin = place(-x, -y, -z);
+}
 
 void SampleTally::add(const SampleTally& other) {
   samples += other.samples;
@@ -93,10 +106,11 @@ std::size_t InsideSampler::few_for_walking() const {
 /// False if a separating axis shows that the triangle misses the cube. For an open surface only
 /// the axes of the cube and the triangle's normal are tried, and a triangle may still miss the
 /// cube: `agrees_throughout` is evidence, not proof, and such cells do not rely on it.
-bool InsideSampler::may_touch(Index triangle, Vec3d middle, double half) const {
+bool InsideSampler::may_touch(const Grid& grid, Index triangle, Vec3d middle, double half) const {
   const Triangle& t = surface_.triangle[triangle];
-  const Vec3d a = surface_.position[t[0]] - middle, b = surface_.position[t[1]] - middle,
-              c = surface_.position[t[2]] - middle;
+  const Vec3d a = grid.along_edges(surface_.position[t[0]] - middle),
+              b = grid.along_edges(surface_.position[t[1]] - middle),
+              c = grid.along_edges(surface_.position[t[2]] - middle);
   for (int axis = 0; axis < 3; ++axis) {
     const double p = component(a, axis), q = component(b, axis), r = component(c, axis);
     if (std::min({p, q, r}) > half || std::max({p, q, r}) < -half) return false;
@@ -201,7 +215,7 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
     tally.work += static_cast<Offset>(cell.triangles.size());
     const Vec3d middle = grid.middle(child);
     for (const Index t : cell.triangles) {
-      if (may_touch(t, middle, half)) child.triangles.push_back(t);
+      if (may_touch(grid, t, middle, half)) child.triangles.push_back(t);
     }
     child.measured = false;
     if (child.level == 0) continue;
@@ -219,6 +233,10 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
 void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
                          SampleTally& tally) const {
   if (cell.known && !(cell.winding > 0.5)) return;
+  if (cell.known) {
+    fill_known(grid, cell, block, tally);
+    return;
+  }
   for (Cell& child : split(grid, cell, tally)) {
     if (child.level > 0) {
       fill(grid, child, block, tally);
@@ -228,17 +246,45 @@ void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
   }
 }
 
+/// Adds a sample for each voxel of a cell inside the surface, in the order of `split`.
+void InsideSampler::fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
+                               SampleTally& tally) {
+  const Offset before = tally.samples;
+  for (std::int64_t m = 0; m < std::int64_t{1} << 3 * cell.level; ++m) {
+    std::int64_t x = cell.x, y = cell.y, z = cell.z;
+    for (int bit = 0; bit < cell.level; ++bit) {
+      const std::int64_t octant = m >> 3 * bit;
+      x += (octant & 1) << bit;
+      y += (octant >> 1 & 1) << bit;
+      z += (octant >> 2 & 1) << bit;
+    }
+    block.offset.push_back(sample_in(grid, x, y, z, block.centre));
+    ++tally.samples;
+  }
+  const Offset added = tally.samples - before;
+  tally.work += added;
+  if (is_doubtful(cell.winding)) tally.doubtful += added;
+  if (cell.winding > 1.5) tally.repeated += added;
+}
+
+/// The sample point of a voxel, as an offset from a block's centre.
+Vec3<float> InsideSampler::sample_in(const Grid& grid, std::int64_t x, std::int64_t y,
+                                     std::int64_t z, Vec3d centre) {
+  Vec3d within{0.5, 0.5, 0.5};
+  if (grid.sweep.at_random) {
+    std::uint64_t bits = mix_bits(grid.sweep.seed ^ mix_bits(static_cast<std::uint64_t>(x)));
+    bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(y)));
+    bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(z)));
+    within = {unit_fraction(bits), unit_fraction(bits >> 21), unit_fraction(bits >> 42)};
+  }
+  return to<float>(grid.place(static_cast<double>(x) + within.x, static_cast<double>(y) + within.y,
+                              static_cast<double>(z) + within.z) -
+                   centre);
+}
+
 void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell& cell,
                                SampleBlock& block, SampleTally& tally) const {
-  std::uint64_t bits = mix_bits(grid.seed ^ mix_bits(static_cast<std::uint64_t>(cell.x)));
-  bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(cell.y)));
-  bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(cell.z)));
-  const Vec3d place = grid.place(static_cast<double>(cell.x) + unit_fraction(bits),
-                                 static_cast<double>(cell.y) + unit_fraction(bits >> 21),
-                                 static_cast<double>(cell.z) + unit_fraction(bits >> 42));
-  const Vec3d offset = place - block.centre;
-  block.offset.push_back(
-      {static_cast<float>(offset.x), static_cast<float>(offset.y), static_cast<float>(offset.z)});
+  block.offset.push_back(sample_in(grid, cell.x, cell.y, cell.z, block.centre));
   const Vec3d rounded = block.position(block.offset.size() - 1);
   const double winding = cell.known                   ? cell.winding
                          : parent.measured && closed_ ? winding_from(grid, parent, rounded, tally)
@@ -253,10 +299,15 @@ void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell&
   tally.repeated += winding > 1.5;
 }
 
-void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, WorkLimit& limit,
+void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally,
+                            WorkLimit& limit,
                             const std::function<void(const SampleBlock&)>& visit_block) const {
   if (cell.known && !(cell.winding > 0.5)) return;
   if (limit.reached()) return;
+  if (cell.known && grid.sweep.wanted) {
+    const double half = 0.5 * grid.voxel * static_cast<double>(std::int64_t{1} << cell.level);
+    if (!grid.sweep.wanted(grid.middle(cell), half)) return;
+  }
   const Offset before = tally.work;
   if (cell.level > block_level) {
     std::vector<Cell> children = split(grid, cell, tally);
@@ -271,21 +322,22 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, Wo
   if (!block.offset.empty()) visit_block(block);
 }
 
-SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& visit_block,
-                                 Stage* stage, Offset most_work) const {
+SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_block,
+                                 Stage* stage) const {
   Cell root;
   root.level = block_level;
-  while (voxel * static_cast<double>(std::int64_t{1} << root.level) < extent_ * 1.001 + voxel) {
-    ++root.level;
-  }
-  const double side = voxel * static_cast<double>(std::int64_t{1} << root.level);
-  const Grid grid{middle_ - 0.5 * Vec3d{side, side, side}, voxel, seed};
+  // A turned cube that contains the bounding box is as wide as the diagonal of the latter, at most;
+  // and its position may be shifted by a voxel.
+  const double width = sweep.at_random ? extent_ * 1.001 + sweep.voxel
+                                       : extent_ * 1.733 + 3 * sweep.voxel;
+  while (sweep.voxel * static_cast<double>(std::int64_t{1} << root.level) < width) ++root.level;
+  const Grid grid(*this, sweep, root.level);
   root.triangles.resize(surface_.triangle.size());
   for (std::size_t t = 0; t < root.triangles.size(); ++t) root.triangles[t] = static_cast<Index>(t);
 
   SampleTally total;
   std::vector<Cell> tasks{root};
-  while (total.work <= most_work && tasks.size() < enough_tasks && !tasks.empty() &&
+  while (total.work <= sweep.most_work && tasks.size() < enough_tasks && !tasks.empty() &&
          tasks.front().level > block_level) {
     std::vector<Cell> finer;
     for (Cell& cell : tasks) {
@@ -296,7 +348,7 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
     tasks.swap(finer);
   }
 
-  WorkLimit limit{total.work, most_work};
+  WorkLimit limit{total.work, sweep.most_work};
   const auto n_tasks = static_cast<std::ptrdiff_t>(tasks.size());
   if (stage) stage->expect(tasks.size());
 #pragma omp parallel for schedule(dynamic)
@@ -311,15 +363,12 @@ SampleTally InsideSampler::visit(double voxel, std::uint64_t seed, const Visit& 
   return total;
 }
 
-SampleTally InsideSampler::collect(double voxel, std::uint64_t seed,
-                                   std::vector<SampleBlock>& blocks, Stage* stage,
-                                   Offset most_work) const {
-  // Each of fewer than enough_tasks cells has at most eight children.
-  std::vector<std::vector<SampleBlock>> by_task(8 * enough_tasks);
+SampleTally InsideSampler::collect(const SampleSweep& sweep, std::vector<SampleBlock>& blocks,
+                                   Stage* stage) const {
+  std::vector<std::vector<SampleBlock>> by_task(most_tasks);
   const SampleTally tally = visit(
-      voxel, seed,
-      [&](std::size_t task, const SampleBlock& block) { by_task[task].push_back(block); }, stage,
-      most_work);
+      sweep, [&](std::size_t task, const SampleBlock& block) { by_task[task].push_back(block); },
+      stage);
   blocks.clear();
   for (std::vector<SampleBlock>& part : by_task) {
     std::move(part.begin(), part.end(), std::back_inserter(blocks));

@@ -36,7 +36,21 @@ struct SampleTally {
   void add(const SampleTally& other);
 };
 
-/// Sampler of the inside of a surface: voxels, each with one sample point at a random position.
+/// One sweep over the voxels of a grid.
+struct SampleSweep {
+  double voxel = 0;        ///< Side of the voxels [m].
+  std::uint64_t seed = 1;  ///< Seed of the points' positions in their voxels, or of the grid's.
+  /// True for a sample point at a random position in each voxel of a grid along the axes; false for
+  /// one in the middle of each voxel of a grid turned by `turn`, at a random position.
+  bool at_random = true;
+  Mat3d turn = identity<double>();
+  /// Tells whether a cube inside the surface, given by its middle and half its side [m], is wanted;
+  /// one that is not may be left out. Called on many threads. Null: all are.
+  std::function<bool(Vec3d middle, double half)> wanted;
+  Offset most_work = std::numeric_limits<Offset>::max();  ///< Upper limit of the work.
+};
+
+/// Sampler of the inside of a surface: voxels, each with one sample point.
 /// An octree is refined down to the voxels near triangles only, so that the empty part of a large
 /// box costs nothing. A point is inside if its winding number is above one half.
 class InsideSampler {
@@ -47,19 +61,20 @@ class InsideSampler {
 
   using Visit = std::function<void(std::size_t task, const SampleBlock&)>;
 
-  static constexpr Offset no_limit = std::numeric_limits<Offset>::max();
+  /// Upper limit of the number of tasks of a sweep.
+  static constexpr std::size_t most_tasks = 3200;
 
-  /// Calls visit_block(task, block) for blocks of up to 4 x 4 x 4 voxels with the side `voxel` [m].
-  /// Tasks run on many threads in any order, the blocks of one task in order; the blocks depend
-  /// on `voxel` and `seed` only. A sweep that takes more than `most_work` ends early: the tally's
-  /// work is then above the limit, and the blocks are incomplete.
+  /// Calls visit_block(task, block) for blocks of up to 4 x 4 x 4 voxels. Tasks run on many threads
+  /// in any order, the blocks of one task in order; the blocks depend on the sweep only. A sweep
+  /// that takes more than `most_work` ends early: the tally's work is then above the limit, and the
+  /// blocks are incomplete.
   /// @param stage reports the progress of the sweep; may be null
-  SampleTally visit(double voxel, std::uint64_t seed, const Visit& visit_block,
-                    Stage* stage = nullptr, Offset most_work = no_limit) const;
+  SampleTally visit(const SampleSweep& sweep, const Visit& visit_block,
+                    Stage* stage = nullptr) const;
 
   /// Collects the blocks of a sweep in the order of their tasks.
-  SampleTally collect(double voxel, std::uint64_t seed, std::vector<SampleBlock>& blocks,
-                      Stage* stage = nullptr, Offset most_work = no_limit) const;
+  SampleTally collect(const SampleSweep& sweep, std::vector<SampleBlock>& blocks,
+                      Stage* stage = nullptr) const;
 
   bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
   /// Approximate number of voxels that the surface passes through; the sampler visits each.
@@ -81,14 +96,22 @@ class InsideSampler {
   /// The work that the tasks of a sweep have done, and its upper limit.
   struct WorkLimit {
     std::atomic<Offset> done = 0;
-    Offset most = no_limit;
+    Offset most = 0;
     bool reached() const { return done.load(std::memory_order_relaxed) > most; }
   };
   struct Grid {
-    Vec3d origin;
+    Grid(const InsideSampler& sampler, const SampleSweep& sweep, int levels);
+
+    const SampleSweep& sweep;
     double voxel;
-    std::uint64_t seed;
-    Vec3d place(double x, double y, double z) const { return origin + voxel * Vec3d{x, y, z}; }
+    Mat3d back;  ///< Inverse of the turn.
+    Vec3d origin;
+    Vec3d place(double x, double y, double z) const {
+      const Vec3d from_origin = voxel * Vec3d{x, y, z};
+      return origin + (sweep.at_random ? from_origin : sweep.turn * from_origin);
+    }
+    /// A vector's components along the edges of the voxels.
+    Vec3d along_edges(Vec3d v) const { return sweep.at_random ? v : back * v; }
     Vec3d middle(const Cell& cell) const {
       const double half = 0.5 * static_cast<double>(std::int64_t{1} << cell.level);
       return place(static_cast<double>(cell.x) + half, static_cast<double>(cell.y) + half,
@@ -98,7 +121,7 @@ class InsideSampler {
 
   std::vector<Cell> split(const Grid& grid, Cell& cell, SampleTally& tally) const;
   std::size_t few_for_walking() const;
-  bool may_touch(Index triangle, Vec3d middle, double half) const;
+  bool may_touch(const Grid& grid, Index triangle, Vec3d middle, double half) const;
   double winding_at(Vec3d point, SampleTally& tally) const;
   std::optional<double> change_between(const Cell& cell, Vec3d start, Vec3d point,
                                        SampleTally& tally) const;
@@ -107,6 +130,10 @@ class InsideSampler {
   void descend(const Grid& grid, Cell& cell, SampleTally& tally, WorkLimit& limit,
                const std::function<void(const SampleBlock&)>& visit_block) const;
   void fill(const Grid& grid, Cell& cell, SampleBlock& block, SampleTally& tally) const;
+  static void fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
+                         SampleTally& tally);
+  static Vec3<float> sample_in(const Grid& grid, std::int64_t x, std::int64_t y, std::int64_t z,
+                               Vec3d centre);
   void add_sample(const Grid& grid, const Cell& parent, const Cell& cell, SampleBlock& block,
                   SampleTally& tally) const;
 

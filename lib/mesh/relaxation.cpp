@@ -173,29 +173,6 @@ SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
 NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
     : hash_(hash_of(site, spacing)) {}
 
-/// The vector from `place` to the site nearest to it.
-Vec3d NearestSite::nearest_to(Vec3d place) const {
-  double nearest2 = HUGE_VAL;
-  Vec3d nearest;
-  const double cell = hash_.cell_size();
-  const auto compare = [&](const SpatialHash::Entry& entry) {
-    const Vec3d d = entry.position - place;
-    if (dot(d, d) >= nearest2) return;
-    nearest2 = dot(d, d);
-    nearest = d;
-  };
-  const int farthest = hash_.farthest_ring(place);
-  for (int ring = 0; ring <= farthest; ++ring) {
-    if (ring > 4) {  // rare: the block is far from every site
-      hash_.visit_all(compare);
-      break;
-    }
-    hash_.visit_ring(place, ring, compare);
-    if (nearest2 <= ring * cell * ring * cell) break;
-  }
-  return nearest;
-}
-
 void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   const std::size_t n = block.offset.size();
   s.x.resize(n);
@@ -210,7 +187,7 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
     ball = std::max(ball, norm({p.x, p.y, p.z}));
   }
 
-  const Vec3d nearest = nearest_to(block.centre);
+  const Vec3d nearest = hash_.nearest(block.centre).apart;
   const double nearest2 = dot(nearest, nearest);
   // A site can be nearest to some point of the ball only if the plane half-way between it and the
   // site nearest to the centre cuts the ball; hence also only if it is within the reach below.
@@ -241,6 +218,17 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
       s.best.data(), s.slot.data());
   s.owner.resize(n);
   for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
+}
+
+InsideSampler::Visit NearestSite::count_into(std::vector<std::uint32_t>& count) const {
+  return [this, &count](std::size_t, const SampleBlock& block) {
+    thread_local Scratch scratch;
+    find(block, scratch);
+    for (const Index i : scratch.owner) {
+#pragma omp atomic
+      ++count[i];
+    }
+  };
 }
 
 SampledVoronoi::SampledVoronoi(std::vector<SampleBlock> blocks) : blocks_(std::move(blocks)) {
@@ -291,8 +279,7 @@ void SampledVoronoi::add_up_cells(Vec3d origin, std::vector<Vec3d>& sum,
 }
 
 void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
-                           std::size_t fixed) {
-  Stage stage("evening out distances");
+                           std::size_t fixed, Stage* stage) {
   const Vec3d origin = blocks_.front().centre;
   std::vector<Vec3d> sum(site.size());
   std::vector<Offset> count(site.size());
@@ -305,9 +292,8 @@ void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
       homeless |= count[i] == 0;
     }
     if (homeless) settle_homeless(site, count, fixed);
-    stage.reach((sweep + 1.0) / sweeps);
+    if (stage) stage->reach((sweep + 1.0) / sweeps);
   }
-  stage.finish();
 }
 
 void SampledVoronoi::settle_homeless(std::vector<Vec3d>& site, const std::vector<Offset>& count,

@@ -40,9 +40,11 @@ class NearestSite {
   /// Finds the nearest site of each point of a block.
   void find(const SampleBlock& block, Scratch& scratch) const;
 
- private:
-  Vec3d nearest_to(Vec3d place) const;
+  /// A visit of blocks, on any number of threads, that counts the points nearest to each site.
+  /// @param count shape [n_sites]; must outlive the visit, as must this search
+  InsideSampler::Visit count_into(std::vector<std::uint32_t>& count) const;
 
+ private:
   SpatialHash hash_;
 };
 
@@ -56,7 +58,9 @@ class SampledVoronoi {
 
   /// Moves each site to the centroid of its cell, `sweeps` times (Lloyd 1982). A site that owns no
   /// sample point is moved into one of the largest cells. The first `fixed` sites stay.
-  void relax(std::vector<Vec3d>& site, double spacing, int sweeps, std::size_t fixed = 0);
+  /// @param stage is told the share of sweeps that is done; may be null
+  void relax(std::vector<Vec3d>& site, double spacing, int sweeps, std::size_t fixed = 0,
+             Stage* stage = nullptr);
 
   /// Moves each site with a nonzero `which` to the nearest sample point of its cell; a site without
   /// sample points is moved as in relax(). The first `fixed` sites stay.

@@ -6,10 +6,12 @@
 #include <numeric>
 
 #include "mesh/inside_filling.hpp"
-#include "mesh/relaxation.hpp"
+#include "mesh/lattice_filling.hpp"
+#include "mesh/scattered_filling.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
 #include "model/cloud_check.hpp"
+#include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "stage.hpp"
@@ -17,21 +19,19 @@
 namespace phyxel {
 namespace {
 
-/// Number of sample points for each phyxel during relaxation. More samples give centroids with
-/// less noise (the smallest gap is 0.70 of the spacing with 64, 0.57 with 24) and take more memory.
-double samples_per_phyxel(Index phyxels) { return std::max(64.0, 20000.0 / phyxels); }
+/// Memory that a phyxel of a lattice takes while a body is filled [bytes].
+constexpr double bytes_on_lattice = 150;
 
-void check_memory(Index phyxels) {
-  // A sample takes 16 bytes, in vectors that grow; a phyxel about 12 candidates of 40 bytes, and
-  // 200 bytes in sums, hashes and results.
-  const double bytes = phyxels * (24 * samples_per_phyxel(phyxels) + 12 * 40 + 200);
+/// Refuses a number of phyxels that takes more memory than there is.
+/// @param bytes memory for each phyxel
+void check_memory(Index phyxels, double bytes) {
   const double memory =
       static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGE_SIZE));
-  if (bytes > memory) {
+  if (phyxels * bytes > memory) {
     throw InputError(fmt::format(
         "{} phyxels need about {:.0f} GiB of memory to sample, but this machine has {:.0f} GiB; "
         "allowed here: at most about {:.2g}",
-        phyxels, bytes / 0x1p30, memory / 0x1p30, phyxels * (memory / bytes)));
+        phyxels, phyxels * bytes / 0x1p30, memory / 0x1p30, memory / bytes));
   }
 }
 
@@ -70,7 +70,7 @@ void check_request(const Surface& surface, const SampleRequest& request) {
     throw InputError(
         fmt::format("{} relaxations asked for; 0 or more are allowed", request.relaxations));
   }
-  check_memory(request.phyxels);
+  check_memory(request.phyxels, bytes_on_lattice);
   if (surface.triangle.empty()) throw InputError("the surface has no triangles");
   check_surface(surface);
 }
@@ -109,33 +109,6 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
       100 * doubtful, defects.describe()));
 }
 
-/// Share of each phyxel in the volume: the number of sample points nearest to it, on voxels half as
-/// large as those of the relaxation.
-std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
-                                   double voxel, double spacing, std::uint64_t seed,
-                                   double& sampled_volume) {
-  Stage stage("volumes of phyxels");
-  const NearestSite nearest(site, spacing);
-  std::vector<std::uint32_t> count(site.size(), 0);
-  const SampleTally tally = sampler.visit(
-      0.5 * voxel, seed,
-      [&](std::size_t, const SampleBlock& b) {
-        thread_local NearestSite::Scratch scratch;
-        nearest.find(b, scratch);
-        for (const Index i : scratch.owner) {
-#pragma omp atomic
-          ++count[i];
-        }
-      },
-      &stage);
-  sampled_volume = static_cast<double>(tally.samples) * std::pow(0.5 * voxel, 3);
-  std::vector<double> share(site.size());
-  // A phyxel without sample points gets the volume of half a sample.
-  for (std::size_t i = 0; i < site.size(); ++i) share[i] = std::max(0.5, double(count[i]));
-  stage.finish();
-  return share;
-}
-
 /// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
 void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& report) {
   const auto n = static_cast<std::ptrdiff_t>(site.size());
@@ -144,21 +117,7 @@ void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& 
   std::vector<double> gap(site.size());
 #pragma omp parallel for schedule(static)
   for (std::ptrdiff_t i = 0; i < n; ++i) {
-    double nearest2 = HUGE_VAL;
-    const auto compare = [&](const SpatialHash::Entry& entry) {
-      if (entry.index == i) return;
-      const Vec3d d = entry.position - site[i];
-      nearest2 = std::min(nearest2, dot(d, d));
-    };
-    const double cell = hash.cell_size();
-    // After rings 0 to r, each site nearer than r cells has been visited.
-    int ring = 0;
-    for (; ring < 4; ++ring) {
-      hash.visit_ring(site[i], ring, compare);
-      if (nearest2 <= ring * cell * ring * cell) break;
-    }
-    if (ring == 4) hash.visit_all(compare);
-    gap[i] = std::sqrt(nearest2);
+    gap[i] = std::sqrt(hash.nearest(site[i], HUGE_VAL, static_cast<Index>(i)).distance2);
   }
   report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
@@ -206,37 +165,76 @@ PreparedSurface prepare(const Surface& surface, SampleReport& found) {
   return made;
 }
 
-/// Adds to `site` the phyxels that lie on the surface, if the request and the surface allow them.
-/// @param spacing cube root of the volume of a phyxel [m], adjusted to the phyxels on the surface
-void place_on_surface(const PreparedSurface& prepared, const SampleTally& tally, double volume,
-                      const SampleRequest& request, std::vector<Vec3d>& site, double& spacing,
-                      SampleReport& found) {
-  if (!request.on_surface.value_or(true)) return;
+/// Phyxels on the surface; none if the request or the surface does not allow them.
+SurfaceSites place_on_surface(const PreparedSurface& prepared, const SampleTally& tally,
+                              double volume, const SampleRequest& request, SampleReport& found) {
   try {
     refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
-    SurfaceSites sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels,
-                                  request.seed + 3, request.relaxations);
-    site = std::move(sites.position);
-    spacing = sites.spacing;
+    return sites_on(prepared.surface, prepared.topology, volume, request.phyxels, request.seed + 3,
+                    request.relaxations);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
     found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
+    return {};
   }
 }
 
-/// Moves sites that relaxation has left outside to a sample point of their cells: in a thin or
-/// hollow body, the centroid of a cell may lie outside. The first `fixed` sites stay.
-void bring_inside(const InsideSampler& sampler, SampledVoronoi& voronoi, std::vector<Vec3d>& site,
-                  double spacing, std::size_t fixed) {
-  std::vector<std::uint8_t> outside(site.size());
-  const auto n = static_cast<std::ptrdiff_t>(site.size());
-#pragma omp parallel for schedule(dynamic, 256)
-  for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
-    outside[i] = !sampler.inside(site[i]);
+/// Fills the inside with about `samples` sample points.
+InsideFilling filled(const PreparedSurface& prepared, const InsideSampler& sampler,
+                     const SampleRequest& request, double samples) {
+  const bool closed = prepared.topology.closed;
+  InsideFilling filling;
+  fill_inside(sampler,
+              {.phyxels = request.phyxels,
+               .samples = samples,
+               .seed = request.seed,
+               .triangles = prepared.surface.triangle.size(),
+               .volume = closed ? std::optional(enclosed_volume(prepared.surface)) : std::nullopt,
+               .exponent = prepared.exponent,
+               .defects = prepared.defects},
+              filling);
+  return filling;
+}
+
+void report_tally(const PreparedSurface& prepared, const SampleTally& tally, SampleReport& found) {
+  const auto percent = [&](Offset part) {
+    return 100 * static_cast<double>(part) / static_cast<double>(tally.samples);
+  };
+  found.doubtful_fraction = percent(tally.doubtful) / 100;
+  if (!prepared.topology.closed) {
+    found.warnings.push_back(fmt::format(
+        "the surface is not closed ({}); {:.2g}% of the interior points have an ambiguous winding "
+        "number",
+        prepared.defects, percent(tally.doubtful)));
   }
-  if (std::count(outside.begin(), outside.end(), 1) > 0) {
-    voronoi.snap(site, spacing, outside, fixed);
+  if (tally.repeated > 0) {
+    found.warnings.push_back(fmt::format(
+        "the surface overlaps itself: {:.2g}% of the inside has a winding number above 1, and "
+        "counts once",
+        percent(tally.repeated)));
   }
+}
+
+/// Fills the inside of a surface that has phyxels on it.
+/// @returns the lattice constant
+double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& sampler,
+                         const SampleRequest& request, const SurfaceSites& sites, double volume,
+                         bool exact_volume, Cloud& cloud) {
+  LatticeFilling inside = fill_by_lattice(
+      {.surface = prepared.surface,
+       .sampler = sampler,
+       .on_surface = sites.position,
+       .surface_spacing = sites.spacing,
+       .volume = volume,
+       .exact_volume = exact_volume,
+       .phyxels = request.phyxels - static_cast<Index>(sites.position.size()),
+       .seed = request.seed,
+       // Repulsion evens out distances in a third of the sweeps that Lloyd's relaxation takes.
+       .sweeps = (request.relaxations + 2) / 3});
+  cloud.position = sites.position;
+  cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
+  cloud.volume = std::move(inside.volume);
+  return inside.spacing;
 }
 
 }  // namespace
@@ -248,54 +246,41 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   const bool closed = prepared.topology.closed;
   const InsideSampler sampler(prepared.surface, closed);
 
-  const std::uint64_t seed = request.seed;
-  InsideFilling filling;
-  fill_inside(sampler,
-              {.phyxels = request.phyxels,
-               .samples = request.phyxels * samples_per_phyxel(request.phyxels),
-               .seed = seed,
-               .triangles = prepared.surface.triangle.size(),
-               .volume = closed ? std::optional(enclosed_volume(prepared.surface)) : std::nullopt,
-               .exponent = prepared.exponent,
-               .defects = prepared.defects},
-              filling);
-  const SampleTally& tally = filling.tally;
-  const double voxel = filling.voxel;
-  refuse_if_too_open(tally, found.defects, closed);
-  found.doubtful_fraction =
-      static_cast<double>(tally.doubtful) / static_cast<double>(tally.samples);
-  if (!closed) {
-    found.warnings.push_back(fmt::format(
-        "the surface is not closed ({}); {:.2g}% of the interior points have an ambiguous winding "
-        "number",
-        prepared.defects, 100 * found.doubtful_fraction));
+  SurfaceSites sites;
+  SampleTally tally;
+  double volume = 0;
+  bool exact = false;
+  const auto measure = [&](const InsideFilling& filling) {
+    tally = filling.tally;
+    refuse_if_too_open(tally, found.defects, closed);
+    // The divergence theorem counts regions with a winding number of two twice.
+    exact = closed && tally.repeated == 0;
+    volume = exact ? enclosed_volume(prepared.surface)
+                   : static_cast<double>(tally.samples) * std::pow(filling.voxel, 3);
+  };
+  if (request.on_surface.value_or(true)) {
+    measure(filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, 2e4, 1e6)));
+    sites = in_stage("phyxels on the surface", [&] {
+      return place_on_surface(prepared, tally, volume, request, found);
+    });
   }
-
   Cloud cloud;
-  const double rough_volume = static_cast<double>(tally.samples) * std::pow(voxel, 3);
-  double spacing = std::cbrt(rough_volume / request.phyxels);
-  place_on_surface(prepared, tally, rough_volume, request, cloud.position, spacing, found);
-  const std::size_t on_surface = cloud.position.size();
-  found.on_surface = static_cast<Index>(on_surface);
-  const std::vector<Vec3d> within = throw_darts(filling.blocks, request.phyxels - found.on_surface,
-                                                spacing, seed + 1, cloud.position);
-  cloud.position.insert(cloud.position.end(), within.begin(), within.end());
-  SampledVoronoi voronoi(std::move(filling.blocks));
-  voronoi.relax(cloud.position, spacing, request.relaxations, on_surface);
-  bring_inside(sampler, voronoi, cloud.position, spacing, on_surface);
-
-  double sampled_volume = 0;
-  cloud.volume = voronoi_shares(sampler, cloud.position, voxel, spacing, seed + 2, sampled_volume);
-  // The divergence theorem counts regions with a winding number of two twice.
-  const bool exact = closed && tally.repeated == 0;
-  found.volume = exact ? enclosed_volume(prepared.surface) : sampled_volume;
-  if (tally.repeated > 0) {
-    found.warnings.push_back(fmt::format(
-        "the surface overlaps itself: {:.2g}% of the inside has a winding number above 1, and "
-        "counts once",
-        100 * static_cast<double>(tally.repeated) / static_cast<double>(tally.samples)));
+  double spacing = 0;
+  if (sites.position.empty()) {
+    const double samples = samples_per_phyxel(request.phyxels);
+    check_memory(request.phyxels, bytes_scattered(samples));
+    InsideFilling filling = filled(prepared, sampler, request, request.phyxels * samples);
+    measure(filling);
+    spacing = std::cbrt(volume / request.phyxels);
+    fill_scattered(sampler, filling, request, spacing, cloud);
+  } else {
+    spacing = fill_with_lattice(prepared, sampler, request, sites, volume, exact, cloud);
   }
+  found.on_surface = static_cast<Index>(sites.position.size());
+  report_tally(prepared, tally, found);
+
   const double total = std::accumulate(cloud.volume.begin(), cloud.volume.end(), 0.0);
+  found.volume = exact ? volume : total;
   for (double& v : cloud.volume) v *= found.volume / total;
 
   measure_gaps(cloud.position, spacing, found);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mesh/face_relaxation.hpp"
 #include "mesh/random_bits.hpp"
 #include "mesh/relaxation.hpp"
 #include "model/host_memory.hpp"
@@ -20,19 +21,13 @@ namespace {
 const double sharp = std::cos(40 * std::numbers::pi / 180);
 /// Area, in squares of the longest side, below which a triangle's normal is rounding error.
 constexpr double no_area = 1e-12;
-/// Number of sample points for each site on a face or an edge.
-constexpr double samples_per_site = 64;
+/// Number of sample points for each site along an edge and on a face.
+constexpr double samples_along_edges = 64, samples_on_faces = 32;
 /// Memory that a sample point on a face takes while sites are selected [bytes].
 constexpr double bytes_per_sample = 150;
 /// Smallest distances between random sites, in spacings, that give about one site for each spacing
 /// of an edge and for each square spacing of a face.
-constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.82;
-
-/// A point on a vertex, an edge or a triangle, with the index of that piece.
-struct PointOn {
-  std::size_t piece;
-  Vec3d point;
-};
+constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.79;
 
 /// The ends of a sharp edge [m].
 struct Crease {
@@ -136,7 +131,7 @@ class Shares {
 
 std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, double spacing) {
   std::vector<PointOn> points;
-  Shares shares(spacing / samples_per_site);
+  Shares shares(spacing / samples_along_edges);
   for (std::size_t e = 0; e < creases.size(); ++e) {
     const Vec3d from = creases[e].from, along = creases[e].to - from;
     const std::int64_t n = shares.next(norm(along));
@@ -148,12 +143,11 @@ std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, doubl
   return blocks_of(points, spacing);
 }
 
-/// Sample points of each triangle, from a low-discrepancy sequence.
-/// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
-std::vector<SampleBlock> samples_over(const Surface& surface, double spacing, std::uint64_t seed) {
+/// Calls visit(triangle, point) for points evenly spread over the triangles.
+template <class Visit>
+void visit_points_over(const Surface& surface, double area, std::uint64_t seed, Visit&& visit) {
   constexpr double step_1 = 0.7548776662466927, step_2 = 0.5698402909980532;
-  std::vector<PointOn> points;
-  Shares shares(spacing * spacing / samples_per_site);
+  Shares shares(area);
   for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
     const Triangle& corner = surface.triangle[t];
     const Vec3d a = surface.position[corner[0]];
@@ -164,14 +158,13 @@ std::vector<SampleBlock> samples_over(const Surface& surface, double spacing, st
     for (std::int64_t k = 0; k < n; ++k) {
       u += step_1, v += step_2;
       u -= std::floor(u), v -= std::floor(v);
-      points.push_back({t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac});
+      visit(t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac);
     }
   }
-  return blocks_of(points, spacing);
 }
 
-/// Adds sites at random sample points and relaxes them; the sites of the argument stay.
-void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
+/// Adds sites at random sample points of edges and relaxes them; the sites of the argument stay.
+void add_along_edges(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
                double spacing, std::uint64_t seed, int relaxations) {
   const std::size_t fixed = site.size();
   const std::vector<Vec3d> more = fill_with_darts(blocks, gap, seed, site);
@@ -183,6 +176,20 @@ void add_sites(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double
   std::vector<std::uint8_t> which(site.size(), 1);
   std::fill_n(which.begin(), fixed, 0);
   voronoi.snap(site, spacing, which, fixed);
+}
+
+/// Adds sites at random points of faces and relaxes them; the sites of the argument stay.
+void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spacing,
+                  std::uint64_t seed, int relaxations) {
+  const std::size_t fixed = site.size();
+  std::vector<PointOn> sample;
+  visit_points_over(surface, spacing * spacing / samples_on_faces, seed,
+                    [&](std::size_t triangle, Vec3d p) { sample.push_back({triangle, p}); });
+  const std::vector<Vec3d> more =
+      fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
+  site.insert(site.end(), more.begin(), more.end());
+  // Repulsion evens out distances in a third of the sweeps that Lloyd's relaxation takes.
+  relax_on_faces(surface, sample, site, fixed, spacing, (relaxations + 2) / 3);
 }
 
 /// A subset of the corners that are not too near to each other [m].
@@ -210,6 +217,12 @@ double spacing_for(double volume, double area, Index phyxels) {
 
 }  // namespace
 
+std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed) {
+  std::vector<Vec3d> points;
+  visit_points_over(surface, area, seed, [&](std::size_t, Vec3d p) { points.push_back(p); });
+  return points;
+}
+
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
                       Index phyxels, std::uint64_t seed, int relaxations) {
   double area = 0;
@@ -222,13 +235,12 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
   for (int attempt = 0; attempt < 8; ++attempt) {
     const double s = found.spacing;
     if (s > 2 * volume / area) break;
-    const double samples = samples_per_site * area / (s * s);
+    const double samples = samples_on_faces * area / (s * s);
     require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
     found.position = corners_of(features, s, seed);
-    add_sites(found.position, samples_along(features.creases, s), gap_along_edges * s, s, seed,
-              relaxations);
-    add_sites(found.position, samples_over(surface, s, seed + 1), gap_on_faces * s, s, seed + 2,
-              relaxations);
+    add_along_edges(found.position, samples_along(features.creases, s), gap_along_edges * s, s,
+                    seed, relaxations);
+    add_on_faces(surface, found.position, s, seed + 1, relaxations);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     if (inside > 0.25 * volume / (s * s * s)) return found;

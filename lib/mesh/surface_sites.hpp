@@ -16,6 +16,10 @@ struct SurfaceSites {
   double spacing = 0;
 };
 
+/// Points evenly spread over the triangles of a surface, one on each `area` [m²].
+/// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
+std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed);
+
 /// Distributes sites over a surface.
 /// @param surface must be closed and must not overlap itself
 /// @param volume enclosed volume [m³]

@@ -60,7 +60,7 @@ void check_terms(const BodyRequest& request) {
         request.where, request.name, term, value, key));
   };
   refuse_if(hourglass_of(request), "hourglass control", "hourglass");
-  refuse_if(request.closure, "closed gradients", "closure");
+  refuse_if(request.closure.value_or(0), "closed gradients", "closure");
 }
 
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {

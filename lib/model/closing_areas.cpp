@@ -110,25 +110,43 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
   return areas;
 }
 
-void check_closure(const BodyRequest& request, const Surface& surface,
-                   std::optional<double> volume) {
-  if (!(request.closure > 0)) return;
-  const auto refuse = [&](const std::string& why) {
-    throw InputError(fmt::format(
-        "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
-        "{}; "
-        "allowed are a mesh, a shape with surfels, a file with such a surface, or closure = 0",
-        request.where, request.name, request.closure, why));
-  };
-  if (surface.triangle.empty()) refuse("it has no triangles");
+namespace {
+
+/// Why the gradients of a body with this surface cannot be closed; empty if they can.
+std::string obstacle_to_closing(const Surface& surface, std::optional<double> volume) {
+  if (surface.triangle.empty()) return "it has no triangles";
   const Enclosed found = enclosed_by(facets_of(surface.position, surface.triangle, 0, HUGE_VAL));
   // Coordinates of a file may be floats.
-  if (!(found.open <= 1e-5)) refuse("its triangles do not enclose a volume");
-  if (!(found.volume > 0)) refuse("its triangles face inward");
+  if (!(found.open <= 1e-5)) return "its triangles do not enclose a volume";
+  if (!(found.volume > 0)) return "its triangles face inward";
   if (volume && !(std::abs(found.volume / *volume - 1) < 0.3)) {
-    refuse(fmt::format("that encloses {:.4g} m^3, and its phyxels have {:.4g}", found.volume,
-                       *volume));
+    return fmt::format("that encloses {:.4g} m^3, and its phyxels have {:.4g}", found.volume,
+                       *volume);
   }
+  return {};
+}
+
+}  // namespace
+
+bool may_close(const BodyRequest& request) {
+  if (request.closure) return *request.closure > 0;
+  const bool regular = !request.source.shape.name.empty() && !(request.source.shape.jitter > 0);
+  return !regular && request.volume_rule != VolumeRule::kernel &&
+         !request.neighbourhood.one_sided();
+}
+
+double closure_of(const BodyRequest& request, const Surface& surface, bool lattice,
+                  std::optional<double> volume) {
+  if (!may_close(request)) return 0;
+  const bool automatic = !request.closure;
+  if (automatic && (lattice || !volume)) return 0;
+  const std::string obstacle = obstacle_to_closing(surface, volume);
+  if (obstacle.empty()) return request.closure.value_or(automatic_closure);
+  if (automatic) return 0;
+  throw InputError(fmt::format(
+      "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
+      "{}; allowed are a mesh, a shape with surfels, a file with such a surface, or closure = 0",
+      request.where, request.name, *request.closure, obstacle));
 }
 
 }  // namespace phyxel

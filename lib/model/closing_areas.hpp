@@ -41,10 +41,15 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
                                     std::span<const Vec3d> position,
                                     std::span<const double> support);
 
-/// Checks that a body with closed gradients has a surface that encloses its volume.
+/// True if the gradients of a body will be closed, provided that its cloud and its surface allow it.
+bool may_close(const BodyRequest& request);
+
+/// The tolerance to which the gradients of a body are to be closed; 0 if they are not.
+/// @param lattice `Cloud::lattice`
 /// @param volume of all phyxels [m³], if it follows from the geometry
-/// @throws InputError naming the body, its fault, and what is allowed
-void check_closure(const BodyRequest& request, const Surface& surface,
-                   std::optional<double> volume);
+/// @throws InputError naming the body, its fault, and what is allowed, if the body asks for closed
+///   gradients and its surface does not enclose its volume
+double closure_of(const BodyRequest& request, const Surface& surface, bool lattice,
+                  std::optional<double> volume);
 
 }  // namespace phyxel

@@ -344,10 +344,14 @@ Excess first_excess(const Model& model, const Bodies& bodies, Change&& change) {
   return {phyxel, ranks.smallest(first.phyxel == phyxel ? first.change : HUGE_VAL)};
 }
 
-/// Says which body cannot be closed.
-std::string refusal_of(const Model& model, const Excess& excess) {
-  const Part* body = model.parts.data();  // the first part of the phyxel's body
-  double first = 0, end = 0;              // its first phyxel, and the end of the part
+/// A body that cannot be closed.
+struct Unclosable {
+  const Part* body;    ///< Its first part.
+  std::string reason;  ///< "phyxel 7 would have to change its volume by 80%"
+};
+Unclosable unclosable(const Model& model, const Excess& excess) {
+  const Part* body = model.parts.data();
+  double first = 0, end = 0;  // the body's first phyxel, and the end of the part
   for (const Part& part : model.parts) {
     if (part.body != body->body) {
       body = &part;
@@ -356,12 +360,27 @@ std::string refusal_of(const Model& model, const Excess& excess) {
     end += part.size;
     if (excess.phyxel < end) break;
   }
-  return fmt::format(
-      "body \"{}\": gradients cannot be closed (closure = {:g}): phyxel {} would have to change "
-      "its volume {}; allowed are more phyxels where the body is thin, or closure = 0",
-      body->name, body->closure, excess.phyxel - first,
-      std::isfinite(excess.change) ? fmt::format("by {:.0f}%", 100 * excess.change)
-                                   : "beyond all bounds");
+  return {body, fmt::format("phyxel {} would have to change its volume {}", excess.phyxel - first,
+                            std::isfinite(excess.change)
+                                ? fmt::format("by {:.0f}%", 100 * excess.change)
+                                : "beyond all bounds")};
+}
+
+/// Leaves a body as it was. @param before volume of each phyxel of the model [m³]
+void leave_open(Model& model, Bodies& bodies, const Unclosable& found,
+                const std::vector<double>& before) {
+  model.warnings.push_back(fmt::format(
+      "body \"{}\": gradients are not closed, as {}: stresses may be off by some 10%; more phyxels "
+      "where the body is thin help",
+      found.body->name, found.reason));
+  const Index number = found.body->body;
+  bodies.erase_if([&](const Body& body) { return body.parts.front().body == number; });
+  for (Part& part : model.parts) {
+    if (part.body != number) continue;
+    part.closure = 0;
+    std::copy(before.begin() + part.begin, before.begin() + part.end,
+              model.volume.begin() + part.begin);
+  }
 }
 
 void warn_of(Model& model, const Body& body) {
@@ -402,21 +421,29 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   for (const auto& [of_body, enclosed] : wanted) {
     Body& body = list.emplace_back(Body{.parts = of_body, .tolerance = of_body.front().closure});
     double volume = 0;
-    for (Part& part : of_body) {
-      volume += part.volume;
-      parts.push_back({.parts = {&part, 1}});
-    }
+    for (const Part& part : of_body) volume += part.volume;
     for (Index i = body.begin(); i < body.end(); ++i) model.volume[i] *= enclosed / volume;
   }
-  const Bodies bodies(model, list);
+  Bodies bodies(model, list);
   const Sums sums(model, bodies, std::move(areas));
   const std::vector<Unknown> found = close(sums, bodies);
   sums.find_means(bodies, found);
   const auto change = [&](const Body& body, Index i) {
     return ease_volume * (found[i].volume - body.mean);
   };
-  const Excess excess = first_excess(model, bodies, change);
-  if (excess.phyxel < HUGE_VAL) return refusal_of(model, excess);
+  for (;;) {
+    const Excess excess = first_excess(model, bodies, change);
+    if (!(excess.phyxel < HUGE_VAL)) break;
+    const Unclosable open = unclosable(model, excess);
+    if (!open.body->automatic_closure) {
+      return fmt::format(
+          "body \"{}\": gradients cannot be closed (closure = {:g}): {}; allowed are more phyxels "
+          "where the body is thin, or closure = 0",
+          open.body->name, open.body->closure, open.reason);
+    }
+    leave_open(model, bodies, open, before);
+  }
+  if (bodies.empty()) return std::nullopt;
   model.closing.resize(model.volume.size());
   bodies.for_each([&](const Body& body, Index i) {
     model.volume[i] *= 1 + change(body, i);
@@ -424,10 +451,13 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   });
   bodies.refresh_ghosts(model.volume);
   bodies.refresh_ghosts(model.closing);
+  for (const Body* body : bodies) {
+    for (Part& part : body->parts) parts.push_back({.parts = {&part, 1}});
+  }
   Bodies(model, parts).sum(&Body::volume, [&](const Body&, Index i) { return model.volume[i]; });
   for (const Body& part : parts) part.parts.front().volume = part.volume;
   follow_volumes(model, before);
-  for (const Body& body : list) warn_of(model, body);
+  for (const Body* body : bodies) warn_of(model, *body);
   return std::nullopt;
 }
 

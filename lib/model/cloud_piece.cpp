@@ -17,6 +17,7 @@ CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
   CloudPiece made{{cut(cloud.position), cut(cloud.volume), cloud.surface, {}},
                   static_cast<Index>(first),
                   static_cast<Index>(whole)};
+  made.cloud.lattice = cloud.lattice;
   for (const auto& [name, members] : cloud.regions) {
     std::vector<Index>& here = made.cloud.regions[name];
     const auto begin = std::lower_bound(members.begin(), members.end(), first),

@@ -57,11 +57,12 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
 /// A surveyor's device finds neighbours within one support of unsorted phyxels, and no more.
 /// @throws InputError if a body needs lists on the host
 void check_surveyable(const BodyRequest& request) {
-  if (request.closure > 0) {
+  if (may_close(request)) {
     throw InputError(fmt::format(
-        "{}: body \"{}\" has closed gradients (closure = {:g}), which are found from lists of "
+        "{}: body \"{}\" may have closed gradients (closure = {}), which are found from lists of "
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
-        request.where, request.name, request.closure));
+        request.where, request.name,
+        request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
   }
   if (!request.inclusions.empty()) {
     refuse_inclusions(request, "which are numbered on the host",
@@ -181,7 +182,6 @@ double add_parts(Model& model, const BodyRequest& request, std::span<const Mater
             .lists = groups.size() == 1 ? survey.lists
                                         : lengths_of(model.neighbourhood.neighbours,
                                                      shift + group.begin, shift + group.end),
-            .closure = request.closure,
             .kernel_volumes = kernel_volumes,
             .size = group.end - group.begin,
             .surfels = surfel_end - surfel_begin};
@@ -243,7 +243,12 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   add_surfels(model.surfels, cloud, survey.support, shift);
   const double volume =
       add_parts(model, request, groups, survey, kernel_volumes, shift, surfel_shift);
-  check_closure(request, cloud.surface, kernel_volumes ? std::nullopt : std::optional(volume));
+  const double closure = closure_of(request, cloud.surface, cloud.lattice,
+                                    kernel_volumes ? std::nullopt : std::optional(volume));
+  for (Part& part : std::span(model.parts).last(groups.size())) {
+    part.closure = closure;
+    part.automatic_closure = !request.closure;
+  }
   add_boundary(model, request, given, sorted ? &*sorted : nullptr, shift);
 }
 

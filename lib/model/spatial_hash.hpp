@@ -100,6 +100,37 @@ class SpatialHash {
     }
   }
 
+  /// The point of the table nearest to a place.
+  struct Nearest {
+    Vec3d apart;                ///< The vector from the place to the point [m].
+    double distance2 = HUGE_VAL;  ///< [m^2]
+    Index index = -1;           ///< -1 if no point was found.
+  };
+
+  /// Finds the point nearest to `place` but for the one with the index `except`. Of points at the
+  /// same distance, the first visited is found. Points beyond `limit` [m] may be left out.
+  Nearest nearest(Vec3d place, double limit = HUGE_VAL, Index except = -1) const {
+    Nearest found;
+    const auto compare = [&](const Entry& entry) {
+      if (entry.index == except) return;
+      const Vec3d d = entry.position - place;
+      const double distance2 = dot(d, d);
+      if (distance2 >= found.distance2) return;
+      found = {d, distance2, entry.index};
+    };
+    const int farthest = farthest_ring(place);
+    for (int ring = 0; ring <= farthest && (ring - 1) * cell_size_ <= limit; ++ring) {
+      if (ring > 4 && limit == HUGE_VAL) {  // rare: the place is far from every point
+        visit_all(compare);
+        break;
+      }
+      visit_ring(place, ring, compare);
+      // After rings 0 to r, each point nearer than r cells has been visited.
+      if (found.distance2 <= ring * cell_size_ * ring * cell_size_) break;
+    }
+    return found;
+  }
+
   /// Rings of cells around `place` beyond which there is no point.
   int farthest_ring(Vec3d place) const { return grid_.farthest_ring(place, high_); }
 

@@ -298,7 +298,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
   naming(body, [&] { choose_placement(table, body); });
-  table.read("closure", body.closure);
+  if (table.is_number("closure")) table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   body.material = read_material(table.table("material"), body);
   if (!body.material.hourglass) body.material.hourglass = default_hourglass(body);

@@ -151,8 +151,8 @@ std::vector<SceneKey> run_keys() {
   return {
       {.section = "time", .name = "end", .unit = "s", .required = true, .range = {0, 1e9, true},
        .meaning = "Simulated time."},
-      {.section = "time", .name = "step", .type = KeyType::number_or_adaptive, .unit = "s",
-       .fallback = "\"adaptive\"", .range = time_span(),
+      {.section = "time", .name = "step", .type = KeyType::number_or_word, .unit = "s",
+       .fallback = "\"adaptive\"", .range = time_span(), .words = {"adaptive", "auto"},
        .meaning = "Time step. \"adaptive\" (or \"auto\"): `safety` times the largest stable step, which "
            "is found from the stiffness of the bodies; three digits of it. It is halved where a law "
            "stiffens, and doubled again later. A given step is only halved; one above the largest "
@@ -271,11 +271,14 @@ std::vector<SceneKey> body_keys() {
            "of Müller et al. 2004 (mass over kernel density, as in Farias et al. 2008); "
            "\"automatic\" is geometry where the body has volumes, else kernel. Masses have each "
            "material's density."},
-      {.section = "body", .name = "closure", .fallback = "0", .range = between(0, 1),
+      {.section = "body", .name = "closure", .type = KeyType::number_or_word,
+       .fallback = "\"auto\"", .range = between(0, 1), .words = {"auto"},
        .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
-           "the phyxels are; 1e-3 is plenty. 0: as they come. Needs a closed surface, and one support "
-           "for the body."},
+           "the phyxels are: without it, irregular bodies are some percent off, however many "
+           "phyxels they have. 1e-3 is plenty. 0: as they come. Needs a closed surface, and one "
+           "support for the body. \"auto\": 0.01 where these are given; 0 for lattices without "
+           "jitter, for the paper's bodies, and with the kernel's volumes."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
       {.section = "body", .name = "neighbours", .type = KeyType::table,

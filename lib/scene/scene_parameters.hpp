@@ -120,7 +120,11 @@ void visit_body(const BodyRequest& body, Visit&& visit) {
   visit("body", "velocity", body.velocity);
   visit("body", "spin", body.spin);
   visit("body", "volumes", word(body.volume_rule));
-  visit("body", "closure", body.closure);
+  if (body.closure) {
+    visit("body", "closure", *body.closure);
+  } else {
+    visit("body", "closure", std::string("auto"));
+  }
   visit_material("body.material", body, body.material, visit);
   visit("body.material", "hourglass", body.material.hourglass.value_or(default_hourglass(body)));
   const NeighbourhoodRule& rule = body.neighbourhood;

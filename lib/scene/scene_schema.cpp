@@ -28,8 +28,8 @@ std::string plain_words(const SceneKey& key) {
       return "an integer";
     case KeyType::number:
       return "a number";
-    case KeyType::number_or_adaptive:
-      return "\"adaptive\" or a number";
+    case KeyType::number_or_word:
+      return fmt::format("\"{}\" or a number", key.words.front());
     case KeyType::boolean:
       return "true or false";
     case KeyType::choice:

@@ -15,7 +15,7 @@ enum class KeyType {
   path,  ///< Text, resolved from the scene file's folder.
   integer,
   number,              ///< An integer or a float; never NaN or infinite.
-  number_or_adaptive,  ///< A number or "adaptive", for which "auto" stands, too.
+  number_or_word,      ///< A number or one of `words`, which mean the same.
   boolean,
   choice,   ///< One of `words`.
   choices,  ///< A list of `words`, each at most once.

@@ -92,8 +92,8 @@ const toml::node* offender(const toml::node& node, const SceneKey& key) {
       return unless(integer(node));
     case KeyType::number:
       return unless(is_number_in(node, key.range));
-    case KeyType::number_or_adaptive:
-      return unless(is_word_of(node, {"adaptive", "auto"}) || is_number_in(node, key.range));
+    case KeyType::number_or_word:
+      return unless(is_word_of(node, key.words) || is_number_in(node, key.range));
     case KeyType::boolean:
       return unless(node.is_boolean());
     case KeyType::choice:

@@ -116,7 +116,9 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
 Cloud make_shape(const ShapeRequest& request) {
   check_name(request.name);
   if (const PaperBody* body = find_paper_body(request.name)) {
-    return make_paper_body(*body, request.surface);
+    Cloud cloud = make_paper_body(*body, request.surface);
+    cloud.lattice = true;
+    return cloud;
   }
   return make_lattice_shape(request).cloud;
 }
@@ -127,6 +129,7 @@ CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
   require_memory_for_cloud(request.name, lattice.phyxels(), piece);
   CloudPiece made = fill_lattice(lattice, request.jitter, request.seed, piece);
   if (request.surface) made.cloud.surface = lattice_surface(lattice, request.spacing);
+  made.cloud.lattice = request.jitter == 0;
   return made;
 }
 

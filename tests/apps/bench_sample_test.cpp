@@ -22,7 +22,8 @@ TEST_F(BenchSample, TellsTheTimeOfEachStageAndTheQualityOfTheCloud) {
   ASSERT_EQ(rows.size(), 2u);
   for (const auto& row : rows) {
     double stages = 0;
-    for (const char* stage : {"inspect_s", "fill_s", "place_s", "relax_s", "volumes_s"}) {
+    for (const char* stage :
+         {"inspect_s", "fill_s", "surface_s", "place_s", "relax_s", "volumes_s"}) {
       EXPECT_GT(row[stage], 0) << stage;
       stages += row[stage].get<double>();
     }

@@ -28,6 +28,7 @@ inline BodyRequest shape(const char* name, double spacing) {
   body.source.shape.size = {3, 1, 1};
   body.source.shape.radius = 1;
   body.source.shape.jitter = 0.2;
+  body.closure = 0;  // so that devices may search
   body.material = testing::rubber();
   return body;
 }
@@ -207,11 +208,27 @@ inline BuildCase closed_alone() {
   top->z += 1.5;
   return c;
 }
+/// Bodies that do not ask for closed gradients: one gets them, one cannot have them, as a phyxel is
+/// far too large for its place, and one is a lattice.
+inline BuildCase closed_by_default() {
+  BuildCase c{"ClosedByDefault",
+              {.bodies = {shape("block", 0.2), shape("block", 0.2), shape("beam", 0.25)}},
+              {}};
+  for (std::size_t b = 0; b < 3; ++b) {
+    BodyRequest& body = c.scene.bodies[b];
+    body.source.shape.jitter = b == 2 ? 0 : 0.2;
+    body.closure.reset();
+    c.clouds.push_back(make_cloud(body));
+  }
+  c.clouds[1].volume[7] *= 30;
+  return c;
+}
 
 inline const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{
       beam(),    rules(),    nearest(), small(), degenerate(),   lumps(),       astray(),
-      lattice(), included(), closed(),  mixed(), closed_alone(), many_regions()};
+      lattice(), included(), closed(),  mixed(), closed_alone(), many_regions(),
+      closed_by_default()};
   return cases;
 }
 

@@ -12,6 +12,7 @@
 
 #include "build_cases.hpp"
 #include "host_surveyor.hpp"
+#include "model/closing_areas.hpp"
 #include "model/host_memory.hpp"
 #include "partition/share.hpp"
 #include "phyxel/backend.hpp"
@@ -56,7 +57,7 @@ class BuiltShares : public ::testing::TestWithParam<std::tuple<BuildCase, Cut>> 
       if (cut_.options.surveyor && body.neighbourhood.max_neighbours) {
         GTEST_SKIP() << "devices do not choose the nearest";
       }
-      needs_host_ |= body.closure > 0 || !body.inclusions.empty();
+      needs_host_ |= may_close(body) || !body.inclusions.empty();
     }
   }
   const BuildCase& case_ = std::get<0>(GetParam());

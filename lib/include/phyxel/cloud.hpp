@@ -27,6 +27,8 @@ struct Cloud {
   Surface surface;              ///< Surfels; may be empty.
   /// Named groups of phyxels (sorted indices) that scenes can select, e.g. "mouth".
   std::map<std::string, std::vector<Index>> regions;
+  /// True for a regular lattice, whose gradients are not closed unless a scene asks for it.
+  bool lattice = false;
   std::vector<std::string> warnings;  ///< Warnings of the generator or sampler, for the summary.
 };
 

@@ -38,7 +38,10 @@ SurfaceDefects inspect_surface(const Surface& surface);
 struct SampleRequest {
   Index phyxels = 0;       ///< Exact number of phyxels.
   std::uint64_t seed = 1;  ///< The same seed gives the same cloud on any number of threads.
-  int relaxations = 30;    ///< Sweeps of Lloyd's relaxation; 0 for none.
+  /// Sweeps that spread the phyxels evenly; 0 for none. They are sweeps of Lloyd's relaxation along
+  /// sharp edges and in bodies whose phyxels all lie inside; elsewhere a third as many sweeps of
+  /// repulsion do as well.
+  int relaxations = 30;
   /// True to place phyxels also on the surface, its corners and its sharp edges; false to place all
   /// inside, in the middle of their cells; unset for the surface if it allows that.
   std::optional<bool> on_surface;
@@ -56,7 +59,9 @@ struct SampleReport {
 };
 
 /// Fills `surface` with exactly `request.phyxels` well-spread phyxels; each gets its share of the
-/// enclosed volume. The surface's vertices become the surfels.
+/// enclosed volume. The surface's vertices become the surfels. With phyxels on the surface, those
+/// deep inside are nodes of a cubic lattice, and those in between are evened out by repulsion;
+/// else all are scattered.
 /// Source of the inside test: Jacobson et al. 2013 (generalised winding number), with the fast
 /// summation of Barill et al. 2018.
 /// @throws InputError for a surface without volume, or so open that its inside is undefined; and,

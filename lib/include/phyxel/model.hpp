@@ -33,7 +33,10 @@ struct Part {
   Material material;
   std::string neighbourhood;    ///< The rule in words, for summaries.
   ListLengths lists;            ///< Of the whole part.
-  double closure = 0;           ///< As `BodyRequest::closure`.
+  double closure = 0;           ///< Tolerance of closed gradients; 0: they are not closed.
+  /// True if the scene does not ask for closed gradients: a body whose sums cannot be closed is left
+  /// as it is.
+  bool automatic_closure = false;
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
   Index size = 0;               ///< Phyxels of the whole part.
   Index surfels = 0;            ///< Surfels of the whole part.

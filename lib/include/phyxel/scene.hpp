@@ -114,6 +114,10 @@ struct BodySource {
   bool operator==(const BodySource&) const = default;
 };
 
+/// Tolerance of closed gradients of a body that does not ask for one. Displacements are then within
+/// a tenth of a per mille of those of gradients closed entirely; stresses within some percent.
+inline constexpr double automatic_closure = 0.01;
+
 /// One body of a scene.
 struct BodyRequest {
   std::string name;
@@ -128,8 +132,9 @@ struct BodyRequest {
   VolumeRule volume_rule = VolumeRule::automatic;
   /// Tolerance of the integration constraint of closed gradients (phyxel/physics/closing.hpp), as a
   /// share of the surface's areas; 0: gradients are not closed. Closed gradients need a closed
-  /// surface and one support for the body.
-  double closure = 0;
+  /// surface and one support for the body. Unset: `automatic_closure` where these are given, the
+  /// body is no regular lattice, and its volumes are not the kernel's; else 0.
+  std::optional<double> closure;
   /// Inclusions; where several contain a phyxel, the last one counts. The strength of hourglass
   /// control is the body's.
   std::vector<InclusionRequest> inclusions;

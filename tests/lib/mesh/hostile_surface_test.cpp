@@ -186,7 +186,7 @@ TEST(HostileSurface, HasTheSameInsideByEitherWay) {
     const double voxel = InsideSampler(surface, true).extent() / 50;
     std::vector<SampleBlock> blocks;
     const auto points = [&](bool closed) {
-      InsideSampler(surface, closed).collect(voxel, 5, blocks);
+      InsideSampler(surface, closed).collect({.voxel = voxel, .seed = 5}, blocks);
       std::vector<Vec3d> all;
       for (const SampleBlock& block : blocks) {
         for (std::size_t k = 0; k < block.offset.size(); ++k) all.push_back(block.position(k));

@@ -65,7 +65,7 @@ const std::vector<Value>& values() {
       {"true", "true", {boolean}},
       {"'nonsense'", "\"nonsense\"", {text, path, choice}},
       {"''", "\"\"", {choice}},
-      {"3.25", "3.25", {number, number_or_adaptive}},
+      {"3.25", "3.25", {number, number_or_word}},
       {"nan", "nan", {}},
       {"-inf", "-inf", {}},
       {"[]", "empty list", {choices}},

@@ -117,7 +117,7 @@ TEST(Validate, AsksForCloudsThatCarryThePhysics) {
 /// No number of a scene file may be so large that it overflows in what follows from it.
 TEST(Validate, EveryNumberOfASceneIsBounded) {
   for (const SceneKey& key : scene_keys()) {
-    const bool number = key.type == KeyType::number || key.type == KeyType::number_or_adaptive ||
+    const bool number = key.type == KeyType::number || key.type == KeyType::number_or_word ||
                         key.type == KeyType::vector || key.type == KeyType::box;
     if (!number) continue;
     EXPECT_TRUE(std::isfinite(key.range.low) && std::isfinite(key.range.high))

@@ -1,0 +1,55 @@
+#include "mesh/face_relaxation.hpp"
+
+#include <algorithm>
+
+#include "mesh/repulsion.hpp"
+
+namespace phyxel {
+
+Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
+  const Vec3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp),
+               d5 = dot(ab, cp), d6 = dot(ac, cp);
+  if (d1 <= 0 && d2 <= 0) return a;
+  if (d3 >= 0 && d4 <= d3) return b;
+  if (d6 >= 0 && d5 <= d6) return c;
+  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + (d1 / (d1 - d3)) * ab;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + (d2 / (d2 - d6)) * ac;
+  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + ((d4 - d3) / (d4 - d3 + d5 - d6)) * (c - b);
+  const double all = va + vb + vc;
+  return a + (vb / all) * ab + (vc / all) * ac;
+}
+
+void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
+                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps) {
+  std::vector<Vec3d> place(sample.size());
+  std::transform(sample.begin(), sample.end(), place.begin(),
+                 [](const PointOn& s) { return s.point; });
+  const SpatialHash samples(place, 0.4 * spacing);
+  const auto corners_at = [&](Vec3d p) {
+    const Index nearest = samples.nearest(p).index;
+    const Triangle& t = surface.triangle[sample[static_cast<std::size_t>(nearest)].piece];
+    return std::array{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
+  };
+  std::vector<Vec3d> moved = site;
+  const auto n = static_cast<std::ptrdiff_t>(site.size());
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const SpatialHash hash = hash_for_repulsion(site, spacing);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
+      Vec3d step = repulsion_step(hash, site[i], static_cast<Index>(i), spacing,
+                                  [](Index) { return 1.0; });
+      const auto [a, b, c] = corners_at(site[i]);
+      const Vec3d normal = cross(b - a, c - a);
+      const double size2 = dot(normal, normal);
+      if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
+      const Vec3d after = site[i] + step;
+      const auto [d, e, f] = corners_at(after);
+      moved[i] = nearest_on_triangle(after, d, e, f);
+    }
+    site = moved;
+  }
+}
+
+}  // namespace phyxel

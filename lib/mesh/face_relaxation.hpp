@@ -1,0 +1,28 @@
+/// Even distribution of points over the faces of a surface.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+
+namespace phyxel {
+
+/// A point on a vertex, an edge or a triangle, with the index of that piece.
+struct PointOn {
+  std::size_t piece;
+  Vec3d point;
+};
+
+/// The point of a triangle nearest to `p`. Source: Ericson 2005, section 5.1.5.
+Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
+
+/// Evens out the distances between points on faces: they repel each other, move along the face, and
+/// are put back on the triangle of the nearest sample point. The first `fixed` points stay.
+/// @param site the points; those after the first `fixed` are on `triangle` [m]
+/// @param sample points spread over the whole surface, with their triangles
+/// @param spacing typical distance between the points [m]
+void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
+                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps);
+
+}  // namespace phyxel

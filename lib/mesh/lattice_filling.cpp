@@ -1,0 +1,297 @@
+#include "mesh/lattice_filling.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "mesh/relaxation.hpp"
+#include "mesh/repulsion.hpp"
+#include "mesh/surface_sites.hpp"
+#include "stage.hpp"
+
+namespace phyxel {
+namespace {
+
+// Distances below are in lattice constants, and were chosen by the accuracy of the clouds.
+
+/// Clearance below which a node moves.
+constexpr double moving = 2;
+/// Clearance from which a phyxel has the volume of a cell of the lattice.
+constexpr double regular = 3;
+/// Clearance up to which clearances are found: that of what moving nodes may meet.
+constexpr double known = 4;
+/// Smallest clearance of a node that is kept; a finer lattice is tried if one has less.
+constexpr double least_clearance = 0.45;
+/// Strength of the repulsion by a phyxel on the surface. Those inside then keep the distance at
+/// which a closed bar bends as it should.
+constexpr double surface_strength = 0.85;
+/// Sample points on the surface for each square of the lattice constant.
+constexpr double surface_samples = 12;
+/// A distance to a sample point of the surface counts that many times: nodes keep off the middle of
+/// a face nearly as far as off a phyxel on it.
+constexpr double sample_factor = 1.2;
+/// Sample points for a volume along a lattice constant.
+constexpr double samples_along = 6;
+
+/// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
+/// that of a face that people draw, so that no layer of nodes has one clearance for all.
+Mat3d turn_of_lattice() {
+  constexpr double w = 30, x = 8, y = 6, z = -9, all = w * w + x * x + y * y + z * z;
+  Mat3d turn;
+  const double rows[3][3] = {
+      {w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+      {2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
+      {2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
+  for (int e = 0; e < 9; ++e) turn(e / 3, e % 3) = rows[e / 3][e % 3] / all;
+  return turn;
+}
+
+/// Distances of places inside from the surface and from the phyxels on it.
+class Clearance {
+ public:
+  Clearance(const LatticeRequest& request, double spacing)
+      : spacing_(spacing),
+        farthest_(request.surface_spacing),
+        site_(request.on_surface, spacing),
+        coarse_(request.on_surface, known * spacing),
+        sample_(points_over(request.surface, spacing * spacing / surface_samples,
+                            request.seed + 1),
+                0.6 * spacing) {}
+
+  /// The clearance of a place, in spacings; `known` for all that is farther.
+  double at(Vec3d place) const {
+    const double far = known * spacing_;
+    double clearance = std::min(far, std::sqrt(site_.nearest(place, far).distance2));
+    if (clearance < moving * spacing_) {
+      const double limit = clearance / sample_factor;
+      const double sampled = std::sqrt(sample_.nearest(place, limit).distance2);
+      clearance = std::min(clearance, sample_factor * sampled);
+    }
+    return clearance / spacing_;
+  }
+
+  /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
+  /// spacings.
+  bool is_deep(Vec3d middle, double radius, double least) const {
+    const double limit = radius + least * spacing_ + farthest_;
+    return coarse_.nearest(middle, limit).distance2 > limit * limit;
+  }
+
+ private:
+  double spacing_, farthest_;
+  SpatialHash site_, coarse_, sample_;
+};
+
+struct Nodes {
+  std::vector<Vec3d> position;
+  std::vector<float> clearance;  ///< In spacings, shape [n_nodes].
+};
+
+/// All nodes of the lattice inside, task by task.
+Nodes nodes_inside(const LatticeRequest& request, const Clearance& clearance, double spacing) {
+  std::vector<Nodes> by_task(InsideSampler::most_tasks);
+  const double block_radius = 2 * std::numbers::sqrt3 * spacing;
+  request.sampler.visit({.voxel = spacing,
+                         .seed = request.seed,
+                         .at_random = false,
+                         .turn = turn_of_lattice()},
+                        [&](std::size_t task, const SampleBlock& block) {
+                          Nodes& nodes = by_task[task];
+                          const bool deep = clearance.is_deep(block.centre, block_radius, known);
+                          for (std::size_t k = 0; k < block.offset.size(); ++k) {
+                            const Vec3d p = block.position(k);
+                            nodes.position.push_back(p);
+                            nodes.clearance.push_back(
+                                static_cast<float>(deep ? known : clearance.at(p)));
+                          }
+                        });
+  Nodes all;
+  std::size_t count = 0;
+  for (const Nodes& nodes : by_task) count += nodes.position.size();
+  all.position.reserve(count);
+  all.clearance.reserve(count);
+  for (Nodes& nodes : by_task) {
+    all.position.insert(all.position.end(), nodes.position.begin(), nodes.position.end());
+    all.clearance.insert(all.clearance.end(), nodes.clearance.begin(), nodes.clearance.end());
+    nodes = {};
+  }
+  return all;
+}
+
+/// Keeps the n nodes of largest clearance, in their order; of equal ones the first.
+/// @returns the smallest clearance kept
+float keep_farthest(Nodes& nodes, std::size_t n) {
+  std::vector<float> sorted = nodes.clearance;
+  const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(n) - 1;
+  std::nth_element(sorted.begin(), nth, sorted.end(), std::greater<>());
+  const float least = *nth;
+  auto ties = n - static_cast<std::size_t>(
+                      std::count_if(nodes.clearance.begin(), nodes.clearance.end(),
+                                    [&](float clearance) { return clearance > least; }));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < nodes.clearance.size(); ++i) {
+    if (nodes.clearance[i] < least) continue;
+    if (nodes.clearance[i] == least) {
+      if (ties == 0) continue;
+      --ties;
+    }
+    nodes.position[kept] = nodes.position[i];
+    nodes.clearance[kept++] = nodes.clearance[i];
+  }
+  nodes.position.resize(n);
+  nodes.clearance.resize(n);
+  return least;
+}
+
+/// The lattice constant a that solves n a³ = V - a A/2: a layer half as thick as the lattice constant
+/// belongs to the phyxels on the surface.
+double lattice_constant(double volume, double area, Index n) {
+  double low = 0, high = std::cbrt(volume / n);
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    (volume - 0.5 * middle * area > n * middle * middle * middle ? low : high) = middle;
+  }
+  return high;
+}
+
+/// Evens out the distances between the nodes near the surface.
+class Skin {
+ public:
+  Skin(const LatticeRequest& request, Nodes& nodes, double spacing)
+      : sampler_(request.sampler),
+        fixed_(request.on_surface.size()),
+        nodes_(nodes),
+        spacing_(spacing),
+        point_(request.on_surface) {
+    for (std::size_t i = 0; i < nodes.position.size(); ++i) {
+      if (nodes.clearance[i] >= known) continue;
+      near_.push_back(i);
+      point_.push_back(nodes.position[i]);
+    }
+  }
+
+  /// Moves each node by the sum of the forces at the places before the sweep.
+  void sweep() {
+    const SpatialHash hash = hash_for_repulsion(point_, spacing_);
+    std::vector<Vec3d> moved(near_.size());
+    const auto n = static_cast<std::ptrdiff_t>(near_.size());
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::ptrdiff_t k = 0; k < n; ++k) {
+      const Vec3d before = point_[fixed_ + k];
+      moved[k] = nodes_.clearance[near_[k]] < moving ? moved_from(before, k, hash) : before;
+    }
+    std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(fixed_));
+  }
+
+  void write_back() {
+    for (std::size_t k = 0; k < near_.size(); ++k) nodes_.position[near_[k]] = point_[fixed_ + k];
+  }
+
+ private:
+  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
+    const auto self = static_cast<Index>(fixed_ + k), sites = static_cast<Index>(fixed_);
+    bool beside_site = false;
+    const Vec3d after =
+        before + repulsion_step(hash, before, self, spacing_, [&](Index other) {
+          beside_site |= other < sites;
+          return other < sites ? surface_strength : 1;
+        });
+    // Only nodes beside phyxels on the surface can leave it.
+    return !beside_site || sampler_.inside(after) ? after : before;
+  }
+
+  const InsideSampler& sampler_;
+  std::size_t fixed_;
+  Nodes& nodes_;
+  double spacing_;
+  std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
+  std::vector<Vec3d> point_;       ///< Phyxels on the surface, then the nodes of `near_` [m].
+};
+
+/// Volumes of the phyxels on the surface and of the nodes [m^3].
+std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes,
+                               const Clearance& clearance, double spacing) {
+  const std::size_t sites = request.on_surface.size();
+  std::vector<Vec3d> point = request.on_surface;
+  std::vector<std::size_t> number(sites);  // of each point, among all phyxels
+  std::iota(number.begin(), number.end(), std::size_t{0});
+  for (std::size_t i = 0; i < nodes.position.size(); ++i) {
+    if (nodes.clearance[i] >= known) continue;
+    point.push_back(nodes.position[i]);
+    number.push_back(sites + i);
+  }
+  std::vector<std::uint32_t> count(point.size(), 0);
+  const NearestSite nearest(point, spacing);
+  const double voxel = spacing / samples_along;
+  request.sampler.visit(
+      {.voxel = voxel,
+       .seed = request.seed + 2,
+       .wanted =
+           [&](Vec3d middle, double half) {
+             // Smaller cells are parts of one that is wanted, larger ones would have to be searched
+             // far about.
+             if (half < 0.5 * spacing || half > 4 * spacing) return true;
+             // Cells of a Voronoi diagram reach one spacing from their phyxels.
+             return !clearance.is_deep(middle, std::numbers::sqrt3 * half, regular + 1);
+           }},
+      nearest.count_into(count));
+  std::vector<double> volume(sites + nodes.position.size(), std::pow(spacing, 3));
+  double sampled = 0;
+  const auto is_regular = [&](std::size_t k) {
+    return k >= sites && nodes.clearance[number[k] - sites] >= regular;
+  };
+  std::size_t irregular = 0;
+  for (std::size_t k = 0; k < point.size(); ++k) {
+    if (is_regular(k)) continue;
+    // A phyxel without sample points gets the volume of half a sample.
+    volume[number[k]] = std::max(0.5, double(count[k])) * std::pow(voxel, 3);
+    sampled += volume[number[k]];
+    ++irregular;
+  }
+  if (!request.exact_volume) return volume;
+  const double rest = static_cast<double>(volume.size() - irregular) * std::pow(spacing, 3);
+  for (std::size_t k = 0; k < point.size(); ++k) {
+    if (!is_regular(k)) volume[number[k]] *= (request.volume - rest) / sampled;
+  }
+  return volume;
+}
+
+}  // namespace
+
+LatticeFilling fill_by_lattice(const LatticeRequest& request) {
+  Stage placing("placing phyxels");
+  const auto n = static_cast<std::size_t>(request.phyxels);
+  double spacing = lattice_constant(request.volume, request.sampler.area(), request.phyxels);
+  Nodes nodes;
+  for (int attempt = 0;; ++attempt) {
+    const Clearance clearance(request, spacing);
+    nodes = nodes_inside(request, clearance, spacing);
+    // In thin parts there may be no room for nodes that keep off the surface.
+    if (nodes.position.size() >= n &&
+        (keep_farthest(nodes, n) >= least_clearance || attempt >= 30)) {
+      break;
+    }
+    spacing *= 0.98;
+  }
+  placing.finish();
+
+  Stage evening("evening out distances");
+  Skin skin(request, nodes, spacing);
+  for (int sweep = 0; sweep < request.sweeps; ++sweep) {
+    skin.sweep();
+    evening.reach((sweep + 1.0) / request.sweeps);
+  }
+  skin.write_back();
+  evening.finish();
+
+  LatticeFilling filling;
+  filling.spacing = spacing;
+  filling.volume = in_stage("volumes of phyxels", [&] {
+    return volumes_of(request, nodes, Clearance(request, spacing), spacing);
+  });
+  filling.position = std::move(nodes.position);
+  return filling;
+}
+
+}  // namespace phyxel
