@@ -98,8 +98,7 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
   }
 }
 
-void close_share(const ShareSetup& setup, const WholeBodies& whole, Model& share,
-                 std::vector<Vec3d> areas) {
+void close_share(const WholeBodies& whole, Model& share, std::vector<Vec3d> areas) {
   std::vector<ClosedBody> closed;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     if (!closes(whole, b)) continue;

@@ -1,8 +1,10 @@
 #include "mesh/face_relaxation.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "mesh/repulsion.hpp"
+#include "stage.hpp"
 
 namespace phyxel {
 
@@ -22,7 +24,8 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
 }
 
 void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
-                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps) {
+                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
+                    Stage& stage) {
   std::vector<Vec3d> place(sample.size());
   std::transform(sample.begin(), sample.end(), place.begin(),
                  [](const PointOn& s) { return s.point; });
@@ -49,6 +52,7 @@ void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
       moved[i] = nearest_on_triangle(after, d, e, f);
     }
     site = moved;
+    stage.reach((sweep + 1.0) / sweeps);
   }
 }
 

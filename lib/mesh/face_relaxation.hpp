@@ -8,6 +8,8 @@
 
 namespace phyxel {
 
+class Stage;
+
 /// A point on a vertex, an edge or a triangle, with the index of that piece.
 struct PointOn {
   std::size_t piece;
@@ -22,7 +24,9 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 /// @param site the points; those after the first `fixed` are on `triangle` [m]
 /// @param sample points spread over the whole surface, with their triangles
 /// @param spacing typical distance between the points [m]
+/// @param stage is told the share of sweeps that is done
 void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
-                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps);
+                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
+                    Stage& stage);
 
 }  // namespace phyxel

@@ -211,7 +211,7 @@ class Skin {
 
 /// Volumes of the phyxels on the surface and of the nodes [m^3].
 std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes,
-                               const Clearance& clearance, double spacing) {
+                               const Clearance& clearance, double spacing, Stage& stage) {
   const std::size_t sites = request.on_surface.size();
   std::vector<Vec3d> point = request.on_surface;
   std::vector<std::size_t> number(sites);  // of each point, among all phyxels
@@ -235,7 +235,7 @@ std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes
              // Cells of a Voronoi diagram reach one spacing from their phyxels.
              return !clearance.is_deep(middle, std::numbers::sqrt3 * half, regular + 1);
            }},
-      nearest.count_into(count));
+      nearest.count_into(count), &stage);
   std::vector<double> volume(sites + nodes.position.size(), std::pow(spacing, 3));
   double sampled = 0;
   const auto is_regular = [&](std::size_t k) {
@@ -287,9 +287,9 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
 
   LatticeFilling filling;
   filling.spacing = spacing;
-  filling.volume = in_stage("volumes of phyxels", [&] {
-    return volumes_of(request, nodes, Clearance(request, spacing), spacing);
-  });
+  Stage measuring("volumes of phyxels");
+  filling.volume = volumes_of(request, nodes, Clearance(request, spacing), spacing, measuring);
+  measuring.finish();
   filling.position = std::move(nodes.position);
   return filling;
 }

@@ -168,15 +168,18 @@ PreparedSurface prepare(const Surface& surface, SampleReport& found) {
 /// Phyxels on the surface; none if the request or the surface does not allow them.
 SurfaceSites place_on_surface(const PreparedSurface& prepared, const SampleTally& tally,
                               double volume, const SampleRequest& request, SampleReport& found) {
+  Stage stage("phyxels on the surface");
+  SurfaceSites sites;
   try {
     refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
-    return sites_on(prepared.surface, prepared.topology, volume, request.phyxels, request.seed + 3,
-                    request.relaxations);
+    sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels,
+                     request.seed + 3, request.relaxations, stage);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
     found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
-    return {};
   }
+  stage.finish();
+  return sites;
 }
 
 /// Fills the inside with about `samples` sample points.
@@ -260,9 +263,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   };
   if (request.on_surface.value_or(true)) {
     measure(filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, 2e4, 1e6)));
-    sites = in_stage("phyxels on the surface", [&] {
-      return place_on_surface(prepared, tally, volume, request, found);
-    });
+    sites = place_on_surface(prepared, tally, volume, request, found);
   }
   Cloud cloud;
   double spacing = 0;

@@ -180,7 +180,7 @@ void add_along_edges(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, 
 
 /// Adds sites at random points of faces and relaxes them; the sites of the argument stay.
 void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spacing,
-                  std::uint64_t seed, int relaxations) {
+                  std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
   std::vector<PointOn> sample;
   visit_points_over(surface, spacing * spacing / samples_on_faces, seed,
@@ -189,7 +189,7 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spaci
       fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());
   // Repulsion evens out distances in a third of the sweeps that Lloyd's relaxation takes.
-  relax_on_faces(surface, sample, site, fixed, spacing, (relaxations + 2) / 3);
+  relax_on_faces(surface, sample, site, fixed, spacing, (relaxations + 2) / 3, stage);
 }
 
 /// A subset of the corners that are not too near to each other [m].
@@ -224,7 +224,7 @@ std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_
 }
 
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
-                      Index phyxels, std::uint64_t seed, int relaxations) {
+                      Index phyxels, std::uint64_t seed, int relaxations, Stage& stage) {
   double area = 0;
   for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
     area += norm(area_of(surface, static_cast<Index>(t)));
@@ -240,7 +240,7 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     found.position = corners_of(features, s, seed);
     add_along_edges(found.position, samples_along(features.creases, s), gap_along_edges * s, s,
                     seed, relaxations);
-    add_on_faces(surface, found.position, s, seed + 1, relaxations);
+    add_on_faces(surface, found.position, s, seed + 1, relaxations, stage);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     if (inside > 0.25 * volume / (s * s * s)) return found;

@@ -9,6 +9,8 @@
 
 namespace phyxel {
 
+class Stage;
+
 /// Sites on a surface, with about the spacing of the phyxels that will fill its inside.
 struct SurfaceSites {
   std::vector<Vec3d> position;  ///< [m]
@@ -24,9 +26,10 @@ std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_
 /// @param surface must be closed and must not overlap itself
 /// @param volume enclosed volume [m³]
 /// @param phyxels total number of phyxels, some of which are left for the inside
+/// @param stage is told the progress
 /// @throws InputError if there are so few phyxels that those on opposite sides would be nearer to
 ///   each other than those side by side
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
-                      Index phyxels, std::uint64_t seed, int relaxations);
+                      Index phyxels, std::uint64_t seed, int relaxations, Stage& stage);
 
 }  // namespace phyxel

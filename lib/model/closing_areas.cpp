@@ -135,11 +135,16 @@ bool may_close(const BodyRequest& request) {
          !request.neighbourhood.one_sided();
 }
 
+bool may_close(const BodyRequest& request, const Surface& surface, bool lattice,
+               bool kernel_volumes) {
+  if (!may_close(request)) return false;
+  return request.closure || (!lattice && !kernel_volumes && !surface.triangle.empty());
+}
+
 double closure_of(const BodyRequest& request, const Surface& surface, bool lattice,
                   std::optional<double> volume) {
-  if (!may_close(request)) return 0;
+  if (!may_close(request, surface, lattice, !volume)) return 0;
   const bool automatic = !request.closure;
-  if (automatic && (lattice || !volume)) return 0;
   const std::string obstacle = obstacle_to_closing(surface, volume);
   if (obstacle.empty()) return request.closure.value_or(automatic_closure);
   if (automatic) return 0;

@@ -41,8 +41,12 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
                                     std::span<const Vec3d> position,
                                     std::span<const double> support);
 
-/// True if the gradients of a body will be closed, provided that its cloud and its surface allow it.
+/// True if the gradients of a body may have to be closed, whatever its cloud is.
 bool may_close(const BodyRequest& request);
+/// True if they have to be closed, provided that the surface encloses the body.
+/// @param lattice `Cloud::lattice`
+bool may_close(const BodyRequest& request, const Surface& surface, bool lattice,
+               bool kernel_volumes);
 
 /// The tolerance to which the gradients of a body are to be closed; 0 if they are not.
 /// @param lattice `Cloud::lattice`

@@ -41,6 +41,11 @@ void add(Unknown& to, double s, const Unknown& x) {
   to.volume += s * x.volume;
 }
 
+Sym3d symmetric_part(const Mat3d& m) {
+  return {m(0, 0), 0.5 * (m(0, 1) + m(1, 0)), 0.5 * (m(0, 2) + m(2, 0)),
+          m(1, 1), 0.5 * (m(1, 2) + m(2, 1)), m(2, 2)};
+}
+
 /// A body whose gradients are closed, and where its search stands.
 struct Body {
   std::span<Part> parts;
@@ -75,7 +80,13 @@ class Bodies {
   /// Calls each(body, i) for the phyxels that are not ghosts.
   template <class Each>
   void for_each(Each&& each) const {
-    on_threads([&](const Stretch& stretch) {
+    on_threads(own_end, [&](const Stretch& stretch) {
+      for (Index i = stretch.begin; i < stretch.end; ++i) each(*list_[stretch.body], i);
+    });
+  }
+  template <class Each>
+  void for_each_with_ghosts(Each&& each) const {
+    on_threads([](const Part& part) { return part.end; }, [&](const Stretch& stretch) {
       for (Index i = stretch.begin; i < stretch.end; ++i) each(*list_[stretch.body], i);
     });
   }
@@ -84,7 +95,7 @@ class Bodies {
   template <class Term>
   void sum(double Body::*into, Term&& term) const {
     std::vector<ExactSum> sums(list_.size());
-    on_threads([&](const Stretch& stretch) {
+    on_threads(own_end, [&](const Stretch& stretch) {
       ExactSum own;
       for (Index i = stretch.begin; i < stretch.end; ++i) own.add(term(*list_[stretch.body], i));
 #pragma omp critical(phyxel_closure_sum)
@@ -101,18 +112,20 @@ class Bodies {
   }
 
  private:
-  /// Phyxels [begin, end) of one part, all of them this rank's own.
+  /// Phyxels [begin, end) of one part.
   struct Stretch {
     std::size_t body;
     Index begin, end;
   };
+  static Index own_end(const Part& part) { return part.owned_end(); }
   /// Calls visit(stretch) on each thread for its share of the phyxels, so that many small bodies
   /// keep all threads busy.
-  template <class Visit>
-  void on_threads(Visit&& visit) const {
+  /// @param end end(part): the end of the phyxels to visit
+  template <class End, class Visit>
+  void on_threads(End&& end, Visit&& visit) const {
     std::int64_t size = 0;
     for (const Body* body : list_) {
-      for (const Part& part : body->parts) size += part.owned_end() - part.begin;
+      for (const Part& part : body->parts) size += end(part) - part.begin;
     }
 #pragma omp parallel
     {
@@ -121,7 +134,7 @@ class Bodies {
       std::int64_t at = 0;
       for (std::size_t b = 0; b < list_.size(); ++b) {
         for (const Part& part : list_[b]->parts) {
-          const std::int64_t length = part.owned_end() - part.begin;
+          const std::int64_t length = end(part) - part.begin;
           const std::int64_t from = std::max(first - at, std::int64_t{0}),
                              to = std::min(last - at, length);
           if (from < to) {
@@ -147,7 +160,12 @@ class Sums {
  public:
   /// @param areas S of each phyxel of the model, those of ghosts undefined [m²]
   Sums(const Model& model, const Bodies& bodies, std::vector<Vec3d> areas)
-      : model_(model), areas_(std::move(areas)), tilt_(areas_.size()), weight_(areas_.size()) {
+      : model_(model),
+        areas_(std::move(areas)),
+        tilt_(areas_.size()),
+        weight_(areas_.size()),
+        placed_sum_(areas_.size()),
+        term_(areas_.size()) {
     for (Body* body : bodies) {
       double volume = 0;
       Index size = 0;
@@ -166,14 +184,18 @@ class Sums {
     bodies.for_each([&](const Body& body, Index i) {
       areas_[i] = areas_[i] / body.unit;
       double sum = 0;
-      visit(i, [&](Index, Vec3d, double w) { sum += w; });
+      const double inverse = inverse_support_squared(i);
+      for (const Index k : model_.neighbourhood.neighbours.row(i)) {
+        const Vec3d x = model_.position[k] - model_.position[i];
+        sum += weight_shape(dot(x, x), inverse);
+      }
       weight_[i] = sum - dot(tilt_[i], model_.moment_offset[i]);
     });
     bodies.sum(&Body::areas, [&](const Body&, Index i) { return dot(areas_[i], areas_[i]); });
   }
 
   /// The sums without closing, as they are to be 0.
-  std::vector<Vec3d> open(const Bodies& bodies) const {
+  std::vector<Vec3d> open(const Bodies& bodies) {
     std::vector<Vec3d> sums(areas_.size());
     const std::vector<Unknown> ones(areas_.size(), {{}, 1 / ease_area, 1 / ease_volume});
     for (Body* body : bodies) body->mean = 0;
@@ -181,7 +203,7 @@ class Sums {
     return sums;
   }
   /// @param x its ghosts receive their owners' values
-  void apply(const Bodies& bodies, std::vector<Unknown>& x, std::vector<Vec3d>& sums) const {
+  void apply(const Bodies& bodies, std::vector<Unknown>& x, std::vector<Vec3d>& sums) {
     bodies.refresh_ghosts(x);
     find_means(bodies, x);
     apply_local(bodies, x, sums);
@@ -193,18 +215,26 @@ class Sums {
   }
   /// @param sums their ghosts receive their owners' values
   void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums,
-                       std::vector<Unknown>& x) const {
+                       std::vector<Unknown>& x) {
     bodies.refresh_ghosts(sums);
+    bodies.for_each_with_ghosts(
+        [&](const Body&, Index i) { placed_sum_[i] = {model_.position[i], sums[i]}; });
     bodies.for_each([&](const Body& body, Index i) {
-      Unknown out;
-      visit(i, [&](Index k, Vec3d x_ik, double w) {
-        const Vec3d difference = sums[k] - sums[i];
-        out.closing += (w * (1 - dot(tilt_[i], x_ik))) * difference;
-        out.volume += w * dot(own_share(body, i, x_ik), difference);
-      });
-      out.volume *= ease_volume;
-      out.area = -ease_area * dot(areas_[i], sums[i]);
-      x[i] = out;
+      Vec3d total;   // Σ w (R_k - R_i)
+      Mat3d moment;  // Σ w (R_k - R_i) x_ikᵀ
+      const PlacedSum own = placed_sum_[i];
+      const double inverse = inverse_support_squared(i);
+      for (const Index k : model_.neighbourhood.neighbours.row(i)) {
+        const PlacedSum& other = placed_sum_[k];
+        const Vec3d apart = other.position - own.position;
+        const Vec3d weighted = weight_shape(dot(apart, apart), inverse) * (other.sum - own.sum);
+        total += weighted;
+        moment = fused_outer(weighted, apart, moment);
+      }
+      x[i] = {.closing = total - moment * tilt_[i],
+              .area = -ease_area * dot(areas_[i], own.sum),
+              .volume = ease_volume * (model_.volume[i] / body.unit) *
+                        contract(symmetric_part(moment), model_.inverse_moment[i])};
     });
     bodies.sum(&Body::sum, [&](const Body&, Index i) { return x[i].volume; });
     bodies.for_each([&](const Body& body, Index i) {
@@ -214,35 +244,46 @@ class Sums {
 
  private:
   void apply_local(const Bodies& bodies, const std::vector<Unknown>& x,
-                   std::vector<Vec3d>& sums) const {
-    bodies.for_each([&](const Body& body, Index j) {
-      Vec3d sum =
-          -weight_[j] * x[j].closing - ease_area * x[j].area * areas_[j] -
-          ease_volume * (x[j].volume - body.mean) * own_share(body, j, model_.moment_offset[j]);
-      visit(j, [&](Index k, Vec3d x_jk, double w) {
-        sum += w * ((1 + dot(tilt_[k], x_jk)) * x[k].closing -
-                    (ease_volume * (x[k].volume - body.mean)) * own_share(body, k, x_jk));
-      });
+                   std::vector<Vec3d>& sums) {
+    bodies.for_each_with_ghosts([&](const Body& body, Index k) {
+      const double change = ease_volume * (x[k].volume - body.mean) * model_.volume[k] / body.unit;
+      term_[k] = {model_.position[k], x[k].closing,
+                  outer(x[k].closing, tilt_[k]) - change * full(model_.inverse_moment[k])};
+    });
+    bodies.for_each([&](const Body&, Index j) {
+      const Term& own = term_[j];
+      // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
+      Vec3d sum = own.linear * model_.moment_offset[j] -
+                  (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * x[j].closing -
+                  ease_area * x[j].area * areas_[j];
+      const double inverse = inverse_support_squared(j);
+      for (const Index k : model_.neighbourhood.neighbours.row(j)) {
+        const Term& other = term_[k];
+        const Vec3d x_jk = other.position - own.position;
+        sum += weight_shape(dot(x_jk, x_jk), inverse) * (other.constant + other.linear * x_jk);
+      }
       sums[j] = sum;
     });
   }
-  template <class Visit>
-  void visit(Index i, Visit&& visit) const {
+  double inverse_support_squared(Index i) const {
     const double h = model_.neighbourhood.support[i];
-    for (const Index k : model_.neighbourhood.neighbours.row(i)) {
-      const Vec3d x = model_.position[k] - model_.position[i];
-      visit(k, x, weight_shape(dot(x, x), 1 / (h * h)));
-    }
-  }
-  /// M_i x per s².
-  Vec3d own_share(const Body& body, Index i, Vec3d x) const {
-    return (model_.volume[i] / body.unit) * (model_.inverse_moment[i] * x);
+    return 1 / (h * h);
   }
 
   const Model& model_;
   std::vector<Vec3d> areas_;    ///< S / s²
   std::vector<Vec3d> tilt_;     ///< a
   std::vector<double> weight_;  ///< Σ_k w_jk (1 - a_j x_jk)
+  /// What a phyxel gives to the sums of its neighbours, each in one piece of memory.
+  struct PlacedSum {
+    Vec3d position, sum;
+  };
+  struct Term {
+    Vec3d position, constant;
+    Mat3d linear;
+  };
+  std::vector<PlacedSum> placed_sum_;
+  std::vector<Term> term_;
 };
 
 /// Updates what is left of a body's sums.
@@ -269,7 +310,7 @@ double way_of(const Body& body) {
 /// algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns, which take
 /// the most of them, matter the least: a few iterations do most of what can be done. What is left
 /// of each body's sums is summed anew at the end.
-std::vector<Unknown> close(const Sums& sums, const Bodies& all) {
+std::vector<Unknown> close(Sums& sums, const Bodies& all) {
   Stage stage("closed gradients");
   const std::vector<Vec3d> open = sums.open(all);
   const std::size_t n = open.size();
@@ -425,7 +466,7 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
     for (Index i = body.begin(); i < body.end(); ++i) model.volume[i] *= enclosed / volume;
   }
   Bodies bodies(model, list);
-  const Sums sums(model, bodies, std::move(areas));
+  Sums sums(model, bodies, std::move(areas));
   const std::vector<Unknown> found = close(sums, bodies);
   sums.find_means(bodies, found);
   const auto change = [&](const Body& body, Index i) {

@@ -56,10 +56,10 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
 
 /// A surveyor's device finds neighbours within one support of unsorted phyxels, and no more.
 /// @throws InputError if a body needs lists on the host
-void check_surveyable(const BodyRequest& request) {
-  if (may_close(request)) {
+void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kernel_volumes) {
+  if (may_close(request, cloud.surface, cloud.lattice, kernel_volumes)) {
     throw InputError(fmt::format(
-        "{}: body \"{}\" may have closed gradients (closure = {}), which are found from lists of "
+        "{}: body \"{}\" has closed gradients (closure = {}), which are found from lists of "
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
         request.where, request.name,
         request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
@@ -225,9 +225,9 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
       fmt::format("body \"{}\"", request.name),
       static_cast<double>(model.size()) + static_cast<double>(cloud.position.size()),
       surveyor ? 300 : 950);
-  if (surveyor) check_surveyable(request);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
+  if (surveyor) check_surveyable(request, cloud, kernel_volumes);
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   const Survey survey = add_neighbours(model, request, cloud, surveyor, kernel_volumes);

@@ -141,6 +141,7 @@ TEST(CloudCheck, RefusesSurveysThatDoNotFit) {
   const auto with = [&](VolumeRule rule, auto&& change) {
     Scene scene = one_body();
     scene.bodies[0].volume_rule = rule;
+    scene.bodies[0].closure = 0;
     return refusal_of([&] {
       build_model(scene, std::span(&cloud, 1),
                   [&](std::span<const Vec3d> position, const NeighbourhoodRule&, bool) {

@@ -71,8 +71,8 @@ TEST_F(Stages, EachIsToldFromItsBeginningToItsEnd) {
   EXPECT_THAT(
       heard.names,
       ElementsAre("reading the mesh", "inspecting the surface", "filling the surface",
-                  "evening out distances", "evening out distances", "placing phyxels",
-                  "evening out distances", "volumes of phyxels", "distances between phyxels",
+                  "phyxels on the surface", "placing phyxels", "evening out distances",
+                  "volumes of phyxels", "distances between phyxels",
                   "neighbours", "phyxels near the surface", "moments", "phyxels near the surface",
                   "closed gradients", "largest time step"));
   std::size_t between = 0;
@@ -83,7 +83,7 @@ TEST_F(Stages, EachIsToldFromItsBeginningToItsEnd) {
     for (std::size_t k = 1; k < shares.size(); ++k) EXPECT_GT(shares[k], shares[k - 1]);
     between += shares.size() > 2;
   }
-  // What takes long tells how far it is: filling, evening out, volumes, gradients, the step.
+  // What takes long tells how far it is: the surface, evening out, volumes, gradients, the step.
   EXPECT_GE(between, 5u);
 
   const std::size_t before = heard.names.size();
@@ -112,7 +112,7 @@ TEST_F(Stages, TheInnermostObserverOfAThreadHears) {
 TEST_F(Stages, AnObserverThatThrowsEndsTheSetUp) {
   const Scene request = scene();
   for (const std::string stage :
-       {"reading the mesh", "filling the surface", "volumes of phyxels", "evening out distances",
+       {"reading the mesh", "phyxels on the surface", "volumes of phyxels", "evening out distances",
         "closed gradients", "largest time step"}) {
     bool over = false;
     const ObserveStages observing([&](std::string_view name, double share) {
