@@ -146,6 +146,7 @@ class Solver {
   State state() const;
   /// Since this solver began.
   SolverWork work() const;
+  /// The method of its steps.
   Method method() const { return method_; }
   /// All forces but those of supports [N] at the end of the last implicit step, shape [n]; empty
   /// before the first one, for other methods, and without supports.
