@@ -5,12 +5,14 @@
 #include <optional>
 
 #include "arrays.hpp"
+#include "dicts.hpp"
 #include "files/frame_file.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/reactions.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/step_control.hpp"
@@ -109,6 +111,12 @@ class Simulation {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
     return diagnose(model_, *backend_, solver_->now());
+  }
+
+  std::vector<Reaction> reactions() {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    return find_reactions(model_, *backend_, *solver_);
   }
 
   State state() const {
@@ -216,6 +224,7 @@ class Simulation {
     Frame frame;
     frame.state = &state;
     frame.diagnostics = look();
+    frame.reactions = find_reactions(model_, *backend_, *solver_);
     SurfelState surfels;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);
@@ -316,18 +325,6 @@ class Simulation {
   std::unique_ptr<std::mutex> busy_ = std::make_unique<std::mutex>();
 };
 
-py::dict energies_of(const Diagnostics& now) {
-  py::dict values;
-  values["step"] = now.step;
-  for (const DiagnosticColumn& column : diagnostic_columns()) {
-    values[column.name] = column.value(now);
-  }
-  values["elastic_energy"] = now.elastic_energy();
-  values["momentum"] = now.momentum;
-  values["angular_momentum"] = now.angular_momentum;
-  return values;
-}
-
 std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>& file,
                                      const std::string& text,
                                      const std::map<std::string, Cloud>& clouds,
@@ -379,6 +376,10 @@ void add_simulation(py::module_& module) {
       .def(
           "energies", [](Simulation& s) { return energies_of(s.energies()); },
           "Energies [J], momenta and the other columns of energy.csv, now: {name: value}.")
+      .def(
+          "reactions", [](Simulation& s) { return dicts_of(s.reactions()); },
+          "Reactions of supports, now: a list of dicts, one for each entry of fixed and motion:\n"
+          "body, set, force [N], torque [N m] about centre [m], work [J].")
       .def(
           "forces", [](Simulation& s) { return taken(s.internal_forces()); },
           "Internal forces [N], (n, 3), a copy.")

@@ -1,7 +1,9 @@
 /// Prescribed motions and loads on the GPU.
 #pragma once
 
+#include "exact_sum.hpp"
 #include "solver/device_model.cuh"
+#include "solver/support_work.hpp"
 
 namespace phyxel::cuda {
 
@@ -13,14 +15,36 @@ struct AffineField {
   __device__ Vec3<T> at(Vec3<T> x) const { return offset + slope * x; }
 };
 
+/// The work of the support of one motion on a device, in which a step adds a term for each phyxel.
+struct DeviceWork {
+  /// Number of accumulators, among which the phyxels are dealt out so that few threads add to the
+  /// same word at once.
+  static constexpr unsigned accumulators = 1024;
+  const double* inertia = nullptr;      ///< As `support_inertia` [kg/s]; null: no work is counted.
+  AffineField<double> mean_step;        ///< Displacement as of `Motion::mean_step` [m].
+  unsigned long long* words = nullptr;  ///< Words of exact sums, shape [words, accumulators].
+
+  /// Adds the work on the k-th phyxel, by velocities as for `support_force` [m/s].
+  __device__ void add(int k, Vec3<double> x, Vec3<double> prescribed, Vec3<double> free) const {
+    const double work = dot(support_force(inertia[k], prescribed, free), mean_step.at(x));
+    const unsigned own = static_cast<unsigned>(k) % accumulators;
+    ExactSum::split(work, [&](int word, std::int64_t number) {
+      if (number == 0) return;
+      atomicAdd(words + static_cast<unsigned>(word) * accumulators + own,
+                static_cast<unsigned long long>(number));
+    });
+  }
+};
+
 /// Sets displacements and velocities of phyxels with a prescribed motion, along its axes, after
-/// each step. One thread per phyxel.
+/// each step, and adds the work of its support. One thread per phyxel.
 /// @param position of the moved phyxels relative to the body's origin [m]; null for
 /// phyxels whose displacements do not depend on it
 template <class Real, class StateReal>
 __global__ void follow(Fields<Real, StateReal> f, const Index* place,
                        const Vec3<StateReal>* position, int count, Axes axes,
-                       AffineField<StateReal> displacements, AffineField<StateReal> velocities) {
+                       AffineField<StateReal> displacements, AffineField<StateReal> velocities,
+                       DeviceWork work) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= count) return;
   const Index at = place[k];
@@ -38,6 +62,10 @@ __global__ void follow(Fields<Real, StateReal> f, const Index* place,
     } else {
       displacement = along_axes(displacement, column3(f.displacement, f.places, at));
     }
+  }
+  if (work.inertia) {
+    const Vec3<double> free = to<double>(column3(f.velocity, f.places, at));
+    work.add(k, to<double>(x), to<double>(velocity), free);
   }
   set_column3(f.velocity, f.places, at, velocity);
   if constexpr (!std::is_same_v<Real, StateReal>) {
@@ -100,19 +128,45 @@ class Boundary {
     }
   }
   /// Moves phyxels to their prescribed positions after a step from `time` [s].
-  void follow_paths(double time, double dt) const {
-    for (const Moved& path : paths_) {
+  void follow_paths(double time, double dt) {
+    prepare_work(dt);
+    for (Moved& path : paths_) {
       const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
       const Vec3d x = path.origin, there = after.at(x);
+      DeviceWork work;
+      if (path.words.size() > 0) {
+        const Path mean_step = path.of->mean_step(time, dt);
+        work = {path.inertia.data(), {mean_step.at(x), mean_step.turn}, path.words.data()};
+      }
       set(path.places, path.positions.data(), path.of->axes,
           {to<StateReal>(there), to_real(after.turn)},
           {to<StateReal>((there - before.at(x)) / dt),
-           to_real((1 / dt) * (after.turn - before.turn))});
+           to_real((1 / dt) * (after.turn - before.turn))},
+          work);
     }
+  }
+  /// The work of supports so far (`Backend::support_work`). Waits for the steps in progress.
+  std::vector<std::int64_t> support_work() const {
+    SupportWork work = no_support_work(m_.model());
+    if (work.empty()) return {};
+    m_.wait();
+    for (const Moved& path : paths_) {
+      if (path.words.size() == 0) continue;
+      const auto m = static_cast<std::size_t>(path.of - m_.model().motions.data());
+      work[m].add(path.earlier);
+      work[m].add(sum_of(path));
+    }
+    return words_of(std::move(work));
+  }
+  /// Bytes of the arrays for the work of supports.
+  std::size_t work_bytes() const {
+    std::size_t bytes = 0;
+    for (const Moved& path : paths_) bytes += path.inertia.bytes() + path.words.bytes();
+    return bytes;
   }
   /// Returns fixed phyxels to their prescribed positions, at rest, whatever an uploaded state says.
   void put_held_at_rest() const {
-    if (held_.size() > 0) set(held_, nullptr, {}, {}, {});
+    if (held_.size() > 0) set(held_, nullptr, {}, {}, {}, {});
   }
   /// The prescribed axes of each phyxel (`Axes::bits`), shape [places]; null if there are none.
   const char* moved() const { return moved_.data(); }
@@ -125,6 +179,11 @@ class Boundary {
     /// Positions relative to `origin` [m] in the precision of displacements: in mixed precision the
     /// tiles have positions in float.
     DeviceArray<Vec3<StateReal>> positions;
+    /// The work of a motion that does not stand still, as of `DeviceWork`.
+    DeviceArray<double> inertia;
+    DeviceArray<unsigned long long> words;
+    ExactSum earlier;        ///< The work of steps before the words were last cleared [J].
+    std::int64_t terms = 0;  ///< Largest number of terms in an accumulator.
   };
   struct Loading {
     const Load* of;
@@ -158,11 +217,48 @@ class Boundary {
       }
       paths_.push_back({&motion, origin, sent(at, "moved phyxels"),
                         sent(positions, "positions of moved phyxels")});
+      if (!motion.stands_still() && !own.empty()) {
+        paths_.back().words = sent(
+            std::vector<unsigned long long>(ExactSum::words * DeviceWork::accumulators), work_name);
+      }
       moved.resize(m_.places(), 0);
       for (const Index place : at) moved[place] |= motion.axes.bits();
     }
     held_ = sent(held, "held phyxels");
     moved_ = sent(moved, "moved phyxels");
+  }
+  static constexpr const char* work_name = "work of supports";
+  /// Makes inertias for steps of `dt` [s], and room in the accumulators for one step more.
+  void prepare_work(double dt) {
+    constexpr std::int64_t most_terms = std::int64_t{1} << 29;  // half of what words hold
+    for (Moved& path : paths_) {
+      if (path.words.size() == 0) continue;
+      if (dt != work_step_) {
+        m_.wait();  // steps in progress read the inertias
+        path.inertia = sent(support_inertia(m_.model(), *path.of, dt), work_name);
+      }
+      path.terms += static_cast<std::int64_t>(path.places.size()) / DeviceWork::accumulators + 1;
+      if (path.terms < most_terms) continue;
+      m_.wait();
+      path.earlier.add(sum_of(path));
+      path.words = sent(std::vector<unsigned long long>(path.words.size()), work_name);
+      path.terms = 0;
+    }
+    work_step_ = dt;
+  }
+  /// The sum of a path's accumulators.
+  static ExactSum sum_of(const Moved& path) {
+    const std::vector<unsigned long long> words = fetched(path.words);
+    ExactSum all;
+    for (unsigned a = 0; a < DeviceWork::accumulators; ++a) {
+      ExactSum one;
+      const std::span<std::int64_t> into = one.ready();
+      for (std::size_t w = 0; w < into.size(); ++w) {
+        into[w] = static_cast<std::int64_t>(words[w * DeviceWork::accumulators + a]);
+      }
+      all.add(one);
+    }
+    return all;
   }
   Vec3d origin_of(const Motion& motion) const {
     for (const Part& part : m_.model().parts) {
@@ -188,17 +284,18 @@ class Boundary {
     }
   }
   void set(const DeviceArray<Index>& at, const Vec3<StateReal>* positions, Axes axes,
-           const AffineField<StateReal>& displacement,
-           const AffineField<StateReal>& velocity) const {
+           const AffineField<StateReal>& displacement, const AffineField<StateReal>& velocity,
+           const DeviceWork& work) const {
     const auto count = static_cast<int>(at.size());
     m_.launch_each("follow", follow<Real, StateReal>, count, m_.fields(), at.data(), positions,
-                   count, axes, displacement, velocity);
+                   count, axes, displacement, velocity, work);
   }
 
   DeviceModel<Real, StateReal>& m_;
   std::vector<Moved> paths_;
   std::vector<Loading> loads_;
   double load_scales_ = -1, time_ = 0;  // scale and time [s] of the last sum
+  double work_step_ = 0;                // step for which inertias were made [s]
   DeviceArray<Index> held_;
   DeviceArray<char> moved_;
 };

@@ -98,6 +98,10 @@ class CudaBackend final : public Backend {
       count -= launched;
     }
   }
+  std::vector<std::int64_t> support_work() const override {
+    m_.use_device();
+    return boundary_.support_work();
+  }
   int best_steps() const override {
     return path_.residence ? path_.residence->most_steps : path_.recorded ? steps_together : 1;
   }
@@ -244,6 +248,7 @@ class CudaBackend final : public Backend {
     if (path_.residence) {
       list.push_back({"what stays in shared memory", path_.residence->bytes()});
     }
+    if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
     if (stiffest_.size() > 0) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "exact_sum.hpp"
 #include "files/frame_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/looks_group.hpp"
@@ -105,6 +106,35 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
+/// The words of exact sums (`State::support_work`) in decimal digits, a line for each sum.
+std::string text_of_work(std::span<const std::int64_t> words) {
+  std::string text;
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    text += std::to_string(words[k]);
+    text += (k + 1) % ExactSum::words == 0 ? '\n' : ' ';
+  }
+  return text;
+}
+
+/// The words in such a text.
+std::vector<std::int64_t> work_in(const Hdf5Reader& in, const std::string& text) {
+  std::vector<std::int64_t> words;
+  for (const std::string& line : lines_of(text)) {
+    const char* at = line.data();
+    const char* const end = at + line.size();
+    for (int k = 0; k < ExactSum::words; ++k) {
+      const auto [next, error] = std::from_chars(at, end, words.emplace_back());
+      const bool last = k + 1 == ExactSum::words;
+      if (error != std::errc() || (last ? next != end : next == end || *next != ' ')) {
+        in.refuse(fmt::format("line {} of /state/support_work does not have {} whole numbers",
+                              words.size() / ExactSum::words + 1, int{ExactSum::words}));
+      }
+      at = last ? next : next + 1;
+    }
+  }
+  return words;
+}
+
 }  // namespace
 
 fs::path write_checkpoint(const fs::path& directory, const State& state,
@@ -166,6 +196,10 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
         values);
   }
   if (!columns.empty()) out.text("/state/history_columns", columns);
+
+  if (!state.support_work.empty()) {
+    out.text("/state/support_work", text_of_work(state.support_work));
+  }
 
   fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);
@@ -237,6 +271,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
       in.refuse(fmt::format("history_interval = {} s; allowed: 0 and more, finite",
                             state_.history_interval));
     }
+    state_.support_work = work_in(in, in.text("/state/support_work"));
     for (std::string& name : lines_of(in.text("/state/history_columns"))) {
       const std::string path = history_path(name);
       if (const std::size_t other = in.shape(path).rows; other != rows) {

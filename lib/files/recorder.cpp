@@ -11,6 +11,7 @@
 #include "files/trajectory_folder.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
+#include "phyxel/reactions.hpp"
 
 namespace phyxel {
 namespace {
@@ -31,6 +32,37 @@ std::string log_line(const Diagnostics& now) {
     line += fmt::format(",{:.17g}", column.value(now));
   }
   return line + "\n";
+}
+
+std::string reactions_header() {
+  std::string header = "step,time [s],body,set";
+  for (const ReactionColumn& column : reaction_columns()) {
+    header += fmt::format(",{} [{}]", column.name, column.unit);
+  }
+  return header + "\n";
+}
+
+/// A text as a cell of a CSV file (RFC 4180).
+std::string cell_of(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+/// The lines of the reactions at one instant. A number that is not known leaves its cell empty.
+std::string reaction_lines(const Diagnostics& now, const std::vector<Reaction>& reactions) {
+  std::string lines;
+  for (const Reaction& reaction : reactions) {
+    lines += fmt::format("{},{:.17g},{},{}", now.step, now.time, cell_of(reaction.body),
+                         cell_of(reaction.set));
+    for (const ReactionColumn& column : reaction_columns()) {
+      const double value = column.value(reaction);
+      lines += std::isnan(value) ? "," : fmt::format(",{:.17g}", value);
+    }
+    lines += '\n';
+  }
+  return lines;
 }
 
 /// @throws InputError if an array of a frame does not fit the model
@@ -123,7 +155,8 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
       scene_(scene),
       directory_(scene.output.directory),
       writes_phyxels_(scene.output.phyxels),
-      writes_surface_(scene.output.surface && model.global_surfel_count() > 0) {
+      writes_surface_(scene.output.surface && model.global_surfel_count() > 0),
+      writes_reactions_(!model.motions.empty()) {
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -198,6 +231,9 @@ void Recorder::create_files() {
   if (writes_surface_) surface_.create(directory_ / "surface.hdf.series", {});
   write_whole_file(directory_ / log_name, log_header(), Durable::no);
   log_size_ = log_header().size();
+  if (!writes_reactions_) return;
+  write_whole_file(directory_ / reactions_name, reactions_header(), Durable::no);
+  reactions_size_ = reactions_header().size();
 }
 
 void Recorder::continue_after(const Continuation& point, bool overwrite) {
@@ -218,6 +254,10 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   };
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
+  std::string reactions;
+  if (writes_reactions_) {
+    reactions = kept_reactions(directory_ / reactions_name, reactions_header(), log.last_step);
+  }
   // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
   fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run
@@ -227,15 +267,19 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   }
   write_whole_file(directory_ / log_name, log.text, Durable::no);
   log_size_ = log.text.size();
+  if (!writes_reactions_) return;
+  write_whole_file(directory_ / reactions_name, reactions, Durable::no);
+  reactions_size_ = reactions.size();
 }
 
 void Recorder::write(const Frame& frame) {
   check_frame(model_, frame);
   FrameSource values(model_, frame);
-  write(frame.diagnostics, values);
+  write(frame.diagnostics, values, frame.reactions);
 }
 
-void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values) {
+void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
+                     const std::vector<Reaction>& reactions) {
   const double time = diagnostics.time;
   if (writes_phyxels_) {
     const fs::path file = frame_file(directory_, "phyxels", frames_);
@@ -248,6 +292,11 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values) {
     write_surface_frame(file, model_, scene_, diagnostics, values);
     unsynced_.push_back(file);
     surface_.append({file, time});
+  }
+  if (writes_reactions_ && !reactions.empty()) {
+    const std::string lines = reaction_lines(diagnostics, reactions);
+    replace_tail(directory_ / reactions_name, reactions_size_, lines);
+    reactions_size_ += lines.size();
   }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
@@ -271,6 +320,7 @@ std::vector<fs::path> Recorder::files() const {
   if (writes_phyxels_) files.push_back(phyxels_.file());
   if (writes_surface_) files.push_back(surface_.file());
   files.push_back(directory_ / log_name);
+  if (writes_reactions_) files.push_back(directory_ / reactions_name);
   return files;
 }
 

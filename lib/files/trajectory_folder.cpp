@@ -22,7 +22,8 @@ constexpr std::size_t largest_log = std::size_t{1} << 30;
 /// True for the name of a file of a trajectory, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
-  for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, summary_name}) {
+  for (const char* one :
+       {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name, summary_name}) {
     if (name == one) return true;
   }
   const auto numbered = [name](std::string_view prefix, std::string_view suffix) {
@@ -142,6 +143,40 @@ bool holds_only_a_start(const fs::path& directory, const Scene& scene) {
   return std::count(text.begin(), text.end(), '\n') <= 2;
 }
 
+namespace {
+/// The whole lines of a text.
+std::vector<std::string_view> lines_of(const std::string& text) {
+  std::vector<std::string_view> lines;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = text.find('\n', begin);
+    if (end == std::string::npos) break;  // an incomplete last line
+    lines.emplace_back(text.data() + begin, end - begin);
+    begin = end + 1;
+  }
+  return lines;
+}
+}  // namespace
+
+std::string kept_reactions(const fs::path& file, const std::string& header, double last_step) {
+  if (!fs::exists(file)) return header;
+  const std::string text = read_text_file(file, largest_log);
+  const std::vector<std::string_view> lines = lines_of(text);
+  const std::string_view wanted(header.data(), header.size() - 1);  // without the line's end
+  if (lines.empty() || lines[0] != wanted) {
+    throw InputError(
+        fmt::format("{}: begins with \"{}\", needed is \"{}\": it belongs to another run, or was "
+                    "changed; it is "
+                    "kept; allowed: another folder (--resume CHECKPOINT --out FOLDER)",
+                    file.string(), lines.empty() ? std::string_view() : lines[0], wanted));
+  }
+  std::string kept = header;
+  for (std::size_t l = 1; l < lines.size(); ++l) {
+    if (!(number_in(cell(lines[l], 0)) <= last_step)) break;
+    kept.append(lines[l]).push_back('\n');
+  }
+  return kept;
+}
+
 KeptLog kept_log(const fs::path& file, const Continuation& point) {
   const std::string text = read_text_file(file, largest_log);
   const auto refuse = [&](const std::string& why) {
@@ -150,13 +185,7 @@ KeptLog kept_log(const fs::path& file, const Continuation& point) {
         "folder (--resume CHECKPOINT --out FOLDER), or an earlier checkpoint",
         file.string(), why));
   };
-  std::vector<std::string_view> lines;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = text.find('\n', begin);
-    if (end == std::string::npos) break;  // an incomplete last line
-    lines.emplace_back(text.data() + begin, end - begin);
-    begin = end + 1;
-  }
+  const std::vector<std::string_view> lines = lines_of(text);
   if (lines.empty()) refuse("has no header");
   // A run that was continued in another folder has the frames since then only.
   std::int64_t kept = 0;
@@ -182,7 +211,7 @@ KeptLog kept_log(const fs::path& file, const Continuation& point) {
   }
   const std::string_view last = lines[static_cast<std::size_t>(kept)];
   return {text.substr(0, static_cast<std::size_t>(last.data() + last.size() + 1 - text.data())),
-          kept};
+          kept, kept > 0 ? number_in(cell(last, 0)) : -1};
 }
 
 KeptSeries kept_series(const fs::path& directory, const char* family, std::int64_t frames,

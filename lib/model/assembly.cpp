@@ -316,8 +316,14 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
     for (Index& i : phyxels) i += shift;
     return phyxels;
   };
+  const auto numbered = [](const char* kind, const auto& one, const auto& all) {
+    return fmt::format("{} {}", kind, &one - all.data() + 1);
+  };
   for (const FixRequest& fix : request.fixed) {
-    model.motions.push_back({.phyxels = next(), .axes = fix.axes});
+    model.motions.push_back({.phyxels = next(),
+                             .axes = fix.axes,
+                             .body = request.name,
+                             .set = numbered("fixed", fix, request.fixed)});
   }
   for (const MotionRequest& m : request.motions) {
     model.motions.push_back({.phyxels = next(),
@@ -328,7 +334,9 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                              .velocity = m.velocity,
                              .amplitude = m.amplitude,
                              .frequency = m.frequency,
-                             .axes = m.axes});
+                             .axes = m.axes,
+                             .body = request.name,
+                             .set = numbered("motion", m, request.motions)});
   }
   for (std::size_t l = 0; l < request.loads.size(); ++l) {
     const LoadRequest& asked = request.loads[l];

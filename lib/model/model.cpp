@@ -297,6 +297,22 @@ Path Motion::path_at(double time) const {
   return path;
 }
 
+namespace {
+/// The path that leads from one instant to another.
+Path between(const Path& before, const Path& after) {
+  return {after.displacement - before.displacement, after.turn - before.turn, after.about};
+}
+}  // namespace
+
+Path Motion::last_step(double time, double dt) const {
+  return between(path_at(std::max(time - dt, 0.0)), path_at(time));
+}
+
+Path Motion::mean_step(double time, double dt) const {
+  const Path both = between(path_at(std::max(time - dt, 0.0)), path_at(time + dt));
+  return {0.5 * both.displacement, 0.5 * both.turn, both.about};
+}
+
 Cloud rest_cloud(const BodySource& source) {
   if (!source.file.empty()) return read_body(source.file);
   if (!source.cloud.empty()) {

@@ -112,7 +112,12 @@ std::vector<SceneSection> make_sections() {
        "Box and ball selections move along with each copy."},
       {"body.fixed", "[[body.fixed]]", "selection",
        "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
-       "some: `axes = \"z\"` of all phyxels is plane strain."},
+       "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
+       "of its own in `reactions.csv`, which has one line for each frame and set, named by its body and "
+       "entry, e.g. `fixed 1`, `motion 2`: force [N] and torque [N m] of the support on the body, and the "
+       "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
+       "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
+       "both sets, along their axes."},
       {"body.motion", "[[body.motion]]", "selection",
        "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
        "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "

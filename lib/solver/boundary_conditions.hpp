@@ -24,6 +24,13 @@ inline void add_loads(const Model& model, double time, std::vector<Vec3d>& force
   for_each_load(model, time, [&](Index i, Vec3d load) { force[i] += load; });
 }
 
+/// Adds the loads at full size to forces [N], shape [n].
+inline void add_full_loads(const Model& model, std::vector<Vec3d>& force) {
+  for (const Load& load : model.loads) {
+    for (std::size_t k = 0; k < load.phyxels.size(); ++k) force[load.phyxels[k]] += load.force[k];
+  }
+}
+
 /// Returns 1 for the free axes of each phyxel and 0 for prescribed ones, shape [n]. Empty for a
 /// model without prescribed motions.
 inline std::vector<Vec3d> free_axes(const Model& model) {

@@ -78,6 +78,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     }
   }
 
+  std::vector<std::int64_t> support_work() const override { return words_of(support_work_.sums()); }
+
   void put_displacements(std::span<const Vec3d> displacement) override {
     check_displacements(displacement, model_.size());
     for (Index i = 0; i < model_.size(); ++i) {
@@ -173,6 +175,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     if (!external_force_.empty()) {
       list.push_back({"external forces", external_force_.size() * sizeof(Vec3d)});
     }
+    if (support_work_.bytes() > 0) list.push_back({"work of supports", support_work_.bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -188,6 +191,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::layout_;
   using Passes::model_;
   using Passes::pull_;
+  using Passes::support_work_;
   using Passes::threads_;
   using Passes::velocity_;
 

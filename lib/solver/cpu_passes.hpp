@@ -20,6 +20,7 @@
 #include "solver/boundary_conditions.hpp"
 #include "solver/cpu_arrays.hpp"
 #include "solver/first_error.hpp"
+#include "solver/support_work.hpp"
 
 namespace phyxel {
 
@@ -172,17 +173,26 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     halo.finish();
   }
 
-  /// Moves phyxels with prescribed motions, either those of the boundary or the others. Ghosts have
-  /// the values of their owners, whose free axes are not known here.
+  /// Moves phyxels with prescribed motions, either those of the boundary or the others, and adds up
+  /// the work of supports that move. Ghosts have the values of their owners, whose free axes are
+  /// not known here.
   void follow_motions(double time, double dt, bool of_boundary) {
-    for (const Motion& motion : model_.motions) {
+    support_work_.begin_step(dt);
+    for (std::size_t m = 0; m < model_.motions.size(); ++m) {
+      const Motion& motion = model_.motions[m];
       const Path before = motion.path_at(time), after = motion.path_at(time + dt);
+      const Path mean_step = motion.mean_step(time, dt);
+      const bool works = !motion.stands_still();
+      std::size_t owned = 0;
       for (const Index i : motion.phyxels) {
-        if (!model_.owns(i) || (!boundary_.empty() && boundary_[i]) != of_boundary) continue;
+        if (!model_.owns(i)) continue;
+        const std::size_t k = owned++;
+        if ((!boundary_.empty() && boundary_[i]) != of_boundary) continue;
         const Index slot = layout_.slot(i);
-        const Vec3d x = model_.position[i], u = after.at(x);
+        const Vec3d x = model_.position[i], u = after.at(x), free = this->get3(velocity_, slot);
         this->set_state(i, motion.along_axes(u, this->get3(displacement_, slot)),
-                        motion.along_axes((u - before.at(x)) / dt, this->get3(velocity_, slot)));
+                        motion.along_axes((u - before.at(x)) / dt, free));
+        if (works) support_work_.add(m, k, this->get3(velocity_, slot), free, mean_step.at(x));
       }
     }
   }
@@ -438,6 +448,7 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   }
 
   int threads_;
+  StepWork support_work_{model_};
   std::vector<char> boundary_;  // result of `boundary_phyxels`
   std::vector<Run> boundary_runs_, interior_runs_;
   std::vector<std::vector<Run>> interior_pieces_;

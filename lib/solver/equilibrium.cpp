@@ -32,11 +32,7 @@ Balance whole_balance(const Model& model, const Newton& newton) {
   }
   balance.applied = vectors.make();
   vectors.for_each([&](Index i) { balance.applied[i] = model.mass[i] * model.gravity; });
-  for (const Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-      balance.applied[load.phyxels[k]] += load.force[k];
-    }
-  }
+  add_full_loads(model, balance.applied);
   newton.add_external_forces(balance.applied);
   return balance;
 }

@@ -18,7 +18,10 @@ const double share_of_step = 1 - std::sqrt(0.5);  // γ
 }  // namespace
 
 ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
-    : model_(model), backend_(backend), newton_(model, backend, most_newton_steps) {
+    : model_(model),
+      backend_(backend),
+      newton_(model, backend, most_newton_steps),
+      support_work_(no_support_work(model)) {
   const OwnedVectors& vectors = newton_.vectors();
   balance_.target = vectors.make();
   balance_.centre = vectors.make();
@@ -44,7 +47,8 @@ void ImplicitStep::find_applied(double time) {
 
 /// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): substituting v' in the first equation
 /// leaves a balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
-void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u, Vector& v) {
+ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u,
+                                              Vector& v) {
   const OwnedVectors& vectors = newton_.vectors();
   find_applied(time);
   prescribe_displacements(model_, time, balance_.target);
@@ -78,11 +82,24 @@ void ImplicitStep::take_stage(double time, double s, const Vector& from, Vector&
   }
   // Velocities are updated from forces rather than displacements: internal forces sum to zero, so
   // momentum is conserved.
-  const Vector force = newton_.inner_forces(u);
+  Vector force = newton_.inner_forces(u);
   vectors.for_each([&](Index i) {
-    const Vec3d acceleration = (1 / model_.mass[i]) * (force[i] + balance_.applied[i]);
+    force[i] += balance_.applied[i];
+    const Vec3d acceleration = (1 / model_.mass[i]) * force[i];
     v[i] = by_components(balance_.free[i], (1 / slowed(i)) * (v[i] + s * acceleration));
   });
+  return force;
+}
+
+void ImplicitStep::add_support_work(const SupportInstant& now) {
+  for (std::size_t m = 0; m < support_work_.size(); ++m) {
+    const Motion& motion = model_.motions[m];
+    if (motion.stands_still()) continue;
+    const Path mean_step = motion.mean_step(now.time, now.dt);
+    for_each_support_force(model_, motion, now, [&](Index i, Vec3d support) {
+      support_work_[m].add(dot(support, mean_step.at(model_.position[i])));
+    });
+  }
 }
 
 void ImplicitStep::take(State& state) {
@@ -103,6 +120,12 @@ void ImplicitStep::take_both_stages(State& state) {
   const Vector u = state.displacement, v = state.velocity;
   Vector& u2 = state.displacement;
   Vector& v2 = state.velocity;
+  Vector first_force;
+  if (state.step == 0 && !support_work_.empty()) {
+    find_applied(begin);
+    first_force = newton_.inner_forces(u);
+    vectors.for_each([&](Index i) { first_force[i] += balance_.applied[i]; });
+  }
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
@@ -114,7 +137,7 @@ void ImplicitStep::take_both_stages(State& state) {
     v2[i] = v[i] + rest * acceleration;
   });
   backend_.set_history_interval(dt);
-  take_stage(end, s, from, u2, v2);
+  Vector force = take_stage(end, s, from, u2, v2);
   Vector before = vectors.make(), after = vectors.make();
   prescribe_displacements(model_, begin, before);
   prescribe_displacements(model_, end, after);
@@ -131,6 +154,10 @@ void ImplicitStep::take_both_stages(State& state) {
   state.history_interval = history.history_interval;
   ++state.step;
   state.time = end;
+  if (model_.motions.empty()) return;
+  if (!first_force.empty()) add_support_work({begin, dt, false, v, first_force});
+  add_support_work({end, dt, false, v2, force});
+  end_force_ = std::move(force);
 }
 
 }  // namespace phyxel

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "solver/newton.hpp"
+#include "solver/support_work.hpp"
 
 namespace phyxel {
 
@@ -25,6 +26,11 @@ class ImplicitStep {
 
   /// Sums over all steps, and the largest residual.
   const NewtonReport& work() const { return work_; }
+  /// All forces but those of supports [N] at the end of the last step, shape [n]; empty before the
+  /// first step, and without supports.
+  const std::vector<Vec3d>& end_force() const { return end_force_; }
+  /// Work of supports [J] by the rule of `Solver::support_work`, on the phyxels of this rank.
+  const SupportWork& support_work() const { return support_work_; }
 
  private:
   using Vector = Newton::Vector;
@@ -32,8 +38,11 @@ class ImplicitStep {
   /// Takes a stage of length s [s] that ends at `time` [s].
   /// @param from U of the stage [m]. @param u start of the search; receives u' [m]. @param v V of
   /// the stage; receives v' [m/s]
-  void take_stage(double time, double s, const Vector& from, Vector& u, Vector& v);
+  /// @returns all forces but those of supports at u' [N]
+  Vector take_stage(double time, double s, const Vector& from, Vector& u, Vector& v);
   void take_both_stages(State& state);
+  /// Adds the work of supports at an instant.
+  void add_support_work(const SupportInstant& now);
 
   const Model& model_;
   Backend& backend_;
@@ -41,6 +50,8 @@ class ImplicitStep {
   Balance balance_;
   std::vector<double> damping_;  ///< Damping [1/s], shape [n]; empty if there is none.
   NewtonReport work_;
+  Vector end_force_;
+  SupportWork support_work_;
 };
 
 }  // namespace phyxel

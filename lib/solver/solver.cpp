@@ -9,9 +9,11 @@
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
+#include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/newton.hpp"
+#include "solver/support_work.hpp"
 
 namespace phyxel {
 
@@ -71,7 +73,9 @@ Solver::Solver(Backend& backend, const State& start)
       steps_(start.step),
       first_step_(start.step),
       dt_(start.dt),
-      looks_(start.looks) {
+      looks_(start.looks),
+      work_before_(start.support_work),
+      work_of_backend_(backend.support_work()) {
   check_times(start);
   backend_.upload(start);
 }
@@ -80,6 +84,12 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
+  const std::size_t words = words_of(no_support_work(model)).size();
+  if (!start.support_work.empty() && start.support_work.size() != words) {
+    throw InputError(fmt::format(
+        "support_work of a state has {} words; allowed for the supports of this model: {} or none",
+        start.support_work.size(), words));
+  }
   model_ = &model;
   method_ = method;
   if (method == Method::equilibrium && start.step == 0) {
@@ -155,7 +165,26 @@ State Solver::state() const {
   state.dt = dt_;
   state.time = time();
   state.looks = looks_;
+  state.support_work = support_work();
   return state;
+}
+
+std::span<const Vec3d> Solver::end_force() const {
+  if (!implicit_) return {};
+  return implicit_->end_force();
+}
+
+std::vector<std::int64_t> Solver::support_work() const {
+  SupportWork work;
+  add_words(work, backend_.support_work());
+  add_words(work, work_of_backend_, -1);
+  add_words(work, work_of_changes_);
+  if (implicit_) add_words(work, words_of(implicit_->support_work()));
+  if (model_ && model_->share && !work.empty()) {
+    add_over_ranks(*model_->share->communicator, work);
+  }
+  add_words(work, work_before_);
+  return words_of(std::move(work));
 }
 
 SolverWork Solver::work() const {

@@ -11,6 +11,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/present_forces.hpp"
 
 namespace phyxel {
 namespace {
@@ -137,8 +138,28 @@ void Solver::change_step(std::int64_t steps, double dt) {
   });
   first_step_ += steps - steps_;  // the number of steps taken does not change
   state.step = steps_ = steps;
+  const double step_before = dt_;
   state.dt = dt_ = dt;
   backend_.put(state);
+  change_support_work(step_before, dt);
+}
+
+void Solver::change_support_work(double before, double after) {
+  if (!has_moving_supports(*model_)) return;
+  SupportWork work = no_support_work(*model_);
+  add_words(work, work_of_changes_);
+  const PresentForces present(*model_, backend_, *this);
+  for (std::size_t m = 0; m < work.size(); ++m) {
+    const Motion& motion = model_->motions[m];
+    if (motion.stands_still()) continue;
+    // The next step takes the one before for a step of its own size.
+    const Path taken = motion.last_step(time(), before), missed = motion.last_step(time(), after);
+    for_each_support_force(*model_, motion, present.instant(), [&](Index i, Vec3d force) {
+      const Vec3d x = model_->position[i];
+      work[m].add(0.5 * dot(force, taken.at(x) - missed.at(x)));
+    });
+  }
+  work_of_changes_ = words_of(std::move(work));
 }
 
 void Solver::halve_step() {

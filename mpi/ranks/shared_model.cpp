@@ -128,6 +128,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     Looks looks;
   };
   Header now{};
+  std::vector<std::int64_t> support_work;
   ranks_.collectively([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time; allowed: 1 or more", length));
@@ -137,6 +138,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     }
     const State header = checkpoint->state(0, 0);
     now = {header.step, header.time, header.dt, header.history_interval, header.looks};
+    support_work = header.support_work;
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -147,6 +149,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.dt = now.dt;
   state.history_interval = now.history_interval;
   state.looks = now.looks;
+  state.support_work = ranks_.communicator().broadcast(support_work);
   return state;
 }
 

@@ -50,6 +50,11 @@ spin = [0.0, 1.0, 0.0]
 young = 6e5
 poisson = 0.3
 density = 1000
+[[body.motion]]
+indices = [3, 40, 200, 201, 202, 203]
+amplitude = [0.0, 0.0, 0.01]
+frequency = 8
+axes = "z"
 )");
   }
   void use_ranks(int count) {

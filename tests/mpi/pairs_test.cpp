@@ -97,6 +97,14 @@ void expect_same_bits(const Model& here, const Course& whole, const Course& shar
   EXPECT_EQ(d.total_energy(), e.total_energy());
   EXPECT_EQ(d.momentum, e.momentum);
   EXPECT_EQ(d.internal_torque, e.internal_torque);
+  ASSERT_EQ(whole.reactions.size(), share.reactions.size());
+  for (std::size_t k = 0; k < whole.reactions.size(); ++k) {
+    const Reaction &r = whole.reactions[k], &s = share.reactions[k];
+    EXPECT_EQ(r.centre, s.centre);
+    EXPECT_EQ(r.force, s.force);
+    EXPECT_EQ(r.torque, s.torque);
+    EXPECT_TRUE(r.work == s.work || (std::isnan(r.work) && std::isnan(s.work))) << r.set;
+  }
 }
 
 /// A row on all ranks has the bits of one rank; on one rank of a GPU, those of launches over tiles.

@@ -446,6 +446,23 @@ def test_trajectories_come_back(tmp_path):
         phyxel.Trajectory(tmp_path)
 
 
+def test_reactions_carry_the_weight_and_come_back(tmp_path):
+    s = simulation(body={"fixed": [{"region": "x-"}]}, gravity=[0, 0, -9.81],
+                   solver={"device": "cpu", "precision": "double", "method": "equilibrium"})
+    s.record(tmp_path / "out")
+    s.run()
+    support, = s.reactions()
+    assert (support["body"], support["set"], support["work"]) == ("beam", "fixed 1", 0)
+    weight = 9.81 * s.mass.sum()
+    assert support["force"] == pytest.approx((0, 0, weight), abs=1e-6 * weight)
+    # Half the length from the clamp, less what bending takes from it.
+    assert support["torque"][1] == pytest.approx(-0.5 * weight, rel=0.06)
+    written = phyxel.Trajectory(tmp_path / "out").reactions
+    assert list(written) == [("beam", "fixed 1")]
+    assert written["beam", "fixed 1"]["force_z"][-1] == support["force"][2]
+    assert simulation().reactions() == []
+
+
 def test_surfaces_follow():
     s = simulation(body={"velocity": [1, 0, 0]})
     s.step(50)

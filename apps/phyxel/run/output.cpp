@@ -67,10 +67,11 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
     stress_fields(model(), *backend_, von_mises ? &frame.von_mises : nullptr,
                   volume_ratio ? &frame.volume_ratio : nullptr);
   }
-  hand_over(moment, [this, diagnostics = good->diagnostics](ChunkedSource& values) {
-    const Phase writing("writing a frame");
-    recorder_->write(diagnostics, values);
-  });
+  hand_over(moment,
+            [this, diagnostics = good->diagnostics, reactions = reactions_](ChunkedSource& values) {
+              const Phase writing("writing a frame");
+              recorder_->write(diagnostics, values, reactions);
+            });
 }
 
 void Run::write_state() {

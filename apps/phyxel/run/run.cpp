@@ -99,6 +99,7 @@ void Run::execute() {
       begin_ ? begin_->info.watched
              : Watched{now_.total_energy(), now_.largest_speed, now_.kinetic_and_elastic_energy()};
   peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
+  reactions_ = find_reactions(model(), *backend_, solver_);
   if (finished) checkpoint_ = resumed_from_;
   if (!finished) step_to_end();
   draw_and_sum_up();
@@ -163,6 +164,10 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     if (frame) writer_.wait_for_room();
     const auto look_start = Clock::now();
     now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
+    if (frame) {
+      reactions_ =
+          spent_.timed("energies", [&] { return find_reactions(model(), *backend_, solver_); });
+    }
     watch.check(now_, &control_);
     control_.see(solver_);
     show_progress(progress, now_);

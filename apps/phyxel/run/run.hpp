@@ -165,6 +165,8 @@ class Run {
                                     const Traffic& traffic) const;
 
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
+  /// Prints the reactions at the end.
+  void say_reactions() const;
 
   const RunOptions& options_;
   StopSignal signals_{ranks().rank() == 0};  // first, to catch signals during set-up
@@ -187,6 +189,7 @@ class Run {
   std::int64_t first_step_ = 0;
   int halvings_told_ = plan_.halvings;  // largest number of halvings printed so far
   Diagnostics start_diagnostics_, now_;
+  std::vector<Reaction> reactions_;        // of the start, or the last frame
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // transport between ranks
   std::vector<int> gpus_;                  // GPU of each rank

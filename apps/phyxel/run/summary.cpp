@@ -26,6 +26,23 @@ double rounding_energy(const Model& model) {
   return energy;
 }
 
+nlohmann::ordered_json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
+
+nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Reaction& r : reactions) {
+    nlohmann::ordered_json& entry = list.emplace_back();
+    entry = {{"body", r.body},
+             {"set", r.set},
+             {"force_n", json_of(r.force)},
+             {"torque_n_m", json_of(r.torque)},
+             {"centre_m", json_of(r.centre)},
+             {"work_j", nullptr}};
+    if (std::isfinite(r.work)) entry["work_j"] = r.work;
+  }
+  return list;
+}
+
 }  // namespace
 
 nlohmann::ordered_json Run::identity() const {
@@ -158,11 +175,30 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"internal_force_balance", force_balance(now)},
             {"internal_torque_balance", torque_balance(now)},
             {"inverted_phyxels", now.inverted},
+            {"reactions", json_of(reactions_)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
             {"checkpoint", checkpoint_.string()}});
   return j;
+}
+
+void Run::say_reactions() const {
+  constexpr std::size_t most_printed = 8;
+  const std::size_t printed = std::min(reactions_.size(), most_printed);
+  for (std::size_t k = 0; k < printed; ++k) {
+    const Reaction& r = reactions_[k];
+    fmt::print(
+        "  reaction    {}, {}: force ({:.4g}, {:.4g}, {:.4g}) N, torque ({:.4g}, {:.4g}, {:.4g}) N "
+        "m "
+        "about ({:.4g}, {:.4g}, {:.4g}) m{}\n",
+        r.body, r.set, r.force.x, r.force.y, r.force.z, r.torque.x, r.torque.y, r.torque.z,
+        r.centre.x, r.centre.y, r.centre.z,
+        std::isnan(r.work) || r.work == 0 ? "" : fmt::format(", work {:.4g} J", r.work));
+  }
+  if (printed < reactions_.size()) {
+    fmt::print("              {} more sets: reactions.csv\n", reactions_.size() - printed);
+  }
 }
 
 void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {
@@ -212,6 +248,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
   }
   fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
              force_balance(now), torque_balance(now));
+  say_reactions();
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

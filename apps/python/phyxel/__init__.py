@@ -129,8 +129,8 @@ class _Family:
 
 
 class Trajectory:
-    """What a run has written: `phyxels` and `surface`, frames each, and `energy`, the columns of
-    energy.csv.
+    """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
+    energy.csv, and `reactions`, those of reactions.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -156,6 +156,23 @@ class Trajectory:
             rows = list(csv.reader(file))
         table = numpy.array(rows[1:], dtype=float).reshape(-1, len(rows[0]))
         return {name.split(" [")[0]: table[:, k] for k, name in enumerate(rows[0])}
+
+    @property
+    def reactions(self):
+        """{(body, set): {column: values}}, one for each frame; forces [N], torques [N m], work [J].
+        Sets are entries of fixed and motion, e.g. ("beam", "fixed 1"). Empty without any."""
+        file = self.directory / "reactions.csv"
+        if not file.exists():
+            return {}
+        with open(file, newline="") as text:
+            header, *rows = csv.reader(text)
+        names = [name.split(" [")[0] for name in header]
+        sets = {}
+        for row in rows:
+            sets.setdefault((row[2], row[3]), []).append(
+                [float(cell or "nan") for cell in row[:2] + row[4:]])
+        columns = names[:2] + names[4:]
+        return {key: dict(zip(columns, numpy.array(table).T)) for key, table in sets.items()}
 
     def __len__(self):
         return len(self.times)

@@ -79,8 +79,15 @@ struct Motion {
   Vec3d amplitude{};
   double frequency = 0;
   Axes axes{};
+  std::string body = {};  ///< Name of the body to which the phyxels belong.
+  std::string set = {};   ///< Entry of that body in the scene, e.g. "fixed 1", "motion 2".
   /// Where it is at a time [s].
   Path path_at(double time) const;
+  /// Mean of the displacements over the step from `time` [s] and over the step before, both of
+  /// `dt` [s]; nothing moves before t = 0.
+  Path mean_step(double time, double dt) const;
+  /// Displacement over the step that leads to `time` [s].
+  Path last_step(double time, double dt) const;
   /// Of displacement and rotation, so much of the way.
   Path path_after(double share) const;
   /// Whether it only holds.

@@ -18,6 +18,7 @@
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/progress.hpp"
 #include "phyxel/ranks.hpp"
+#include "phyxel/reactions.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/shapes.hpp"

@@ -21,6 +21,7 @@ struct Frame {
   const State* state = nullptr;
   const SurfelState* surfels = nullptr;  ///< Surfels; null without a surface family.
   Diagnostics diagnostics;
+  std::vector<Reaction> reactions;   ///< Reactions of supports (`find_reactions`), or none.
   std::vector<double> von_mises;     ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
   std::vector<double> volume_ratio;  ///< det F, shape [n] or empty.
 };
@@ -91,6 +92,7 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   phyxels_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, one poly-vertex cell a body;
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
+///   reactions.csv                              of a scene with supports: one line a frame and set
 ///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
@@ -112,7 +114,8 @@ class Recorder {
   ///   writing fails: earlier frames stay intact
   void write(const Frame& frame);
   /// Writes a frame whose values come from a source, chunk by chunk. @throws OutputError likewise
-  void write(const Diagnostics& diagnostics, ChunkedSource& values);
+  void write(const Diagnostics& diagnostics, ChunkedSource& values,
+             const std::vector<Reaction>& reactions = {});
 
   /// Flushes all frames to the disk, so that a checkpoint that counts them finds them after a power
   /// cut.
@@ -126,7 +129,7 @@ class Recorder {
   std::int64_t frames_written() const { return frames_; }
   /// The output folder.
   const std::filesystem::path& directory() const { return directory_; }
-  std::vector<std::filesystem::path> files() const;  ///< Series files and the log, for summaries.
+  std::vector<std::filesystem::path> files() const;  ///< Series files and logs, for summaries.
 
  private:
   void remove_unfinished() const;  ///< Removes temporary files of a killed run.
@@ -138,11 +141,12 @@ class Recorder {
   const Model& model_;
   const Scene& scene_;
   std::filesystem::path directory_;
-  bool writes_phyxels_, writes_surface_;
+  bool writes_phyxels_, writes_surface_, writes_reactions_;
   std::int64_t frames_ = 0;
   SeriesFile phyxels_, surface_;
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
+  std::size_t reactions_size_ = 0;               // size of reactions.csv [bytes]
 };
 
 /// The content of a frame.

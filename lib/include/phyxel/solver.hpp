@@ -5,7 +5,9 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/equilibrium.hpp"
@@ -140,14 +142,29 @@ class Solver {
   const Looks& looks() const { return looks_; }
   /// When the present state is, for `diagnose`.
   Instant now() const;
-  State state() const;  ///< Downloaded copy.
+  /// A downloaded copy. Collective on a share whose supports move.
+  State state() const;
   /// Since this solver began.
   SolverWork work() const;
+  /// The method of its steps.
+  Method method() const { return method_; }
+  /// All forces but those of supports [N] at the end of the last implicit step, shape [n]; empty
+  /// before the first one, for other methods, and without supports.
+  std::span<const Vec3d> end_force() const;
+  /// Work [J] that the support of each motion has done since t = 0: words of exact sums over all
+  /// ranks, shape [motions, words]; empty if no support moves. Each step adds the reactions at its
+  /// start, after Verlet's steps, or at its end, after implicit ones, times the mean of the
+  /// displacements over the steps before and after: trapezoids, but for the last half
+  /// (`find_reactions` completes them). A search for equilibrium adds nothing. Collective on a
+  /// share, for a solver that was made with the model.
+  std::vector<std::int64_t> support_work() const;
 
  private:
   void step_by_newton();
   /// Goes on by steps of dt [s], of which the time so far is `steps`.
   void change_step(std::int64_t steps, double dt);
+  /// Corrects the work of supports for a step that changes from `before` to `after` [s].
+  void change_support_work(double before, double after);
 
   const Model* model_ = nullptr;  ///< Of a method that needs it.
   Backend& backend_;
@@ -160,6 +177,9 @@ class Solver {
   NewtonObserver observer_;
   bool begun_ = false;  ///< The start is that of an interrupted search for rest.
   SolverWork rest_;     ///< Of the search for rest.
+  // Work of supports, as words: that of the start, of all ranks; that of the backend before this
+  // solver began; and corrections where the step changed, the last two of this rank.
+  std::vector<std::int64_t> work_before_, work_of_backend_, work_of_changes_;
 };
 
 }  // namespace phyxel

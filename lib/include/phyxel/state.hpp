@@ -63,6 +63,9 @@ struct State {
   std::int64_t step = 0;
   double dt = 0;  ///< [s]
   Looks looks;
+  /// Work that the support of each motion has done in earlier steps, by the rule of
+  /// `Solver::support_work`: words of exact sums over all ranks. Empty if nothing moves.
+  std::vector<std::int64_t> support_work;
 };
 
 /// Time level of a backend's state. Velocities are stored at `time - lag` (lag is dt/2 for
@@ -86,6 +89,19 @@ struct Stiffening {
   double ratio = 1;
   double stretch = 1;  ///< Its largest principal stretch.
   Index phyxel = -1;   ///< Its global id; -1: there is no phyxel.
+};
+
+/// The reaction of the support of one set of phyxels, an entry of `fixed` or `motion` of a body, at
+/// one instant.
+struct Reaction {
+  std::string body;  ///< Name of the body.
+  std::string set;   ///< Entry of the body, e.g. "fixed 1", "motion 2".
+  Vec3d centre;      ///< Centre of mass of the set at rest [m], about which the torque is taken.
+  Vec3d force;       ///< Force of the support on the body [N].
+  Vec3d torque;      ///< Torque of these forces about `centre`, on present positions [N m].
+  /// Work that the support has done on the body since t = 0 [J]; NaN for a set that a search for
+  /// equilibrium has moved, which follows no path.
+  double work = 0;
 };
 
 /// Energies and conserved quantities at one instant, all bodies together.

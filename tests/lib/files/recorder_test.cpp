@@ -195,6 +195,65 @@ TEST_F(Recording, TheLogHasOneLineAFrameAndUnitsInItsHeader) {
   EXPECT_FALSE(std::getline(log, line));
 }
 
+TEST_F(Recording, ReactionsHaveOneLineAFrameAndSetAndAreCutBackToTheCheckpoint) {
+  const fs::path file = folder_ / "out" / "reactions.csv";
+  {
+    Recorder none(model_, scene_, true);
+    record(none, 0);
+    EXPECT_FALSE(fs::exists(file));  // nothing is fixed or moved
+  }
+  model_.motions.resize(2);
+  const auto record_with = [&](Recorder& recorder, int k) {
+    Frame frame = test::TwoBodiesFrame(model_, k).frame();
+    const test::TwoBodiesFrame data(model_, k);
+    frame.state = &data.state;
+    frame.surfels = &data.surfels;
+    frame.reactions = {{.body = "a, \"b\"", .set = "fixed 1", .force = {0.1 * k, 2, 3}},
+                       {.body = "c",
+                        .set = "motion 1",
+                        .torque = {1, 2, 3},
+                        .work = std::numeric_limits<double>::quiet_NaN()}};
+    recorder.write(frame);
+  };
+  {
+    Recorder recorder(model_, scene_, true);
+    for (int k = 0; k < 4; ++k) record_with(recorder, k);
+  }
+  const std::string log = text_of(file);
+  std::istringstream lines(log);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line,
+            "step,time [s],body,set,force_x [N],force_y [N],force_z [N],torque_x [N m],"
+            "torque_y [N m],torque_z [N m],work [J],centre_x [m],centre_y [m],centre_z [m]");
+  std::getline(lines, line);
+  EXPECT_EQ(line, "0,0,\"a, \"\"b\"\"\",fixed 1,0,2,3,0,0,0,0,0,0,0");
+  std::getline(lines, line);
+  EXPECT_EQ(line, "0,0,c,motion 1,0,0,0,1,2,3,,0,0,0");  // work that is not known
+  EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1 + 4 * 2);
+
+  Recorder resumed(model_, scene_, false, Continuation{2});
+  const std::string kept = text_of(file);
+  EXPECT_EQ(std::count(kept.begin(), kept.end(), '\n'), 1 + 2 * 2);
+  for (int k = 2; k < 4; ++k) record_with(resumed, k);
+  EXPECT_EQ(text_of(file), log);
+
+  // A folder of an earlier version of the program has no reactions.
+  fs::remove(file);
+  Recorder again(model_, scene_, false, Continuation{3});
+  record_with(again, 3);
+  EXPECT_EQ(text_of(file), log.substr(0, log.find('\n') + 1) + log.substr(log.find("30,0.3")));
+
+  write("out/reactions.csv", "step,force\n");
+  try {
+    Recorder(model_, scene_, false, Continuation{3});
+    ADD_FAILURE() << "another file was taken for a log of reactions";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("reactions.csv: begins with \"step,force\""));
+    EXPECT_THAT(error.what(), HasSubstr("allowed: another folder"));
+  }
+}
+
 TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
   {
     Recorder recorder(model_, scene_, false);

@@ -16,6 +16,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/law_table.hpp"
+#include "phyxel/reactions.hpp"
 #include "phyxel/solver.hpp"
 #include "support/clouds.hpp"
 #include "support/pairs/combinations.hpp"
@@ -24,9 +25,10 @@ namespace phyxel::testing {
 
 /// A few steps of a combination, and the answers of its backend after them.
 struct Course {
-  State before, after;       ///< Before and after the last step.
-  std::vector<Vec3d> force;  ///< Internal forces after it [N], shape [n].
-  Diagnostics energies;      ///< After it.
+  State before, after;              ///< Before and after the last step.
+  std::vector<Vec3d> force;         ///< Internal forces after it [N], shape [n].
+  Diagnostics energies;             ///< After it.
+  std::vector<Reaction> reactions;  ///< After it.
 };
 
 /// Takes six steps of Verlet's method, two implicit ones, or one search for equilibrium. Collective
@@ -44,6 +46,7 @@ inline Course course_of(const Combination& row, const Model& model, Backend& bac
   course.after = solver.state();
   backend.internal_forces(course.force);
   course.energies = diagnose(model, backend, solver.now());
+  course.reactions = find_reactions(model, backend, solver);
   return course;
 }
 
@@ -79,6 +82,7 @@ class Physics {
     if (row_.is(method, "implicit")) check_implicit();
     if (row_.is(method, "equilibrium")) check_equilibrium();
     check_terms();
+    if (!row_.is(method, "implicit")) check_reactions();
   }
 
  private:
@@ -234,6 +238,45 @@ class Physics {
       std::fill(rates.begin() + part.begin, rates.begin() + part.end, part.material.damping);
     }
     return rates;
+  }
+  /// Reactions are masses times prescribed accelerations, less all other forces, along the axes of
+  /// each motion; at equilibrium there are no accelerations.
+  void check_reactions() {
+    const State& state = course_.after;
+    const bool steps = row_.is(method, "verlet");
+    const std::vector<Vec3d> force = reference_forces(state),
+                             applied = applied_at(steps ? state.time
+                                                        : std::numeric_limits<double>::infinity());
+    const std::vector<double> damping_of = damping_rates();
+    ASSERT_EQ(course_.reactions.size(), whole_.motions.size());
+    for (std::size_t k = 0; k < whole_.motions.size(); ++k) {
+      const Motion& motion = whole_.motions[k];
+      const Reaction& found = course_.reactions[k];
+      const double dt = state.dt;
+      const Path now = motion.path_at(state.time), next = motion.path_at(state.time + dt);
+      Vec3d sum, torque;
+      double scale = 0;  // of the terms of the sum [N]
+      for (const Index i : motion.phyxels) {
+        Vec3d reaction = -(force[i] + applied[i]);
+        scale += norm(force[i]) + norm(applied[i]);
+        if (steps) {
+          const double c = damping_of[i], keep = std::exp(-c * dt),
+                       gain = c > 0 ? (1 - keep) / c : dt;
+          const Vec3d x = whole_.position[i], change = (next.at(x) - now.at(x)) / dt;
+          reaction += (whole_.mass[i] / gain) * (change - keep * state.velocity[i]);
+          scale += whole_.mass[i] / gain * (norm(change) + norm(state.velocity[i]));
+        }
+        reaction = motion.along_axes(reaction, {});
+        sum += reaction;
+        torque += cross(whole_.position[i] + state.displacement[i] - found.centre, reaction);
+      }
+      // Bodies are shorter than a metre.
+      const double rounding = std::max(force_tolerance(), 1e-13) * scale;
+      EXPECT_LE(norm(found.force - sum), rounding) << found.set;
+      EXPECT_LE(norm(found.torque - torque), rounding) << found.set;
+      EXPECT_TRUE(motion.stands_still() ? found.work == 0
+                                        : found.work != 0 && std::isnan(found.work) == !steps);
+    }
   }
   /// 1 along free axes.
   std::vector<Vec3d> free_axes() const {

@@ -49,6 +49,14 @@ PHYXEL_HD Vec3<Real> verlet_velocity_damped(Vec3<Real> velocity, Vec3<Real> acce
   return fused(keep, velocity, gain * acceleration);
 }
 
+/// The force [N] of a support over a step: the one that brings a phyxel to the prescribed velocity
+/// where all other forces lead to the velocity `free` (both in m/s). It is zero along free axes,
+/// where the two are equal.
+/// @param inertia mass over the gain of the step (`DampedFlow`) [kg/s]
+PHYXEL_HD Vec3<double> support_force(double inertia, Vec3<double> prescribed, Vec3<double> free) {
+  return inertia * (prescribed - free);
+}
+
 /// The correction of a state (u, v) at t with which Verlet's method changes its step. With the
 /// acceleration a and its derivative a'(w) along a vector w,
 ///

@@ -1,0 +1,51 @@
+/// All forces but those of supports at the present state of a solver.
+#pragma once
+
+#include <vector>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/solver.hpp"
+#include "solver/boundary_conditions.hpp"
+#include "solver/support_work.hpp"
+
+namespace phyxel {
+
+/// The state of a solver and the forces on it, from which forces of supports follow.
+class PresentForces {
+ public:
+  /// Downloads the state and evaluates the forces. Collective on a share.
+  PresentForces(const Model& model, Backend& backend, const Solver& solver)
+      : time_(solver.time()),
+        dt_(solver.method() == Method::equilibrium ? 0 : solver.dt()),
+        single_(backend.precision() == Precision::single) {
+    backend.download(state_);
+    const std::span<const Vec3d> known = solver.end_force();
+    if (!known.empty()) {
+      force_.assign(known.begin(), known.end());
+      return;
+    }
+    backend.internal_forces(force_);
+    if (dt_ > 0) {
+      add_loads(model, time_, force_);
+    } else {
+      add_full_loads(model, force_);
+    }
+    const std::span<const Vec3d> external = backend.external_forces();
+    for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];
+    for (std::size_t i = 0; i < force_.size(); ++i) force_[i] += model.mass[i] * model.gravity;
+  }
+
+  /// The present state.
+  const State& state() const { return state_; }
+  /// The instant for `for_each_support_force`, which refers to this object.
+  SupportInstant instant() const { return {time_, dt_, single_, state_.velocity, force_}; }
+
+ private:
+  double time_, dt_;  // [s]; dt 0: at rest
+  bool single_;
+  State state_;
+  std::vector<Vec3d> force_;  // [N]
+};
+
+}  // namespace phyxel
