@@ -176,16 +176,24 @@ def tetgen(folder, switches):
 
 
 def sizes(x, rim, largest, reach, smallest=0.1):
-    """Sizes of elements at points: `largest`, and smaller within `reach` of the clamped section's border (k, 2, 3)."""
+    """Sizes of elements at points: `largest`, and smaller within `reach` of singular edges (k, 2, 3)."""
     steps = (np.arange(20) + 0.5) / 20
     points = (rim[:, None, 0] + steps[:, None] * (rim[:, None, 1] - rim[:, None, 0])).reshape(-1, 3)
     distance = cKDTree(points).query(x)[0]
     return largest * np.clip(distance / reach, smallest ** (1 / 0.65), 1) ** 0.65
 
 
+def quality(nodes, cells):
+    """The least ratio of volume to cubed edges; 1 for a regular tetrahedron, 0 for a flat one."""
+    corner = nodes[cells]
+    edges = corner[:, [0, 0, 0, 1, 1, 2]] - corner[:, [1, 2, 3, 2, 3, 3]]
+    mean = np.sqrt((edges ** 2).sum(2).mean(1))
+    return (2 ** 0.5 * np.linalg.det(corner[:, 1:] - corner[:, :1]) / mean ** 3).min()
+
+
 def tetrahedra(vertices, faces, rim, largest, reach, start=None):
     """Graded tetrahedra inside a closed surface, whose planes they keep; `start`: a coarser mesh of the same body, on
-    whose nodes the sizes of elements are given."""
+    whose nodes the sizes of elements are given. A mesh with a flat element is made again with slightly smaller ones."""
     with tempfile.TemporaryDirectory() as folder:
         with open(os.path.join(folder, "body.smesh"), "w") as file:
             file.write(f"{len(vertices)} 3 0 0\n")
@@ -193,14 +201,33 @@ def tetrahedra(vertices, faces, rim, largest, reach, start=None):
             file.write(f"{len(faces)} 0\n")
             file.writelines("3 {} {} {}\n".format(*f) for f in faces + 1)
             file.write("0\n0\n")
-        if start is None:
-            start = tetgen(folder, "-pq1.6/5Q")
-        nodes, cells = start
+        nodes, cells = tetgen(folder, "-pq1.6/5Q") if start is None else start
         name = os.path.join(folder, "body.b.")
         table(name + "node", f"{len(nodes)} 3 0 0", np.arange(1, len(nodes) + 1), nodes)
         table(name + "ele", f"{len(cells)} 4 0", np.arange(1, len(cells) + 1), cells + 1)
-        table(name + "mtr", f"{len(nodes)} 1", sizes(nodes, rim, largest, reach))
-        return tetgen(folder, "-pq1.6/5mQ")
+        for attempt in range(8):
+            table(name + "mtr", f"{len(nodes)} 1", sizes(nodes, rim, largest * 0.98 ** attempt, reach))
+            mesh = tetgen(folder, "-pq1.6/5mQ")
+            if quality(*mesh) > 1e-6:
+                return mesh
+    raise RuntimeError("TetGen makes flat elements")
+
+
+def creases(vertices, faces, degrees=60):
+    """Re-entrant edges (k, 2, 3) of a closed surface whose faces turn by more than this angle: stresses are singular
+    there."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    face = np.tile(np.arange(len(faces)), 3)
+    key = np.sort(edges, axis=1)
+    order = np.lexsort((key[:, 1], key[:, 0]))
+    one, two = face[order[::2]], face[order[1::2]]
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    middle = vertices[faces].mean(1)
+    rises = ((middle[two] - middle[one]) * normal[one]).sum(1) > 0
+    sharp = (normal[one] * normal[two]).sum(1) < np.cos(np.radians(degrees))
+    return vertices[key[order[::2]][rises & sharp]]
 
 
 def distance_to(points, vertices, faces):
