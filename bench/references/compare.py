@@ -129,7 +129,8 @@ def main():
     options = parser.parse_args()
     with open(os.path.join(HERE, "references.json")) as file:
         references = json.load(file)
-    out = csv.writer(open(options.out, "w", newline="") if options.out else sys.stdout, lineterminator="\n")
+    file = open(options.out, "w", newline="", buffering=1) if options.out else sys.stdout
+    out = csv.writer(file, lineterminator="\n")
     out.writerow(COLUMNS)
     with tempfile.TemporaryDirectory() as folder:
         write_meshes(folder, options.meshes, {references[c]["mesh"][:-4] for c in options.cases if "mesh" in references[c]})
