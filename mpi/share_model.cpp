@@ -247,8 +247,9 @@ void choose_closures(const ShareSetup& setup, WholeBodies& whole, LocalModel& lo
       const BodyRequest& request = setup.scene.bodies[b];
       WholeBody& body = whole.bodies[b];
       if (body.size == 0) continue;
-      const std::span<Part> parts = std::span(local.model.parts)
-                                        .subspan(body.first_part, model_parts_of(whole, local, b).size());
+      const std::span<Part> parts =
+          std::span(local.model.parts)
+              .subspan(body.first_part, model_parts_of(whole, local, b).size());
       double volume = 0;
       for (const Part& part : parts) volume += part.volume;
       body.closure = naming(request, [&] {

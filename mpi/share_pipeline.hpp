@@ -33,8 +33,8 @@ struct WholeBody {
   std::size_t first_part = 0;  ///< Part of the body's own material; its inclusions follow.
   Vec3d origin;                ///< Rest position of the first phyxel [m].
   bool kernel_volumes = false;
-  bool lattice = false;  ///< `Cloud::lattice`.
-  double closure = 0;    ///< Tolerance of closed gradients; 0: they are not closed.
+  bool lattice = false;              ///< `Cloud::lattice`.
+  double closure = 0;                ///< Tolerance of closed gradients; 0: they are not closed.
   std::vector<std::string> regions;  ///< Names of its regions, those that the scene uses first.
   std::size_t used_regions = 0;
   RegionSets region_sets;  ///< Sets of regions that its phyxels are in.

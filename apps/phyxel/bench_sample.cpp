@@ -30,12 +30,9 @@ struct BenchSampleOptions {
 
 /// Stages of the sampler, and the columns of their times.
 const std::vector<std::pair<std::string, std::string>> stages = {
-    {"inspecting the surface", "inspect_s"},
-    {"filling the surface", "fill_s"},
-    {"phyxels on the surface", "surface_s"},
-    {"placing phyxels", "place_s"},
-    {"evening out distances", "relax_s"},
-    {"volumes of phyxels", "volumes_s"}};
+    {"inspecting the surface", "inspect_s"}, {"filling the surface", "fill_s"},
+    {"phyxels on the surface", "surface_s"}, {"placing phyxels", "place_s"},
+    {"evening out distances", "relax_s"},    {"volumes of phyxels", "volumes_s"}};
 
 /// Time spent in each stage [s].
 class StageTimes {

@@ -103,7 +103,7 @@ def summary(page, table):
                           *(short_error(row.number("error")) if row else "–" for row in finest)])
     page.paragraph("## Summary")
     page.paragraph("Errors at the finest resolution of each problem, with the largest number of phyxels (cells have fewer). "
-                   "By default, scenes have nodes (cells in round bodies), or meshes, with α = 0.1.")
+                   "By default, scenes have nodes (cells in round bodies) with α = 0.1, or meshes with α = 0.1, closed to 0.01.")
     page.add(markdown_table(["", "phyxels", *ways], cells))
 
 

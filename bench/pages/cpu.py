@@ -62,6 +62,26 @@ def neighbours_section(page, table):
           f"{sum(row.number(part) for part in parts):.2f}"] for row in table.rows]))
 
 
+def sample_section(page, results):
+    """Adds how fast a mesh is filled with phyxels."""
+    tables = [table for table in (read_if_there(results / f"cpu_sample{more}.csv") for more in ("", "_16")) if table]
+    if not tables:
+        return
+    page.paragraph("## Filling a mesh with phyxels")
+    page.paragraph("`phyxel bench sample`. Seconds, of the whole and of its stages; bytes are the most memory in use at a "
+                   "time, with the cloud itself. The smallest gap between two phyxels is relative to the mean distance to "
+                   "the nearest; *uneven*: the relative standard deviation of that distance.")
+    stages = ["surface_s", "place_s", "relax_s", "volumes_s"]
+    for table in tables:
+        page.paragraph(f"{measured(table)}:")
+        page.add(markdown_table(
+            ["mesh", "triangles", "threads", "phyxels", "on the surface", "phyxels/s", "s", "surface", "lattice", "evening out",
+             "volumes", "bytes/phyxel", "smallest gap", "uneven"],
+            [[row["mesh"], row["triangles"], row["threads"], row["phyxels"], row["on_surface"],
+              f"{row.number('phyxels_per_s'):,.0f}", row["seconds"], *(row[stage] for stage in stages),
+              row["bytes_per_phyxel"], row["smallest_gap"], f"{row.number('gap_spread'):.1%}"] for row in table.rows]))
+
+
 def peer_rows(peer, own):
     """Yields rows of LAMMPS and the speeds of phyxel in double and float, of a similar size on as many cores."""
     for row in peer.rows:
@@ -106,6 +126,7 @@ def make(results, link):
     table = read_if_there(results / "cpu_neighbours.csv")
     if table:
         neighbours_section(page, table)
+    sample_section(page, results)
     beside = peers(results)
     if beside and beside[2]:
         peer, _, rows = beside

@@ -45,7 +45,7 @@ def scene_of(case, reference, clamp, closure, count):
     with open(os.path.join(HERE, "scenes", case + ".toml")) as file:
         text = file.read()
     text = re.sub(r"(?m)^phyxels = .*", f"phyxels = {count}", text)
-    text = re.sub(r"(?m)^closure = .*", f"closure = {closure:g}", text)
+    text = re.sub(r"(?m)^closure = .*", f"closure = {closure}", text)
     if clamp == "cut":
         axis, slack = "xyz".index(reference["axis"]), 1e-4 * reference["longest_side"]
         low, high = [-10.0] * 3, [10.0] * 3
@@ -124,7 +124,7 @@ def main():
     parser.add_argument("--cases", nargs="+", default=["plate_hole", "fandisk", "spot", "spot_sideways", "sphere", "bar_5",
                                                        "bar"])
     parser.add_argument("--counts", nargs="+", type=int, default=[2000, 10000])
-    parser.add_argument("--closures", nargs="+", type=float, default=[0, 1e-3])
+    parser.add_argument("--closures", nargs="+", default=["0", '"auto"'], help="as scenes have them")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", help="CSV file for the table")
     options = parser.parse_args()
@@ -144,12 +144,11 @@ def main():
                         try:
                             x, u, mass, stress = run(options.phyxel, folder, text, options.threads)
                         except RuntimeError as error:
-                            print(f"{case}, {clamp}, closure {closure:g}, {count}: {error}", file=sys.stderr)
+                            print(f"{case}, {clamp}, closure {closure}, {count}: {error}", file=sys.stderr)
                             continue
-                        row = {"case": case, "clamp": clamp, "closure": closure, "phyxels": len(x),
+                        row = {"case": case, "clamp": clamp, "closure": closure.strip('"'), "phyxels": len(x),
                                "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, x, u, mass, stress)}
-                        out.writerow([f"{v:.2e}" if isinstance(v, float) and c != "closure" else v
-                                      for c, v in ((c, row.get(c, "")) for c in COLUMNS)])
+                        out.writerow([f"{v:.2e}" if isinstance(v, float) else v for c, v in ((c, row.get(c, "")) for c in COLUMNS)])
 
 
 if __name__ == "__main__":

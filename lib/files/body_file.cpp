@@ -107,8 +107,8 @@ Cloud read_body(const std::filesystem::path& file) {
     }
   }
   if (in.has("/surface")) cloud.surface = read_surface(in);
-  cloud.lattice = in.has_attribute("/phyxel", "lattice") &&
-                  in.integer_attribute("/phyxel", "lattice") != 0;
+  cloud.lattice =
+      in.has_attribute("/phyxel", "lattice") && in.integer_attribute("/phyxel", "lattice") != 0;
   for (const std::string& name : in.names("/regions")) {
     const std::string path = "/regions/" + name;
     std::vector<Index> phyxels = in.array<Index>(path);

@@ -41,8 +41,8 @@ void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
     const SpatialHash hash = hash_for_repulsion(site, spacing);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
-      Vec3d step = repulsion_step(hash, site[i], static_cast<Index>(i), spacing,
-                                  [](Index) { return 1.0; });
+      Vec3d step =
+          repulsion_step(hash, site[i], static_cast<Index>(i), spacing, [](Index) { return 1.0; });
       const auto [a, b, c] = corners_at(site[i]);
       const Vec3d normal = cross(b - a, c - a);
       const double size2 = dot(normal, normal);

@@ -9,7 +9,7 @@
 namespace phyxel {
 namespace {
 
-constexpr int block_level = 2;             ///< A block has 2^2 voxels a side.
+constexpr int block_level = 2;  ///< A block has 2^2 voxels a side.
 /// Number of tasks that balances the load of threads; each of fewer cells has up to eight children.
 constexpr std::size_t enough_tasks = InsideSampler::most_tasks / 8;
 
@@ -106,11 +106,7 @@ std::size_t InsideSampler::few_for_walking() const {
 /// False if a separating axis shows that the triangle misses the cube. For an open surface only
 /// the axes of the cube and the triangle's normal are tried, and a triangle may still miss the
 /// cube: `agrees_throughout` is evidence, not proof, and such cells do not rely on it.
-bool InsideSampler::may_touch(const Grid& grid, Index triangle, Vec3d middle, double half) const {
-  const Triangle& t = surface_.triangle[triangle];
-  const Vec3d a = grid.along_edges(surface_.position[t[0]] - middle),
-              b = grid.along_edges(surface_.position[t[1]] - middle),
-              c = grid.along_edges(surface_.position[t[2]] - middle);
+bool InsideSampler::may_touch(Vec3d a, Vec3d b, Vec3d c, double half) const {
   for (int axis = 0; axis < 3; ++axis) {
     const double p = component(a, axis), q = component(b, axis), r = component(c, axis);
     if (std::min({p, q, r}) > half || std::max({p, q, r}) < -half) return false;
@@ -190,6 +186,35 @@ bool InsideSampler::agrees_throughout(const Grid& grid, const Cell& cell,
   return agrees;
 }
 
+/// Gives each child of a cell the triangles that may touch it.
+/// @param half half the side of a child, or a little more [m]
+void InsideSampler::deal_out(const Grid& grid, const Cell& cell, double half,
+                             std::vector<Cell>& children) const {
+  const Vec3d middle = grid.middle(cell);
+  const double shift = 0.25 * grid.voxel * static_cast<double>(std::int64_t{1} << cell.level);
+  for (const Index t : cell.triangles) {
+    const Triangle& corner = surface_.triangle[t];
+    const Vec3d a = grid.along_edges(surface_.position[corner[0]] - middle),
+                b = grid.along_edges(surface_.position[corner[1]] - middle),
+                c = grid.along_edges(surface_.position[corner[2]] - middle);
+    // Along each axis most triangles are on one side.
+    bool reaches[3][2];
+    for (int axis = 0; axis < 3; ++axis) {
+      const double p = component(a, axis), q = component(b, axis), r = component(c, axis);
+      reaches[axis][0] = std::min({p, q, r}) <= half - shift;
+      reaches[axis][1] = std::max({p, q, r}) >= shift - half;
+    }
+    for (int k = 0; k < 8; ++k) {
+      if (!reaches[0][k & 1] || !reaches[1][k >> 1 & 1] || !reaches[2][k >> 2]) continue;
+      const Vec3d to_child =
+          shift * Vec3d{k & 1 ? 1.0 : -1.0, k >> 1 & 1 ? 1.0 : -1.0, k >> 2 ? 1.0 : -1.0};
+      if (may_touch(a - to_child, b - to_child, c - to_child, half)) {
+        children[k].triangles.push_back(t);
+      }
+    }
+  }
+}
+
 std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& cell,
                                                       SampleTally& tally) const {
   std::vector<Cell> children(8);
@@ -211,12 +236,12 @@ std::vector<InsideSampler::Cell> InsideSampler::split(const Grid& grid, Cell& ce
     child.known = cell.known;
     child.measured = cell.measured;
     child.winding = cell.winding;
-    if (cell.known) continue;
+  }
+  if (cell.known) return children;
+  deal_out(grid, cell, half, children);
+  for (Cell& child : children) {
     tally.work += static_cast<Offset>(cell.triangles.size());
     const Vec3d middle = grid.middle(child);
-    for (const Index t : cell.triangles) {
-      if (may_touch(grid, t, middle, half)) child.triangles.push_back(t);
-    }
     child.measured = false;
     if (child.level == 0) continue;
     if (few && cell.measured) {
@@ -299,8 +324,7 @@ void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell&
   tally.repeated += winding > 1.5;
 }
 
-void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally,
-                            WorkLimit& limit,
+void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, WorkLimit& limit,
                             const std::function<void(const SampleBlock&)>& visit_block) const {
   if (cell.known && !(cell.winding > 0.5)) return;
   if (limit.reached()) return;
@@ -328,8 +352,8 @@ SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_bl
   root.level = block_level;
   // A turned cube that contains the bounding box is as wide as the diagonal of the latter, at most;
   // and its position may be shifted by a voxel.
-  const double width = sweep.at_random ? extent_ * 1.001 + sweep.voxel
-                                       : extent_ * 1.733 + 3 * sweep.voxel;
+  const double width =
+      sweep.at_random ? extent_ * 1.001 + sweep.voxel : extent_ * 1.733 + 3 * sweep.voxel;
   while (sweep.voxel * static_cast<double>(std::int64_t{1} << root.level) < width) ++root.level;
   const Grid grid(*this, sweep, root.level);
   root.triangles.resize(surface_.triangle.size());
@@ -339,13 +363,22 @@ SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_bl
   std::vector<Cell> tasks{root};
   while (total.work <= sweep.most_work && tasks.size() < enough_tasks && !tasks.empty() &&
          tasks.front().level > block_level) {
-    std::vector<Cell> finer;
-    for (Cell& cell : tasks) {
-      for (Cell& child : split(grid, cell, total)) {
-        if (!child.known || child.winding > 0.5) finer.push_back(std::move(child));
+    const auto n_cells = static_cast<std::ptrdiff_t>(tasks.size());
+    std::vector<std::vector<Cell>> children(tasks.size());
+#pragma omp parallel for schedule(dynamic)
+    for (std::ptrdiff_t k = 0; k < n_cells; ++k) {
+      SampleTally tally;
+      children[k] = split(grid, tasks[k], tally);
+      tasks[k] = {};
+#pragma omp critical(phyxel_sample_tally)
+      total.add(tally);
+    }
+    tasks.clear();
+    for (std::vector<Cell>& of_cell : children) {
+      for (Cell& child : of_cell) {
+        if (!child.known || child.winding > 0.5) tasks.push_back(std::move(child));
       }
     }
-    tasks.swap(finer);
   }
 
   WorkLimit limit{total.work, sweep.most_work};

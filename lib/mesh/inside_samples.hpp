@@ -121,7 +121,9 @@ class InsideSampler {
 
   std::vector<Cell> split(const Grid& grid, Cell& cell, SampleTally& tally) const;
   std::size_t few_for_walking() const;
-  bool may_touch(const Grid& grid, Index triangle, Vec3d middle, double half) const;
+  /// @param a, b, c corners of the triangle, relative to the cube's middle and along its edges [m]
+  bool may_touch(Vec3d a, Vec3d b, Vec3d c, double half) const;
+  void deal_out(const Grid& grid, const Cell& cell, double half, std::vector<Cell>& children) const;
   double winding_at(Vec3d point, SampleTally& tally) const;
   std::optional<double> change_between(const Cell& cell, Vec3d start, Vec3d point,
                                        SampleTally& tally) const;

@@ -55,8 +55,7 @@ class Clearance {
         farthest_(request.surface_spacing),
         site_(request.on_surface, spacing),
         coarse_(request.on_surface, known * spacing),
-        sample_(points_over(request.surface, spacing * spacing / surface_samples,
-                            request.seed + 1),
+        sample_(points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1),
                 0.6 * spacing) {}
 
   /// The clearance of a place, in spacings; `known` for all that is farther.
@@ -92,20 +91,17 @@ struct Nodes {
 Nodes nodes_inside(const LatticeRequest& request, const Clearance& clearance, double spacing) {
   std::vector<Nodes> by_task(InsideSampler::most_tasks);
   const double block_radius = 2 * std::numbers::sqrt3 * spacing;
-  request.sampler.visit({.voxel = spacing,
-                         .seed = request.seed,
-                         .at_random = false,
-                         .turn = turn_of_lattice()},
-                        [&](std::size_t task, const SampleBlock& block) {
-                          Nodes& nodes = by_task[task];
-                          const bool deep = clearance.is_deep(block.centre, block_radius, known);
-                          for (std::size_t k = 0; k < block.offset.size(); ++k) {
-                            const Vec3d p = block.position(k);
-                            nodes.position.push_back(p);
-                            nodes.clearance.push_back(
-                                static_cast<float>(deep ? known : clearance.at(p)));
-                          }
-                        });
+  request.sampler.visit(
+      {.voxel = spacing, .seed = request.seed, .at_random = false, .turn = turn_of_lattice()},
+      [&](std::size_t task, const SampleBlock& block) {
+        Nodes& nodes = by_task[task];
+        const bool deep = clearance.is_deep(block.centre, block_radius, known);
+        for (std::size_t k = 0; k < block.offset.size(); ++k) {
+          const Vec3d p = block.position(k);
+          nodes.position.push_back(p);
+          nodes.clearance.push_back(static_cast<float>(deep ? known : clearance.at(p)));
+        }
+      });
   Nodes all;
   std::size_t count = 0;
   for (const Nodes& nodes : by_task) count += nodes.position.size();
@@ -144,8 +140,8 @@ float keep_farthest(Nodes& nodes, std::size_t n) {
   return least;
 }
 
-/// The lattice constant a that solves n a³ = V - a A/2: a layer half as thick as the lattice constant
-/// belongs to the phyxels on the surface.
+/// The lattice constant a that solves n a³ = V - a A/2: a layer half as thick as the lattice
+/// constant belongs to the phyxels on the surface.
 double lattice_constant(double volume, double area, Index n) {
   double low = 0, high = std::cbrt(volume / n);
   for (int k = 0; k < 60; ++k) {
@@ -192,11 +188,10 @@ class Skin {
   Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
     const auto self = static_cast<Index>(fixed_ + k), sites = static_cast<Index>(fixed_);
     bool beside_site = false;
-    const Vec3d after =
-        before + repulsion_step(hash, before, self, spacing_, [&](Index other) {
-          beside_site |= other < sites;
-          return other < sites ? surface_strength : 1;
-        });
+    const Vec3d after = before + repulsion_step(hash, before, self, spacing_, [&](Index other) {
+                          beside_site |= other < sites;
+                          return other < sites ? surface_strength : 1;
+                        });
     // Only nodes beside phyxels on the surface can leave it.
     return !beside_site || sampler_.inside(after) ? after : before;
   }
@@ -224,18 +219,18 @@ std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes
   std::vector<std::uint32_t> count(point.size(), 0);
   const NearestSite nearest(point, spacing);
   const double voxel = spacing / samples_along;
-  request.sampler.visit(
-      {.voxel = voxel,
-       .seed = request.seed + 2,
-       .wanted =
-           [&](Vec3d middle, double half) {
-             // Smaller cells are parts of one that is wanted, larger ones would have to be searched
-             // far about.
-             if (half < 0.5 * spacing || half > 4 * spacing) return true;
-             // Cells of a Voronoi diagram reach one spacing from their phyxels.
-             return !clearance.is_deep(middle, std::numbers::sqrt3 * half, regular + 1);
-           }},
-      nearest.count_into(count), &stage);
+  request.sampler.visit({.voxel = voxel,
+                         .seed = request.seed + 2,
+                         .wanted =
+                             [&](Vec3d middle, double half) {
+                               // Smaller cells are parts of one that is wanted, larger ones would
+                               // have to be searched far about.
+                               if (half < 0.5 * spacing || half > 4 * spacing) return true;
+                               // Cells of a Voronoi diagram reach one spacing from their phyxels.
+                               return !clearance.is_deep(middle, std::numbers::sqrt3 * half,
+                                                         regular + 1);
+                             }},
+                        nearest.count_into(count), &stage);
   std::vector<double> volume(sites + nodes.position.size(), std::pow(spacing, 3));
   double sampled = 0;
   const auto is_regular = [&](std::size_t k) {

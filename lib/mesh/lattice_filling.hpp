@@ -13,15 +13,15 @@ namespace phyxel {
 /// What to fill, and how.
 struct LatticeRequest {
   const Surface& surface;
-  const InsideSampler& sampler;        ///< Sampler of the surface's inside.
+  const InsideSampler& sampler;          ///< Sampler of the surface's inside.
   const std::vector<Vec3d>& on_surface;  ///< Phyxels on the surface [m].
   /// Distance within which every place of the surface has a phyxel [m].
   double surface_spacing = 0;
-  double volume = 0;          ///< Enclosed volume [m^3].
-  bool exact_volume = true;   ///< True if volumes have to add up to it.
-  Index phyxels = 0;                   ///< Number of phyxels inside, 1 or more.
-  std::uint64_t seed = 1;              ///< Seed of the lattice's position and of sample points.
-  int sweeps = 10;                     ///< Sweeps that move the nodes near the surface.
+  double volume = 0;         ///< Enclosed volume [m^3].
+  bool exact_volume = true;  ///< True if volumes have to add up to it.
+  Index phyxels = 0;         ///< Number of phyxels inside, 1 or more.
+  std::uint64_t seed = 1;    ///< Seed of the lattice's position and of sample points.
+  int sweeps = 10;           ///< Sweeps that move the nodes near the surface.
 };
 
 /// Phyxels inside a surface, and the volumes of all its phyxels.

@@ -278,8 +278,8 @@ void SampledVoronoi::add_up_cells(Vec3d origin, std::vector<Vec3d>& sum,
   }
 }
 
-void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps,
-                           std::size_t fixed, Stage* stage) {
+void SampledVoronoi::relax(std::vector<Vec3d>& site, double spacing, int sweeps, std::size_t fixed,
+                           Stage* stage) {
   const Vec3d origin = blocks_.front().centre;
   std::vector<Vec3d> sum(site.size());
   std::vector<Offset> count(site.size());

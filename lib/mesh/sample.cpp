@@ -172,8 +172,8 @@ SurfaceSites place_on_surface(const PreparedSurface& prepared, const SampleTally
   SurfaceSites sites;
   try {
     refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
-    sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels,
-                     request.seed + 3, request.relaxations, stage);
+    sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels, request.seed + 3,
+                     request.relaxations, stage);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
     found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));

@@ -54,8 +54,7 @@ void fill_scattered(const InsideSampler& sampler, InsideFilling& filling,
   voronoi.relax(cloud.position, spacing, request.relaxations, 0, &evening);
   evening.finish();
   bring_inside(sampler, voronoi, cloud.position, spacing);
-  cloud.volume =
-      voronoi_shares(sampler, cloud.position, filling.voxel, spacing, request.seed + 2);
+  cloud.volume = voronoi_shares(sampler, cloud.position, filling.voxel, spacing, request.seed + 2);
 }
 
 }  // namespace phyxel

@@ -165,7 +165,7 @@ void visit_points_over(const Surface& surface, double area, std::uint64_t seed, 
 
 /// Adds sites at random sample points of edges and relaxes them; the sites of the argument stay.
 void add_along_edges(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
-               double spacing, std::uint64_t seed, int relaxations) {
+                     double spacing, std::uint64_t seed, int relaxations) {
   const std::size_t fixed = site.size();
   const std::vector<Vec3d> more = fill_with_darts(blocks, gap, seed, site);
   if (more.empty()) return;
@@ -184,7 +184,9 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spaci
   const std::size_t fixed = site.size();
   std::vector<PointOn> sample;
   visit_points_over(surface, spacing * spacing / samples_on_faces, seed,
-                    [&](std::size_t triangle, Vec3d p) { sample.push_back({triangle, p}); });
+                    [&](std::size_t triangle, Vec3d p) {
+                      sample.push_back({triangle, p});
+                    });
   const std::vector<Vec3d> more =
       fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());

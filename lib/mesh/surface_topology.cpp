@@ -4,6 +4,8 @@
 #include <numeric>
 #include <tuple>
 
+#include "parallel_sort.hpp"
+
 namespace phyxel {
 namespace {
 
@@ -11,8 +13,8 @@ std::vector<Index> coincident_corners(const std::vector<Vec3d>& position) {
   std::vector<Index> order(position.size()), corner(position.size());
   std::iota(order.begin(), order.end(), 0);
   const auto key = [&](Index v) { return std::tuple(position[v].x, position[v].y, position[v].z); };
-  std::sort(order.begin(), order.end(),
-            [&](Index a, Index b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
+  parallel_sort(order,
+                [&](Index a, Index b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
   for (std::size_t k = 0; k < order.size(); ++k) {
     const bool same = k > 0 && position[order[k]] == position[order[k - 1]];
     corner[order[k]] = same ? corner[order[k - 1]] : order[k];
@@ -47,10 +49,9 @@ SurfaceTopology connect(const Surface& surface) {
       topology.edges.push_back({std::min(from, to), std::max(from, to), t, from < to});
     }
   }
-  std::sort(topology.edges.begin(), topology.edges.end(),
-            [](const SurfaceEdge& a, const SurfaceEdge& b) {
-              return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
-            });
+  parallel_sort(topology.edges, [](const SurfaceEdge& a, const SurfaceEdge& b) {
+    return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+  });
 
   topology.closed = true;
   for (std::size_t k = 0, next = 0; k < topology.edges.size(); k = next) {

@@ -23,7 +23,7 @@ class MemoryGrowth {
   double largest() const;
 
  private:
-  double before_;
+  double before_ = 0;
 };
 
 /// @throws InputError naming `what`, how much its phyxels take, how much there is (in a container:

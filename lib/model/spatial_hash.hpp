@@ -102,9 +102,9 @@ class SpatialHash {
 
   /// The point of the table nearest to a place.
   struct Nearest {
-    Vec3d apart;                ///< The vector from the place to the point [m].
+    Vec3d apart;                  ///< The vector from the place to the point [m].
     double distance2 = HUGE_VAL;  ///< [m^2]
-    Index index = -1;           ///< -1 if no point was found.
+    Index index = -1;             ///< -1 if no point was found.
   };
 
   /// Finds the point nearest to `place` but for the one with the index `except`. Of points at the

@@ -14,8 +14,8 @@ enum class KeyType {
   text,
   path,  ///< Text, resolved from the scene file's folder.
   integer,
-  number,              ///< An integer or a float; never NaN or infinite.
-  number_or_word,      ///< A number or one of `words`, which mean the same.
+  number,          ///< An integer or a float; never NaN or infinite.
+  number_or_word,  ///< A number or one of `words`, which mean the same.
   boolean,
   choice,   ///< One of `words`.
   choices,  ///< A list of `words`, each at most once.

@@ -225,10 +225,13 @@ inline BuildCase closed_by_default() {
 }
 
 inline const std::vector<BuildCase>& build_cases() {
-  static const std::vector<BuildCase> cases{
-      beam(),    rules(),    nearest(), small(), degenerate(),   lumps(),       astray(),
-      lattice(), included(), closed(),  mixed(), closed_alone(), many_regions(),
-      closed_by_default()};
+  static const std::vector<BuildCase> cases{beam(),         rules(),
+                                            nearest(),      small(),
+                                            degenerate(),   lumps(),
+                                            astray(),       lattice(),
+                                            included(),     closed(),
+                                            mixed(),        closed_alone(),
+                                            many_regions(), closed_by_default()};
   return cases;
 }
 

@@ -31,11 +31,11 @@ struct Part {
   Index ghosts = 0;
   Index surfel_begin = 0, surfel_end = 0;
   Material material;
-  std::string neighbourhood;    ///< The rule in words, for summaries.
-  ListLengths lists;            ///< Of the whole part.
-  double closure = 0;           ///< Tolerance of closed gradients; 0: they are not closed.
-  /// True if the scene does not ask for closed gradients: a body whose sums cannot be closed is left
-  /// as it is.
+  std::string neighbourhood;  ///< The rule in words, for summaries.
+  ListLengths lists;          ///< Of the whole part.
+  double closure = 0;         ///< Tolerance of closed gradients; 0: they are not closed.
+  /// True if the scene does not ask for closed gradients: a body whose sums cannot be closed is
+  /// left as it is.
   bool automatic_closure = false;
   bool kernel_volumes = false;  ///< Volumes by the 2004 kernel rule instead of the geometry.
   Index size = 0;               ///< Phyxels of the whole part.

@@ -69,14 +69,14 @@ TEST(LatticeFilling, VolumesHaveTheMomentsOfTheBody) {
 }
 
 TEST(LatticeFilling, TurnedGridsHoldTheNodesInside) {
-  const Surface body = test::together(test::sphere({0.2, 0, 0}, 0.5, 3), test::box({1, 0, 0},
-                                                                                   {2, 0.4, 0.7}));
+  const Surface body =
+      test::together(test::sphere({0.2, 0, 0}, 0.5, 3), test::box({1, 0, 0}, {2, 0.4, 0.7}));
   const WindingNumber winding(body);
   const Mat3d turn = rotation_by({0.3, -0.8, 0.5});
   const double voxel = 0.043;
   std::vector<SampleBlock> blocks;
-  InsideSampler(body, true).collect({.voxel = voxel, .seed = 7, .at_random = false, .turn = turn},
-                                    blocks);
+  InsideSampler(body, true)
+      .collect({.voxel = voxel, .seed = 7, .at_random = false, .turn = turn}, blocks);
   std::vector<Vec3d> node;
   for (const SampleBlock& block : blocks) {
     for (std::size_t k = 0; k < block.offset.size(); ++k) node.push_back(block.position(k));
@@ -89,7 +89,8 @@ TEST(LatticeFilling, TurnedGridsHoldTheNodesInside) {
     for (int y = -80; y <= 80; ++y) {
       for (int z = -80; z <= 80; ++z) {
         const Vec3d p = first + turn * (voxel * Vec3d{double(x), double(y), double(z)});
-        if (p.x < -0.31 || p.x > 2.01 || std::abs(p.y) > 0.51 || p.z < -0.51 || p.z > 0.71) continue;
+        if (p.x < -0.31 || p.x > 2.01 || std::abs(p.y) > 0.51 || p.z < -0.51 || p.z > 0.71)
+          continue;
         inside += winding(p) > 0.5;
       }
     }
@@ -137,9 +138,9 @@ TEST(LatticeFilling, ADisplacedNodeOfALatticeGoesSixTenthsBack) {
     EXPECT_LT(norm(step + 0.6 * a * off), 0.01 * norm(a * off));  // 0.998, and terms of order 2
   }
   // Steps are no longer than 0.15 spacings.
-  EXPECT_NEAR(norm(repulsion_step(hash, a * Vec3d{0.9, 0.1, 0}, self, a,
-                                  [](Index) { return 1.0; })),
-              0.15 * a, 1e-12);
+  EXPECT_NEAR(
+      norm(repulsion_step(hash, a * Vec3d{0.9, 0.1, 0}, self, a, [](Index) { return 1.0; })),
+      0.15 * a, 1e-12);
 }
 
 TEST(LatticeFilling, TheNearestPointOfATriangleIsThatOfAllItsPoints) {

@@ -68,13 +68,12 @@ TEST_F(Stages, EachIsToldFromItsBeginningToItsEnd) {
     const ObserveStages observing(heard.observer());
     set_up(scene());
   }
-  EXPECT_THAT(
-      heard.names,
-      ElementsAre("reading the mesh", "inspecting the surface", "filling the surface",
-                  "phyxels on the surface", "placing phyxels", "evening out distances",
-                  "volumes of phyxels", "distances between phyxels",
-                  "neighbours", "phyxels near the surface", "moments", "phyxels near the surface",
-                  "closed gradients", "largest time step"));
+  EXPECT_THAT(heard.names,
+              ElementsAre("reading the mesh", "inspecting the surface", "filling the surface",
+                          "phyxels on the surface", "placing phyxels", "evening out distances",
+                          "volumes of phyxels", "distances between phyxels", "neighbours",
+                          "phyxels near the surface", "moments", "phyxels near the surface",
+                          "closed gradients", "largest time step"));
   std::size_t between = 0;
   for (std::size_t s = 0; s < heard.names.size(); ++s) {
     const std::vector<double>& shares = heard.shares[s];

@@ -33,8 +33,8 @@ std::string digest(const Scene& s) {
          << b.source.seed << ' ' << b.source.relaxations << ' ' << b.source.shape.surface << ' '
          << b.scale << '\n';
     for (const Vec3d v : {b.rotation, b.translation, b.velocity, b.spin}) vector(v);
-    text << static_cast<int>(b.volume_rule) << ' ' << b.closure.value_or(-1) << ' ' << b.material.law << ' '
-         << b.material.volume_stiffness << ' ' << b.material.damping << ' '
+    text << static_cast<int>(b.volume_rule) << ' ' << b.closure.value_or(-1) << ' '
+         << b.material.law << ' ' << b.material.volume_stiffness << ' ' << b.material.damping << ' '
          << b.material.hourglass.value_or(-1) << ' ' << static_cast<int>(b.neighbourhood.support)
          << ' ' << b.neighbourhood.nearest << ' ' << b.neighbourhood.factor << '\n';
     for (const MotionRequest& m : b.motions) {

@@ -156,9 +156,9 @@ class Physics {
       return d.elastic_energy() + d.plastic_work;
     };
     // Central differences over 1e-6 of a spacing: rounding of the energy, 1e-16 / 1e-7 (seen: 2e-10
-    // of the forces). A body at rest has a hundredth of the force of one phyxel, E h, over the step;
-    // where one begins to flow within the step, its second derivative jumps by up to E h (seen: a
-    // third of that, 2e-5 of the sum).
+    // of the forces). A body at rest has a hundredth of the force of one phyxel, E h, over the
+    // step; where one begins to flow within the step, its second derivative jumps by up to E h
+    // (seen: a third of that, 2e-5 of the sum).
     const double step = 1e-7;
     const double slope = (energy_at(step) - energy_at(-step)) / (2 * step);
     const double jump = has_law_with_history() ? 1 : 1e-2;
