@@ -85,7 +85,9 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
     if (!closes(whole, b)) continue;
     const Surface& surface = whole.surfaces[b];
     const std::vector<Facet> facets =
-        facets_of(surface.position, surface.triangle, 0, longest_edge(whole.bodies[b].reach));
+        facets_of(surface.position, surface.triangle, 0,
+                  longest_edge(whole.bodies[b].reach, surface.position, surface.triangle, 0,
+                               whole.bodies[b].size));
     check_alike(setup.ranks, facets.size());
     whole.bodies[b].enclosed = enclosed_by(facets).volume;
     const NearFacets here = facets_near(setup, whole, local, b, facets);

@@ -253,8 +253,9 @@ void choose_closures(const ShareSetup& setup, WholeBodies& whole, LocalModel& lo
       double volume = 0;
       for (const Part& part : parts) volume += part.volume;
       body.closure = naming(request, [&] {
-        return closure_of(request, whole.surfaces[b], body.lattice,
-                          body.kernel_volumes ? std::nullopt : std::optional(volume));
+        return closure_of(request, whole.surfaces[b], body.lattice, body.size,
+                          body.kernel_volumes ? std::nullopt : std::optional(volume),
+                          whole.warnings);
       });
       for (Part& part : parts) {
         part.closure = body.closure;

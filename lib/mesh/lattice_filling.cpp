@@ -16,13 +16,14 @@ namespace {
 // Distances below are in lattice constants, and were chosen by the accuracy of the clouds.
 
 /// Clearance below which a node moves.
-constexpr double moving = 2;
+constexpr double moving_clearance = 2;
 /// Clearance from which a phyxel has the volume of a cell of the lattice.
-constexpr double regular = 3;
+constexpr double regular_clearance = 3;
 /// Clearance up to which clearances are found: that of what moving nodes may meet.
-constexpr double known = 4;
-/// Smallest clearance of a node that is kept; a finer lattice is tried if one has less.
-constexpr double least_clearance = 0.45;
+constexpr double largest_clearance = 4;
+/// Clearances of the nodes nearest to the surface: as a rule, and the limits beyond which a finer
+/// lattice is tried, or a coarser one.
+constexpr double usual_clearance = 0.62, least_clearance = 0.45, most_clearance = 0.8;
 /// Strength of the repulsion by a phyxel on the surface. Those inside then keep the distance at
 /// which a closed bar bends as it should.
 constexpr double surface_strength = 0.85;
@@ -54,15 +55,15 @@ class Clearance {
       : spacing_(spacing),
         farthest_(request.surface_spacing),
         site_(request.on_surface, spacing),
-        coarse_(request.on_surface, known * spacing),
+        coarse_(request.on_surface, largest_clearance * spacing),
         sample_(points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1),
                 0.6 * spacing) {}
 
-  /// The clearance of a place, in spacings; `known` for all that is farther.
+  /// The clearance of a place, in spacings; `largest_clearance` for all that is farther.
   double at(Vec3d place) const {
-    const double far = known * spacing_;
+    const double far = largest_clearance * spacing_;
     double clearance = std::min(far, std::sqrt(site_.nearest(place, far).distance2));
-    if (clearance < moving * spacing_) {
+    if (clearance < moving_clearance * spacing_) {
       const double limit = clearance / sample_factor;
       const double sampled = std::sqrt(sample_.nearest(place, limit).distance2);
       clearance = std::min(clearance, sample_factor * sampled);
@@ -95,11 +96,11 @@ Nodes nodes_inside(const LatticeRequest& request, const Clearance& clearance, do
       {.voxel = spacing, .seed = request.seed, .at_random = false, .turn = turn_of_lattice()},
       [&](std::size_t task, const SampleBlock& block) {
         Nodes& nodes = by_task[task];
-        const bool deep = clearance.is_deep(block.centre, block_radius, known);
+        const bool deep = clearance.is_deep(block.centre, block_radius, largest_clearance);
         for (std::size_t k = 0; k < block.offset.size(); ++k) {
           const Vec3d p = block.position(k);
           nodes.position.push_back(p);
-          nodes.clearance.push_back(static_cast<float>(deep ? known : clearance.at(p)));
+          nodes.clearance.push_back(static_cast<float>(deep ? largest_clearance : clearance.at(p)));
         }
       });
   Nodes all;
@@ -161,7 +162,7 @@ class Skin {
         spacing_(spacing),
         point_(request.on_surface) {
     for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-      if (nodes.clearance[i] >= known) continue;
+      if (nodes.clearance[i] >= largest_clearance) continue;
       near_.push_back(i);
       point_.push_back(nodes.position[i]);
     }
@@ -175,7 +176,8 @@ class Skin {
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const Vec3d before = point_[fixed_ + k];
-      moved[k] = nodes_.clearance[near_[k]] < moving ? moved_from(before, k, hash) : before;
+      moved[k] =
+          nodes_.clearance[near_[k]] < moving_clearance ? moved_from(before, k, hash) : before;
     }
     std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(fixed_));
   }
@@ -212,7 +214,7 @@ std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes
   std::vector<std::size_t> number(sites);  // of each point, among all phyxels
   std::iota(number.begin(), number.end(), std::size_t{0});
   for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-    if (nodes.clearance[i] >= known) continue;
+    if (nodes.clearance[i] >= largest_clearance) continue;
     point.push_back(nodes.position[i]);
     number.push_back(sites + i);
   }
@@ -228,13 +230,13 @@ std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes
                                if (half < 0.5 * spacing || half > 4 * spacing) return true;
                                // Cells of a Voronoi diagram reach one spacing from their phyxels.
                                return !clearance.is_deep(middle, std::numbers::sqrt3 * half,
-                                                         regular + 1);
+                                                         regular_clearance + 1);
                              }},
                         nearest.count_into(count), &stage);
   std::vector<double> volume(sites + nodes.position.size(), std::pow(spacing, 3));
   double sampled = 0;
   const auto is_regular = [&](std::size_t k) {
-    return k >= sites && nodes.clearance[number[k] - sites] >= regular;
+    return k >= sites && nodes.clearance[number[k] - sites] >= regular_clearance;
   };
   std::size_t irregular = 0;
   for (std::size_t k = 0; k < point.size(); ++k) {
@@ -259,26 +261,35 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   const auto n = static_cast<std::size_t>(request.phyxels);
   double spacing = lattice_constant(request.volume, request.sampler.area(), request.phyxels);
   Nodes nodes;
+  constexpr int most_coarser = 12, most_attempts = 40;
   for (int attempt = 0;; ++attempt) {
     const Clearance clearance(request, spacing);
     nodes = nodes_inside(request, clearance, spacing);
-    // In thin parts there may be no room for nodes that keep off the surface.
-    if (nodes.position.size() >= n &&
-        (keep_farthest(nodes, n) >= least_clearance || attempt >= 30)) {
-      break;
+    const auto roomy = std::count_if(nodes.clearance.begin(), nodes.clearance.end(),
+                                     [](float found) { return found >= usual_clearance; });
+    if (nodes.position.size() >= n) {
+      const float least = keep_farthest(nodes, n);
+      // Thin parts hold fewer nodes than their volume would, and thick parts then have room for all
+      // with a coarser lattice; or there is no room for nodes that keep off the surface.
+      if (least > most_clearance && attempt < most_coarser) {
+        const double ratio = static_cast<double>(roomy) / static_cast<double>(n);
+        spacing *= std::clamp(std::cbrt(ratio), 1.005, 2.0);
+        continue;
+      }
+      if (least >= least_clearance || attempt >= most_attempts) break;
     }
     spacing *= 0.98;
   }
   placing.finish();
 
-  Stage evening("evening out distances");
+  Stage relaxing("evening out distances");
   Skin skin(request, nodes, spacing);
   for (int sweep = 0; sweep < request.sweeps; ++sweep) {
     skin.sweep();
-    evening.reach((sweep + 1.0) / request.sweeps);
+    relaxing.reach((sweep + 1.0) / request.sweeps);
   }
   skin.write_back();
-  evening.finish();
+  relaxing.finish();
 
   LatticeFilling filling;
   filling.spacing = spacing;

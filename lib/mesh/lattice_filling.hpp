@@ -15,7 +15,7 @@ struct LatticeRequest {
   const Surface& surface;
   const InsideSampler& sampler;          ///< Sampler of the surface's inside.
   const std::vector<Vec3d>& on_surface;  ///< Phyxels on the surface [m].
-  /// Distance within which every place of the surface has a phyxel [m].
+  /// Distance between those phyxels, within which every place of the surface has one [m].
   double surface_spacing = 0;
   double volume = 0;         ///< Enclosed volume [m^3].
   bool exact_volume = true;  ///< True if volumes have to add up to it.

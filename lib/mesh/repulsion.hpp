@@ -12,6 +12,9 @@ inline constexpr double repulsion_reach = 1.8;
 /// Longest step of a sweep, in spacings.
 inline constexpr double longest_step = 0.15;
 
+/// Sweeps of repulsion that even out distances as well as `relaxations` of Lloyd's relaxation.
+inline int repulsion_sweeps(int relaxations) { return (relaxations + 2) / 3; }
+
 /// A hash of points for `repulsion_step`.
 inline SpatialHash hash_for_repulsion(std::span<const Vec3d> point, double spacing) {
   return {point, 0.5 * repulsion_reach * spacing};

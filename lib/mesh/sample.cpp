@@ -7,6 +7,7 @@
 
 #include "mesh/inside_filling.hpp"
 #include "mesh/lattice_filling.hpp"
+#include "mesh/repulsion.hpp"
 #include "mesh/scattered_filling.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
@@ -19,8 +20,9 @@
 namespace phyxel {
 namespace {
 
-/// Memory that a phyxel of a lattice takes while a body is filled [bytes].
-constexpr double bytes_on_lattice = 150;
+/// Memory that a phyxel takes while a lattice fills a body [bytes]: 340 of 500,000 in a cube, 150
+/// of ten million. What those on the surface take beside is checked with their number.
+constexpr double bytes_on_lattice = 350;
 
 /// Refuses a number of phyxels that takes more memory than there is.
 /// @param bytes memory for each phyxel
@@ -223,17 +225,16 @@ void report_tally(const PreparedSurface& prepared, const SampleTally& tally, Sam
 double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& sampler,
                          const SampleRequest& request, const SurfaceSites& sites, double volume,
                          bool exact_volume, Cloud& cloud) {
-  LatticeFilling inside = fill_by_lattice(
-      {.surface = prepared.surface,
-       .sampler = sampler,
-       .on_surface = sites.position,
-       .surface_spacing = sites.spacing,
-       .volume = volume,
-       .exact_volume = exact_volume,
-       .phyxels = request.phyxels - static_cast<Index>(sites.position.size()),
-       .seed = request.seed,
-       // Repulsion evens out distances in a third of the sweeps that Lloyd's relaxation takes.
-       .sweeps = (request.relaxations + 2) / 3});
+  LatticeFilling inside =
+      fill_by_lattice({.surface = prepared.surface,
+                       .sampler = sampler,
+                       .on_surface = sites.position,
+                       .surface_spacing = sites.spacing,
+                       .volume = volume,
+                       .exact_volume = exact_volume,
+                       .phyxels = request.phyxels - static_cast<Index>(sites.position.size()),
+                       .seed = request.seed,
+                       .sweeps = repulsion_sweeps(request.relaxations)});
   cloud.position = sites.position;
   cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
   cloud.volume = std::move(inside.volume);

@@ -10,6 +10,7 @@
 #include "mesh/face_relaxation.hpp"
 #include "mesh/random_bits.hpp"
 #include "mesh/relaxation.hpp"
+#include "mesh/repulsion.hpp"
 #include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
 
@@ -190,8 +191,7 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spaci
   const std::vector<Vec3d> more =
       fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());
-  // Repulsion evens out distances in a third of the sweeps that Lloyd's relaxation takes.
-  relax_on_faces(surface, sample, site, fixed, spacing, (relaxations + 2) / 3, stage);
+  relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
 }
 
 /// A subset of the corners that are not too near to each other [m].

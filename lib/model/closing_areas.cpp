@@ -25,7 +25,22 @@ void add_facets(std::vector<Facet>& facets, Vec3d a, Vec3d b, Vec3d c, double lo
   }
 }
 
+/// Largest sum of the sizes of a facet's shares among phyxels in its plane. More means that some
+/// are large and of both signs, since the phyxels lie nearly in a line, or all on one side: as on
+/// curved surfaces, where few are in the plane of a facet by chance.
+constexpr double most_shares = 1.2;
+
 }  // namespace
+
+double longest_edge(double support, std::span<const Vec3d> position,
+                    std::span<const Triangle> triangles, Index first, Index size) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const Vec3d a = position[t[0] - first];
+    area += 0.5 * norm(cross(position[t[1] - first] - a, position[t[2] - first] - a));
+  }
+  return std::max(0.5 * support, std::sqrt(area / (25.0 * size)));
+}
 
 std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Triangle> triangles,
                              Index first, double longest) {
@@ -94,7 +109,11 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
       }
       return inverse.rank;
     };
-    if (weigh(true) == 2) continue;
+    if (weigh(true) == 2) {
+      double all = 0;
+      for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) all += std::abs(share[k]);
+      if (all <= most_shares) continue;
+    }
     if (weigh(false) < 0) {  // only the nearest, beyond its support
       for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
         share[k] = 1.0 / near.length(f);
@@ -141,16 +160,24 @@ bool may_close(const BodyRequest& request, const Surface& surface, bool lattice,
   return request.closure || (!lattice && !kernel_volumes && !surface.triangle.empty());
 }
 
-double closure_of(const BodyRequest& request, const Surface& surface, bool lattice,
-                  std::optional<double> volume) {
+double closure_of(const BodyRequest& request, const Surface& surface, bool lattice, Index size,
+                  std::optional<double> volume, std::vector<std::string>& warnings) {
   if (!may_close(request, surface, lattice, !volume)) return 0;
-  const bool automatic = !request.closure;
-  const std::string obstacle = obstacle_to_closing(surface, volume);
+  std::string obstacle = obstacle_to_closing(surface, volume);
+  // Fewer span no space, in which a stress could be uniform.
+  if (obstacle.empty() && size < 4) obstacle = fmt::format("it has {} phyxels", size);
   if (obstacle.empty()) return request.closure.value_or(automatic_closure);
-  if (automatic) return 0;
+  if (!request.closure) {
+    warnings.push_back(
+        fmt::format("body \"{}\": gradients are not closed, as {}: stresses may be off by some 10%",
+                    request.name, obstacle));
+    return 0;
+  }
   throw InputError(fmt::format(
-      "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
-      "{}; allowed are a mesh, a shape with surfels, a file with such a surface, or closure = 0",
+      "{}: body \"{}\" has closed gradients (closure = {:g}), which need four phyxels and its "
+      "whole "
+      "surface, but {}; allowed are a mesh, a shape with surfels, a file with such a surface, or "
+      "closure = 0",
       request.where, request.name, *request.closure, obstacle));
 }
 

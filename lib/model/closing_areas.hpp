@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "phyxel/model.hpp"
@@ -22,7 +23,11 @@ std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Tr
 
 /// The largest edge of a facet of a body whose phyxels have this support: short enough for the
 /// facet's area to go to the phyxels beside it [m].
-inline double longest_edge(double support) { return 0.5 * support; }
+///
+/// No body gets more than some hundred facets for each phyxel, however small its support is.
+/// @param size number of phyxels of the body
+double longest_edge(double support, std::span<const Vec3d> position,
+                    std::span<const Triangle> triangles, Index first, Index size);
 
 /// The space inside a closed surface.
 struct Enclosed {
@@ -50,10 +55,12 @@ bool may_close(const BodyRequest& request, const Surface& surface, bool lattice,
 
 /// The tolerance to which the gradients of a body are to be closed; 0 if they are not.
 /// @param lattice `Cloud::lattice`
+/// @param size number of phyxels
 /// @param volume of all phyxels [m³], if it follows from the geometry
+/// @param warnings are told why a body that does not ask for closed gradients cannot have them
 /// @throws InputError naming the body, its fault, and what is allowed, if the body asks for closed
 ///   gradients and its surface does not enclose its volume
-double closure_of(const BodyRequest& request, const Surface& surface, bool lattice,
-                  std::optional<double> volume);
+double closure_of(const BodyRequest& request, const Surface& surface, bool lattice, Index size,
+                  std::optional<double> volume, std::vector<std::string>& warnings);
 
 }  // namespace phyxel

@@ -186,8 +186,12 @@ std::vector<Facet> facets_of(const Model& model, const Part& part) {
   const std::span<const Vec3d> position =
       std::span(model.surfels.position)
           .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin);
-  return facets_of(position, model.surfels.triangles_of(part), part.surfel_begin,
-                   longest_edge(model.neighbourhood.support[part.begin]));
+  const std::span<const Triangle> triangles = model.surfels.triangles_of(part);
+  Index size = 0;
+  for (const Part& of_body : model.parts_of_body(part)) size += of_body.size;
+  return facets_of(position, triangles, part.surfel_begin,
+                   longest_edge(model.neighbourhood.support[part.begin], position, triangles,
+                                part.surfel_begin, size));
 }
 
 }  // namespace

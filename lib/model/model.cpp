@@ -243,8 +243,9 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   add_surfels(model.surfels, cloud, survey.support, shift);
   const double volume =
       add_parts(model, request, groups, survey, kernel_volumes, shift, surfel_shift);
-  const double closure = closure_of(request, cloud.surface, cloud.lattice,
-                                    kernel_volumes ? std::nullopt : std::optional(volume));
+  const double closure =
+      closure_of(request, cloud.surface, cloud.lattice, model.size() - shift,
+                 kernel_volumes ? std::nullopt : std::optional(volume), model.warnings);
   for (Part& part : std::span(model.parts).last(groups.size())) {
     part.closure = closure;
     part.automatic_closure = !request.closure;

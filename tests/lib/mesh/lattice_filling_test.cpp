@@ -52,6 +52,31 @@ TEST(LatticeFilling, IsACubicLatticeDeepInside) {
   EXPECT_GT(deep, 900);  // the cube's middle (1 - 9/19)³ holds a thousand
 }
 
+/// A cube beside a sheet a third as thick as the phyxels' spacing: the sheet holds fewer phyxels
+/// than its volume would, and the cube gets them all.
+TEST(LatticeFilling, ThickPartsAreFullBesideThinOnes) {
+  const Surface both = test::together(test::unit_cube(), test::box({2, 0, 0}, {4, 2, 0.02}));
+  const Cloud cloud = sample_surface(both, {.phyxels = 6000});
+  std::vector<Vec3d> in_cube;
+  double largest = 0;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    if (cloud.position[i].x > 1.5) continue;
+    in_cube.push_back(cloud.position[i]);
+    largest = std::max(largest, cloud.volume[i]);
+  }
+  const auto n = static_cast<double>(in_cube.size());
+  const double spacing = std::cbrt(1 / n);
+  EXPECT_LT(largest * n, 1.7);  // 1.42 here; 1.95 if the lattice is as fine as the volume asks
+  const SpatialHash hash(in_cube, spacing);
+  std::mt19937_64 engine(8);
+  double hole = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    hole = std::max(hole, hash.nearest(random_point(engine, 0, 1)).distance2);
+  }
+  // Half the diagonal of a cell is 0.87: 0.91 here; 0.98 if nodes stop short of the surface.
+  EXPECT_LT(std::sqrt(hole), 0.95 * spacing);
+}
+
 /// The mean square distance of a bar's matter from its middle plane, which its bending stiffness is
 /// made of. Equal layers of phyxels with half a layer on either face would have 1 + 2 (s/H)² of it.
 TEST(LatticeFilling, VolumesHaveTheMomentsOfTheBody) {
