@@ -174,10 +174,10 @@ double closure_of(const BodyRequest& request, const Surface& surface, bool latti
     return 0;
   }
   throw InputError(fmt::format(
-      "{}: body \"{}\" has closed gradients (closure = {:g}), which need four phyxels and its "
-      "whole "
-      "surface, but {}; allowed are a mesh, a shape with surfels, a file with such a surface, or "
-      "closure = 0",
+      "{}: body \"{}\" has closed gradients (closure = {:g}), which need its whole surface, but "
+      "{}; "
+      "allowed are a mesh, a shape with surfels, or a file with such a surface, of four phyxels or "
+      "more, or closure = 0",
       request.where, request.name, *request.closure, obstacle));
 }
 
