@@ -89,6 +89,8 @@ run_sanitizers() {
   # Laws that remember: by tiles, and in residence.
   check cuda_backend_test '*Forces*/ClosedPlasticViscous'
   check history_cuda_test 'History.EvaluationsNeverCommit' 'memcheck initcheck synccheck'
+  # The work of supports, which many blocks add up.
+  check reactions_cuda_test 'Reactions.HaveTheSameBits*' 'memcheck racecheck initcheck'
   check setup_test '*Overlapping*'
   check physics_device_test '*'
   check_ranks share_test 'Bodies/Shares.MayBeLookedAtAtAnyTime/ApartGpuDirect' memcheck
