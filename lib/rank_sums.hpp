@@ -7,6 +7,8 @@
 
 #include "exact_sum.hpp"
 #include "phyxel/communicator.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/share.hpp"
 
 namespace phyxel {
 
@@ -30,6 +32,12 @@ inline void add_over_ranks(const Communicator& ranks, std::vector<ExactSum>& sum
   std::vector<ExactSum*> all;
   for (ExactSum& sum : sums) all.push_back(&sum);
   add_over_ranks(ranks, all);
+}
+
+/// Adds the sums of all ranks if the model is a share; a whole model has them already.
+template <class Sums>
+void add_over_ranks(const Model& model, Sums& sums) {
+  if (model.share) add_over_ranks(*model.share->communicator, sums);
 }
 
 }  // namespace phyxel

@@ -23,8 +23,9 @@ std::vector<std::string> bench_terms();
 Scene bench_scene(const std::string& terms, double factor = NeighbourhoodRule{}.factor,
                   int bodies = 1);
 
-/// Adds the options --phyxels and --repeat of speed measurements.
+/// Adds the option --repeat of speed measurements.
 void add_repeats(CLI::App& command, int& repeats);
+/// Adds the options --phyxels and --repeat of speed measurements.
 void add_size_options(CLI::App& command, std::vector<Index>& sizes, int& repeats);
 /// Adds the option --threads of speed measurements.
 void add_thread_counts(CLI::App& command, std::vector<int>& threads);

@@ -51,7 +51,7 @@ void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
       const auto [d, e, f] = corners_at(after);
       moved[i] = nearest_on_triangle(after, d, e, f);
     }
-    site = moved;
+    site.swap(moved);
     stage.reach((sweep + 1.0) / sweeps);
   }
 }

@@ -21,7 +21,7 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 
 /// Evens out the distances between points on faces: they repel each other, move along the face, and
 /// are put back on the triangle of the nearest sample point. The first `fixed` points stay.
-/// @param site the points; those after the first `fixed` are on `triangle` [m]
+/// @param site the points; all after the first `fixed` lie on faces [m]
 /// @param sample points spread over the whole surface, with their triangles
 /// @param spacing typical distance between the points [m]
 /// @param stage is told the share of sweeps that is done

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
@@ -19,13 +18,13 @@ namespace {
 constexpr double moving_clearance = 2;
 /// Clearance from which a phyxel has the volume of a cell of the lattice.
 constexpr double regular_clearance = 3;
-/// Clearance up to which clearances are found: that of what moving nodes may meet.
+/// Largest clearance that is found: moving nodes meet no nodes beyond it.
 constexpr double largest_clearance = 4;
 /// Clearances of the nodes nearest to the surface: as a rule, and the limits beyond which a finer
 /// lattice is tried, or a coarser one.
 constexpr double usual_clearance = 0.62, least_clearance = 0.45, most_clearance = 0.8;
-/// Strength of the repulsion by a phyxel on the surface. Those inside then keep the distance at
-/// which a closed bar bends as it should.
+/// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
+/// which closed bars bend right.
 constexpr double surface_strength = 0.85;
 /// Sample points on the surface for each square of the lattice constant.
 constexpr double surface_samples = 12;
@@ -48,14 +47,32 @@ Mat3d turn_of_lattice() {
   return turn;
 }
 
+/// A test that tells places deep inside a surface.
+class Depth {
+ public:
+  Depth(const LatticeRequest& request, double spacing)
+      : spacing_(spacing),
+        farthest_(request.surface_spacing),
+        site_(request.on_surface, largest_clearance * spacing) {}
+
+  /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
+  /// spacings.
+  bool is_deep(Vec3d middle, double radius, double least) const {
+    const double limit = radius + least * spacing_ + farthest_;
+    return site_.nearest(middle, limit).distance2 > limit * limit;
+  }
+
+ private:
+  double spacing_, farthest_;
+  SpatialHash site_;
+};
+
 /// Distances of places inside from the surface and from the phyxels on it.
 class Clearance {
  public:
   Clearance(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
-        farthest_(request.surface_spacing),
         site_(request.on_surface, spacing),
-        coarse_(request.on_surface, largest_clearance * spacing),
         sample_(points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1),
                 0.6 * spacing) {}
 
@@ -71,16 +88,9 @@ class Clearance {
     return clearance / spacing_;
   }
 
-  /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
-  /// spacings.
-  bool is_deep(Vec3d middle, double radius, double least) const {
-    const double limit = radius + least * spacing_ + farthest_;
-    return coarse_.nearest(middle, limit).distance2 > limit * limit;
-  }
-
  private:
-  double spacing_, farthest_;
-  SpatialHash site_, coarse_, sample_;
+  double spacing_;
+  SpatialHash site_, sample_;
 };
 
 struct Nodes {
@@ -89,14 +99,16 @@ struct Nodes {
 };
 
 /// All nodes of the lattice inside, task by task.
-Nodes nodes_inside(const LatticeRequest& request, const Clearance& clearance, double spacing) {
+Nodes nodes_inside(const LatticeRequest& request, double spacing) {
+  const Depth depth(request, spacing);
+  const Clearance clearance(request, spacing);
   std::vector<Nodes> by_task(InsideSampler::most_tasks);
   const double block_radius = 2 * std::numbers::sqrt3 * spacing;
   request.sampler.visit(
       {.voxel = spacing, .seed = request.seed, .at_random = false, .turn = turn_of_lattice()},
       [&](std::size_t task, const SampleBlock& block) {
         Nodes& nodes = by_task[task];
-        const bool deep = clearance.is_deep(block.centre, block_radius, largest_clearance);
+        const bool deep = depth.is_deep(block.centre, block_radius, largest_clearance);
         for (std::size_t k = 0; k < block.offset.size(); ++k) {
           const Vec3d p = block.position(k);
           nodes.position.push_back(p);
@@ -152,15 +164,11 @@ double lattice_constant(double volume, double area, Index n) {
   return high;
 }
 
-/// Evens out the distances between the nodes near the surface.
+/// The phyxels on the surface, and the nodes near it.
 class Skin {
  public:
   Skin(const LatticeRequest& request, Nodes& nodes, double spacing)
-      : sampler_(request.sampler),
-        fixed_(request.on_surface.size()),
-        nodes_(nodes),
-        spacing_(spacing),
-        point_(request.on_surface) {
+      : request_(request), nodes_(nodes), spacing_(spacing), point_(request.on_surface) {
     for (std::size_t i = 0; i < nodes.position.size(); ++i) {
       if (nodes.clearance[i] >= largest_clearance) continue;
       near_.push_back(i);
@@ -175,84 +183,70 @@ class Skin {
     const auto n = static_cast<std::ptrdiff_t>(near_.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t k = 0; k < n; ++k) {
-      const Vec3d before = point_[fixed_ + k];
-      moved[k] =
-          nodes_.clearance[near_[k]] < moving_clearance ? moved_from(before, k, hash) : before;
+      const Vec3d before = point_[sites() + k];
+      moved[k] = clearance_of(k) < moving_clearance ? moved_from(before, k, hash) : before;
     }
-    std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(fixed_));
+    std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
   }
 
   void write_back() {
-    for (std::size_t k = 0; k < near_.size(); ++k) nodes_.position[near_[k]] = point_[fixed_ + k];
+    for (std::size_t k = 0; k < near_.size(); ++k) nodes_.position[near_[k]] = point_[sites() + k];
+  }
+
+  /// Volumes of the phyxels on the surface, then of all nodes [m^3].
+  std::vector<double> volumes(Stage& stage) const {
+    const double cell = std::pow(spacing_, 3);
+    const Depth depth(request_, spacing_);
+    const auto wanted = [&](Vec3d middle, double half) {
+      // Smaller cells are parts of one that is wanted; larger ones would need a long search.
+      if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
+      // Cells of a Voronoi diagram reach one spacing from their phyxels.
+      return !depth.is_deep(middle, std::numbers::sqrt3 * half, regular_clearance + 1);
+    };
+    const std::vector<double> sampled =
+        NearestSite(point_, spacing_)
+            .volumes(
+                request_.sampler,
+                {.voxel = spacing_ / samples_along, .seed = request_.seed + 2, .wanted = wanted},
+                stage);
+    std::vector<double> volume(sites() + nodes_.position.size(), cell);
+    std::vector<std::size_t> irregular;  // phyxels whose volumes are not those of lattice cells
+    double sum = 0;
+    for (std::size_t k = 0; k < point_.size(); ++k) {
+      if (k >= sites() && clearance_of(k - sites()) >= regular_clearance) continue;
+      irregular.push_back(k < sites() ? k : sites() + near_[k - sites()]);
+      volume[irregular.back()] = sampled[k];
+      sum += sampled[k];
+    }
+    if (!request_.exact_volume) return volume;
+    const double rest = static_cast<double>(volume.size() - irregular.size()) * cell;
+    for (const std::size_t i : irregular) volume[i] *= (request_.volume - rest) / sum;
+    return volume;
   }
 
  private:
+  std::size_t sites() const { return request_.on_surface.size(); }
+  /// The clearance that the k-th node of the skin had in the lattice.
+  float clearance_of(std::size_t k) const { return nodes_.clearance[near_[k]]; }
   Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
-    const auto self = static_cast<Index>(fixed_ + k), sites = static_cast<Index>(fixed_);
+    const auto first_node = static_cast<Index>(sites());
     bool beside_site = false;
-    const Vec3d after = before + repulsion_step(hash, before, self, spacing_, [&](Index other) {
-                          beside_site |= other < sites;
-                          return other < sites ? surface_strength : 1;
-                        });
+    const auto strength = [&](Index other) {
+      beside_site |= other < first_node;
+      return other < first_node ? surface_strength : 1;
+    };
+    const Vec3d after = before + repulsion_step(hash, before, first_node + static_cast<Index>(k),
+                                                spacing_, strength);
     // Only nodes beside phyxels on the surface can leave it.
-    return !beside_site || sampler_.inside(after) ? after : before;
+    return !beside_site || request_.sampler.inside(after) ? after : before;
   }
 
-  const InsideSampler& sampler_;
-  std::size_t fixed_;
+  const LatticeRequest& request_;
   Nodes& nodes_;
   double spacing_;
   std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
   std::vector<Vec3d> point_;       ///< Phyxels on the surface, then the nodes of `near_` [m].
 };
-
-/// Volumes of the phyxels on the surface and of the nodes [m^3].
-std::vector<double> volumes_of(const LatticeRequest& request, const Nodes& nodes,
-                               const Clearance& clearance, double spacing, Stage& stage) {
-  const std::size_t sites = request.on_surface.size();
-  std::vector<Vec3d> point = request.on_surface;
-  std::vector<std::size_t> number(sites);  // of each point, among all phyxels
-  std::iota(number.begin(), number.end(), std::size_t{0});
-  for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-    if (nodes.clearance[i] >= largest_clearance) continue;
-    point.push_back(nodes.position[i]);
-    number.push_back(sites + i);
-  }
-  std::vector<std::uint32_t> count(point.size(), 0);
-  const NearestSite nearest(point, spacing);
-  const double voxel = spacing / samples_along;
-  request.sampler.visit({.voxel = voxel,
-                         .seed = request.seed + 2,
-                         .wanted =
-                             [&](Vec3d middle, double half) {
-                               // Smaller cells are parts of one that is wanted, larger ones would
-                               // have to be searched far about.
-                               if (half < 0.5 * spacing || half > 4 * spacing) return true;
-                               // Cells of a Voronoi diagram reach one spacing from their phyxels.
-                               return !clearance.is_deep(middle, std::numbers::sqrt3 * half,
-                                                         regular_clearance + 1);
-                             }},
-                        nearest.count_into(count), &stage);
-  std::vector<double> volume(sites + nodes.position.size(), std::pow(spacing, 3));
-  double sampled = 0;
-  const auto is_regular = [&](std::size_t k) {
-    return k >= sites && nodes.clearance[number[k] - sites] >= regular_clearance;
-  };
-  std::size_t irregular = 0;
-  for (std::size_t k = 0; k < point.size(); ++k) {
-    if (is_regular(k)) continue;
-    // A phyxel without sample points gets the volume of half a sample.
-    volume[number[k]] = std::max(0.5, double(count[k])) * std::pow(voxel, 3);
-    sampled += volume[number[k]];
-    ++irregular;
-  }
-  if (!request.exact_volume) return volume;
-  const double rest = static_cast<double>(volume.size() - irregular) * std::pow(spacing, 3);
-  for (std::size_t k = 0; k < point.size(); ++k) {
-    if (!is_regular(k)) volume[number[k]] *= (request.volume - rest) / sampled;
-  }
-  return volume;
-}
 
 }  // namespace
 
@@ -263,8 +257,7 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   Nodes nodes;
   constexpr int most_coarser = 12, most_attempts = 40;
   for (int attempt = 0;; ++attempt) {
-    const Clearance clearance(request, spacing);
-    nodes = nodes_inside(request, clearance, spacing);
+    nodes = nodes_inside(request, spacing);
     const auto roomy = std::count_if(nodes.clearance.begin(), nodes.clearance.end(),
                                      [](float found) { return found >= usual_clearance; });
     if (nodes.position.size() >= n) {
@@ -294,7 +287,7 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   LatticeFilling filling;
   filling.spacing = spacing;
   Stage measuring("volumes of phyxels");
-  filling.volume = volumes_of(request, nodes, Clearance(request, spacing), spacing, measuring);
+  filling.volume = skin.volumes(measuring);
   measuring.finish();
   filling.position = std::move(nodes.position);
   return filling;

@@ -10,7 +10,7 @@
 
 namespace phyxel {
 
-/// What to fill, and how.
+/// A surface to fill, and the number of phyxels to fill it with.
 struct LatticeRequest {
   const Surface& surface;
   const InsideSampler& sampler;          ///< Sampler of the surface's inside.

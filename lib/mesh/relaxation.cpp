@@ -171,7 +171,7 @@ SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
 }  // namespace
 
 NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
-    : hash_(hash_of(site, spacing)) {}
+    : hash_(hash_of(site, spacing)), sites_(site.size()) {}
 
 void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   const std::size_t n = block.offset.size();
@@ -220,15 +220,25 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
 }
 
-InsideSampler::Visit NearestSite::count_into(std::vector<std::uint32_t>& count) const {
-  return [this, &count](std::size_t, const SampleBlock& block) {
-    thread_local Scratch scratch;
-    find(block, scratch);
-    for (const Index i : scratch.owner) {
+std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
+                                         Stage& stage) const {
+  std::vector<std::uint32_t> count(sites_, 0);
+  sampler.visit(
+      sweep,
+      [&](std::size_t, const SampleBlock& block) {
+        thread_local Scratch scratch;
+        find(block, scratch);
+        for (const Index i : scratch.owner) {
 #pragma omp atomic
-      ++count[i];
-    }
-  };
+          ++count[i];
+        }
+      },
+      &stage);
+  std::vector<double> volume(sites_);
+  for (std::size_t i = 0; i < sites_; ++i) {
+    volume[i] = std::max(0.5, double(count[i])) * std::pow(sweep.voxel, 3);
+  }
+  return volume;
 }
 
 SampledVoronoi::SampledVoronoi(std::vector<SampleBlock> blocks) : blocks_(std::move(blocks)) {

@@ -40,12 +40,14 @@ class NearestSite {
   /// Finds the nearest site of each point of a block.
   void find(const SampleBlock& block, Scratch& scratch) const;
 
-  /// A visit of blocks, on any number of threads, that counts the points nearest to each site.
-  /// @param count shape [n_sites]; must outlive the visit, as must this search
-  InsideSampler::Visit count_into(std::vector<std::uint32_t>& count) const;
+  /// Finds the volume [m^3] that sample points give to each site, the nearest one; a site without
+  /// sample points gets half of one's. @param stage is told the progress
+  std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep,
+                              Stage& stage) const;
 
  private:
   SpatialHash hash_;
+  std::size_t sites_;
 };
 
 /// A Voronoi diagram of sites, restricted to the inside of a surface and represented by sample

@@ -21,7 +21,7 @@ namespace phyxel {
 namespace {
 
 /// Memory that a phyxel takes while a lattice fills a body [bytes]: 340 of 500,000 in a cube, 150
-/// of ten million. What those on the surface take beside is checked with their number.
+/// of ten million. Memory for phyxels on the surface is checked when their number is known.
 constexpr double bytes_on_lattice = 350;
 
 /// Refuses a number of phyxels that takes more memory than there is.

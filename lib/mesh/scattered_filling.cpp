@@ -9,24 +9,6 @@
 namespace phyxel {
 namespace {
 
-/// Share of each phyxel in the volume [m^3], from sample points on voxels half as large as those of
-/// the relaxation.
-std::vector<double> voronoi_shares(const InsideSampler& sampler, const std::vector<Vec3d>& site,
-                                   double voxel, double spacing, std::uint64_t seed) {
-  Stage stage("volumes of phyxels");
-  const double fine = 0.5 * voxel;
-  const NearestSite nearest(site, spacing);
-  std::vector<std::uint32_t> count(site.size(), 0);
-  sampler.visit({.voxel = fine, .seed = seed}, nearest.count_into(count), &stage);
-  std::vector<double> share(site.size());
-  // A phyxel without sample points gets the volume of half a sample.
-  for (std::size_t i = 0; i < site.size(); ++i) {
-    share[i] = std::max(0.5, double(count[i])) * std::pow(fine, 3);
-  }
-  stage.finish();
-  return share;
-}
-
 /// Moves sites that relaxation has left outside to a sample point of their cells: in a thin or
 /// hollow body, the centroid of a cell may lie outside.
 void bring_inside(const InsideSampler& sampler, SampledVoronoi& voronoi, std::vector<Vec3d>& site,
@@ -50,11 +32,15 @@ void fill_scattered(const InsideSampler& sampler, InsideFilling& filling,
                     const SampleRequest& request, double spacing, Cloud& cloud) {
   cloud.position = throw_darts(filling.blocks, request.phyxels, spacing, request.seed + 1);
   SampledVoronoi voronoi(std::move(filling.blocks));
-  Stage evening("evening out distances");
-  voronoi.relax(cloud.position, spacing, request.relaxations, 0, &evening);
-  evening.finish();
+  Stage relaxing("evening out distances");
+  voronoi.relax(cloud.position, spacing, request.relaxations, 0, &relaxing);
+  relaxing.finish();
   bring_inside(sampler, voronoi, cloud.position, spacing);
-  cloud.volume = voronoi_shares(sampler, cloud.position, filling.voxel, spacing, request.seed + 2);
+  Stage measuring("volumes of phyxels");
+  cloud.volume =
+      NearestSite(cloud.position, spacing)
+          .volumes(sampler, {.voxel = 0.5 * filling.voxel, .seed = request.seed + 2}, measuring);
+  measuring.finish();
 }
 
 }  // namespace phyxel

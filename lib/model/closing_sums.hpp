@@ -97,7 +97,7 @@ class Bodies {
 #pragma omp critical(phyxel_closure_sum)
       sums[stretch.body].add(own);
     });
-    if (model_.share) add_over_ranks(*model_.share->communicator, sums);
+    add_over_ranks(model_, sums);
     for (std::size_t b = 0; b < list_.size(); ++b) list_[b]->*into = sums[b].value();
   }
   /// Copies the owners' values to the ghosts of all bodies from the first to the last. Collective.

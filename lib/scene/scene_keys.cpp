@@ -282,8 +282,8 @@ std::vector<SceneKey> body_keys() {
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
            "the phyxels are: without it, irregular bodies are some percent off, however many "
            "phyxels they have. 1e-3 is plenty. 0: as they come. Needs a closed surface, and one "
-           "support for the body. \"auto\": 0.01 for bodies that have both; 0 for others, for lattices "
-           "without jitter, for the paper's bodies, and with the kernel's volumes."},
+           "support for the body. \"auto\": 0.01 for bodies that have both; 0 for all other bodies, "
+           "for lattices without jitter, for the paper's bodies, and with the kernel's volumes."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
       {.section = "body", .name = "neighbours", .type = KeyType::table,

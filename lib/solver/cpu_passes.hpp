@@ -181,8 +181,8 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     for (std::size_t m = 0; m < model_.motions.size(); ++m) {
       const Motion& motion = model_.motions[m];
       const Path before = motion.path_at(time), after = motion.path_at(time + dt);
-      const Path mean_step = motion.mean_step(time, dt);
       const bool works = !motion.stands_still();
+      const Path mean_step = works ? motion.mean_step(time, dt) : Path{};
       std::size_t owned = 0;
       for (const Index i : motion.phyxels) {
         if (!model_.owns(i)) continue;

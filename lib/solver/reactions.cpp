@@ -9,36 +9,44 @@
 namespace phyxel {
 namespace {
 
+/// Sums over the phyxels of a motion.
+struct CentreSums {
+  ExactSum mass;       ///< [kg]
+  ExactVector moment;  ///< Mass times position [kg m].
+  std::vector<ExactSum*> all() { return {&mass, &moment.x, &moment.y, &moment.z}; }
+};
+struct ReactionSums {
+  ExactVector force, torque;  ///< [N], [N m]
+  ExactSum rest_of_work;      ///< [J]
+  std::vector<ExactSum*> all() {
+    return {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z, &rest_of_work};
+  }
+};
+
 /// Adds the sums of all ranks.
-void add_over_ranks(const Model& model, std::vector<ExactSum>& sums) {
-  if (model.share) add_over_ranks(*model.share->communicator, sums);
-}
-
-/// Returns the vector whose components are the sums from `first` on.
-Vec3d vector_at(const std::vector<ExactSum>& sums, std::size_t first) {
-  return {sums[first].value(), sums[first + 1].value(), sums[first + 2].value()};
-}
-
-void add(std::vector<ExactSum>& sums, std::size_t first, Vec3d term) {
-  sums[first].add(term.x);
-  sums[first + 1].add(term.y);
-  sums[first + 2].add(term.z);
+template <class Sums>
+void add_of_motions(const Model& model, std::vector<Sums>& of_motions) {
+  std::vector<ExactSum*> all;
+  for (Sums& sums : of_motions) {
+    for (ExactSum* sum : sums.all()) all.push_back(sum);
+  }
+  add_over_ranks(model, all);
 }
 
 /// Returns the centre of mass of each motion's phyxels at rest [m].
 std::vector<Vec3d> centres_of(const Model& model) {
-  std::vector<ExactSum> sums(4 * model.motions.size());  // mass [kg] and mass times position
+  std::vector<CentreSums> sums(model.motions.size());
   for (std::size_t m = 0; m < model.motions.size(); ++m) {
     for_each_owned(model, model.motions[m], [&](Index i, const Part&) {
-      sums[4 * m].add(model.mass[i]);
-      add(sums, 4 * m + 1, model.mass[i] * model.position[i]);
+      sums[m].mass.add(model.mass[i]);
+      sums[m].moment.add(model.mass[i] * model.position[i]);
     });
   }
-  add_over_ranks(model, sums);
+  add_of_motions(model, sums);
   std::vector<Vec3d> centres;
-  for (std::size_t m = 0; m < model.motions.size(); ++m) {
-    const double mass = sums[4 * m].value();
-    centres.push_back(mass > 0 ? vector_at(sums, 4 * m + 1) / mass : Vec3d{});
+  for (CentreSums& of : sums) {
+    const double mass = of.mass.value();
+    centres.push_back(mass > 0 ? of.moment.value() / mass : Vec3d{});
   }
   return centres;
 }
@@ -65,19 +73,18 @@ std::vector<Reaction> find_reactions(const Model& model, Backend& backend, const
   if (model.motions.empty()) return {};
   const PresentForces present(model, backend, solver);
   const std::vector<Vec3d> centres = centres_of(model);
-  constexpr std::size_t width = 7;  // force, torque, and the rest of the work
-  std::vector<ExactSum> sums(width * model.motions.size());
+  std::vector<ReactionSums> sums(model.motions.size());
   for (std::size_t m = 0; m < model.motions.size(); ++m) {
     const Motion& motion = model.motions[m];
     const Path rest = rest_of_work(motion, solver);
     for_each_support_force(model, motion, present.instant(), [&](Index i, Vec3d force) {
       const Vec3d x = model.position[i], arm = x + present.state().displacement[i] - centres[m];
-      add(sums, width * m, force);
-      add(sums, width * m + 3, cross(arm, force));
-      if (!motion.stands_still()) sums[width * m + 6].add(dot(force, rest.at(x)));
+      sums[m].force.add(force);
+      sums[m].torque.add(cross(arm, force));
+      if (!motion.stands_still()) sums[m].rest_of_work.add(dot(force, rest.at(x)));
     });
   }
-  add_over_ranks(model, sums);
+  add_of_motions(model, sums);
   SupportWork work = no_support_work(model);
   add_words(work, solver.support_work());
   std::vector<Reaction> reactions;
@@ -87,11 +94,11 @@ std::vector<Reaction> find_reactions(const Model& model, Backend& backend, const
     reaction.body = motion.body;
     reaction.set = motion.set;
     reaction.centre = centres[m];
-    reaction.force = vector_at(sums, width * m);
-    reaction.torque = vector_at(sums, width * m + 3);
+    reaction.force = sums[m].force.value();
+    reaction.torque = sums[m].torque.value();
     if (motion.stands_still()) continue;
     ExactSum whole = work[m];
-    whole.add(sums[width * m + 6]);
+    whole.add(sums[m].rest_of_work);
     reaction.work = solver.method() == Method::equilibrium
                         ? std::numeric_limits<double>::quiet_NaN()
                         : whole.value();

@@ -180,9 +180,7 @@ std::vector<std::int64_t> Solver::support_work() const {
   add_words(work, work_of_backend_, -1);
   add_words(work, work_of_changes_);
   if (implicit_) add_words(work, words_of(implicit_->support_work()));
-  if (model_ && model_->share && !work.empty()) {
-    add_over_ranks(*model_->share->communicator, work);
-  }
+  if (model_ && !work.empty()) add_over_ranks(*model_, work);
   add_words(work, work_before_);
   return words_of(std::move(work));
 }

@@ -74,10 +74,9 @@ TEST_F(Program, StoppedByASignalAndResumedIsBitwiseTheWholeRun) {
     write_beam("1.5");
     const std::string whole = "whole_" + precision, parts = "parts_" + precision;
     ASSERT_EQ(run({"run", "beam.toml", "--out", whole, "--precision", precision}).code, 0);
-    const pid_t child = start({"run", "beam.toml", "--out", parts, "--precision", precision});
-    wait_for(folder_ / parts / "phyxels_000003.hdf");
-    kill(child, signal);
-    const Outcome stopped = finish(child);
+    const Outcome stopped =
+        interrupted({"run", "beam.toml", "--out", parts, "--precision", precision},
+                    parts + "/phyxels_000003.hdf", signal);
     ASSERT_EQ(stopped.code, 75) << stopped.out << stopped.err;
     EXPECT_THAT(stopped.err, HasSubstr("--resume auto"));
     const State middle = final_state(folder_ / parts);
@@ -150,10 +149,8 @@ TEST_F(Program, HalvesTheStepOfABodyThatStiffens) {
   EXPECT_NEAR(summary["time_s"].get<double>(), 0.6, 1e-9);
   // Frames stay where they were: 0.6 s at 50 a second, first and last.
   EXPECT_EQ(read_series(folder_ / "whole" / "phyxels.hdf.series").size(), 31u);
-  const pid_t child = start({"run", "beam.toml", "--out", "parts"});
-  wait_for(folder_ / "parts" / "phyxels_000020.hdf");
-  kill(child, SIGTERM);
-  const Outcome stopped = finish(child);
+  const Outcome stopped =
+      interrupted({"run", "beam.toml", "--out", "parts"}, "parts/phyxels_000020.hdf", SIGTERM);
   ASSERT_TRUE(stopped.code == 75 || stopped.code == 0) << stopped.err;
   ASSERT_EQ(run({"run", "beam.toml", "--out", "parts", "--resume", "auto"}).code, 0);
   const State one = final_state(folder_ / "whole"), two = final_state(folder_ / "parts");

@@ -1,7 +1,6 @@
 /// Reactions in the output of a run.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -75,10 +74,10 @@ TEST_F(ReactionsOfRuns, AreTheSameBytesAfterAStopAndAResumedRun) {
     write_shaken_beam("1.5");
     const std::string whole = "whole_" + precision, parts = "parts_" + precision;
     ASSERT_EQ(run({"run", "beam.toml", "--out", whole, "--precision", precision}).code, 0);
-    const pid_t child = start({"run", "beam.toml", "--out", parts, "--precision", precision});
-    wait_for(folder_ / parts / "phyxels_000003.hdf");
-    kill(child, SIGTERM);
-    ASSERT_EQ(finish(child).code, 75);
+    ASSERT_EQ(interrupted({"run", "beam.toml", "--out", parts, "--precision", precision},
+                          parts + "/phyxels_000003.hdf", SIGTERM)
+                  .code,
+              75);
     const auto middle = latest_checkpoint(folder_ / parts);
     ASSERT_TRUE(middle.has_value());
     EXPECT_FALSE(read_checkpoint(*middle).state.support_work.empty());

@@ -109,10 +109,7 @@ TEST_F(Resuming, AFrameCutShortIsNoticed) {
 
 TEST_F(Resuming, ARunHasACheckpointFromItsStart) {
   write_beam("1000");
-  const pid_t child = start({"run", "beam.toml"});
-  wait_for("out/checkpoint_000000000.h5");
-  kill(child, SIGKILL);
-  finish(child);
+  interrupted({"run", "beam.toml"}, "out/checkpoint_000000000.h5", SIGKILL);
   EXPECT_EQ(read_checkpoint(newest("out")).state.displacement.empty(), false);
   const Outcome outcome = run({"run", "beam.toml", "--resume", "auto", "--until", "0.1"});
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -169,10 +166,8 @@ TEST_F(Resuming, AFinishedRunKeepsItsSummaryAndAnUnfinishedEndIsMadeGood) {
 TEST_F(Resuming, EverySignalThatEndsJobsLeavesACheckpoint) {
   write_beam("1000");
   for (const int sent : {SIGHUP, SIGXCPU, SIGPIPE}) {
-    const pid_t child = start({"run", "beam.toml", "--force"});
-    wait_for("out/phyxels_000002.hdf");
-    kill(child, sent);
-    const Outcome outcome = finish(child);
+    const Outcome outcome =
+        interrupted({"run", "beam.toml", "--force"}, "out/phyxels_000002.hdf", sent);
     EXPECT_EQ(outcome.code, 75) << sent << outcome.err;
     EXPECT_GT(read_checkpoint(newest("out")).state.step, 0);
     fs::remove_all(folder_ / "out");

@@ -196,10 +196,9 @@ TEST_F(Shortage, ACheckpointThatCannotBeWrittenEndsTheRunBetweenFrames) {
 TEST_F(Shortage, ACheckpointOnTheWayCountsTheFramesOnDisk) {
   write_beam("100");
   replace_in_beam("frames_per_second = 50", "frames_per_second = 50\ncheckpoint_every = 0.02");
-  const pid_t child = start({"run", "beam.toml"});
-  wait_for(folder_ / "out" / "phyxels_000030.hdf");
-  kill(child, SIGKILL);  // no chance to finish anything
-  EXPECT_EQ(finish(child).code, 128 + SIGKILL);
+  // No chance to finish anything.
+  EXPECT_EQ(interrupted({"run", "beam.toml"}, "out/phyxels_000030.hdf", SIGKILL).code,
+            128 + SIGKILL);
   const auto file = latest_checkpoint(folder_ / "out");
   ASSERT_TRUE(file.has_value());
   const Checkpoint checkpoint = read_checkpoint(*file);

@@ -1,6 +1,7 @@
 /// A fixture that runs the program in a temporary folder, as a user would.
 #pragma once
 
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -49,6 +50,15 @@ class Program : public Folder {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     EXPECT_TRUE(std::filesystem::exists(folder_ / file));
+  }
+
+  /// Starts the program, and sends it a signal once it has written a file.
+  Outcome interrupted(const std::vector<std::string>& arguments, const std::string& file,
+                      int signal) const {
+    const pid_t child = start(arguments);
+    wait_for(file);
+    kill(child, signal);
+    return finish(child);
   }
 
   /// Command that launches the program, e.g. mpirun and its options; empty if there is none.
