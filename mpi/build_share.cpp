@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <utility>
 
 #include "model/assembly.hpp"
@@ -49,12 +50,11 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
   return share;
 }
 
-/// Returns options for a scene: without a surveyor if gradients may be closed, which takes lists on
-/// the host, or if a body has inclusions, whose phyxels a device does not sort by material.
+/// Returns options for a scene: without a surveyor if a body needs lists on the host.
 ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   ShareOptions own = options;
   for (const BodyRequest& body : scene.bodies) {
-    if (may_close(body) || !body.inclusions.empty()) own.surveyor = nullptr;
+    if (needs_lists_on_host(body)) own.surveyor = nullptr;
   }
   return own;
 }
@@ -71,18 +71,19 @@ Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
   // Copies of a body follow one another and share one cloud.
-  const BodySource* made = nullptr;
+  std::optional<CutSource> made;
   Cloud rest;
   const auto piece_of_source = [&](const BodyRequest& request, Piece piece, std::uint64_t& digest) {
     CloudPiece cut;
     if (const auto lattice = lattice_of(request.source, piece)) {
       cut = make_lattice_shape(*lattice, piece);
     } else {
-      if (!made || !(*made == request.source)) {
-        rest = rest_cloud(request.source);
+      CutSource source = source_of(request);
+      if (!made || !(*made == source)) {
+        rest = rest_cloud(source);
         digest = 31 * digest + cloud_digest(rest);
       }
-      made = &request.source;
+      made = std::move(source);
       cut = cut_piece(rest, piece);
       cut.cloud.warnings = std::exchange(rest.warnings, {});  // once for all copies
     }

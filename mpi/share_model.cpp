@@ -44,10 +44,12 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
         if (rule.one_sided()) m.neighbourhood.symmetric = false;
         continue;
       }
-      const Neighbourhood hood = neighbours_within(of_range(m.position, body),
-                                                   {m.neighbourhood.support.begin() + body.begin,
-                                                    m.neighbourhood.support.begin() + body.end},
-                                                   rule);
+      const std::span<const Vec3d> position = of_range(m.position, body);
+      Neighbourhood hood = neighbours_within(position,
+                                             {m.neighbourhood.support.begin() + body.begin,
+                                              m.neighbourhood.support.begin() + body.end},
+                                             rule);
+      separate(hood, position, whole.bodies[b].walls);
       append_lists(m.neighbourhood, hood, body.begin);
       std::copy(hood.support.begin(), hood.support.end(),
                 m.neighbourhood.support.begin() + body.begin);
@@ -359,7 +361,6 @@ void gather_degenerate(const ShareSetup& setup, const WholeBodies& whole, LocalM
 void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   m.gravity = setup.scene.gravity;
-  find_moments(m);
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       collect_ghost_neighbours(setup, whole, local, b);
@@ -370,6 +371,7 @@ void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& loc
   add_up_parts(setup, whole, local);
   choose_closures(setup, whole, local);
   add_boundary(setup, whole, local);
+  find_moments(m);
   gather_degenerate(setup, whole, local);
   add_surfels(setup, whole, local);
   find_areas(setup, whole, local);

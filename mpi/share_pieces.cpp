@@ -203,6 +203,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       with_volumes[b] = !cloud.volume.empty();
       lattices[b] = cloud.lattice;
       const BodyRequest& request = setup.scene.bodies[b];
+      body.walls = walls_of(request, cloud);
       const std::vector<std::uint32_t> sets =
           naming(request, [&] { return find_region_sets(request, made, body); });
       if (!request.inclusions.empty()) {

@@ -2,7 +2,7 @@
 #include <bit>
 
 #include "device.hpp"
-#include "model/closing_areas.hpp"
+#include "model/assembly.hpp"
 #include "model/nearest_distances.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -317,8 +317,7 @@ Surveyor cuda_surveyor(int device) {
 
 bool can_survey_on_cuda(const Scene& scene) {
   return std::none_of(scene.bodies.begin(), scene.bodies.end(), [](const BodyRequest& body) {
-    // The host finds closing vectors from its lists, and sorts phyxels by material.
-    return may_close(body) || !body.inclusions.empty() || body.neighbourhood.max_neighbours ||
+    return needs_lists_on_host(body) || body.neighbourhood.max_neighbours ||
            body.neighbourhood.nearest > most_nearest;
   });
 }

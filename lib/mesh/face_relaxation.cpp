@@ -3,10 +3,35 @@
 #include <algorithm>
 #include <array>
 
+#include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
+namespace {
+
+/// Sweeps of repulsion over all points but the first `fixed`.
+/// @param move move(place, step) returns the place of a point after a step [m]
+/// @param done done(sweeps) is told the number of sweeps done
+template <class Move, class Done>
+void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
+                Move&& move, Done&& done) {
+  std::vector<Vec3d> moved = site;
+  const auto n = static_cast<std::ptrdiff_t>(site.size());
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const SpatialHash hash = hash_for_repulsion(site, spacing);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
+      const Vec3d step =
+          repulsion_step(hash, site[i], static_cast<Index>(i), spacing, [](Index) { return 1.0; });
+      moved[i] = move(site[i], step);
+    }
+    site.swap(moved);
+    done(sweep + 1);
+  }
+}
+
+}  // namespace
 
 Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
   const Vec3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -35,25 +60,26 @@ void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
     const Triangle& t = surface.triangle[sample[static_cast<std::size_t>(nearest)].piece];
     return std::array{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
   };
-  std::vector<Vec3d> moved = site;
-  const auto n = static_cast<std::ptrdiff_t>(site.size());
-  for (int sweep = 0; sweep < sweeps; ++sweep) {
-    const SpatialHash hash = hash_for_repulsion(site, spacing);
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
-      Vec3d step =
-          repulsion_step(hash, site[i], static_cast<Index>(i), spacing, [](Index) { return 1.0; });
-      const auto [a, b, c] = corners_at(site[i]);
-      const Vec3d normal = cross(b - a, c - a);
-      const double size2 = dot(normal, normal);
-      if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
-      const Vec3d after = site[i] + step;
-      const auto [d, e, f] = corners_at(after);
-      moved[i] = nearest_on_triangle(after, d, e, f);
-    }
-    site.swap(moved);
-    stage.reach((sweep + 1.0) / sweeps);
-  }
+  const auto move = [&](Vec3d before, Vec3d step) {
+    const auto [a, b, c] = corners_at(before);
+    const Vec3d normal = cross(b - a, c - a);
+    const double size2 = dot(normal, normal);
+    if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
+    const Vec3d after = before + step;
+    const auto [d, e, f] = corners_at(after);
+    return nearest_on_triangle(after, d, e, f);
+  };
+  sweep_over(site, fixed, spacing, sweeps, move,
+             [&](int done) { stage.reach(static_cast<double>(done) / sweeps); });
+}
+
+void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::vector<Vec3d>& site,
+                  std::size_t fixed, double spacing, int sweeps) {
+  const auto move = [&](Vec3d before, Vec3d step) {
+    const Vec3d after = region.nearest_on_boundary(before + step);
+    return sampler.inside(after) ? after : before;
+  };
+  sweep_over(site, fixed, spacing, sweeps, move, [](int) {});
 }
 
 }  // namespace phyxel

@@ -5,9 +5,11 @@
 #include <vector>
 
 #include "phyxel/cloud.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
+class InsideSampler;
 class Stage;
 
 /// A point on a vertex, an edge or a triangle, with the index of that piece.
@@ -28,5 +30,12 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
                     std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
                     Stage& stage);
+
+/// Evens out the distances between points on the boundary of a region inside a surface: they repel
+/// each other and are put back on the boundary, and stay inside the surface. The first `fixed`
+/// points stay where they are.
+/// @param spacing typical distance between the points [m]
+void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::vector<Vec3d>& site,
+                  std::size_t fixed, double spacing, int sweeps);
 
 }  // namespace phyxel

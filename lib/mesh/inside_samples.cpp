@@ -328,7 +328,7 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, Wo
                             const std::function<void(const SampleBlock&)>& visit_block) const {
   if (cell.known && !(cell.winding > 0.5)) return;
   if (limit.reached()) return;
-  if (cell.known && grid.sweep.wanted) {
+  if (grid.sweep.wanted) {
     const double half = 0.5 * grid.voxel * static_cast<double>(std::int64_t{1} << cell.level);
     if (!grid.sweep.wanted(grid.middle(cell), half)) return;
   }

@@ -44,8 +44,8 @@ struct SampleSweep {
   /// one in the middle of each voxel of a grid turned by `turn`, at a random position.
   bool at_random = true;
   Mat3d turn = identity<double>();
-  /// Tells whether a cube inside the surface, given by its middle and half its side [m], is wanted;
-  /// one that is not may be left out. Called on many threads. Null: all are.
+  /// Tells whether a cube, given by its middle and half its side [m], is wanted; one that is not
+  /// may be left out. Called on many threads. Null: all are.
   std::function<bool(Vec3d middle, double half)> wanted;
   Offset most_work = std::numeric_limits<Offset>::max();  ///< Upper limit of the work.
 };

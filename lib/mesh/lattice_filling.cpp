@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "mesh/relaxation.hpp"
@@ -47,13 +48,20 @@ Mat3d turn_of_lattice() {
   return turn;
 }
 
-/// A test that tells places deep inside a surface.
+/// Phyxels on the surface, then those on cuts [m].
+std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
+  std::vector<Vec3d> all = sites.position;
+  all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
+  return all;
+}
+
+/// A test that tells places deep inside a surface and far from cuts.
 class Depth {
  public:
   Depth(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
-        farthest_(request.surface_spacing),
-        site_(request.on_surface, largest_clearance * spacing) {}
+        farthest_(request.sites.spacing),
+        site_(all_sites(request.sites), largest_clearance * spacing) {}
 
   /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
   /// spacings.
@@ -67,14 +75,13 @@ class Depth {
   SpatialHash site_;
 };
 
-/// Distances of places inside from the surface and from the phyxels on it.
+/// Distances of places inside from the surface, from cuts and from the phyxels on them.
 class Clearance {
  public:
   Clearance(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
-        site_(request.on_surface, spacing),
-        sample_(points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1),
-                0.6 * spacing) {}
+        site_(all_sites(request.sites), spacing),
+        sample_(samples(request, spacing), 0.6 * spacing) {}
 
   /// The clearance of a place, in spacings; `largest_clearance` for all that is farther.
   double at(Vec3d place) const {
@@ -89,6 +96,14 @@ class Clearance {
   }
 
  private:
+  static std::vector<Vec3d> samples(const LatticeRequest& request, double spacing) {
+    std::vector<Vec3d> points =
+        points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1);
+    const std::vector<Vec3d>& on_cuts = request.sites.cut_points;
+    points.insert(points.end(), on_cuts.begin(), on_cuts.end());
+    return points;
+  }
+
   double spacing_;
   SpatialHash site_, sample_;
 };
@@ -154,7 +169,8 @@ float keep_farthest(Nodes& nodes, std::size_t n) {
 }
 
 /// The lattice constant a that solves n a³ = V - a A/2: a layer half as thick as the lattice
-/// constant belongs to the phyxels on the surface.
+/// constant belongs to the phyxels on the surface. The area of cuts, which have two sides, counts
+/// twice.
 double lattice_constant(double volume, double area, Index n) {
   double low = 0, high = std::cbrt(volume / n);
   for (int k = 0; k < 60; ++k) {
@@ -164,11 +180,11 @@ double lattice_constant(double volume, double area, Index n) {
   return high;
 }
 
-/// The phyxels on the surface, and the nodes near it.
+/// The phyxels on the surface and on cuts, and the nodes near them.
 class Skin {
  public:
   Skin(const LatticeRequest& request, Nodes& nodes, double spacing)
-      : request_(request), nodes_(nodes), spacing_(spacing), point_(request.on_surface) {
+      : request_(request), nodes_(nodes), spacing_(spacing), point_(all_sites(request.sites)) {
     for (std::size_t i = 0; i < nodes.position.size(); ++i) {
       if (nodes.clearance[i] >= largest_clearance) continue;
       near_.push_back(i);
@@ -193,22 +209,10 @@ class Skin {
     for (std::size_t k = 0; k < near_.size(); ++k) nodes_.position[near_[k]] = point_[sites() + k];
   }
 
-  /// Volumes of the phyxels on the surface, then of all nodes [m^3].
+  /// Volumes of the phyxels on the surface, on cuts, then of all nodes [m^3].
   std::vector<double> volumes(Stage& stage) const {
     const double cell = std::pow(spacing_, 3);
-    const Depth depth(request_, spacing_);
-    const auto wanted = [&](Vec3d middle, double half) {
-      // Smaller cells are parts of one that is wanted; larger ones would need a long search.
-      if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
-      // Cells of a Voronoi diagram reach one spacing from their phyxels.
-      return !depth.is_deep(middle, std::numbers::sqrt3 * half, regular_clearance + 1);
-    };
-    const std::vector<double> sampled =
-        NearestSite(point_, spacing_)
-            .volumes(
-                request_.sampler,
-                {.voxel = spacing_ / samples_along, .seed = request_.seed + 2, .wanted = wanted},
-                stage);
+    const std::vector<double> sampled = sampled_volumes(stage);
     std::vector<double> volume(sites() + nodes_.position.size(), cell);
     std::vector<std::size_t> irregular;  // phyxels whose volumes are not those of lattice cells
     double sum = 0;
@@ -225,27 +229,74 @@ class Skin {
   }
 
  private:
-  std::size_t sites() const { return request_.on_surface.size(); }
+  std::size_t on_surface() const { return request_.sites.position.size(); }
+  /// Phyxels on the surface and on cuts.
+  std::size_t sites() const { return on_surface() + request_.sites.on_cuts.size(); }
   /// The clearance that the k-th node of the skin had in the lattice.
   float clearance_of(std::size_t k) const { return nodes_.clearance[near_[k]]; }
-  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
-    const auto first_node = static_cast<Index>(sites());
-    bool beside_site = false;
-    const auto strength = [&](Index other) {
-      beside_site |= other < first_node;
-      return other < first_node ? surface_strength : 1;
+
+  /// Shares of the inside by sample points [m^3]. Cells end at cuts: a phyxel on a cut has none of
+  /// the space in its region, unless no other phyxel is there.
+  std::vector<double> sampled_volumes(Stage& stage) const {
+    const std::vector<SpaceRegion>& cuts = request_.sites.cuts;
+    // Room 0 is outside all regions.
+    const auto room_of = [&](Vec3d p, double depth) {
+      std::size_t k = 0;
+      while (k < cuts.size() && !cuts[k].shrunk(depth).contains(p)) ++k;
+      return k < cuts.size() ? k + 1 : 0;
     };
-    const Vec3d after = before + repulsion_step(hash, before, first_node + static_cast<Index>(k),
-                                                spacing_, strength);
+    std::vector<std::vector<std::size_t>> in_room(cuts.size() + 1);
+    for (std::size_t k = 0; k < point_.size(); ++k) {
+      in_room[room_of(point_[k], 4 * request_.sites.cut_depth)].push_back(k);
+    }
+    const auto settled_room_of = [&](Vec3d p) {
+      const std::size_t room = room_of(p, 0);
+      return in_room[room].empty() ? 0 : room;
+    };
+    const Depth depth(request_, spacing_);
+    std::vector<double> volume(point_.size());
+    for (std::size_t room = 0; room < in_room.size(); ++room) {
+      if (in_room[room].empty()) continue;
+      std::vector<Vec3d> site;
+      for (const std::size_t k : in_room[room]) site.push_back(point_[k]);
+      const auto wanted = [&](Vec3d middle, double half) {
+        const double radius = std::numbers::sqrt3 * half;
+        if (room > 0 && cuts[room - 1].distance(middle) > radius) return false;
+        // Smaller cells are parts of one that is wanted; larger ones would need a long search.
+        if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
+        // Cells of a Voronoi diagram reach one spacing from their phyxels.
+        return !depth.is_deep(middle, radius, regular_clearance + 1);
+      };
+      std::function<bool(Vec3d)> counts;
+      if (!cuts.empty()) counts = [&](Vec3d p) { return settled_room_of(p) == room; };
+      const std::vector<double> shares =
+          NearestSite(site, spacing_)
+              .volumes(
+                  request_.sampler,
+                  {.voxel = spacing_ / samples_along, .seed = request_.seed + 2, .wanted = wanted},
+                  stage, counts);
+      for (std::size_t k = 0; k < site.size(); ++k) volume[in_room[room][k]] = shares[k];
+    }
+    return volume;
+  }
+  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
+    const auto first_inside = static_cast<Index>(on_surface());
+    bool beside_surface = false;
+    const auto strength = [&](Index other) {
+      beside_surface |= other < first_inside;
+      return other < first_inside ? surface_strength : 1;
+    };
+    const auto self = static_cast<Index>(static_cast<std::ptrdiff_t>(sites()) + k);
+    const Vec3d after = before + repulsion_step(hash, before, self, spacing_, strength);
     // Only nodes beside phyxels on the surface can leave it.
-    return !beside_site || request_.sampler.inside(after) ? after : before;
+    return !beside_surface || request_.sampler.inside(after) ? after : before;
   }
 
   const LatticeRequest& request_;
   Nodes& nodes_;
   double spacing_;
   std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
-  std::vector<Vec3d> point_;       ///< Phyxels on the surface, then the nodes of `near_` [m].
+  std::vector<Vec3d> point_;       ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
 };
 
 }  // namespace
@@ -253,7 +304,8 @@ class Skin {
 LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   Stage placing("placing phyxels");
   const auto n = static_cast<std::size_t>(request.phyxels);
-  double spacing = lattice_constant(request.volume, request.sampler.area(), request.phyxels);
+  double spacing = lattice_constant(
+      request.volume, request.sampler.area() + 2 * request.sites.cut_area, request.phyxels);
   Nodes nodes;
   constexpr int most_coarser = 12, most_attempts = 40;
   for (int attempt = 0;; ++attempt) {

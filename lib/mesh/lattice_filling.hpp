@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mesh/inside_samples.hpp"
+#include "mesh/surface_sites.hpp"
 #include "phyxel/cloud.hpp"
 
 namespace phyxel {
@@ -13,21 +14,19 @@ namespace phyxel {
 /// A surface to fill, and the number of phyxels to fill it with.
 struct LatticeRequest {
   const Surface& surface;
-  const InsideSampler& sampler;          ///< Sampler of the surface's inside.
-  const std::vector<Vec3d>& on_surface;  ///< Phyxels on the surface [m].
-  /// Distance between those phyxels, within which every place of the surface has one [m].
-  double surface_spacing = 0;
-  double volume = 0;         ///< Enclosed volume [m^3].
-  bool exact_volume = true;  ///< True if volumes have to add up to it.
-  Index phyxels = 0;         ///< Number of phyxels inside, 1 or more.
-  std::uint64_t seed = 1;    ///< Seed of the lattice's position and of sample points.
-  int sweeps = 10;           ///< Sweeps that move the nodes near the surface.
+  const InsideSampler& sampler;  ///< Sampler of the surface's inside.
+  const SurfaceSites& sites;     ///< Phyxels on the surface and on cuts.
+  double volume = 0;             ///< Enclosed volume [m^3].
+  bool exact_volume = true;      ///< True if volumes have to add up to it.
+  Index phyxels = 0;             ///< Number of phyxels inside, 1 or more.
+  std::uint64_t seed = 1;        ///< Seed of the lattice's position and of sample points.
+  int sweeps = 10;               ///< Sweeps that move the nodes near the surface.
 };
 
 /// Phyxels inside a surface, and the volumes of all its phyxels.
 struct LatticeFilling {
   std::vector<Vec3d> position;  ///< Phyxels inside [m], shape [request.phyxels].
-  /// Volumes of the phyxels on the surface, then of those inside, shape [n_phyxels] [m^3].
+  /// Volumes of the phyxels on the surface, on cuts, then of those inside, shape [n_phyxels] [m^3].
   std::vector<double> volume;
   double spacing = 0;  ///< Lattice constant [m].
 };
@@ -35,8 +34,9 @@ struct LatticeFilling {
 /// Fills a closed surface with a cubic lattice turned against the axes: exactly the requested
 /// number of its nodes, those farthest from the surface and the phyxels on it. Nodes within two
 /// spacings of the surface are then evened out: they and the phyxels on the surface repel each
-/// other. Volumes are shares of sample points within three spacings of the surface, and the cube of
-/// the lattice constant elsewhere.
+/// other. Phyxels on cuts through the inside are treated as those on the surface are. Volumes are
+/// shares of sample points within three spacings of the surface, and the cube of the lattice
+/// constant elsewhere.
 LatticeFilling fill_by_lattice(const LatticeRequest& request);
 
 }  // namespace phyxel

@@ -221,16 +221,18 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
 }
 
 std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
-                                         Stage& stage) const {
+                                         Stage& stage,
+                                         const std::function<bool(Vec3d)>& counts) const {
   std::vector<std::uint32_t> count(sites_, 0);
   sampler.visit(
       sweep,
       [&](std::size_t, const SampleBlock& block) {
         thread_local Scratch scratch;
         find(block, scratch);
-        for (const Index i : scratch.owner) {
+        for (std::size_t k = 0; k < scratch.owner.size(); ++k) {
+          if (counts && !counts(block.position(k))) continue;
 #pragma omp atomic
-          ++count[i];
+          ++count[scratch.owner[k]];
         }
       },
       &stage);

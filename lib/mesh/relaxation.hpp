@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -42,8 +43,9 @@ class NearestSite {
 
   /// Finds the volume [m^3] that sample points give to each site, the nearest one; a site without
   /// sample points gets half of one's. @param stage is told the progress
-  std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep,
-                              Stage& stage) const;
+  /// @param counts tells whether a sample point counts, on many threads; null: all do
+  std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
+                              const std::function<bool(Vec3d)>& counts = nullptr) const;
 
  private:
   SpatialHash hash_;

@@ -168,14 +168,19 @@ PreparedSurface prepare(const Surface& surface, SampleReport& found) {
 }
 
 /// Phyxels on the surface; none if the request or the surface does not allow them.
-SurfaceSites place_on_surface(const PreparedSurface& prepared, const SampleTally& tally,
-                              double volume, const SampleRequest& request, SampleReport& found) {
+SurfaceSites place_on_surface(const PreparedSurface& prepared, const InsideSampler& sampler,
+                              const SampleTally& tally, double volume, const SampleRequest& request,
+                              SampleReport& found) {
   Stage stage("phyxels on the surface");
   SurfaceSites sites;
   try {
     refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
-    sites = sites_on(prepared.surface, prepared.topology, volume, request.phyxels, request.seed + 3,
-                     request.relaxations, stage);
+    std::vector<SpaceRegion> cuts;
+    for (const SpaceRegion& cut : request.cuts) {
+      cuts.push_back(cut.scaled(std::ldexp(1.0, prepared.exponent)));
+    }
+    sites = sites_on(prepared.surface, prepared.topology, volume, sampler, cuts, request.phyxels,
+                     request.seed + 3, request.relaxations, stage);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
     found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
@@ -225,19 +230,21 @@ void report_tally(const PreparedSurface& prepared, const SampleTally& tally, Sam
 double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& sampler,
                          const SampleRequest& request, const SurfaceSites& sites, double volume,
                          bool exact_volume, Cloud& cloud) {
-  LatticeFilling inside =
-      fill_by_lattice({.surface = prepared.surface,
-                       .sampler = sampler,
-                       .on_surface = sites.position,
-                       .surface_spacing = sites.spacing,
-                       .volume = volume,
-                       .exact_volume = exact_volume,
-                       .phyxels = request.phyxels - static_cast<Index>(sites.position.size()),
-                       .seed = request.seed,
-                       .sweeps = repulsion_sweeps(request.relaxations)});
+  const auto placed = static_cast<Index>(sites.position.size() + sites.on_cuts.size());
+  LatticeFilling inside = fill_by_lattice({.surface = prepared.surface,
+                                           .sampler = sampler,
+                                           .sites = sites,
+                                           .volume = volume,
+                                           .exact_volume = exact_volume,
+                                           .phyxels = request.phyxels - placed,
+                                           .seed = request.seed,
+                                           .sweeps = repulsion_sweeps(request.relaxations)});
   cloud.position = sites.position;
+  cloud.position.insert(cloud.position.end(), sites.on_cuts.begin(), sites.on_cuts.end());
   cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
   cloud.volume = std::move(inside.volume);
+  cloud.cuts = sites.cuts;
+  cloud.cut_depth = sites.cut_depth;
   return inside.spacing;
 }
 
@@ -264,7 +271,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   };
   if (request.on_surface.value_or(true)) {
     measure(filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, 2e4, 1e6)));
-    sites = place_on_surface(prepared, tally, volume, request, found);
+    sites = place_on_surface(prepared, sampler, tally, volume, request, found);
   }
   Cloud cloud;
   double spacing = 0;
@@ -293,6 +300,8 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   scale(cloud.surface.position, -exponent);
   scale(cloud.position, -exponent);
   for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);
+  for (SpaceRegion& cut : cloud.cuts) cut = cut.scaled(std::ldexp(1.0, -exponent));
+  cloud.cut_depth = std::ldexp(cloud.cut_depth, -exponent);
   found.volume = std::ldexp(found.volume, -3 * exponent);
   found.spacing = std::ldexp(found.spacing, -exponent);
   found.smallest_gap = std::ldexp(found.smallest_gap, -exponent);

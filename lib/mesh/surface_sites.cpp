@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "mesh/cuts.hpp"
 #include "mesh/face_relaxation.hpp"
 #include "mesh/random_bits.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
+#include "model/box.hpp"
 #include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
 
@@ -29,11 +32,6 @@ constexpr double bytes_per_sample = 150;
 /// Smallest distances between random sites, in spacings, that give about one site for each spacing
 /// of an edge and for each square spacing of a face.
 constexpr double gap_at_corners = 0.5, gap_along_edges = 0.75, gap_on_faces = 0.79;
-
-/// The ends of a sharp edge [m].
-struct Crease {
-  Vec3d from, to;
-};
 
 struct Features {
   std::vector<PointOn> corners;  ///< Corners, with the indices of their vertices.
@@ -194,6 +192,68 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spaci
   relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
 }
 
+/// Moves the sites from `first` on, which lie on the boundaries of regions, into these by `depth`
+/// [m].
+void settle_on_cuts(std::vector<Vec3d>& site, std::size_t first, std::span<const SpaceRegion> cuts,
+                    double depth) {
+  for (std::size_t i = first; i < site.size(); ++i) {
+    const auto nearer = [&](const SpaceRegion& a, const SpaceRegion& b) {
+      return std::abs(a.distance(site[i])) < std::abs(b.distance(site[i]));
+    };
+    const SpaceRegion& cut = *std::min_element(cuts.begin(), cuts.end(), nearer);
+    site[i] = cut.nearest_on_boundary(site[i], depth);
+  }
+}
+
+/// Adds sites where sharp edges cross the boundaries of regions.
+void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std::uint64_t seed) {
+  const double spacing = sites.spacing;
+  std::vector<PointOn> points;
+  for (const Vec3d p : crossings(creases, sites.cuts, 0.5 * spacing)) points.push_back({0, p});
+  if (points.empty()) return;
+  std::vector<Vec3d>& site = sites.position;
+  const std::size_t first = site.size();
+  const std::vector<Vec3d> more =
+      fill_with_darts(blocks_of(points, spacing), gap_at_corners * spacing, seed, site);
+  site.insert(site.end(), more.begin(), more.end());
+  settle_on_cuts(site, first, sites.cuts, sites.cut_depth);
+}
+
+/// Adds sites along the curves on a surface in which the boundaries of regions cut it.
+void add_along_cuts(const Surface& surface, SurfaceSites& sites, std::uint64_t seed,
+                    int relaxations) {
+  const double spacing = sites.spacing;
+  const std::vector<Crease> curves = cutting_curves(surface, sites.cuts, 0.5 * spacing);
+  if (curves.empty()) return;
+  const std::size_t first = sites.position.size();
+  add_along_edges(sites.position, samples_along(curves, spacing), gap_along_edges * spacing,
+                  spacing, seed, relaxations);
+  settle_on_cuts(sites.position, first, sites.cuts, sites.cut_depth);
+}
+
+/// Adds sites on the boundary of a region inside a surface, at most `most` with those there are.
+void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSites& sites,
+                double most, std::uint64_t seed, int relaxations) {
+  const double spacing = sites.spacing, gap = spacing / std::sqrt(samples_on_faces);
+  const std::vector<Vec3d> points = points_on_cut(sampler, cut, gap, seed);
+  if (points.empty()) return;
+  std::vector<PointOn> samples;
+  for (const Vec3d p : points) samples.push_back({0, p});
+  std::vector<Vec3d> all = sites.position;
+  all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
+  const std::size_t first = all.size();
+  const std::vector<Vec3d> more =
+      fill_with_darts(blocks_of(samples, spacing), gap_on_faces * spacing, seed + 1, all);
+  if (static_cast<double>(sites.on_cuts.size() + more.size()) > 0.75 * most) return;
+  all.insert(all.end(), more.begin(), more.end());
+  relax_on_cut(cut, sampler, all, first, spacing, repulsion_sweeps(relaxations));
+  settle_on_cuts(all, first, {&cut, 1}, sites.cut_depth);
+  sites.on_cuts.insert(sites.on_cuts.end(), all.begin() + static_cast<std::ptrdiff_t>(first),
+                       all.end());
+  sites.cut_points.insert(sites.cut_points.end(), points.begin(), points.end());
+  sites.cut_area += gap * gap * static_cast<double>(points.size());
+}
+
 /// A subset of the corners that are not too near to each other [m].
 std::vector<Vec3d> corners_of(const Features& features, double spacing, std::uint64_t seed) {
   const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing);
@@ -226,12 +286,15 @@ std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_
 }
 
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
+                      const InsideSampler& sampler, std::span<const SpaceRegion> regions,
                       Index phyxels, std::uint64_t seed, int relaxations, Stage& stage) {
   double area = 0;
   for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
     area += norm(area_of(surface, static_cast<Index>(t)));
   }
   const Features features = features_of(surface, topology);
+  const double rounding =
+      16 * std::numeric_limits<double>::epsilon() * box_around(surface.position).farthest();
   SurfaceSites found;
   found.spacing = spacing_for(volume, area, phyxels);
   for (int attempt = 0; attempt < 8; ++attempt) {
@@ -239,13 +302,26 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     if (s > 2 * volume / area) break;
     const double samples = samples_on_faces * area / (s * s);
     require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
+    found.cuts.clear();
+    for (const SpaceRegion& region : regions) {
+      // A thin box around a face of the body ends where the body does.
+      if (reaches_into(sampler, region, 0.5 * s)) found.cuts.push_back(region);
+    }
+    found.cut_depth = 1e-7 * s + rounding;
     found.position = corners_of(features, s, seed);
+    add_crossings(found, features.creases, seed);
     add_along_edges(found.position, samples_along(features.creases, s), gap_along_edges * s, s,
                     seed, relaxations);
+    add_along_cuts(surface, found, seed + 2, relaxations);
     add_on_faces(surface, found.position, s, seed + 1, relaxations, stage);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
-    if (inside > 0.25 * volume / (s * s * s)) return found;
+    if (inside > 0.25 * volume / (s * s * s)) {
+      for (const SpaceRegion& cut : found.cuts) {
+        add_on_cut(sampler, cut, found, inside, seed + 3, relaxations);
+      }
+      return found;
+    }
     found.spacing *= 1.1;
   }
   const double thickness = 2 * volume / area;

@@ -2,18 +2,28 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "mesh/surface_topology.hpp"
 #include "phyxel/cloud.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
+class InsideSampler;
 class Stage;
 
-/// Sites on a surface, with about the spacing of the phyxels that will fill its inside.
+/// Sites on a surface and on cuts through its inside, with about the spacing of the phyxels that
+/// will fill the rest.
 struct SurfaceSites {
-  std::vector<Vec3d> position;  ///< [m]
+  std::vector<Vec3d> position;  ///< Sites on the surface [m].
+  std::vector<Vec3d> on_cuts;   ///< Sites on cuts, inside the surface [m].
+  /// Points spread evenly over the cuts [m], shape [n]; each stands for `cut_area / n` of them.
+  std::vector<Vec3d> cut_points;
+  double cut_area = 0;            ///< Area of all cuts [m²].
+  std::vector<SpaceRegion> cuts;  ///< Regions at whose boundaries the inside is cut.
+  double cut_depth = 0;           ///< Depth of the sites on cuts below the boundaries [m].
   /// Cube root of the volume of an interior phyxel [m]; one on a face has about half that volume.
   double spacing = 0;
 };
@@ -22,14 +32,17 @@ struct SurfaceSites {
 /// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
 std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed);
 
-/// Distributes sites over a surface.
+/// Distributes sites over a surface and over cuts through its inside: the boundaries of regions
+/// that reach into it. Sites on cuts lie inside the regions by a little more than rounding errors.
 /// @param surface must be closed and must not overlap itself
+/// @param sampler sampler of the surface's inside
 /// @param volume enclosed volume [m³]
 /// @param phyxels total number of phyxels, some of which are left for the inside
 /// @param stage is told the progress
 /// @throws InputError if there are so few phyxels that those on opposite sides would be nearer to
 ///   each other than those side by side
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
+                      const InsideSampler& sampler, std::span<const SpaceRegion> cuts,
                       Index phyxels, std::uint64_t seed, int relaxations, Stage& stage);
 
 }  // namespace phyxel

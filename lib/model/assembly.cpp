@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "model/closing_areas.hpp"
 #include "model/selection.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
@@ -17,6 +18,40 @@ namespace phyxel {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
+
+/// The region in which a support holds or moves phyxels.
+struct SupportRegion {
+  SpaceRegion region;
+  bool all_axes = false;  ///< True if the phyxels are supported along every axis.
+};
+
+/// The regions of the supports of a body that are given by regions of space, in place.
+std::vector<SupportRegion> support_regions(const BodyRequest& request) {
+  std::vector<SupportRegion> regions;
+  const auto add = [&](const auto& support) {
+    if (const auto region = region_of(support.select)) {
+      regions.push_back({*region, support.axes.all()});
+    }
+  };
+  for (const FixRequest& fix : request.fixed) add(fix);
+  for (const MotionRequest& motion : request.motions) add(motion);
+  return regions;
+}
+
+/// Moves the cuts of a cloud to where their supports are; cuts of other supports are left out.
+void place_cuts(Cloud& cloud, const BodyRequest& request) {
+  cloud.cut_depth *= request.scale;
+  if (cloud.cuts.empty()) return;
+  const std::vector<SpaceRegion> before = source_of(request).cuts;
+  const std::vector<SupportRegion> placed = support_regions(request);
+  std::vector<SpaceRegion> cuts;
+  for (std::size_t k = 0; k < before.size(); ++k) {
+    if (std::count(cloud.cuts.begin(), cloud.cuts.end(), before[k]) > 0) {
+      cuts.push_back(placed[k].region);
+    }
+  }
+  cloud.cuts = std::move(cuts);
+}
 
 }  // namespace
 
@@ -37,8 +72,33 @@ void place(Cloud& cloud, const BodyRequest& request) {
     cloud.position[i] = placed(cloud.position[i]);
   }
   for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
+  place_cuts(cloud, request);
   for (Vec3d& p : cloud.surface.position) p = placed(p);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
+}
+
+CutSource source_of(const BodyRequest& request) {
+  CutSource made{request.source, {}};
+  if (request.source.mesh.empty()) return made;
+  const Mat3d rotation = rotation_by(degree * request.rotation);
+  for (const SupportRegion& support : support_regions(request)) {
+    made.cuts.push_back(
+        support.region.before_placement(request.scale, rotation, request.translation));
+  }
+  return made;
+}
+
+std::vector<SpaceRegion> walls_of(const BodyRequest& request, const Cloud& cloud) {
+  std::vector<SpaceRegion> walls;
+  for (const auto& [region, all_axes] : support_regions(request)) {
+    if (!all_axes || std::count(cloud.cuts.begin(), cloud.cuts.end(), region) == 0) continue;
+    walls.push_back(region.shrunk(4 * cloud.cut_depth));
+  }
+  return walls;
+}
+
+bool needs_lists_on_host(const BodyRequest& request) {
+  return may_close(request) || !request.inclusions.empty() || !source_of(request).cuts.empty();
 }
 
 double hourglass_of(const BodyRequest& request) {
@@ -212,7 +272,15 @@ void find_moments(Model& model) {
     rank[i] = static_cast<signed char>(inverse.rank);
     if ((i + 1) % part == 0) stage.count();
   }
+  const std::vector<char> supported = supported_phyxels(model);
   for (Index i = 0; i < n; ++i) {
+    if (rank[i] == 3 && !coincident[i]) continue;
+    // A phyxel that moves with all its neighbours has nothing to resist.
+    const std::span<const Index> beside = model.neighbourhood.neighbours.row(i);
+    if (supported[i] &&
+        std::all_of(beside.begin(), beside.end(), [&](Index j) { return supported[j] != 0; })) {
+      continue;
+    }
     if (coincident[i]) model.degenerate.coincident.push_back(i);
     if (rank[i] == 0) model.degenerate.isolated.push_back(i);
     if (rank[i] == 1) model.degenerate.collinear.push_back(i);

@@ -11,11 +11,29 @@
 #include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
-/// The rest cloud of a source, before it is scaled and moved.
-Cloud rest_cloud(const BodySource& source);
+/// The source of a body, with the regions at whose boundaries the body's supports end, before it
+/// is scaled and moved.
+struct CutSource {
+  BodySource source;
+  std::vector<SpaceRegion> cuts;
+  bool operator==(const CutSource&) const = default;
+};
+CutSource source_of(const BodyRequest& request);
+
+/// The regions inside which the phyxels of a placed cloud are held along all axes and have no
+/// neighbours outside (`Cloud::cuts`). The phyxels on their boundaries are outside.
+std::vector<SpaceRegion> walls_of(const BodyRequest& request, const Cloud& cloud);
+
+/// True if the neighbour lists of a body cannot be left to a device.
+bool needs_lists_on_host(const BodyRequest& request);
+
+/// The rest cloud of a source, before it is scaled and moved. Only meshes have phyxels where they
+/// are cut.
+Cloud rest_cloud(const CutSource& from);
 /// The lattice that a source is, with its spacing, if it is one. @param piece that is to be made
 std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 
@@ -70,8 +88,9 @@ void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift);
 /// @param shift what the indices found are counted from
 void append(Degenerate& to, const Degenerate& found, Index shift);
 
-/// Moments A_i, their pseudo-inverses and the offsets b_i; notes what is degenerate. Nothing where
-/// the lists are left to a device.
+/// Moments A_i, their pseudo-inverses and the offsets b_i; notes the degenerate phyxels, except
+/// those that are supported and have only supported neighbours. Nothing where the lists are left to
+/// a device.
 void find_moments(Model& model);
 
 /// What the summary shall warn of, once all bodies are in. @param surfels of the whole model

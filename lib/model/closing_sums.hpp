@@ -149,9 +149,10 @@ class Bodies {
 /// The sums of bodies, per s², as a linear function of the unknowns:
 ///   R_j = Σ_k w_jk (c_k (1 + a_k x_jk) - M_k x_jk (1 + σ_k)) - c_j Σ_k w_jk (1 - a_j x_jk)
 ///         - M_j b_j (1 + σ_j) - S_j (1 + y_j),   M = v A⁻¹, a = A⁻¹ b.
-/// Of the changes σ only what leaves a body's volume as it is counts: by Σ x Sᵀ = V I, areas of
-/// whole faces stay, too. Vectors have a value for each phyxel of the model, of which ranks hold
-/// their shares.
+/// R_j is the force of a uniform stress on phyxel j, which does nothing where j is supported: there
+/// it may be anything, and counts as 0. Of the changes σ only what leaves a body's volume as it is
+/// counts: by Σ x Sᵀ = V I, areas of whole faces stay, too. Vectors have a value for each phyxel of
+/// the model, of which ranks hold their shares.
 class Sums {
  public:
   /// @param areas S of each phyxel of the model, those of ghosts undefined [m²]
@@ -161,7 +162,8 @@ class Sums {
         tilt_(areas_.size()),
         weight_(areas_.size()),
         placed_sum_(areas_.size()),
-        term_(areas_.size()) {
+        term_(areas_.size()),
+        supported_(supported_phyxels(model)) {
     for (Body* body : bodies) {
       double volume = 0;
       Index size = 0;
@@ -178,7 +180,7 @@ class Sums {
     }
     bodies.sum(&Body::volume, [&](const Body&, Index i) { return model_.volume[i]; });
     bodies.for_each([&](const Body& body, Index i) {
-      areas_[i] = areas_[i] / body.unit;
+      areas_[i] = supported_[i] ? Vec3d{} : areas_[i] / body.unit;
       double sum = 0;
       const double inverse = inverse_support_squared(i);
       for (const Index k : model_.neighbourhood.neighbours.row(i)) {
@@ -257,7 +259,7 @@ class Sums {
         const Vec3d x_jk = other.position - own.position;
         sum += weight_shape(dot(x_jk, x_jk), inverse) * (other.constant + other.linear * x_jk);
       }
-      sums[j] = sum;
+      sums[j] = supported_[j] ? Vec3d{} : sum;
     });
   }
   double inverse_support_squared(Index i) const {
@@ -279,6 +281,7 @@ class Sums {
   };
   std::vector<PlacedSum> placed_sum_;
   std::vector<Term> term_;
+  std::vector<char> supported_;  ///< `supported_phyxels`.
 };
 
 }  // namespace phyxel::closing

@@ -3,6 +3,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <array>
 
 namespace phyxel {
 
@@ -18,6 +19,8 @@ CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
                   static_cast<Index>(first),
                   static_cast<Index>(whole)};
   made.cloud.lattice = cloud.lattice;
+  made.cloud.cuts = cloud.cuts;
+  made.cloud.cut_depth = cloud.cut_depth;
   for (const auto& [name, members] : cloud.regions) {
     std::vector<Index>& here = made.cloud.regions[name];
     const auto begin = std::lower_bound(members.begin(), members.end(), first),
@@ -36,6 +39,7 @@ std::uint64_t cloud_digest(const Cloud& cloud) {
   add(cloud.volume);
   add(cloud.surface.position);
   add(cloud.surface.triangle);
+  add(std::array{static_cast<double>(cloud.cuts.size()), cloud.cut_depth});
   for (const auto& [name, members] : cloud.regions) {
     add(name);
     add(members);

@@ -13,6 +13,7 @@
 #include "model/closure.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
+#include "model/neighbour_search.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -46,6 +47,7 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
   Survey survey;
   survey.spacing = mean_spacing(cloud.position, request.neighbourhood.nearest);
   hood = find_neighbours(cloud.position, survey.spacing, request.neighbourhood);
+  separate(hood, cloud.position, walls_of(request, cloud));
   if (kernel_volumes) {
     survey.kernel_sum = kernel_sums(cloud.position, hood, survey.spacing);
   }
@@ -63,6 +65,12 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
         request.where, request.name,
         request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
+  }
+  if (!walls_of(request, cloud).empty()) {
+    throw InputError(fmt::format(
+        "{}: a support of body \"{}\" ends inside the body, and its phyxels are parted from others "
+        "in lists of neighbours on the host: allowed is a model built without a surveyor",
+        request.where, request.name));
   }
   if (!request.inclusions.empty()) {
     refuse_inclusions(request, "which are numbered on the host",
@@ -314,7 +322,8 @@ Path Motion::mean_step(double time, double dt) const {
   return {0.5 * both.displacement, 0.5 * both.turn, both.about};
 }
 
-Cloud rest_cloud(const BodySource& source) {
+Cloud rest_cloud(const CutSource& from) {
+  const BodySource& source = from.source;
   if (!source.file.empty()) return read_body(source.file);
   if (!source.cloud.empty()) {
     throw InputError(fmt::format(
@@ -330,7 +339,8 @@ Cloud rest_cloud(const BodySource& source) {
                                    {.phyxels = source.phyxels,
                                     .seed = source.seed,
                                     .relaxations = source.relaxations,
-                                    .on_surface = source.on_surface},
+                                    .on_surface = source.on_surface,
+                                    .cuts = from.cuts},
                                    &report);
       for (const std::string& warning : report.warnings) {
         cloud.warnings.push_back(fmt::format("{}: {}", source.mesh.string(), warning));
@@ -355,7 +365,7 @@ std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {
 }
 
 Cloud make_cloud(const BodyRequest& request) {
-  Cloud cloud = naming(request, [&] { return rest_cloud(request.source); });
+  Cloud cloud = naming(request, [&] { return rest_cloud(source_of(request)); });
   place(cloud, request);
   return cloud;
 }
@@ -377,16 +387,16 @@ const Cloud& named_cloud(const BodyRequest& request, const std::map<std::string,
 template <class Use>
 void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& named, Use&& use) {
   // Copies of a body follow one another; filling a mesh once serves them all.
-  const BodySource* made = nullptr;
+  std::optional<CutSource> made;
   Cloud rest;
   for (const BodyRequest& request : scene.bodies) {
-    if (!made || !(*made == request.source)) {
+    CutSource source = source_of(request);
+    if (!made || !(*made == source)) {
       rest = naming(request, [&] {
-        return request.source.cloud.empty() ? rest_cloud(request.source)
-                                            : named_cloud(request, named);
+        return request.source.cloud.empty() ? rest_cloud(source) : named_cloud(request, named);
       });
     }
-    made = &request.source;
+    made = std::move(source);
     Cloud cloud = rest;
     rest.warnings.clear();  // once is enough
     place(cloud, request);
@@ -482,6 +492,15 @@ Model build_model(const Scene& scene, const Surveyor& survey) {
 }
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey) {
   return naming(scene, [&] { return model_from_clouds(scene, clouds, &survey); });
+}
+
+std::vector<char> supported_phyxels(const Model& model) {
+  std::vector<char> axes(static_cast<std::size_t>(model.size()), 0);
+  for (const Motion& motion : model.motions) {
+    for (const Index i : motion.phyxels) axes[i] = static_cast<char>(axes[i] | motion.axes.bits());
+  }
+  for (char& bits : axes) bits = bits == Axes{}.bits();
+  return axes;
 }
 
 std::vector<char> held_phyxels(const Model& model) {

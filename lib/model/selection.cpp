@@ -60,20 +60,18 @@ std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
   const Cloud& cloud = body.cloud;
   if (selection.region) return of_region(selection, cloud, name);
   if (selection.indices) return of_indices(selection, body, name);
-  if (selection.box) {
-    const Vec3d low = selection.box->low, high = selection.box->high;
-    return indices_where(cloud, [&](Vec3d p) {
-      return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y && p.z >= low.z &&
-             p.z <= high.z;
-    });
-  }
-  if (selection.ball) {
-    const double r2 = selection.ball->radius * selection.ball->radius;
-    return indices_where(cloud, [&](Vec3d p) {
-      return dot(p - selection.ball->centre, p - selection.ball->centre) <= r2;
-    });
+  if (const std::optional<SpaceRegion> region = region_of(selection)) {
+    return indices_where(cloud, [&](Vec3d p) { return region->contains(p); });
   }
   return indices_where(cloud, [](Vec3d) { return true; });
+}
+
+std::optional<SpaceRegion> region_of(const Selection& selection) {
+  if (const auto& box = selection.box) return SpaceRegion{.low = box->low, .high = box->high};
+  if (const auto& ball = selection.ball) {
+    return SpaceRegion{.centre = ball->centre, .radius = ball->radius, .is_ball = true};
+  }
+  return std::nullopt;
 }
 
 void refuse_selection(const Selection& selection, const std::string& name, const Box& box) {

@@ -1,6 +1,7 @@
 /// Which phyxels of a body a scene means.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "model/box.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/scene.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
@@ -23,6 +25,9 @@ struct SomePhyxels {
 /// @throws InputError if a region is unknown or an index out of range.
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
                           const std::string& name);
+
+/// The part of space that a selection means; unset if it means none.
+std::optional<SpaceRegion> region_of(const Selection& selection);
 
 /// For a selection of nothing. @param box around the body @throws InputError
 [[noreturn]] void refuse_selection(const Selection& selection, const std::string& name,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "phyxel/space_region.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -29,6 +30,12 @@ struct Cloud {
   std::map<std::string, std::vector<Index>> regions;
   /// True for a regular lattice, whose gradients are not closed unless a scene asks for it.
   bool lattice = false;
+  /// Regions of supports on whose boundaries phyxels lie. Inside a region in which all phyxels are
+  /// held, none is a neighbour of one on the boundary or outside: the clamp then acts at the
+  /// boundary, instead of being smeared over a support of its phyxels.
+  std::vector<SpaceRegion> cuts;
+  /// Greatest depth of the phyxels on boundaries below them, a rounding error [m].
+  double cut_depth = 0;
   std::vector<std::string> warnings;  ///< Warnings of the generator or sampler, for the summary.
 };
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "phyxel/cloud.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
@@ -45,6 +46,9 @@ struct SampleRequest {
   /// True to place phyxels also on the surface, its corners and its sharp edges; false to place all
   /// inside, in the middle of their cells; unset for the surface if it allows that.
   std::optional<bool> on_surface;
+  /// Regions at whose boundaries supports of the body end: if there are phyxels on the surface,
+  /// there are also some on these boundaries, and the cloud has the regions as its `cuts`.
+  std::vector<SpaceRegion> cuts;
 };
 
 /// Statistics of a sampled surface.

@@ -175,6 +175,9 @@ void check_model(const Model& model);
 /// Whether each phyxel is held in place along all axes by a motion that stands still, shape [n].
 std::vector<char> held_phyxels(const Model& model);
 
+/// True for each phyxel that motions hold or move along all axes, shape [n].
+std::vector<char> supported_phyxels(const Model& model);
+
 /// A number that tells two models apart: rest positions, supports, geometric volumes, materials,
 /// motions and loads, and the surfaces of bodies with closed gradients, from which all else
 /// follows; so it is the same whatever device built them. A checkpoint carries it, so that a state

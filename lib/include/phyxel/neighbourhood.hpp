@@ -51,8 +51,9 @@ struct NeighbourhoodRule {
   bool one_sided() const { return max_neighbours || (!radius && support == Support::adaptive); }
 };
 
-/// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i. The lists are empty if
-/// the device finds them; `support` is always set.
+/// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i, except pairs across
+/// the boundary of a support (`Cloud::cuts`). The lists are empty if the device finds them;
+/// `support` is always set.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.

@@ -1,0 +1,37 @@
+/// Curves and faces along which the boundaries of regions of space cut a body.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mesh/inside_samples.hpp"
+#include "phyxel/cloud.hpp"
+#include "phyxel/space_region.hpp"
+
+namespace phyxel {
+
+/// A straight piece of a sharp edge, or of a curve on a surface.
+struct Crease {
+  Vec3d from, to;  ///< Ends [m].
+};
+
+/// True if a region reaches into the inside of a surface by more than `depth` [m].
+bool reaches_into(const InsideSampler& sampler, const SpaceRegion& region, double depth);
+
+/// The curves on a surface along which the boundaries of regions cut it.
+/// @param step greatest length of a piece [m]
+std::vector<Crease> cutting_curves(const Surface& surface, std::span<const SpaceRegion> regions,
+                                   double step);
+
+/// The points at which creases cross the boundaries of regions [m]. Of two crossings within `step`
+/// [m] of each other, both may be missed.
+std::vector<Vec3d> crossings(std::span<const Crease> creases, std::span<const SpaceRegion> regions,
+                             double step);
+
+/// Points spread evenly over that part of a region's boundary which lies inside a surface, one on
+/// each square of `gap` [m].
+std::vector<Vec3d> points_on_cut(const InsideSampler& sampler, const SpaceRegion& region,
+                                 double gap, std::uint64_t seed);
+
+}  // namespace phyxel

@@ -1,0 +1,159 @@
+/// Regions of space that end inside bodies made from meshes: where the phyxels of their supports
+/// lie, and where the supports act.
+#include "mesh/cuts.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "model/assembly.hpp"
+#include "model/spatial_hash.hpp"
+#include "phyxel/equilibrium.hpp"
+#include "phyxel/mesh.hpp"
+#include "phyxel/model.hpp"
+#include "support/backend.hpp"
+#include "support/clouds.hpp"
+#include "support/surfaces.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+using ::testing::ElementsAre;
+
+const SpaceRegion slab{.low = {-1, -1, -1}, .high = {0.43, 2, 2}};
+const SpaceRegion ball{.centre = {0.1, 0.5, 0.45}, .radius = 0.37, .is_ball = true};
+
+TEST(SpaceRegion, MeasuresDistancesFromItsBoundary) {
+  const SpaceRegion box{.low = {0, 0, 0}, .high = {1, 2, 3}};
+  EXPECT_TRUE(box.contains({1, 2, 3}));
+  EXPECT_FALSE(box.contains({1.0000001, 2, 3}));
+  EXPECT_DOUBLE_EQ(box.distance({0.3, 1, 1}), -0.3);
+  EXPECT_DOUBLE_EQ(box.distance({4, 6, 3}), 5);
+  EXPECT_EQ(box.nearest_on_boundary({0.8, 1, 1}), (Vec3d{1, 1, 1}));
+  EXPECT_EQ(box.nearest_on_boundary({4, 1, 5}), (Vec3d{1, 1, 3}));
+  EXPECT_EQ(box.nearest_on_boundary({4, 1, 1}, 0.25), (Vec3d{0.75, 1, 1}));
+  // An inset deeper than the box ends in its middle.
+  EXPECT_EQ(box.nearest_on_boundary({4, 1, 1}, 0.75), (Vec3d{0.5, 1, 1}));
+  EXPECT_DOUBLE_EQ(ball.distance({0.1, 0.5, 0.95}), 0.13);
+  EXPECT_NEAR(norm(ball.nearest_on_boundary({0.2, 0.6, 0.9}, 0.01) - ball.centre), 0.36, 1e-15);
+  EXPECT_DOUBLE_EQ(ball.shrunk(0.1).radius, 0.27);
+  EXPECT_FALSE(ball.shrunk(1).contains(ball.centre));
+  EXPECT_EQ(box.shrunk(0.25).high, (Vec3d{0.75, 1.75, 2.75}));
+}
+
+/// A region in the coordinates of a body that is not yet placed contains the points that are in the
+/// region after placement.
+TEST(SpaceRegion, IsTheSameBeforePlacement) {
+  const Mat3d rotation = rotation_by({0.3, -1.1, 0.7});
+  const Vec3d translation{0.4, -2, 0.1};
+  std::mt19937_64 engine(3);
+  for (const SpaceRegion& region : {slab, ball}) {
+    const SpaceRegion before = region.before_placement(2.5, rotation, translation);
+    for (int k = 0; k < 200; ++k) {
+      const Vec3d p = uniform_vector(engine, 1), placed = rotation * (2.5 * p) + translation;
+      EXPECT_NEAR(2.5 * before.distance(p), region.distance(placed), 1e-14);
+      const Vec3d on = before.nearest_on_boundary(p);
+      EXPECT_NEAR(region.distance(rotation * (2.5 * on) + translation), 0, 1e-14);
+    }
+  }
+}
+
+/// Phyxels lie on the boundary of a region as densely as elsewhere, all others keep their distance,
+/// and cells end at the boundary.
+TEST(Cuts, HavePhyxelsAllOver) {
+  for (const SpaceRegion& region : {slab, ball}) {
+    SampleReport report;
+    const Cloud cloud =
+        sample_surface(test::unit_cube(), {.phyxels = 5000, .cuts = {region}}, &report);
+    ASSERT_EQ(cloud.position.size(), 5000u);
+    ASSERT_TRUE(report.warnings.empty());
+    const double spacing = std::cbrt(1.0 / 5000);
+    EXPECT_THAT(cloud.cuts, ElementsAre(region));
+    EXPECT_LT(cloud.cut_depth, 1e-6 * spacing);
+    std::vector<Vec3d> on_cut;
+    for (const Vec3d p : cloud.position) {
+      if (std::abs(region.distance(p)) > 1e-6 * spacing) continue;
+      EXPECT_TRUE(region.contains(p));
+      on_cut.push_back(p);
+    }
+    const SpatialHash hash(on_cut, spacing);
+    std::mt19937_64 engine(7);
+    int places = 0;
+    double farthest = 0;
+    for (int k = 0; k < 4000; ++k) {
+      const Vec3d p =
+          region.nearest_on_boundary(Vec3d{0.5, 0.5, 0.5} + uniform_vector(engine, 0.5));
+      if (std::min({p.x, p.y, p.z}) < 0 || std::max({p.x, p.y, p.z}) > 1) continue;
+      farthest = std::max(farthest, std::sqrt(hash.nearest(p).distance2));
+      ++places;
+    }
+    ASSERT_GT(places, 300);
+    // Points of a square lattice leave holes of 0.71 spacings.
+    EXPECT_LT(farthest, 0.95 * spacing);
+    EXPECT_GT(report.smallest_gap, 0.45 * spacing);  // without cuts: 0.5
+    double volume = 0;
+    for (const double v : cloud.volume) volume += v;
+    EXPECT_NEAR(volume, 1, 1e-12);
+  }
+}
+
+TEST(Cuts, ThatEndWhereTheBodyDoesAreNone) {
+  const SampleRequest plain{.phyxels = 2000};
+  SampleRequest cut = plain;
+  cut.cuts = {{.low = {-1, -1, -1}, .high = {0.001, 2, 2}}, {.low = {2, 2, 2}, .high = {3, 3, 3}}};
+  const Cloud made = sample_surface(test::unit_cube(), cut);
+  EXPECT_EQ(made.position, sample_surface(test::unit_cube(), plain).position);
+  EXPECT_TRUE(made.cuts.empty());
+}
+
+/// A bar of length 1, held up to some place, under its own weight along its axis. Its end goes
+/// ρ g l² / (2 E), l from the clamp.
+/// @param turned whether the bar lies along y instead of x
+/// @returns how far from `clamp` the clamp acts [spacings]; positive: the free length is too short
+double clamp_error(double clamp, Index phyxels, bool turned) {
+  constexpr double young = 1e6, density = 1000, weight = 0.1;
+  Scene scene = one_body(
+      {.young = young, .poisson = 0, .density = density, .law = SmallStrain<double>::name});
+  BodyRequest& body = scene.bodies[0];
+  body.source.mesh = "bar.obj";  // the cuts of a body are those of its mesh
+  if (turned) body.rotation = {0, 0, 90};
+  Selection held;
+  held.box = Selection::Box{{-9, -9, -9}, {9, 9, 9}};
+  (turned ? held.box->high.y : held.box->high.x) = clamp;
+  body.fixed = {{.select = held}};
+  const Vec3d along = turned ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0};
+  scene.gravity = weight * along;
+  Cloud cloud = sample_surface(test::box({0, 0, 0}, {1, 0.3, 0.3}),
+                               {.phyxels = phyxels, .cuts = source_of(body).cuts});
+  place(cloud, body);
+  body.source = {};
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  const auto backend = make_test_backend(model, Precision::double_);
+  const State rest = find_equilibrium(model, *backend).state;
+  double end = 0, volume = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    if (dot(model.position[i], along) < 1 - 1e-9) continue;
+    end += model.volume[i] * dot(rest.displacement[i], along);
+    volume += model.volume[i];
+  }
+  const double length = std::sqrt(2 * young / (density * weight) * end / volume);
+  return (1 - clamp - length) / std::cbrt(0.09 / phyxels);
+}
+
+TEST(Cuts, HoldBodiesWhereSupportsEnd) {
+  for (const double clamp : {0.31, 0.325, 0.34, 0.355}) {
+    const double error = clamp_error(clamp, 1500, false);
+
+    EXPECT_LT(std::abs(error), 0.1);
+  }
+  EXPECT_LT(std::abs(clamp_error(0.33, 1500, true)), 0.1);
+}
+
+}  // namespace
+}  // namespace phyxel
