@@ -3,8 +3,10 @@
 
 #include "model/closing_areas.hpp"
 #include "model/closure.hpp"
+#include "model/loads.hpp"
 #include "model/neighbour_search.hpp"
 #include "mpi/share_pipeline.hpp"
+#include "scene/scene_error.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -14,6 +16,7 @@ namespace {
 /// among which the area of each is divided.
 struct NearFacets {
   std::vector<Facet> facets;
+  std::vector<Index> number;  ///< Index of each in the whole list.
   Csr near;
 };
 
@@ -69,6 +72,7 @@ NearFacets facets_near(const ShareSetup& setup, const WholeBodies& whole, const 
       near.push_back(nearest[f] - body.begin);
     }
     found.facets.push_back(all[f]);
+    found.number.push_back(static_cast<Index>(f));
     found.near.offsets.push_back(static_cast<Offset>(near.size()));
   }
   return found;
@@ -79,6 +83,38 @@ bool closes(const WholeBodies& whole, std::size_t b) {
 }
 
 }  // namespace
+
+void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+    const BodyRequest& request = setup.scene.bodies[b];
+    const Surface& surface = whole.surfaces[b];
+    const Range& body = local.bodies[b];
+    for (std::size_t t = 0; t < request.tractions.size(); ++t) {
+      LoadedFacets loaded;
+      setup.ranks.collectively([&] {
+        naming(request, [&] {
+          const double longest = longest_edge(whole.bodies[b].reach, surface.position,
+                                              surface.triangle, 0, whole.bodies[b].size);
+          loaded = loaded_facets(request, request.tractions[t], surface.position, surface.triangle,
+                                 0, longest);
+        });
+      });
+      const NearFacets here = facets_near(setup, whole, local, b, loaded.facets);
+      const std::vector<Vec3d> value = tabulated(
+          here.number.size(), [&](std::size_t f) { return loaded.force[here.number[f]]; });
+      const std::vector<Vec3d> force =
+          distribute(here.facets, value, here.near, of_range(local.model.position, body),
+                     of_range(local.model.neighbourhood.support, body));
+      Load& load = local.model.loads.emplace_back(traction_load(request, t, loaded));
+      for (std::size_t k = 0; k < force.size(); ++k) {
+        const Index i = body.begin + static_cast<Index>(k);
+        if (!owns(local, static_cast<std::size_t>(i)) || force[k] == Vec3d{}) continue;
+        load.phyxels.push_back(i);
+        load.force.push_back(force[k]);
+      }
+    }
+  }
+}
 
 void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {

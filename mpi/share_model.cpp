@@ -309,7 +309,7 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   Model& m = local.model;
   std::vector<BoundaryChoice> choices(whole.bodies.size());
   std::vector<std::int64_t> counts;
-  std::vector<ExactSum> masses;
+  std::vector<std::vector<LoadSums>> sums(whole.bodies.size());
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       if (selections_of(setup.scene.bodies[b]).empty()) continue;
@@ -321,14 +321,19 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
                       [&](Index i) { return !owns(local, static_cast<std::size_t>(begin + i)); });
       }
       for (const std::int64_t count : own.counts()) counts.push_back(count);
-      for (const ExactSum& mass : own.loaded_masses(m, begin)) masses.push_back(mass);
+      sums[b] = own.load_sums(m, begin, whole.bodies[b].origin);
     }
   });
   setup.ranks.add(counts);
-  add_over_ranks(setup.ranks, masses);
+  std::vector<ExactSum*> all;
+  for (std::vector<LoadSums>& of_body : sums) {
+    for (LoadSums& of_load : of_body) {
+      for (ExactSum* sum : of_load.all()) all.push_back(sum);
+    }
+  }
+  add_over_ranks(setup.ranks, all);
   setup.ranks.collectively([&] {
     auto count = counts.begin();
-    auto mass = masses.begin();
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       const BodyRequest& request = setup.scene.bodies[b];
       const auto entries = static_cast<std::ptrdiff_t>(choices[b].chosen.size());
@@ -336,9 +341,10 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
         choices[b].refuse_empty(request, {count, count + entries}, whole.boxes[b]);
       });
       count += entries;
-      std::vector<double> loaded;
-      for (std::size_t l = 0; l < request.loads.size(); ++l) loaded.push_back((mass++)->value());
-      naming(request, [&] { choices[b].add_to(m, request, local.bodies[b].begin, loaded); });
+      naming(request, [&] {
+        choices[b].add_to(m, request, local.bodies[b].begin, sums[b], whole.bodies[b].origin,
+                          loaded_pieces(request, whole.surfaces[b]));
+      });
     }
   });
 }
@@ -375,6 +381,7 @@ void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& loc
   gather_degenerate(setup, whole, local);
   add_surfels(setup, whole, local);
   find_areas(setup, whole, local);
+  add_tractions(setup, whole, local);
 }
 
 }  // namespace phyxel

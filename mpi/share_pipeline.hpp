@@ -140,6 +140,9 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
 /// Finds the areas of own phyxels of bodies with closed gradients, and the volumes inside their
 /// surfaces.
 void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
+
+/// Adds the tractions of all bodies, as forces on own phyxels. Collective.
+void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local);
 /// Closes the gradients of the bodies of a connected share that ask for it.
 /// @param areas of each phyxel of the share [m²]; empty if none asks
 /// @throws AgreedError for what `close_gradients` refuses

@@ -146,6 +146,18 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
   text += fmt::format(
       "  boundary    {} phyxels fixed or moved, {} loaded; gravity [{:g}, {:g}, {:g}] m/s^2\n",
       boundary.moved, boundary.loaded, scene.gravity.x, scene.gravity.y, scene.gravity.z);
+  constexpr std::size_t most_loads = 8;
+  for (std::size_t k = 0; k < std::min(model.loads.size(), most_loads); ++k) {
+    const Load& load = model.loads[k];
+    const bool total = load.density == Vec3d{};
+    const Vec3d f = total ? load.total : load.density, x = load.centroid;
+    text += fmt::format(
+        "  load        {}, {}: [{:.4g}, {:.4g}, {:.4g}] {} about [{:.4g}, {:.4g}, {:.4g}] m\n",
+        load.body, load.set, f.x, f.y, f.z, total ? "N" : "N/m^3", x.x, x.y, x.z);
+  }
+  if (model.loads.size() > most_loads) {
+    text += fmt::format("              and {} more loads\n", model.loads.size() - most_loads);
+  }
   for (const std::string& warning : model.warnings)
     text += fmt::format("  warning     {}\n", warning);
   return text;

@@ -163,12 +163,10 @@ class Simulation {
     backend_->displacement_gradients(gradient);
     return gradient;
   }
-  std::pair<std::vector<double>, std::vector<double>> stresses() {
+  std::vector<double> field(Quantity quantity) {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
-    std::pair<std::vector<double>, std::vector<double>> fields;
-    stress_fields(model_, *backend_, &fields.first, &fields.second);
-    return fields;
+    return std::move(find_fields(model_, *backend_, {&quantity, 1}).at(quantity));
   }
   SurfelState surfels() {
     const auto turn = my_turn();
@@ -230,13 +228,7 @@ class Simulation {
       backend_->advect_surfels(surfels);
       frame.surfels = &surfels;
     }
-    // Asked for neither, it would find both for nothing.
-    const bool von_mises = scene_.output.wants("von_mises");
-    const bool volume_ratio = scene_.output.wants("volume_ratio");
-    if (von_mises || volume_ratio) {
-      stress_fields(model_, *backend_, von_mises ? &frame.von_mises : nullptr,
-                    volume_ratio ? &frame.volume_ratio : nullptr);
-    }
+    frame.fields = find_fields(model_, *backend_, wanted_fields(scene_.output));
     recorder_->write(frame);
   }
 
@@ -387,11 +379,23 @@ void add_simulation(py::module_& module) {
           "gradients", [](Simulation& s) { return taken(s.gradients()); },
           "Displacement gradients, F - 1, (n, 3, 3), a copy.")
       .def(
-          "von_mises", [](Simulation& s) { return taken(s.stresses().first); },
+          "von_mises", [](Simulation& s) { return taken(s.field(Quantity::von_mises)); },
           "Von Mises equivalent of the Cauchy stress [Pa], (n,), a copy.")
       .def(
-          "volume_ratio", [](Simulation& s) { return taken(s.stresses().second); },
+          "volume_ratio", [](Simulation& s) { return taken(s.field(Quantity::volume_ratio)); },
           "det F, (n,), a copy.")
+      .def(
+          "stress",
+          [](Simulation& s) {
+            return taken(s.field(Quantity::stress)).reshape({-1, 6});
+          },
+          "Cauchy stress [Pa], (n, 6): xx, yy, zz, xy, yz, xz; a copy.")
+      .def(
+          "strain",
+          [](Simulation& s) {
+            return taken(s.field(Quantity::strain)).reshape({-1, 6});
+          },
+          "Green's strain, (n, 6): xx, yy, zz, xy, yz, xz; a copy.")
       .def(
           "surface",
           [](Simulation& s) {

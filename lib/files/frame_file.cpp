@@ -197,8 +197,9 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
   };
   if (scene.output.wants("displacement")) field("displacement", as_float, Quantity::displacement);
   if (scene.output.wants("velocity")) field("velocity", as_float, Quantity::velocity);
-  if (values.has(Quantity::von_mises)) field("von_mises", true, Quantity::von_mises);
-  if (values.has(Quantity::volume_ratio)) field("volume_ratio", true, Quantity::volume_ratio);
+  for (const PointField& computed : point_fields()) {
+    if (values.has(computed.quantity)) field(computed.name, true, computed.quantity);
+  }
   if (scene.output.wants("history")) {
     const std::vector<std::string> columns = history_columns(model);
     for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -300,7 +301,11 @@ FrameData read_frame(const std::filesystem::path& file, bool with_fields) {
       frame.field[name] = std::move(values);
     };
     for (const char* name : {"displacement", "velocity"}) field(name, 3);
-    for (const char* name : {"von_mises", "volume_ratio", "mass", "volume"}) field(name, 0);
+    for (const PointField& computed : point_fields()) {
+      const std::size_t width = width_of(computed.quantity);
+      field(computed.name, width > 1 ? width : 0);
+    }
+    for (const char* name : {"mass", "volume"}) field(name, 0);
     for (const std::string& name : in.members("/VTKHDF/PointData")) {  // what laws remember
       const std::string path = "/VTKHDF/PointData/" + name;
       if (name != "body" && frame.field.count(name) == 0 && in.shape(path).columns == 0) {

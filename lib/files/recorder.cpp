@@ -84,8 +84,12 @@ void check_frame(const Model& model, const Frame& frame) {
     throw InputError(fmt::format("frame: {} columns of history; allowed: {} or none",
                                  state.history.size(), columns));
   }
-  check("von_mises", frame.von_mises.size(), model.size(), true);
-  check("volume_ratio", frame.volume_ratio.size(), model.size(), true);
+  for (const PointField& field : point_fields()) {
+    const auto found = frame.fields.find(field.quantity);
+    if (found == frame.fields.end()) continue;
+    const auto width = static_cast<Index>(width_of(field.quantity));
+    check(field.name, found->second.size(), width * model.size(), true);
+  }
   if (!frame.surfels) return;
   const auto surfels = static_cast<Index>(model.surfels.position.size());
   check("surfels.position", frame.surfels->position.size(), surfels, false);
@@ -115,10 +119,6 @@ std::span<const double> values_of(const Model& model, const Frame& frame, Quanti
       return flat(frame.state->displacement);
     case Quantity::velocity:
       return flat(frame.state->velocity);
-    case Quantity::von_mises:
-      return frame.von_mises;
-    case Quantity::volume_ratio:
-      return frame.volume_ratio;
     case Quantity::surfel_position:
       if (frame.surfels) return flat(frame.surfels->position);
       break;
@@ -126,7 +126,10 @@ std::span<const double> values_of(const Model& model, const Frame& frame, Quanti
       if (frame.surfels) return flat(frame.surfels->normal);
       break;
     default:
-      if (history_column(quantity) < frame.state->history.size()) {
+      if (const auto found = frame.fields.find(quantity); found != frame.fields.end()) {
+        return found->second;
+      }
+      if (is_history(quantity) && history_column(quantity) < frame.state->history.size()) {
         return frame.state->history[history_column(quantity)].values;
       }
   }

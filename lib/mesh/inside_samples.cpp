@@ -17,8 +17,6 @@ constexpr std::size_t enough_tasks = InsideSampler::most_tasks / 8;
 /// of a compact surface, which visits few of its triangles.
 constexpr std::size_t few_triangles = 48;
 
-double component(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
-
 /// True if an axis perpendicular to an edge of the triangle and an edge of the cube separates the
 /// two; the cube is centred at the origin. Without this test a long thin triangle oblique to the
 /// axes would seem to touch each cell of its plane within its bounding box.

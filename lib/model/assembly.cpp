@@ -359,11 +359,14 @@ std::vector<std::int64_t> BoundaryChoice::counts() const {
   return counts;
 }
 
-std::vector<ExactSum> BoundaryChoice::loaded_masses(const Model& model, Index shift) const {
-  std::vector<ExactSum> sums;
+std::vector<LoadSums> BoundaryChoice::load_sums(const Model& model, Index shift,
+                                                Vec3d origin) const {
+  std::vector<LoadSums> sums;
   for (std::size_t entry = first_load; entry < chosen.size(); ++entry) {
-    ExactSum& sum = sums.emplace_back();
-    for (const Index i : chosen[entry]) sum.add(model.mass[shift + i]);
+    LoadSums& sum = sums.emplace_back();
+    for (const Index i : chosen[entry]) {
+      sum.add(model.mass[shift + i], model.position[shift + i] - origin);
+    }
   }
   return sums;
 }
@@ -377,7 +380,8 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
 }
 
 void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shift,
-                            const std::vector<double>& loaded) const {
+                            const std::vector<LoadSums>& loaded, Vec3d origin,
+                            const std::vector<std::optional<BodyPiece>>& pieces) const {
   auto entry = chosen.begin();
   const auto next = [&] {
     std::vector<Index> phyxels = *entry++;
@@ -407,16 +411,9 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                              .set = numbered("motion", m, request.motions)});
   }
   for (std::size_t l = 0; l < request.loads.size(); ++l) {
-    const LoadRequest& asked = request.loads[l];
-    Load& load = model.loads.emplace_back();
-    load.phyxels = next();
-    load.total = asked.force;
-    load.density = asked.force_density;
-    load.ramp = asked.ramp;
-    for (const Index i : load.phyxels) {
-      load.force.push_back((model.mass[i] / loaded[l]) * asked.force +
-                           model.volume[i] * asked.force_density);
-    }
+    std::vector<Index> phyxels = next();
+    model.loads.push_back(
+        load_of(request, l, std::move(phyxels), model, loaded[l], origin, pieces[l]));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "model/box.hpp"
 #include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
+#include "model/loads.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/space_region.hpp"
 
@@ -128,14 +129,16 @@ struct BoundaryChoice {
   /// Phyxel i of the cloud is phyxel place[i] of the body.
   void renumber(const std::vector<Index>& place);
   std::vector<std::int64_t> counts() const;
-  /// Of each load.
-  std::vector<ExactSum> loaded_masses(const Model& model, Index shift) const;
+  /// Sums over the phyxels of each load. @param origin of positions in the sums [m]
+  std::vector<LoadSums> load_sums(const Model& model, Index shift, Vec3d origin) const;
   /// @param counts of each entry, in the whole body. @throws InputError for one of nothing
   void refuse_empty(const BodyRequest& request, const std::vector<std::int64_t>& counts,
                     const Box& box) const;
-  /// @param loaded masses of each load, in the whole body
+  /// @param loaded sums of each load, in the whole body, and the `origin` of their positions [m]
+  /// @param pieces of the body that are loaded
   void add_to(Model& model, const BodyRequest& request, Index shift,
-              const std::vector<double>& loaded) const;
+              const std::vector<LoadSums>& loaded, Vec3d origin,
+              const std::vector<std::optional<BodyPiece>>& pieces) const;
 };
 
 /// @param number which phyxels of a body of `size` the cloud has, ascending; empty: all

@@ -8,6 +8,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -75,6 +76,14 @@ Enclosed enclosed_by(std::span<const Facet> facets) {
 std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& near,
                                     std::span<const Vec3d> position,
                                     std::span<const double> support) {
+  const std::vector<Vec3d> areas =
+      tabulated(facets.size(), [&](std::size_t f) { return facets[f].area; });
+  return distribute(facets, areas, near, position, support);
+}
+
+std::vector<Vec3d> distribute(std::span<const Facet> facets, std::span<const Vec3d> value,
+                              const Csr& near, std::span<const Vec3d> position,
+                              std::span<const double> support) {
   std::vector<double> share(near.indices.size());
 #pragma omp parallel for schedule(static)
   for (Index f = 0; f < near.rows(); ++f) {
@@ -120,13 +129,13 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
       }
     }
   }
-  std::vector<Vec3d> areas(position.size());
+  std::vector<Vec3d> sums(position.size());
   for (Index f = 0; f < near.rows(); ++f) {
     for (Offset k = near.offsets[f]; k < near.offsets[f + 1]; ++k) {
-      areas[near.indices[k]] += share[k] * facets[f].area;
+      sums[near.indices[k]] += share[k] * value[f];
     }
   }
-  return areas;
+  return sums;
 }
 
 namespace {
@@ -146,6 +155,10 @@ std::string obstacle_to_closing(const Surface& surface, std::optional<double> vo
 }
 
 }  // namespace
+
+bool encloses_volume(const Surface& surface) {
+  return obstacle_to_closing(surface, std::nullopt).empty();
+}
 
 bool may_close(const BodyRequest& request) {
   if (request.closure) return *request.closure > 0;

@@ -46,6 +46,16 @@ std::vector<Vec3d> areas_of_phyxels(std::span<const Facet> facets, const Csr& ne
                                     std::span<const Vec3d> position,
                                     std::span<const double> support);
 
+/// Distributes values on facets over the phyxels near them as `areas_of_phyxels` distributes areas:
+/// sums and moments of the values stay.
+/// @param value of each facet
+std::vector<Vec3d> distribute(std::span<const Facet> facets, std::span<const Vec3d> value,
+                              const Csr& near, std::span<const Vec3d> position,
+                              std::span<const double> support);
+
+/// True if a surface encloses a volume and faces outward.
+bool encloses_volume(const Surface& surface);
+
 /// True if the gradients of a body may have to be closed, whatever its cloud is.
 bool may_close(const BodyRequest& request);
 /// True if they have to be closed, provided that the surface encloses the body.

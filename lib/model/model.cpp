@@ -212,10 +212,10 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
   BoundaryChoice choice =
       choose_boundary(request, given, {}, static_cast<Index>(given.position.size()));
   if (sorted) choice.renumber(sorted->place);
-  std::vector<double> loaded;
-  for (const ExactSum& mass : choice.loaded_masses(model, shift)) loaded.push_back(mass.value());
   choice.refuse_empty(request, choice.counts(), box_around(given.position));
-  choice.add_to(model, request, shift, loaded);
+  const Vec3d origin = model.position[shift];
+  choice.add_to(model, request, shift, choice.load_sums(model, shift, origin), origin,
+                loaded_pieces(request, given.surface));
 }
 
 /// @param surveyor null: lists and moments are made here.
@@ -412,6 +412,7 @@ Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
     append(model.warnings, cloud.warnings);
     naming(request, [&] { add_body(model, request, cloud, surveyor); });
   });
+  add_tractions(model, scene);
   find_moments(model);
   close_gradients(model);
   add_warnings(model, model.surfels.position.size());
@@ -431,6 +432,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
     append(model.warnings, clouds[b].warnings);
     naming(scene.bodies[b], [&] { add_body(model, scene.bodies[b], clouds[b], surveyor); });
   }
+  add_tractions(model, scene);
   find_moments(model);
   close_gradients(model);
   add_warnings(model, model.surfels.position.size());

@@ -279,6 +279,23 @@ LoadRequest read_load(const SceneTable& table) {
   return load;
 }
 
+TractionRequest read_traction(const SceneTable& table) {
+  TractionRequest traction;
+  table.expect_one_of({"box", "ball", "all"});
+  traction.select = read_selection(table);
+  table.expect_one_of({"traction", "pressure"});
+  table.read("traction", traction.traction);
+  table.read("pressure", traction.pressure);
+  if (table.has("angle")) table.expect_together("angle", "normal");
+  table.read("normal", traction.normal);
+  if (table.has("normal") && traction.normal == Vec3d{}) {
+    table.refuse("normal", "[0, 0, 0] found; allowed: a direction");
+  }
+  table.read("angle", traction.angle);
+  table.read("ramp", traction.ramp);
+  return traction;
+}
+
 std::string name_of_source(const BodySource& source) {
   if (!source.shape.name.empty()) return source.shape.name;
   if (!source.cloud.empty()) return source.cloud;
@@ -312,6 +329,9 @@ BodyRequest read_body_request(const SceneTable& table) {
     body.motions.push_back(read_motion(motion));
   }
   for (const SceneTable& load : table.tables("load")) body.loads.push_back(read_load(load));
+  for (const SceneTable& traction : table.tables("traction")) {
+    body.tractions.push_back(read_traction(traction));
+  }
   return body;
 }
 
@@ -331,6 +351,7 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
     motion.about += by;
   }
   for (LoadRequest& load : copy.loads) move(load.select, by);
+  for (TractionRequest& traction : copy.tractions) move(traction.select, by);
   return copy;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "phyxel/law_table.hpp"
+#include "phyxel/point_fields.hpp"
 #include "scene/scene_schema.hpp"
 
 namespace phyxel {
@@ -47,6 +48,20 @@ std::string law_meanings() {
 std::string default_laws() {
   return fmt::format("\"{}\"; \"{}\" for the paper's bodies", usual_law,
                      StVenantKirchhoff<double>::name);
+}
+
+std::vector<std::string> field_names() {
+  std::vector<std::string> names{"displacement", "velocity", "mass", "volume", "body", "history"};
+  for (const PointField& field : point_fields()) names.emplace_back(field.name);
+  return names;
+}
+
+std::string field_meanings() {
+  std::string all =
+      "What each phyxel carries beside its position: displacement [m], velocity [m/s], mass [kg], volume "
+      "[m^3], number of its body, and what its material remembers";
+  for (const PointField& field : point_fields()) all += fmt::format("; `{}`: {}", field.name, field.meaning);
+  return all + ".";
 }
 
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
@@ -125,10 +140,20 @@ std::vector<SceneSection> make_sections() {
        "is needed; `displacement` and `rotation` need `duration`, and `amplitude` and `frequency` "
        "go together."},
       {"body.load", "[[body.load]]", "selection",
-       "A force on phyxels: exactly one of `force` and `force_density`."},
+       "A force on phyxels: exactly one of `force` and `force_density`. In a box or a ball it acts on "
+       "the space there: its centroid, and with `force_density` its total, are those of the part of the "
+       "body's inside that lies in the region, if the body has a closed surface and one material."},
+      {"body.traction", "[[body.traction]]", "selection",
+       "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
+       "body's surface lie in a `box` or a `ball`, or on `all` of it. The force keeps its size and "
+       "direction as the body deforms. Phyxels get their shares such that total, centroid and torque are "
+       "those on the triangles."},
       {"selection", "Selections", "",
-       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]` and `[[body.load]]` has exactly one of these "
-       "keys. Positions are those at rest, after the body is placed."},
+       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]` and `[[body.traction]]` has "
+       "exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
+       "A box or ball that holds or moves a part of a body made from a `mesh` acts exactly there: "
+       "phyxels lie on its boundary, and if all axes are held, strains end at it. In other bodies, phyxels whose "
+       "centres lie in it are held, and the support ends with them."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
 }
@@ -194,8 +219,7 @@ std::vector<SceneKey> run_keys() {
        .meaning = "Write the deformed surface, if a body has surfels."},
       {.section = "output", .name = "fields", .type = KeyType::choices,
        .fallback = "[\"displacement\", \"velocity\"]",
-       .words = {"displacement", "velocity", "von_mises", "volume_ratio", "mass", "volume", "body", "history"},
-       .meaning = "What each phyxel carries beside its position, in m, m/s, Pa, 1, kg, m^3 and 1."},
+       .words = field_names(), .meaning = field_meanings()},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},
@@ -298,6 +322,8 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Phyxels moved along a path."},
       {.section = "body", .name = "load", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Forces on phyxels."},
+      {.section = "body", .name = "traction", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Forces and pressures on the surface."},
 
       {.section = "body.material", .name = "young", .unit = "Pa", .otherwise = "required by laws that have it",
        .range = between(1e-12, stiffest), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
@@ -399,6 +425,18 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "body.load", .name = "force_density", .type = KeyType::vector, .unit = "N/m^3",
        .fallback = "[0, 0, 0]", .range = within(largest_force), .meaning = "Force per volume at rest."},
       {.section = "body.load", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
+       .meaning = "Time over which the force grows from zero; 0: at once."},
+
+      {.section = "body.traction", .name = "traction", .type = KeyType::vector, .unit = "Pa",
+       .fallback = "[0, 0, 0]", .range = within(stiffest), .meaning = "Force per area at rest."},
+      {.section = "body.traction", .name = "pressure", .unit = "Pa", .fallback = "0", .range = within(stiffest),
+       .meaning = "Force per area against the outward normal at rest; negative: along it."},
+      {.section = "body.traction", .name = "normal", .type = KeyType::vector, .otherwise = "everywhere",
+       .range = within(longest),
+       .meaning = "Only where the outward normal at rest has nearly this direction."},
+      {.section = "body.traction", .name = "angle", .unit = "degrees", .fallback = "45", .range = between(0, 180),
+       .meaning = "Largest angle between the normal and that direction."},
+      {.section = "body.traction", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
 
       {.section = "selection", .name = "region", .type = KeyType::text, .otherwise = "none",

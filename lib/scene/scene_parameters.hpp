@@ -157,6 +157,13 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.load", "force_density", load.force_density);
     inner("body.load", "ramp", load.ramp);
   });
+  each(body.tractions, "traction", [](const TractionRequest& traction, auto&& inner) {
+    inner("body.traction", "traction", traction.traction);
+    inner("body.traction", "pressure", traction.pressure);
+    inner("body.traction", "normal", traction.normal);
+    inner("body.traction", "angle", traction.angle);
+    inner("body.traction", "ramp", traction.ramp);
+  });
 }
 
 template <class Visit>

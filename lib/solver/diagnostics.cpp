@@ -19,27 +19,6 @@
 #include "solver/totals.hpp"
 
 namespace phyxel {
-namespace {
-
-/// Von Mises stress sqrt(3/2 s:s) [Pa], with s the deviator of σ = P Fᵀ / det F.
-double von_mises_stress(const Mat3d& piola, const Mat3d& grad_u) {
-  const Mat3d f = identity<double>() + grad_u;
-  Mat3d sigma = (1 / determinant(f)) * (piola * transpose(f));
-  const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
-  for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
-  double largest = 0;  // scales the entries, so that squares neither overflow nor vanish
-  for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
-  if (!(largest > 0) || !std::isfinite(largest)) return largest;
-  double squares = 0;
-  for (int e = 0; e < 9; ++e) {
-    const double share = sigma(e / 3, e % 3) / largest;
-    squares += share * share;
-  }
-  return largest * std::sqrt(1.5 * squares);
-}
-
-}  // namespace
-
 double pressure_wave_speed(const Material& m) {
   return std::sqrt(wave_stiffness_at_rest(m) / m.density);
 }
@@ -146,32 +125,6 @@ std::string describe_phyxel(const Model& model, Index global_id) {
     begin += part.size;
   }
   return "no phyxel";
-}
-
-void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
-                   std::vector<double>* volume_ratio) {
-  check_fits(model, backend);
-  std::vector<Mat3d> gradient;
-  backend.displacement_gradients(gradient);
-  const std::vector<std::string> columns = history_columns(model);
-  State state;
-  if (von_mises && !columns.empty()) backend.download(state);
-  if (von_mises) von_mises->resize(gradient.size());
-  if (volume_ratio) volume_ratio->resize(gradient.size());
-  for (const Part& part : model.parts) {
-    const PartLaw law(part.material);
-    const PartHistory history(state, part.material, columns);
-    std::vector<double> numbers(history.size());
-    for (Index i = part.begin; i < part.owned_end(); ++i) {
-      const Mat3d& g = gradient[i];
-      if (von_mises) {
-        const PointResponse<double> response =
-            law.after_step(g, history.of(i, numbers), state.history_interval);
-        (*von_mises)[i] = von_mises_stress(response.first_piola_stress, g);
-      }
-      if (volume_ratio) (*volume_ratio)[i] = 1 + volume_change(g);
-    }
-  }
 }
 
 }  // namespace phyxel

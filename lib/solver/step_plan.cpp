@@ -110,6 +110,12 @@ Resolution finest_resolution(const Scene& scene) {
         add(load.ramp, load.select, fmt::format("body.load.ramp = {:g} s", load.ramp));
       }
     }
+    for (const TractionRequest& traction : body.tractions) {
+      if (traction.ramp > 0) {
+        add(traction.ramp, traction.select,
+            fmt::format("body.traction.ramp = {:g} s", traction.ramp));
+      }
+    }
   }
   return finest;
 }

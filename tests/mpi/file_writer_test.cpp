@@ -54,8 +54,8 @@ std::shared_ptr<const Moment> moment_at(int k, const Model& model) {
     const auto value = [&](int what) { return value_of(number, what) + k; };
     state->displacement.push_back({value(0), value(1), value(2)});
     state->velocity.push_back({value(3), value(4), value(5)});
-    moment->frame.von_mises.push_back(value(6));
-    moment->frame.volume_ratio.push_back(value(7));
+    moment->frame.fields[Quantity::von_mises].push_back(value(6));
+    moment->frame.fields[Quantity::volume_ratio].push_back(value(7));
   }
   for (Index s = 0; s < static_cast<Index>(model.surfels.position.size()); ++s) {
     const Index number = model.share ? model.share->global_surfel_id[s] : s;

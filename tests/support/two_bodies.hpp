@@ -50,8 +50,8 @@ struct TwoBodiesFrame {
     Frame frame;
     frame.state = &state;
     frame.surfels = &surfels;
-    frame.von_mises.assign(5, 100.0 * number);
-    frame.volume_ratio.assign(5, 1.0);
+    frame.fields[Quantity::von_mises].assign(5, 100.0 * number);
+    frame.fields[Quantity::volume_ratio].assign(5, 1.0);
     frame.diagnostics.step = state.step;
     frame.diagnostics.time = state.time;
     frame.diagnostics.kinetic_energy = number;

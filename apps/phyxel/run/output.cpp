@@ -56,17 +56,9 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
     frame.surfels = &moment->surfels;
     moment->optional.push_back(Quantity::surfel_position);
   }
-  const auto wanted = [&](const char* field, Quantity quantity) {
-    if (!scene_.output.wants(field)) return false;
-    moment->optional.push_back(quantity);
-    return true;
-  };
-  const bool von_mises = wanted("von_mises", Quantity::von_mises);
-  const bool volume_ratio = wanted("volume_ratio", Quantity::volume_ratio);
-  if (von_mises || volume_ratio) {
-    stress_fields(model(), *backend_, von_mises ? &frame.von_mises : nullptr,
-                  volume_ratio ? &frame.volume_ratio : nullptr);
-  }
+  const std::vector<Quantity> wanted = wanted_fields(scene_.output);
+  moment->optional.insert(moment->optional.end(), wanted.begin(), wanted.end());
+  frame.fields = find_fields(model(), *backend_, wanted);
   hand_over(moment,
             [this, diagnostics = good->diagnostics, reactions = reactions_](ChunkedSource& values) {
               const Phase writing("writing a frame");

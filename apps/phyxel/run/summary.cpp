@@ -28,6 +28,18 @@ double rounding_energy(const Model& model) {
 
 nlohmann::ordered_json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
 
+nlohmann::ordered_json json_of(const std::vector<Load>& loads) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Load& load : loads) {
+    list.push_back({{"body", load.body},
+                    {"set", load.set},
+                    {"force_n", json_of(load.total)},
+                    {"force_density_n_m3", json_of(load.density)},
+                    {"centroid_m", json_of(load.centroid)}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Reaction& r : reactions) {
@@ -175,6 +187,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"internal_force_balance", force_balance(now)},
             {"internal_torque_balance", torque_balance(now)},
             {"inverted_phyxels", now.inverted},
+            {"loads", json_of(model().loads)},
             {"reactions", json_of(reactions_)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},

@@ -20,6 +20,10 @@ enum class Quantity {
   velocity,
   von_mises,
   volume_ratio,
+  stress,
+  principal_stress,
+  strain,
+  boundary,
   surfel_position,  ///< Deformed.
   surfel_normal,
   history  ///< The first column of a state's history; further ones follow (`history_quantity`).
@@ -44,7 +48,11 @@ constexpr std::size_t width_of(Quantity quantity) {
     case Quantity::volume:
     case Quantity::von_mises:
     case Quantity::volume_ratio:
+    case Quantity::boundary:
       return 1;
+    case Quantity::stress:
+    case Quantity::strain:
+      return 6;
     default:
       return 3;
   }

@@ -105,8 +105,12 @@ struct Motion {
 struct Load {
   std::vector<Index> phyxels;
   std::vector<Vec3d> force;  ///< [N], shape [phyxels]
-  Vec3d total, density;      ///< What the scene asks, shared by mass [N] and by volume [N/m³].
+  Vec3d total;               ///< Sum of the forces but for those by volume [N].
+  Vec3d density;             ///< Force by volume [N/m³].
   double ramp = 0;           ///< [s]
+  std::string body = {};     ///< Name of the body to which the phyxels belong.
+  std::string set = {};      ///< Entry of that body in the scene, e.g. "load 1", "traction 2".
+  Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
   /// Which share of the force acts at a time [s].
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };

@@ -11,6 +11,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/point_fields.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
 
@@ -21,9 +22,8 @@ struct Frame {
   const State* state = nullptr;
   const SurfelState* surfels = nullptr;  ///< Surfels; null without a surface family.
   Diagnostics diagnostics;
-  std::vector<Reaction> reactions;   ///< Reactions of supports (`find_reactions`), or none.
-  std::vector<double> von_mises;     ///< Von Mises Cauchy stress [Pa], shape [n] or empty.
-  std::vector<double> volume_ratio;  ///< det F, shape [n] or empty.
+  std::vector<Reaction> reactions;  ///< Reactions of supports (`find_reactions`), or none.
+  FieldValues fields;               ///< Computed fields (`find_fields`); others are not written.
 };
 
 /// This rank's values of a quantity, in the order of its model; empty if the frame lacks it.

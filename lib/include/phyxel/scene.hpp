@@ -91,11 +91,25 @@ struct MotionRequest {
 };
 
 /// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density`
-/// [N/m^3]. Grows linearly from zero during `ramp` seconds.
+/// [N/m^3]. Grows linearly from zero during `ramp` seconds. In a box or a ball it acts on the space
+/// there: its centroid, and with `force_density` its total, are those of the part of the body's
+/// inside that lies in the region, if the body has a closed surface and one material.
 struct LoadRequest {
   Selection select;
   Vec3d force;          ///< [N]
   Vec3d force_density;  ///< [N/m^3]
+  double ramp = 0;      ///< [s]
+};
+
+/// A force on a part of a body's surface: either `traction`, along a direction, or `pressure`,
+/// against the outward normals at rest. It keeps its size and direction while the body deforms, and
+/// grows linearly from zero during `ramp` seconds.
+struct TractionRequest {
+  Selection select;     ///< By box, ball or all: the triangles, or parts of them, that lie there.
+  Vec3d traction;       ///< [Pa]
+  double pressure = 0;  ///< [Pa]
+  Vec3d normal;         ///< If not zero, only where the outward normal is nearly along it.
+  double angle = 45;    ///< Largest angle between the two [degrees].
   double ramp = 0;      ///< [s]
 };
 
@@ -141,6 +155,7 @@ struct BodyRequest {
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;
+  std::vector<TractionRequest> tractions;
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
@@ -166,8 +181,8 @@ struct OutputRequest {
   double frames_per_second = 25;    ///< Frames per simulated second; 0: last frame only.
   bool phyxels = true;              ///< Write the phyxel family.
   bool surface = true;              ///< Write the deformed surface family.
-  /// Phyxel fields beside the positions: "displacement", "velocity", "von_mises" [Pa],
-  /// "volume_ratio", "mass", "volume", "body", "history".
+  /// Phyxel fields beside the positions: "displacement", "velocity", "mass", "volume", "body",
+  /// "history", and the computed ones (`point_fields`).
   std::vector<std::string> fields = {"displacement", "velocity"};
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
   /// True if `fields` contains the field.

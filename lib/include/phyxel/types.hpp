@@ -133,6 +133,8 @@ PHYXEL_HD Vec3<R> cross(Vec3<R> a, Vec3<R> b) {
 }
 /// Component by component.
 inline Vec3d by_components(Vec3d a, Vec3d b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+/// The component along an axis, 0 to 2.
+inline double component(Vec3d a, int axis) { return axis == 0 ? a.x : axis == 1 ? a.y : a.z; }
 /// |a|.
 inline double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 /// Unit vector along `a`; the zero vector stays zero.

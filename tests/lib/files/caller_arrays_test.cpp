@@ -63,9 +63,9 @@ TEST_F(CallerArrays, FramesHaveValuesForTheirModel) {
             "frame: displacement has 1 entries; allowed: " + n);
   EXPECT_EQ(with([](Frame&, S& s, U&) { s.velocity.clear(); }),
             "frame: velocity has 0 entries; allowed: " + n);
-  EXPECT_EQ(with([](Frame& f, S&, U&) { f.von_mises.resize(2); }),
+  EXPECT_EQ(with([](Frame& f, S&, U&) { f.fields[Quantity::von_mises].resize(2); }),
             "frame: von_mises has 2 entries; allowed: " + n + " or none");
-  EXPECT_THAT(with([](Frame& f, S&, U&) { f.volume_ratio.resize(3); }),
+  EXPECT_THAT(with([](Frame& f, S&, U&) { f.fields[Quantity::volume_ratio].resize(3); }),
               HasSubstr("volume_ratio has 3"));
   EXPECT_THAT(with([](Frame&, S& s, U&) {
                 s.history = {{"strain", {1, 2}}};

@@ -1,0 +1,34 @@
+/// Fields of phyxels that are computed for output: stress, strain, and what the scene sets.
+#pragma once
+
+#include <map>
+#include <span>
+#include <vector>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/chunked_source.hpp"
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// A computed field.
+struct PointField {
+  const char* name;  ///< In `output.fields` and in frames.
+  Quantity quantity;
+  const char* meaning;  ///< With its unit and components, for documentation.
+};
+/// All computed fields.
+std::span<const PointField> point_fields();
+
+/// Values of computed fields, each of shape [n, width_of(quantity)].
+using FieldValues = std::map<Quantity, std::vector<double>>;
+
+/// The computed fields that the output of a scene wants.
+std::vector<Quantity> wanted_fields(const OutputRequest& output);
+
+/// Computes fields of the phyxels of a model, or of a rank's share, at the backend's present state.
+/// Stress is Cauchy's, σ = P Fᵀ / det F [Pa], strain is Green's, (FᵀF - I) / 2; both as xx, yy, zz,
+/// xy, yz, xz. Values of ghosts are 0.
+FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted);
+
+}  // namespace phyxel

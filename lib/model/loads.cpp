@@ -1,0 +1,219 @@
+#include "model/loads.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "model/neighbour_search.hpp"
+#include "model/selection.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Largest shift of a load's centroid along a principal axis, in standard deviations of the
+/// phyxels' positions along it: weights then stay above -2 times the mean.
+constexpr double largest_shift = 0.7;
+
+/// The gradient g [1/m] of weights m (1 + g x) whose centroid is at `shift`.
+/// @param covariance of the phyxels' positions, x from their centroid [m²]
+Vec3d weight_gradient(const Eigen::Matrix3d& covariance, Vec3d shift) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
+  const Eigen::Vector3d wanted(shift.x, shift.y, shift.z);
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double variance = axes.eigenvalues()[k];
+    if (!(variance > 1e-12 * axes.eigenvalues()[2])) continue;  // all in one plane
+    const double most = largest_shift * std::sqrt(variance);
+    const double along = std::clamp(axes.eigenvectors().col(k).dot(wanted), -most, most);
+    gradient += (along / variance) * axes.eigenvectors().col(k);
+  }
+  return {gradient[0], gradient[1], gradient[2]};
+}
+
+void halve_at_boundary(const SpaceRegion& region, const std::array<Vec3d, 3>& corner,
+                       double shortest, std::vector<Facet>& facets) {
+  const Vec3d centroid = (corner[0] + corner[1] + corner[2]) / 3.0;
+  const double distance = region.distance(centroid);
+  double reach = 0;
+  for (const Vec3d c : corner) reach = std::max(reach, norm(c - centroid));
+  std::array<double, 3> side;
+  for (int k = 0; k < 3; ++k) side[k] = norm(corner[(k + 1) % 3] - corner[k]);
+  const auto longest = std::max_element(side.begin(), side.end()) - side.begin();
+  if (std::abs(distance) >= reach || side[longest] <= shortest) {
+    if (distance > 0) return;
+    facets.push_back({centroid, 0.5 * cross(corner[1] - corner[0], corner[2] - corner[0])});
+    return;
+  }
+  const Vec3d a = corner[longest], b = corner[(longest + 1) % 3], c = corner[(longest + 2) % 3];
+  const Vec3d middle = 0.5 * (a + b);
+  halve_at_boundary(region, {a, middle, c}, shortest, facets);
+  halve_at_boundary(region, {middle, b, c}, shortest, facets);
+}
+
+std::string entry_of(const char* kind, std::size_t number) {
+  return fmt::format("{} {}", kind, number + 1);
+}
+
+}  // namespace
+
+void LoadSums::add(double m, Vec3d x) {
+  mass.add(m);
+  moment.add(m * x);
+  const double terms[6] = {x.x * x.x, x.x * x.y, x.x * x.z, x.y * x.y, x.y * x.z, x.z * x.z};
+  for (int k = 0; k < 6; ++k) second[k].add(m * terms[k]);
+}
+
+std::vector<ExactSum*> LoadSums::all() {
+  std::vector<ExactSum*> sums{&mass, &moment.x, &moment.y, &moment.z};
+  for (ExactSum& sum : second) sums.push_back(&sum);
+  return sums;
+}
+
+std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
+                                                    const Surface& surface) {
+  std::vector<std::optional<BodyPiece>> pieces(request.loads.size());
+  if (!request.inclusions.empty() || !encloses_volume(surface)) return pieces;
+  for (std::size_t l = 0; l < pieces.size(); ++l) {
+    const auto region = region_of(request.loads[l].select);
+    if (!region) continue;
+    const BodyPiece piece = piece_in(surface, *region);
+    if (piece.volume > 0) pieces[l] = piece;
+  }
+  return pieces;
+}
+
+Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> phyxels,
+             const Model& model, LoadSums sums, Vec3d origin,
+             const std::optional<BodyPiece>& piece) {
+  const LoadRequest& asked = request.loads[number];
+  Load load{.phyxels = std::move(phyxels),
+            .total = asked.force,
+            .density = asked.force_density,
+            .ramp = asked.ramp,
+            .body = request.name,
+            .set = entry_of("load", number)};
+  const double mass = sums.mass.value();
+  const Vec3d mean = sums.moment.value() / mass;
+  load.centroid = origin + mean;
+  Vec3d gradient;
+  if (piece) {
+    Eigen::Matrix3d covariance;
+    for (int k = 0, row = 0; row < 3; ++row) {
+      for (int column = row; column < 3; ++column, ++k) {
+        covariance(row, column) = covariance(column, row) =
+            sums.second[k].value() / mass - component(mean, row) * component(mean, column);
+      }
+    }
+    gradient = weight_gradient(covariance, piece->centroid - load.centroid);
+    const Eigen::Vector3d shift = covariance * Eigen::Vector3d(gradient.x, gradient.y, gradient.z);
+    load.total += piece->volume * asked.force_density;
+    load.density = {};
+    load.centroid += Vec3d{shift[0], shift[1], shift[2]};
+  }
+  for (const Index i : load.phyxels) {
+    const double weight =
+        model.mass[i] / mass * (1 + dot(gradient, model.position[i] - origin - mean));
+    load.force.push_back(weight * load.total + model.volume[i] * load.density);
+  }
+  return load;
+}
+
+LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& traction,
+                           std::span<const Vec3d> position, std::span<const Triangle> triangles,
+                           Index first, double longest) {
+  LoadedFacets loaded;
+  const std::optional<SpaceRegion> region = region_of(traction.select);
+  const double least = std::cos(traction.angle * std::numbers::pi / 180);
+  const Vec3d direction = normalised(traction.normal);
+  std::vector<Triangle> facing;
+  for (const Triangle& t : triangles) {
+    const Vec3d a = position[t[0] - first];
+    const Vec3d area = cross(position[t[1] - first] - a, position[t[2] - first] - a);
+    const bool is_facing = direction == Vec3d{} || dot(area, direction) >= least * norm(area);
+    if (is_facing) facing.push_back(t);
+  }
+  if (region) {
+    // Finer near the boundary, so that the loaded area is right within about a hundredth of a
+    // facet's.
+    std::vector<Facet> cut;
+    for (const Triangle& t : facing) {
+      halve_at_boundary(*region,
+                        {position[t[0] - first], position[t[1] - first], position[t[2] - first]},
+                        longest / 16, cut);
+    }
+    loaded.facets = std::move(cut);
+  } else {
+    loaded.facets = facets_of(position, facing, first, longest);
+  }
+  if (loaded.facets.empty()) {
+    throw InputError(fmt::format(
+        "{}: this traction acts on no part of the surface of body \"{}\"{}; allowed: a box, a ball "
+        "or a normal that some of its {} triangles are in or have",
+        traction.select.where.empty() ? request.where : traction.select.where, request.name,
+        triangles.empty() ? ", which has no triangles" : "", triangles.size()));
+  }
+  for (const Facet& facet : loaded.facets) {
+    loaded.force.push_back(norm(facet.area) * traction.traction - traction.pressure * facet.area);
+  }
+  return loaded;
+}
+
+Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded) {
+  Load load{.ramp = request.tractions[number].ramp,
+            .body = request.name,
+            .set = entry_of("traction", number)};
+  double sizes = 0;
+  Vec3d moment;
+  const Vec3d origin = loaded.facets.front().centroid;
+  for (std::size_t f = 0; f < loaded.facets.size(); ++f) {
+    const double size = norm(loaded.force[f]);
+    load.total += loaded.force[f];
+    sizes += size;
+    moment += size * (loaded.facets[f].centroid - origin);
+  }
+  load.centroid = origin;
+  if (sizes > 0) load.centroid += moment / sizes;
+  return load;
+}
+
+void add_tractions(Model& model, const Scene& scene) {
+  for (const Part& part : model.parts) {
+    const bool is_first = &part == model.parts_of_body(part).data();
+    const BodyRequest& request = scene.bodies[static_cast<std::size_t>(part.body)];
+    if (!is_first || request.tractions.empty()) continue;
+    const std::span<const Part> parts = model.parts_of_body(part);
+    const auto begin = static_cast<std::size_t>(part.begin),
+               count = static_cast<std::size_t>(parts.back().end) - begin;
+    const std::span<const Vec3d> place = std::span(model.position).subspan(begin, count);
+    const std::span<const double> support =
+        std::span(model.neighbourhood.support).subspan(begin, count);
+    const std::span<const Vec3d> surfel =
+        std::span(model.surfels.position)
+            .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin);
+    const std::span<const Triangle> triangles = model.surfels.triangles_of(part);
+    const double longest =
+        triangles.empty() ? 1
+                          : longest_edge(*std::max_element(support.begin(), support.end()), surfel,
+                                         triangles, part.surfel_begin, static_cast<Index>(count));
+    for (std::size_t t = 0; t < request.tractions.size(); ++t) {
+      const LoadedFacets loaded = loaded_facets(request, request.tractions[t], surfel, triangles,
+                                                part.surfel_begin, longest);
+      std::vector<Vec3d> centroids;
+      for (const Facet& f : loaded.facets) centroids.push_back(f.centroid);
+      const std::vector<Vec3d> force = distribute(
+          loaded.facets, loaded.force, phyxels_near(centroids, place, support), place, support);
+      Load& load = model.loads.emplace_back(traction_load(request, t, loaded));
+      for (std::size_t i = 0; i < force.size(); ++i) {
+        if (force[i] == Vec3d{}) continue;
+        load.phyxels.push_back(static_cast<Index>(begin + i));
+        load.force.push_back(force[i]);
+      }
+    }
+  }
+}
+
+}  // namespace phyxel

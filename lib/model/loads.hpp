@@ -1,0 +1,59 @@
+/// Loads on phyxels and tractions on surfaces, as forces on single phyxels.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "model/closing_areas.hpp"
+#include "model/region_integrals.hpp"
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// Sums over the phyxels that a load selects.
+struct LoadSums {
+  ExactSum mass;                   ///< Σ m [kg]
+  ExactVector moment;              ///< Σ m x [kg m], x from some origin.
+  std::array<ExactSum, 6> second;  ///< Σ m x xᵀ [kg m²]: xx, xy, xz, yy, yz, zz.
+  /// Adds a phyxel. @param m mass [kg] @param x position from the origin [m]
+  void add(double m, Vec3d x);
+  /// All sums, for exchanges between ranks.
+  std::vector<ExactSum*> all();
+};
+
+/// The parts of a body on which its loads in boxes and balls act, one for each load; unset for
+/// other loads, and for bodies of several materials or without a closed surface.
+std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
+                                                    const Surface& surface);
+
+/// The load of entry `number` (from 0) of a body. Weights of the phyxels are their masses, times a
+/// linear function of position that moves their centroid to that of the piece.
+/// @param phyxels the selected phyxels of the model
+/// @param sums over all of them, in the whole body, of positions from `origin` [m]
+Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> phyxels,
+             const Model& model, LoadSums sums, Vec3d origin,
+             const std::optional<BodyPiece>& piece);
+
+/// A traction on a surface: the pieces of triangles on which it acts, and the force on each.
+struct LoadedFacets {
+  std::vector<Facet> facets;
+  std::vector<Vec3d> force;  ///< [N], shape [facets]
+};
+/// Finds where a traction acts. @param longest greatest edge of a facet [m]
+/// @throws InputError if it acts nowhere
+LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& traction,
+                           std::span<const Vec3d> position, std::span<const Triangle> triangles,
+                           Index first, double longest);
+
+/// The load of traction `number` (from 0) of a body, without phyxels and forces.
+Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded);
+
+/// Adds the tractions of a scene to a whole model.
+void add_tractions(Model& model, const Scene& scene);
+
+}  // namespace phyxel

@@ -1,0 +1,166 @@
+#include "phyxel/point_fields.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/history.hpp"
+#include "solver/first_error.hpp"
+#include "solver/part_law.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Σ of a phyxel's motions and loads in the field "boundary".
+constexpr double is_held = 1, is_moved = 2, is_loaded = 4;
+
+/// Cauchy stress σ = P Fᵀ / det F [Pa].
+Mat3d cauchy_stress(const Mat3d& piola, const Mat3d& grad_u) {
+  const Mat3d f = identity<double>() + grad_u;
+  return (1 / determinant(f)) * (piola * transpose(f));
+}
+
+/// Von Mises stress sqrt(3/2 s:s) [Pa], s the deviator of σ.
+double von_mises_stress(Mat3d sigma) {
+  const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
+  for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
+  double largest = 0;  // scales the entries, so that squares neither overflow nor vanish
+  for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
+  if (!(largest > 0) || !std::isfinite(largest)) return largest;
+  double squares = 0;
+  for (int e = 0; e < 9; ++e) {
+    const double share = sigma(e / 3, e % 3) / largest;
+    squares += share * share;
+  }
+  return largest * std::sqrt(1.5 * squares);
+}
+
+/// Principal values of a symmetric matrix, the largest first.
+std::array<double, 3> principal_values(const Mat3d& m) {
+  Eigen::Matrix3d matrix;
+  for (int e = 0; e < 9; ++e) matrix(e / 3, e % 3) = 0.5 * (m(e / 3, e % 3) + m(e % 3, e / 3));
+  const Eigen::Vector3d found =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+  return {found[2], found[1], found[0]};
+}
+
+/// The components of a symmetric matrix in the order of fields.
+std::array<double, 6> components(const Mat3d& m) {
+  return {m(0, 0),
+          m(1, 1),
+          m(2, 2),
+          0.5 * (m(0, 1) + m(1, 0)),
+          0.5 * (m(1, 2) + m(2, 1)),
+          0.5 * (m(0, 2) + m(2, 0))};
+}
+
+std::vector<double> boundary_of(const Model& model) {
+  std::vector<double> marks(static_cast<std::size_t>(model.size()), 0);
+  const auto mark = [&](const std::vector<Index>& phyxels, int kind) {
+    for (const Index i : phyxels) marks[i] = static_cast<int>(marks[i]) | kind;
+  };
+  for (const Motion& motion : model.motions) {
+    mark(motion.phyxels, static_cast<int>(motion.stands_still() ? is_held : is_moved));
+  }
+  for (const Load& load : model.loads) mark(load.phyxels, static_cast<int>(is_loaded));
+  return marks;
+}
+
+/// The arrays that a computation fills, by quantity.
+class Arrays {
+ public:
+  Arrays(FieldValues& values, std::span<const Quantity> wanted, Index n) : values_(values) {
+    for (const Quantity q : wanted) {
+      values[q].resize(static_cast<std::size_t>(n) * width_of(q));
+    }
+  }
+  bool has(Quantity q) const { return values_.count(q) > 0; }
+  template <std::size_t width>
+  void set(Quantity q, Index i, const std::array<double, width>& entries) {
+    std::copy(entries.begin(), entries.end(),
+              values_.at(q).begin() + static_cast<std::ptrdiff_t>(width) * i);
+  }
+
+ private:
+  FieldValues& values_;
+};
+
+}  // namespace
+
+std::span<const PointField> point_fields() {
+  static constexpr PointField fields[] = {
+      {"von_mises", Quantity::von_mises, "von Mises equivalent of the Cauchy stress [Pa]"},
+      {"volume_ratio", Quantity::volume_ratio, "det F"},
+      {"stress", Quantity::stress, "Cauchy stress [Pa]: xx, yy, zz, xy, yz, xz"},
+      {"principal_stress", Quantity::principal_stress,
+       "principal values of the Cauchy stress [Pa], the largest first"},
+      {"strain", Quantity::strain, "Green's strain: xx, yy, zz, xy, yz, xz"},
+      {"boundary", Quantity::boundary,
+       "sum of 1 for phyxels that are held along an axis, 2 for moved and 4 for loaded ones"}};
+  return fields;
+}
+
+std::vector<Quantity> wanted_fields(const OutputRequest& output) {
+  std::vector<Quantity> wanted;
+  for (const PointField& field : point_fields()) {
+    if (output.wants(field.name)) wanted.push_back(field.quantity);
+  }
+  return wanted;
+}
+
+FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted) {
+  FieldValues values;
+  std::vector<Quantity> computed(wanted.begin(), wanted.end());
+  if (std::erase(computed, Quantity::boundary) > 0) values[Quantity::boundary] = boundary_of(model);
+  if (computed.empty()) return values;
+  check_fits(model, backend);
+  std::vector<Mat3d> gradient;
+  backend.displacement_gradients(gradient);
+  Arrays arrays(values, computed, static_cast<Index>(gradient.size()));
+  const bool stresses = arrays.has(Quantity::von_mises) || arrays.has(Quantity::stress) ||
+                        arrays.has(Quantity::principal_stress);
+  const std::vector<std::string> columns = history_columns(model);
+  State state;
+  if (stresses && !columns.empty()) backend.download(state);
+  for (const Part& part : model.parts) {
+    const PartLaw law(part.material);
+    const PartHistory history(state, part.material, columns);
+    std::vector<double> numbers(history.size());
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const Mat3d& g = gradient[i];
+      if (arrays.has(Quantity::volume_ratio)) {
+        arrays.set(Quantity::volume_ratio, i, std::array{1 + volume_change(g)});
+      }
+      if (arrays.has(Quantity::strain)) {
+        const Mat3d green = 0.5 * (g + transpose(g) + transpose(g) * g);
+        arrays.set(Quantity::strain, i, components(green));
+      }
+      if (!stresses) continue;
+      const PointResponse<double> response =
+          law.after_step(g, history.of(i, numbers), state.history_interval);
+      const Mat3d sigma = cauchy_stress(response.first_piola_stress, g);
+      if (arrays.has(Quantity::von_mises)) {
+        arrays.set(Quantity::von_mises, i, std::array{von_mises_stress(sigma)});
+      }
+      if (arrays.has(Quantity::stress)) arrays.set(Quantity::stress, i, components(sigma));
+      if (arrays.has(Quantity::principal_stress)) {
+        arrays.set(Quantity::principal_stress, i, principal_values(sigma));
+      }
+    }
+  }
+  return values;
+}
+
+void stress_fields(const Model& model, Backend& backend, std::vector<double>* von_mises,
+                   std::vector<double>* volume_ratio) {
+  check_fits(model, backend);
+  std::vector<Quantity> wanted;
+  if (von_mises) wanted.push_back(Quantity::von_mises);
+  if (volume_ratio) wanted.push_back(Quantity::volume_ratio);
+  FieldValues found = find_fields(model, backend, wanted);
+  if (von_mises) *von_mises = std::move(found[Quantity::von_mises]);
+  if (volume_ratio) *volume_ratio = std::move(found[Quantity::volume_ratio]);
+}
+
+}  // namespace phyxel
