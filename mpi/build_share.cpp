@@ -79,7 +79,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
       cut = make_lattice_shape(*lattice, piece);
     } else {
       CutSource source = source_of(request);
-      if (!made || !(*made == source)) {
+      if (!made || !is_same(*made, source)) {
         rest = rest_cloud(source);
         digest = 31 * digest + cloud_digest(rest);
       }

@@ -305,7 +305,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   return naming(request, [&] { return choose_boundary(request, cloud, number, body.size); });
 }
 
-void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local) {
+void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   std::vector<BoundaryChoice> choices(whole.bodies.size());
   std::vector<std::int64_t> counts;
@@ -339,6 +339,9 @@ void add_boundary(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
       const auto entries = static_cast<std::ptrdiff_t>(choices[b].chosen.size());
       naming(request, [&] {
         choices[b].refuse_empty(request, {count, count + entries}, whole.boxes[b]);
+        if (entries > 0) {
+          choices[b].warn_of_few(request, {count, count + entries}, whole.warnings);
+        }
       });
       count += entries;
       naming(request, [&] {

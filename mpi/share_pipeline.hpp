@@ -13,6 +13,7 @@
 #include "model/cloud_piece.hpp"
 #include "model/inclusions.hpp"
 #include "model/share_surveyor.hpp"
+#include "model/walls.hpp"
 #include "mpi/build_share.hpp"
 #include "mpi/migrate.hpp"
 #include "mpi/region_sets.hpp"
@@ -34,7 +35,7 @@ struct WholeBody {
   Vec3d origin;                ///< Rest position of the first phyxel [m].
   bool kernel_volumes = false;
   bool lattice = false;              ///< `Cloud::lattice`.
-  std::vector<SpaceRegion> walls;    ///< `walls_of` its cloud.
+  Walls walls;                       ///< `walls_of` its cloud.
   double closure = 0;                ///< Tolerance of closed gradients; 0: they are not closed.
   std::vector<std::string> regions;  ///< Names of its regions, those that the scene uses first.
   std::size_t used_regions = 0;

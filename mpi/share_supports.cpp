@@ -106,7 +106,11 @@ void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,
                                     const MigratingPhyxels& own, double supports) {
   std::vector<double> reach;
-  for (const WholeBody& body : whole.bodies) reach.push_back(supports * margin * body.reach);
+  for (const WholeBody& body : whole.bodies) {
+    // Beside walls, lists depend on phyxels up to two spacings away.
+    const double beside = body.walls.regions.empty() ? 0 : 2 * body.walls.spacing;
+    reach.push_back(supports * margin * body.reach + beside);
+  }
   return remote_phyxels_around(setup.ranks, own, reach, whole.boxes);
 }
 

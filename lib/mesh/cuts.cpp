@@ -71,7 +71,101 @@ class TriangleCutter {
   std::vector<Crease>& pieces_;
 };
 
+/// Sides of a box of which the shortest is less than this many spacings leave no room for two
+/// layers of phyxels.
+constexpr double thin = 0.8;
+/// Distance from the end of a body within which a box ends with it, in spacings.
+constexpr double flush = 0.35;
+
+double& component_of(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// A box whose faces that are beyond the body, or nearly so, are moved well away from it.
+SpaceRegion beyond_body(const SpaceRegion& region, const Surface& surface, double slack) {
+  SpaceRegion made = region;
+  if (region.is_ball) return made;
+  for (int k = 0; k < 3; ++k) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (const Triangle& t : surface.triangle) {
+      for (const Index corner : t) {
+        const double at = dot(region.edge[k], surface.position[corner]);
+        low = std::min(low, at), high = std::max(high, at);
+      }
+    }
+    const double away = high - low;
+    if (component(region.low, k) < low + slack) component_of(made.low, k) = low - away;
+    if (component(region.high, k) > high - slack) component_of(made.high, k) = high + away;
+  }
+  return made;
+}
+
+/// Counts sample points inside a surface, up to about a hundred of each kind.
+/// @param kind kind(point) is the number of a kind of point that counts, or -1
+/// @param near near(middle, radius) is false if no point of a ball counts
+template <class Kind, class Near>
+std::array<int, 2> count_points(const InsideSampler& sampler, double voxel, Kind&& kind,
+                                Near&& near) {
+  std::atomic<int> count[2] = {0, 0};
+  sampler.visit({.voxel = voxel,
+                 .at_random = false,
+                 .wanted = [&](Vec3d middle,
+                               double half) { return near(middle, std::numbers::sqrt3 * half); }},
+                [&](std::size_t, const SampleBlock& block) {
+                  for (std::size_t k = 0; k < block.offset.size(); ++k) {
+                    const int of_point = kind(block.position(k));
+                    if (of_point >= 0) ++count[of_point];
+                  }
+                });
+  return {count[0], count[1]};
+}
+
+/// True if a region reaches into the inside of a surface by more than `depth` [m].
+bool reaches_into(const InsideSampler& sampler, const SpaceRegion& region, double depth) {
+  // A layer, since the part of a region that is deeper may be large.
+  const auto in_layer = [&](Vec3d p, double slack) {
+    return std::abs(region.distance(p) + 1.5 * depth) <= 0.5 * depth + slack;
+  };
+  const std::array<int, 2> found = count_points(
+      sampler, 0.25 * depth, [&](Vec3d p) { return in_layer(p, 0) ? 0 : -1; }, in_layer);
+  return found[0] > 0;
+}
+
+/// True if the body goes on for half a spacing on both sides of a thin box's middle.
+bool goes_through(const InsideSampler& sampler, const SpaceRegion& box, int axis, double spacing) {
+  const double middle = 0.5 * (component(box.low, axis) + component(box.high, axis));
+  SpaceRegion layer = box;
+  component_of(layer.low, axis) = middle - 0.5 * spacing;
+  component_of(layer.high, axis) = middle + 0.5 * spacing;
+  const auto side = [&](Vec3d p) { return dot(box.edge[axis], p) < middle ? 0 : 1; };
+  const std::array<int, 2> found = count_points(
+      sampler, 0.125 * spacing, [&](Vec3d p) { return layer.contains(p) ? side(p) : -1; },
+      [&](Vec3d p, double radius) { return layer.distance(p) <= radius; });
+  return std::min(found[0], found[1]) > 0.5 * std::max(found[0], found[1]);
+}
+
 }  // namespace
+
+PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const SpaceRegion& region,
+                    double spacing) {
+  PlannedCut planned{.boundary = beyond_body(region, surface, flush * spacing)};
+  SpaceRegion& box = planned.boundary;
+  double shortest = 2 * region.radius;
+  int axis = 0;
+  if (!region.is_ball) {
+    for (int k = 1; k < 3; ++k) {
+      const auto side = [&](int of) { return component(box.high, of) - component(box.low, of); };
+      if (side(k) < side(axis)) axis = k;
+    }
+    shortest = component(box.high, axis) - component(box.low, axis);
+  }
+  if (shortest >= thin * spacing) {
+    const double depth = std::min(0.5 * spacing, 0.2 * shortest);
+    planned.is_cut = planned.has_inside = reaches_into(sampler, box, depth);
+  } else if (!region.is_ball && goes_through(sampler, box, axis, spacing)) {
+    planned.is_cut = true;
+    component_of(box.low, axis) = 0.5 * (component(box.low, axis) + component(box.high, axis));
+  }
+  return planned;
+}
 
 std::vector<Crease> cutting_curves(const Surface& surface, std::span<const SpaceRegion> regions,
                                    double step) {
@@ -105,24 +199,6 @@ std::vector<Vec3d> crossings(std::span<const Crease> creases, std::span<const Sp
       }
     }
   }
-  return found;
-}
-
-bool reaches_into(const InsideSampler& sampler, const SpaceRegion& region, double depth) {
-  const auto in_layer = [&](Vec3d p, double slack) {
-    return std::abs(region.distance(p) + 1.5 * depth) <= 0.5 * depth + slack;
-  };
-  std::atomic<bool> found = false;
-  sampler.visit(
-      {.voxel = 0.5 * depth,
-       .at_random = false,
-       .wanted = [&](Vec3d middle,
-                     double half) { return in_layer(middle, std::numbers::sqrt3 * half); }},
-      [&](std::size_t, const SampleBlock& block) {
-        for (std::size_t k = 0; k < block.offset.size() && !found; ++k) {
-          if (in_layer(block.position(k), 0)) found = true;
-        }
-      });
   return found;
 }
 

@@ -16,8 +16,17 @@ struct Crease {
   Vec3d from, to;  ///< Ends [m].
 };
 
-/// True if a region reaches into the inside of a surface by more than `depth` [m].
-bool reaches_into(const InsideSampler& sampler, const SpaceRegion& region, double depth);
+/// Where a region is to cut a body.
+struct PlannedCut {
+  bool is_cut = false;      ///< True if phyxels are to lie on the boundary.
+  bool has_inside = false;  ///< True if phyxels will also lie inside.
+  /// The region, but beyond the body where it ends nearly where the body does; or, of a region that
+  /// is too thin for two layers of phyxels, the half whose boundary is in its middle.
+  SpaceRegion boundary;
+};
+/// Plans the cut of a region. @param spacing of the phyxels [m]
+PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const SpaceRegion& region,
+                    double spacing);
 
 /// The curves on a surface along which the boundaries of regions cut it.
 /// @param step greatest length of a piece [m]

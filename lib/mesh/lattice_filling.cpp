@@ -238,16 +238,16 @@ class Skin {
   /// Shares of the inside by sample points [m^3]. Cells end at cuts: a phyxel on a cut has none of
   /// the space in its region, unless no other phyxel is there.
   std::vector<double> sampled_volumes(Stage& stage) const {
-    const std::vector<SpaceRegion>& cuts = request_.sites.cuts;
+    const SupportCuts& cuts = request_.sites.cuts;
     // Room 0 is outside all regions.
     const auto room_of = [&](Vec3d p, double depth) {
       std::size_t k = 0;
-      while (k < cuts.size() && !cuts[k].shrunk(depth).contains(p)) ++k;
-      return k < cuts.size() ? k + 1 : 0;
+      while (k < cuts.list.size() && !cuts.list[k].wall.shrunk(depth).contains(p)) ++k;
+      return k < cuts.list.size() ? k + 1 : 0;
     };
-    std::vector<std::vector<std::size_t>> in_room(cuts.size() + 1);
+    std::vector<std::vector<std::size_t>> in_room(cuts.list.size() + 1);
     for (std::size_t k = 0; k < point_.size(); ++k) {
-      in_room[room_of(point_[k], 4 * request_.sites.cut_depth)].push_back(k);
+      in_room[room_of(point_[k], 4 * cuts.depth)].push_back(k);
     }
     const auto settled_room_of = [&](Vec3d p) {
       const std::size_t room = room_of(p, 0);
@@ -261,14 +261,14 @@ class Skin {
       for (const std::size_t k : in_room[room]) site.push_back(point_[k]);
       const auto wanted = [&](Vec3d middle, double half) {
         const double radius = std::numbers::sqrt3 * half;
-        if (room > 0 && cuts[room - 1].distance(middle) > radius) return false;
+        if (room > 0 && cuts.list[room - 1].wall.distance(middle) > radius) return false;
         // Smaller cells are parts of one that is wanted; larger ones would need a long search.
         if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
         // Cells of a Voronoi diagram reach one spacing from their phyxels.
         return !depth.is_deep(middle, radius, regular_clearance + 1);
       };
       std::function<bool(Vec3d)> counts;
-      if (!cuts.empty()) counts = [&](Vec3d p) { return settled_room_of(p) == room; };
+      if (!cuts.list.empty()) counts = [&](Vec3d p) { return settled_room_of(p) == room; };
       const std::vector<double> shares =
           NearestSite(site, spacing_)
               .volumes(

@@ -244,7 +244,6 @@ double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& s
   cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
   cloud.volume = std::move(inside.volume);
   cloud.cuts = sites.cuts;
-  cloud.cut_depth = sites.cut_depth;
   return inside.spacing;
 }
 
@@ -300,8 +299,12 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   scale(cloud.surface.position, -exponent);
   scale(cloud.position, -exponent);
   for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);
-  for (SpaceRegion& cut : cloud.cuts) cut = cut.scaled(std::ldexp(1.0, -exponent));
-  cloud.cut_depth = std::ldexp(cloud.cut_depth, -exponent);
+  for (SupportCut& cut : cloud.cuts.list) {
+    cut = {cut.support.scaled(std::ldexp(1.0, -exponent)),
+           cut.wall.scaled(std::ldexp(1.0, -exponent))};
+  }
+  cloud.cuts.depth = std::ldexp(cloud.cuts.depth, -exponent);
+  cloud.cuts.spacing = std::ldexp(cloud.cuts.spacing, -exponent);
   found.volume = std::ldexp(found.volume, -3 * exponent);
   found.spacing = std::ldexp(found.spacing, -exponent);
   found.smallest_gap = std::ldexp(found.smallest_gap, -exponent);

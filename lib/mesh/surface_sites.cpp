@@ -209,26 +209,27 @@ void settle_on_cuts(std::vector<Vec3d>& site, std::size_t first, std::span<const
 void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std::uint64_t seed) {
   const double spacing = sites.spacing;
   std::vector<PointOn> points;
-  for (const Vec3d p : crossings(creases, sites.cuts, 0.5 * spacing)) points.push_back({0, p});
+  for (const Vec3d p : crossings(creases, sites.boundaries, 0.5 * spacing))
+    points.push_back({0, p});
   if (points.empty()) return;
   std::vector<Vec3d>& site = sites.position;
   const std::size_t first = site.size();
   const std::vector<Vec3d> more =
       fill_with_darts(blocks_of(points, spacing), gap_at_corners * spacing, seed, site);
   site.insert(site.end(), more.begin(), more.end());
-  settle_on_cuts(site, first, sites.cuts, sites.cut_depth);
+  settle_on_cuts(site, first, sites.boundaries, sites.cuts.depth);
 }
 
 /// Adds sites along the curves on a surface in which the boundaries of regions cut it.
 void add_along_cuts(const Surface& surface, SurfaceSites& sites, std::uint64_t seed,
                     int relaxations) {
   const double spacing = sites.spacing;
-  const std::vector<Crease> curves = cutting_curves(surface, sites.cuts, 0.5 * spacing);
+  const std::vector<Crease> curves = cutting_curves(surface, sites.boundaries, 0.5 * spacing);
   if (curves.empty()) return;
   const std::size_t first = sites.position.size();
   add_along_edges(sites.position, samples_along(curves, spacing), gap_along_edges * spacing,
                   spacing, seed, relaxations);
-  settle_on_cuts(sites.position, first, sites.cuts, sites.cut_depth);
+  settle_on_cuts(sites.position, first, sites.boundaries, sites.cuts.depth);
 }
 
 /// Adds sites on the boundary of a region inside a surface, at most `most` with those there are.
@@ -244,10 +245,11 @@ void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSit
   const std::size_t first = all.size();
   const std::vector<Vec3d> more =
       fill_with_darts(blocks_of(samples, spacing), gap_on_faces * spacing, seed + 1, all);
-  if (static_cast<double>(sites.on_cuts.size() + more.size()) > 0.75 * most) return;
+  // A boundary that two regions share has its sites already.
+  if (more.empty() || static_cast<double>(sites.on_cuts.size() + more.size()) > 0.75 * most) return;
   all.insert(all.end(), more.begin(), more.end());
   relax_on_cut(cut, sampler, all, first, spacing, repulsion_sweeps(relaxations));
-  settle_on_cuts(all, first, {&cut, 1}, sites.cut_depth);
+  settle_on_cuts(all, first, {&cut, 1}, sites.cuts.depth);
   sites.on_cuts.insert(sites.on_cuts.end(), all.begin() + static_cast<std::ptrdiff_t>(first),
                        all.end());
   sites.cut_points.insert(sites.cut_points.end(), points.begin(), points.end());
@@ -302,12 +304,13 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     if (s > 2 * volume / area) break;
     const double samples = samples_on_faces * area / (s * s);
     require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
-    found.cuts.clear();
+    found.cuts = {.list = {}, .depth = 1e-7 * s + rounding, .spacing = s, .shift = 0};
+    found.boundaries.clear();
     for (const SpaceRegion& region : regions) {
-      // A thin box around a face of the body ends where the body does.
-      if (reaches_into(sampler, region, 0.5 * s)) found.cuts.push_back(region);
+      const PlannedCut planned = plan_cut(sampler, surface, region, s);
+      if (planned.is_cut) found.boundaries.push_back(planned.boundary);
+      if (planned.has_inside) found.cuts.list.push_back({region, planned.boundary});
     }
-    found.cut_depth = 1e-7 * s + rounding;
     found.position = corners_of(features, s, seed);
     add_crossings(found, features.creases, seed);
     add_along_edges(found.position, samples_along(features.creases, s), gap_along_edges * s, s,
@@ -317,7 +320,7 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     if (inside > 0.25 * volume / (s * s * s)) {
-      for (const SpaceRegion& cut : found.cuts) {
+      for (const SpaceRegion& cut : found.boundaries) {
         add_on_cut(sampler, cut, found, inside, seed + 3, relaxations);
       }
       return found;

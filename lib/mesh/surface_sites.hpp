@@ -21,9 +21,11 @@ struct SurfaceSites {
   std::vector<Vec3d> on_cuts;   ///< Sites on cuts, inside the surface [m].
   /// Points spread evenly over the cuts [m], shape [n]; each stands for `cut_area / n` of them.
   std::vector<Vec3d> cut_points;
-  double cut_area = 0;            ///< Area of all cuts [m²].
-  std::vector<SpaceRegion> cuts;  ///< Regions at whose boundaries the inside is cut.
-  double cut_depth = 0;           ///< Depth of the sites on cuts below the boundaries [m].
+  double cut_area = 0;  ///< Area of all cuts [m²].
+  /// Regions on whose boundaries there are sites: the walls of `cuts`, and thin ones without a
+  /// wall.
+  std::vector<SpaceRegion> boundaries;
+  SupportCuts cuts;  ///< Regions that have space inside.
   /// Cube root of the volume of an interior phyxel [m]; one on a face has about half that volume.
   double spacing = 0;
 };

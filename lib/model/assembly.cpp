@@ -19,40 +19,6 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-/// The region in which a support holds or moves phyxels.
-struct SupportRegion {
-  SpaceRegion region;
-  bool all_axes = false;  ///< True if the phyxels are supported along every axis.
-};
-
-/// The regions of the supports of a body that are given by regions of space, in place.
-std::vector<SupportRegion> support_regions(const BodyRequest& request) {
-  std::vector<SupportRegion> regions;
-  const auto add = [&](const auto& support) {
-    if (const auto region = region_of(support.select)) {
-      regions.push_back({*region, support.axes.all()});
-    }
-  };
-  for (const FixRequest& fix : request.fixed) add(fix);
-  for (const MotionRequest& motion : request.motions) add(motion);
-  return regions;
-}
-
-/// Moves the cuts of a cloud to where their supports are; cuts of other supports are left out.
-void place_cuts(Cloud& cloud, const BodyRequest& request) {
-  cloud.cut_depth *= request.scale;
-  if (cloud.cuts.empty()) return;
-  const std::vector<SpaceRegion> before = source_of(request).cuts;
-  const std::vector<SupportRegion> placed = support_regions(request);
-  std::vector<SpaceRegion> cuts;
-  for (std::size_t k = 0; k < before.size(); ++k) {
-    if (std::count(cloud.cuts.begin(), cloud.cuts.end(), before[k]) > 0) {
-      cuts.push_back(placed[k].region);
-    }
-  }
-  cloud.cuts = std::move(cuts);
-}
-
 }  // namespace
 
 Mat3d rotation_by(Vec3d radians) {
@@ -64,8 +30,10 @@ Mat3d rotation_by(Vec3d radians) {
   return identity<double>() + std::sin(angle) * k + (1 - std::cos(angle)) * (k * k);
 }
 
+Mat3d rotation_by(const BodyRequest& request) { return rotation_by(degree * request.rotation); }
+
 void place(Cloud& cloud, const BodyRequest& request) {
-  const Mat3d rotation = rotation_by(degree * request.rotation);
+  const Mat3d rotation = rotation_by(request);
   const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {
@@ -75,26 +43,6 @@ void place(Cloud& cloud, const BodyRequest& request) {
   place_cuts(cloud, request);
   for (Vec3d& p : cloud.surface.position) p = placed(p);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
-}
-
-CutSource source_of(const BodyRequest& request) {
-  CutSource made{request.source, {}};
-  if (request.source.mesh.empty()) return made;
-  const Mat3d rotation = rotation_by(degree * request.rotation);
-  for (const SupportRegion& support : support_regions(request)) {
-    made.cuts.push_back(
-        support.region.before_placement(request.scale, rotation, request.translation));
-  }
-  return made;
-}
-
-std::vector<SpaceRegion> walls_of(const BodyRequest& request, const Cloud& cloud) {
-  std::vector<SpaceRegion> walls;
-  for (const auto& [region, all_axes] : support_regions(request)) {
-    if (!all_axes || std::count(cloud.cuts.begin(), cloud.cuts.end(), region) == 0) continue;
-    walls.push_back(region.shrunk(4 * cloud.cut_depth));
-  }
-  return walls;
 }
 
 bool needs_lists_on_host(const BodyRequest& request) {
@@ -376,6 +324,24 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
   const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < selections.size(); ++entry) {
     if (counts[entry] == 0) refuse_selection(*selections[entry], request.name, box);
+  }
+}
+
+void BoundaryChoice::warn_of_few(const BodyRequest& request,
+                                 const std::vector<std::int64_t>& counts,
+                                 std::vector<std::string>& warnings) const {
+  const std::vector<const Selection*> selections = selections_of(request);
+  for (std::size_t entry = 0; entry < first_load; ++entry) {
+    if (counts[entry] > 2 || !region_of(*selections[entry])) continue;
+    const bool is_fixed = entry < request.fixed.size();
+    warnings.push_back(
+        fmt::format("body \"{}\", {} {}: only {} of its phyxels {} in the {}, and a body can turn "
+                    "about so few: a "
+                    "larger {}, or more phyxels, hold it",
+                    request.name, is_fixed ? "fixed" : "motion",
+                    entry + 1 - (is_fixed ? 0 : request.fixed.size()), counts[entry],
+                    counts[entry] == 1 ? "lies" : "lie", selections[entry]->box ? "box" : "ball",
+                    selections[entry]->box ? "box" : "ball"));
   }
 }
 

@@ -11,23 +11,10 @@
 #include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
 #include "model/loads.hpp"
+#include "model/walls.hpp"
 #include "phyxel/model.hpp"
-#include "phyxel/space_region.hpp"
 
 namespace phyxel {
-
-/// The source of a body, with the regions at whose boundaries the body's supports end, before it
-/// is scaled and moved.
-struct CutSource {
-  BodySource source;
-  std::vector<SpaceRegion> cuts;
-  bool operator==(const CutSource&) const = default;
-};
-CutSource source_of(const BodyRequest& request);
-
-/// The regions inside which the phyxels of a placed cloud are held along all axes and have no
-/// neighbours outside (`Cloud::cuts`). The phyxels on their boundaries are outside.
-std::vector<SpaceRegion> walls_of(const BodyRequest& request, const Cloud& cloud);
 
 /// True if the neighbour lists of a body cannot be left to a device.
 bool needs_lists_on_host(const BodyRequest& request);
@@ -40,6 +27,9 @@ std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 
 /// Rotation by |r| about r (Rodrigues).
 Mat3d rotation_by(Vec3d radians);
+
+/// The rotation of a body.
+Mat3d rotation_by(const BodyRequest& request);
 
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);
@@ -134,6 +124,10 @@ struct BoundaryChoice {
   /// @param counts of each entry, in the whole body. @throws InputError for one of nothing
   void refuse_empty(const BodyRequest& request, const std::vector<std::int64_t>& counts,
                     const Box& box) const;
+  /// Warns of boxes and balls that hold or move one or two phyxels.
+  /// @param counts of each entry, in the whole body
+  void warn_of_few(const BodyRequest& request, const std::vector<std::int64_t>& counts,
+                   std::vector<std::string>& warnings) const;
   /// @param loaded sums of each load, in the whole body, and the `origin` of their positions [m]
   /// @param pieces of the body that are loaded
   void add_to(Model& model, const BodyRequest& request, Index shift,

@@ -25,10 +25,15 @@ constexpr int most_iterations = 10'000;
 /// Iterations that have to take a tenth of what is left.
 constexpr int patience = 500;
 
+/// What is left of a body's sums, by their areas; nothing if all phyxels are supported.
+double left_of(const Body& body) {
+  return body.areas > 0 ? std::sqrt(body.residual_squared / body.areas) : 0;
+}
+
 /// Updates what is left of a body's sums.
 /// @returns whether they are as closed as is asked or as they get
 bool update_and_check(Body& body) {
-  body.left = std::sqrt(body.residual_squared / body.areas);
+  body.left = left_of(body);
   if (body.iterations == 0) body.left_first = body.left;
   if (!(body.left > body.tolerance) || !(body.gradient_squared > 0) ||
       body.iterations == most_iterations) {
@@ -93,7 +98,7 @@ std::vector<Unknown> close(Sums& sums, const Bodies& all) {
   sums.apply(all, x, image);
   all.for_each([&](const Body&, Index i) { image[i] += open[i]; });
   all.sum(&Body::residual_squared, [&](const Body&, Index i) { return dot(image[i], image[i]); });
-  for (Body* body : all) body->left = std::sqrt(body->residual_squared / body->areas);
+  for (Body* body : all) body->left = left_of(*body);
   stage.finish();
   return x;
 }

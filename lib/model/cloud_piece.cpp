@@ -20,7 +20,6 @@ CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
                   static_cast<Index>(whole)};
   made.cloud.lattice = cloud.lattice;
   made.cloud.cuts = cloud.cuts;
-  made.cloud.cut_depth = cloud.cut_depth;
   for (const auto& [name, members] : cloud.regions) {
     std::vector<Index>& here = made.cloud.regions[name];
     const auto begin = std::lower_bound(members.begin(), members.end(), first),
@@ -39,7 +38,7 @@ std::uint64_t cloud_digest(const Cloud& cloud) {
   add(cloud.volume);
   add(cloud.surface.position);
   add(cloud.surface.triangle);
-  add(std::array{static_cast<double>(cloud.cuts.size()), cloud.cut_depth});
+  add(std::array{static_cast<double>(cloud.cuts.list.size()), cloud.cuts.depth});
   for (const auto& [name, members] : cloud.regions) {
     add(name);
     add(members);

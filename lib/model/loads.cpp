@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/box.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/selection.hpp"
 #include "phyxel/error.hpp"
@@ -34,24 +35,38 @@ Vec3d weight_gradient(const Eigen::Matrix3d& covariance, Vec3d shift) {
   return {gradient[0], gradient[1], gradient[2]};
 }
 
-void halve_at_boundary(const SpaceRegion& region, const std::array<Vec3d, 3>& corner,
-                       double shortest, std::vector<Facet>& facets) {
+/// Adds the pieces of a triangle that lie in a region, halved until no side is longer than
+/// `longest`, and at the boundary than a sixteenth of that.
+/// @param tolerance distance beyond the boundary at which a piece still counts [m]
+void add_facets_in(const SpaceRegion& region, const std::array<Vec3d, 3>& corner, double longest,
+                   double tolerance, std::vector<Facet>& facets) {
   const Vec3d centroid = (corner[0] + corner[1] + corner[2]) / 3.0;
   const double distance = region.distance(centroid);
   double reach = 0;
-  for (const Vec3d c : corner) reach = std::max(reach, norm(c - centroid));
+  bool is_inside = true;  // regions are convex
+  for (const Vec3d c : corner) {
+    reach = std::max(reach, norm(c - centroid));
+    is_inside = is_inside && region.distance(c) <= tolerance;
+  }
+  if (distance >= reach + tolerance) return;
   std::array<double, 3> side;
   for (int k = 0; k < 3; ++k) side[k] = norm(corner[(k + 1) % 3] - corner[k]);
-  const auto longest = std::max_element(side.begin(), side.end()) - side.begin();
-  if (std::abs(distance) >= reach || side[longest] <= shortest) {
-    if (distance > 0) return;
-    facets.push_back({centroid, 0.5 * cross(corner[1] - corner[0], corner[2] - corner[0])});
+  const auto at = std::max_element(side.begin(), side.end()) - side.begin();
+  if (side[at] <= (is_inside ? longest : longest / 16)) {
+    const Vec3d area = 0.5 * cross(corner[1] - corner[0], corner[2] - corner[0]);
+    if (distance <= tolerance && norm(area) > 0) facets.push_back({centroid, area});
     return;
   }
-  const Vec3d a = corner[longest], b = corner[(longest + 1) % 3], c = corner[(longest + 2) % 3];
+  const Vec3d a = corner[at], b = corner[(at + 1) % 3], c = corner[(at + 2) % 3];
   const Vec3d middle = 0.5 * (a + b);
-  halve_at_boundary(region, {a, middle, c}, shortest, facets);
-  halve_at_boundary(region, {middle, b, c}, shortest, facets);
+  add_facets_in(region, {a, middle, c}, longest, tolerance, facets);
+  add_facets_in(region, {middle, b, c}, longest, tolerance, facets);
+}
+
+/// A vector's direction, whatever its length is.
+Vec3d direction_of(Vec3d v) {
+  const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return largest > 0 ? normalised(v / largest) : Vec3d{};
 }
 
 std::string entry_of(const char* kind, std::size_t number) {
@@ -81,7 +96,18 @@ std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
     const auto region = region_of(request.loads[l].select);
     if (!region) continue;
     const BodyPiece piece = piece_in(surface, *region);
-    if (piece.volume > 0) pieces[l] = piece;
+    // The volume of a flat box is a rounding error.
+    const double least = 1e-12 * std::pow(box_around(surface.position).extent(), 3);
+    if (piece.volume > least) {
+      pieces[l] = piece;
+    } else if (request.loads[l].force_density != Vec3d{}) {
+      throw InputError(fmt::format(
+          "{}: this {} holds no part of the inside of body \"{}\", on which "
+          "body.load.force_density "
+          "acts; allowed: one that does, or body.load.force",
+          request.loads[l].select.where.empty() ? request.where : request.loads[l].select.where,
+          region->is_ball ? "ball" : "box", request.name));
+    }
   }
   return pieces;
 }
@@ -128,22 +154,23 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
   LoadedFacets loaded;
   const std::optional<SpaceRegion> region = region_of(traction.select);
   const double least = std::cos(traction.angle * std::numbers::pi / 180);
-  const Vec3d direction = normalised(traction.normal);
+  const Vec3d direction = direction_of(traction.normal);
+  constexpr double digits = 1e-9;  // of cosines, and of places in units of the surface's size
   std::vector<Triangle> facing;
   for (const Triangle& t : triangles) {
     const Vec3d a = position[t[0] - first];
     const Vec3d area = cross(position[t[1] - first] - a, position[t[2] - first] - a);
-    const bool is_facing = direction == Vec3d{} || dot(area, direction) >= least * norm(area);
+    const bool is_facing =
+        direction == Vec3d{} || dot(area, direction) >= (least - digits) * norm(area);
     if (is_facing) facing.push_back(t);
   }
   if (region) {
-    // Finer near the boundary, so that the loaded area is right within about a hundredth of a
-    // facet's.
+    const double tolerance = digits * box_around(position).extent();
     std::vector<Facet> cut;
     for (const Triangle& t : facing) {
-      halve_at_boundary(*region,
-                        {position[t[0] - first], position[t[1] - first], position[t[2] - first]},
-                        longest / 16, cut);
+      add_facets_in(*region,
+                    {position[t[0] - first], position[t[1] - first], position[t[2] - first]},
+                    longest, tolerance, cut);
     }
     loaded.facets = std::move(cut);
   } else {

@@ -66,7 +66,7 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
         request.where, request.name,
         request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
   }
-  if (!walls_of(request, cloud).empty()) {
+  if (!walls_of(request, cloud).regions.empty()) {
     throw InputError(fmt::format(
         "{}: a support of body \"{}\" ends inside the body, and its phyxels are parted from others "
         "in lists of neighbours on the host: allowed is a model built without a surveyor",
@@ -213,6 +213,7 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
       choose_boundary(request, given, {}, static_cast<Index>(given.position.size()));
   if (sorted) choice.renumber(sorted->place);
   choice.refuse_empty(request, choice.counts(), box_around(given.position));
+  choice.warn_of_few(request, choice.counts(), model.warnings);
   const Vec3d origin = model.position[shift];
   choice.add_to(model, request, shift, choice.load_sums(model, shift, origin), origin,
                 loaded_pieces(request, given.surface));
@@ -391,7 +392,7 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
   Cloud rest;
   for (const BodyRequest& request : scene.bodies) {
     CutSource source = source_of(request);
-    if (!made || !(*made == source)) {
+    if (!made || !is_same(*made, source)) {
       rest = naming(request, [&] {
         return request.source.cloud.empty() ? rest_cloud(source) : named_cloud(request, named);
       });

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "phyxel/neighbourhood.hpp"
-#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
@@ -24,11 +23,6 @@ std::vector<double> support_radii(std::span<const double> spacing, const Neighbo
 /// `find_neighbours` once supports are known.
 Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<double> support,
                                 const NeighbourhoodRule& rule);
-
-/// Removes the pairs of phyxels of which one lies in a region and the other does not lie in the
-/// same one.
-void separate(Neighbourhood& hood, std::span<const Vec3d> position,
-              std::span<const SpaceRegion> walls);
 
 /// `phyxels_near` without the nearest where none reaches: such rows are empty.
 ///   None is larger than the largest support

@@ -14,7 +14,6 @@
 #include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "stage.hpp"
-#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -211,29 +210,6 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
   if (!result.symmetric) result.inverse_lists = transpose(result.neighbours, n);
   stage.finish();
   return result;
-}
-
-void separate(Neighbourhood& hood, std::span<const Vec3d> position,
-              std::span<const SpaceRegion> walls) {
-  if (walls.empty()) return;
-  const std::vector<std::size_t> room = tabulated(position.size(), [&](std::size_t i) {
-    const auto wall = std::find_if(walls.begin(), walls.end(), [&](const SpaceRegion& region) {
-      return region.contains(position[i]);
-    });
-    return static_cast<std::size_t>(wall - walls.begin());
-  });
-  Csr& lists = hood.neighbours;
-  Offset kept = 0, from = 0;
-  for (Index i = 0; i < lists.rows(); ++i) {
-    const Offset end = lists.offsets[i + 1];
-    for (; from < end; ++from) {
-      const Index j = lists.indices[from];
-      if (room[i] == room[j]) lists.indices[kept++] = j;
-    }
-    lists.offsets[i + 1] = kept;
-  }
-  lists.indices.resize(static_cast<std::size_t>(kept));
-  if (!hood.symmetric) hood.inverse_lists = transpose(lists, lists.rows());
 }
 
 Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,

@@ -72,18 +72,19 @@ Integrals in_box(const Surface& surface, Vec3d origin, Vec3d low, Vec3d high) {
 
 /// Adds the integrals over a triangle of p g(r), the position from the ball's centre times a
 /// function with the divergence 1 inside the ball and 0 outside; for moments, times a coordinate.
-void add_ball_triangle(Integrals& sums, Vec3d a, Vec3d b, Vec3d c, double radius) {
+/// @param finest sides of triangles on the sphere [m]
+void add_ball_triangle(Integrals& sums, Vec3d a, Vec3d b, Vec3d c, double radius, double finest) {
   const double longest = std::max({norm(b - a), norm(c - b), norm(a - c)});
   const double nearest = norm((a + b + c) / 3.0) - 0.6 * longest,
                farthest = std::max({norm(a), norm(b), norm(c)});
   const bool inside = farthest <= radius;
   // The function has a kink on the sphere, and is the smoother the farther it is outside.
-  if (!inside && longest > (nearest > radius ? 0.25 * nearest : radius / 40)) {
+  if (!inside && longest > (nearest > radius ? 0.25 * nearest : finest)) {
     const Vec3d ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
-    add_ball_triangle(sums, a, ab, ca, radius);
-    add_ball_triangle(sums, ab, b, bc, radius);
-    add_ball_triangle(sums, ca, bc, c, radius);
-    add_ball_triangle(sums, ab, bc, ca, radius);
+    add_ball_triangle(sums, a, ab, ca, radius, finest);
+    add_ball_triangle(sums, ab, b, bc, radius, finest);
+    add_ball_triangle(sums, ca, bc, c, radius, finest);
+    add_ball_triangle(sums, ab, bc, ca, radius, finest);
     return;
   }
   const Vec3d area = 0.5 * cross(b - a, c - a);
@@ -102,9 +103,10 @@ BodyPiece piece_in(const Surface& surface, const SpaceRegion& region) {
   const Vec3d origin = region.is_ball ? region.centre : 0.5 * (low + high);
   Integrals sums;
   if (region.is_ball) {
+    const double finest = std::min(region.radius, norm(high - low)) / 40;
     for (const Triangle& t : surface.triangle) {
       add_ball_triangle(sums, surface.position[t[0]] - origin, surface.position[t[1]] - origin,
-                        surface.position[t[2]] - origin, region.radius);
+                        surface.position[t[2]] - origin, region.radius, finest);
     }
   } else {
     sums = in_box(surface, origin, region.low - origin, region.high - origin);

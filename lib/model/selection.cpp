@@ -61,7 +61,12 @@ std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
   if (selection.region) return of_region(selection, cloud, name);
   if (selection.indices) return of_indices(selection, body, name);
   if (const std::optional<SpaceRegion> region = region_of(selection)) {
-    return indices_where(cloud, [&](Vec3d p) { return region->contains(p); });
+    // Coordinates of faces that a scene means may differ in their last digits.
+    constexpr double digits = 1e-12;
+    const double size = region->is_ball ? region->radius : norm(region->high - region->low);
+    return indices_where(cloud, [&](Vec3d p) {
+      return region->distance(p) <= digits * (norm(p) + std::min(size, norm(p)));
+    });
   }
   return indices_where(cloud, [](Vec3d) { return true; });
 }

@@ -68,13 +68,30 @@ SpaceRegion SpaceRegion::before_placement(double scale, const Mat3d& rotation,
                                           Vec3d translation) const {
   const Mat3d back = transpose(rotation);
   SpaceRegion before = *this;
+  if (is_ball) {
+    before.centre = (back * (centre - translation)) / scale;
+    before.radius = radius / scale;
+    return before;
+  }
   for (Vec3d& e : before.edge) e = back * e;
   const Vec3d shift = along_edges(*this, translation);
   before.low = (low - shift) / scale;
   before.high = (high - shift) / scale;
-  before.centre = (back * (centre - translation)) / scale;
-  before.radius = radius / scale;
   return before;
+}
+
+SpaceRegion SpaceRegion::placed(double scale, const Mat3d& rotation, Vec3d translation) const {
+  SpaceRegion after = *this;
+  if (is_ball) {
+    after.centre = rotation * (scale * centre) + translation;
+    after.radius = scale * radius;
+    return after;
+  }
+  for (Vec3d& e : after.edge) e = rotation * e;
+  const Vec3d shift = along_edges(after, translation);
+  after.low = scale * low + shift;
+  after.high = scale * high + shift;
+  return after;
 }
 
 SpaceRegion SpaceRegion::scaled(double factor) const {

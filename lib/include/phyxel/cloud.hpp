@@ -21,6 +21,23 @@ struct Surface {
   std::vector<Triangle> triangle;  ///< Vertex indices, counter-clockwise seen from outside.
 };
 
+/// A region of space in which a body is held or moved, and on whose boundary phyxels lie.
+struct SupportCut {
+  SpaceRegion support;  ///< The region as the scene has it.
+  SpaceRegion wall;     ///< The region whose boundary has phyxels: `support`, but beyond the body.
+  bool operator==(const SupportCut&) const = default;
+};
+
+/// The cuts of a body made from a mesh. Inside a region in which all phyxels are held, none is a
+/// neighbour of one on the boundary or outside: the clamp then acts at the boundary, instead of
+/// being smeared over a support of its phyxels.
+struct SupportCuts {
+  std::vector<SupportCut> list;
+  double depth = 0;  ///< Depth of phyxels on boundaries below them, at most; a rounding error [m].
+  double spacing = 0;  ///< Distance within which each place of a boundary has a phyxel [m].
+  double shift = 0;    ///< Size of the numbers that coordinates of regions are differences of [m].
+};
+
 /// Rest points of one body, in the caller's order.
 struct Cloud {
   std::vector<Vec3d> position;  ///< Phyxel positions [m], shape [n_phyxels, 3].
@@ -30,12 +47,7 @@ struct Cloud {
   std::map<std::string, std::vector<Index>> regions;
   /// True for a regular lattice, whose gradients are not closed unless a scene asks for it.
   bool lattice = false;
-  /// Regions of supports on whose boundaries phyxels lie. Inside a region in which all phyxels are
-  /// held, none is a neighbour of one on the boundary or outside: the clamp then acts at the
-  /// boundary, instead of being smeared over a support of its phyxels.
-  std::vector<SpaceRegion> cuts;
-  /// Greatest depth of the phyxels on boundaries below them, a rounding error [m].
-  double cut_depth = 0;
+  SupportCuts cuts;                   ///< Where supports end inside the body.
   std::vector<std::string> warnings;  ///< Warnings of the generator or sampler, for the summary.
 };
 

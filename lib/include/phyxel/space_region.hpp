@@ -27,6 +27,8 @@ struct SpaceRegion {
   Vec3d nearest_on_boundary(Vec3d point, double inset = 0) const;
   /// The region of the points p whose images scale * rotation * p + translation lie in this one.
   SpaceRegion before_placement(double scale, const Mat3d& rotation, Vec3d translation) const;
+  /// The region of the images scale * rotation * p + translation of the points p of this one.
+  SpaceRegion placed(double scale, const Mat3d& rotation, Vec3d translation) const;
   /// The region multiplied by a positive factor about the origin.
   SpaceRegion scaled(double factor) const;
 

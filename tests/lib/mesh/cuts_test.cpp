@@ -24,7 +24,6 @@ namespace phyxel {
 namespace {
 
 using namespace phyxel::testing;
-using ::testing::ElementsAre;
 
 const SpaceRegion slab{.low = {-1, -1, -1}, .high = {0.43, 2, 2}};
 const SpaceRegion ball{.centre = {0.1, 0.5, 0.45}, .radius = 0.37, .is_ball = true};
@@ -74,8 +73,9 @@ TEST(Cuts, HavePhyxelsAllOver) {
     ASSERT_EQ(cloud.position.size(), 5000u);
     ASSERT_TRUE(report.warnings.empty());
     const double spacing = std::cbrt(1.0 / 5000);
-    EXPECT_THAT(cloud.cuts, ElementsAre(region));
-    EXPECT_LT(cloud.cut_depth, 1e-6 * spacing);
+    ASSERT_EQ(cloud.cuts.list.size(), 1u);
+    EXPECT_EQ(cloud.cuts.list[0].support, region);
+    EXPECT_LT(cloud.cuts.depth, 1e-6 * spacing);
     std::vector<Vec3d> on_cut;
     for (const Vec3d p : cloud.position) {
       if (std::abs(region.distance(p)) > 1e-6 * spacing) continue;
@@ -109,7 +109,7 @@ TEST(Cuts, ThatEndWhereTheBodyDoesAreNone) {
   cut.cuts = {{.low = {-1, -1, -1}, .high = {0.001, 2, 2}}, {.low = {2, 2, 2}, .high = {3, 3, 3}}};
   const Cloud made = sample_surface(test::unit_cube(), cut);
   EXPECT_EQ(made.position, sample_surface(test::unit_cube(), plain).position);
-  EXPECT_TRUE(made.cuts.empty());
+  EXPECT_TRUE(made.cuts.list.empty());
 }
 
 /// A bar of length 1, held up to some place, under its own weight along its axis. Its end goes
@@ -153,6 +153,122 @@ TEST(Cuts, HoldBodiesWhereSupportsEnd) {
     EXPECT_LT(std::abs(error), 0.1);
   }
   EXPECT_LT(std::abs(clamp_error(0.33, 1500, true)), 0.1);
+}
+
+/// A unit cube of about 10 phyxels along an edge, held in boxes.
+struct HeldCube {
+  Scene scene = one_body();
+  Cloud cloud;
+  Model model;
+
+  explicit HeldCube(const std::vector<Selection::Box>& boxes, const std::vector<Axes>& axes = {}) {
+    BodyRequest& body = scene.bodies[0];
+    body.source.mesh = "cube.obj";
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      Selection select;
+      select.box = boxes[k];
+      body.fixed.push_back({.select = select, .axes = axes.empty() ? Axes{} : axes[k]});
+    }
+    cloud = sample_surface(test::unit_cube(), {.phyxels = 1000, .cuts = source_of(body).cuts});
+    place(cloud, body);
+    body.source = {};
+    model = build_model(scene, std::span(&cloud, 1));
+  }
+  /// Pairs across the plane x = `wall`, but for those of phyxels on it.
+  int pairs_across(double wall) const {
+    int count = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      if (model.position[i].x >= wall - 1e-6) continue;
+      for (const Index j : model.neighbourhood.neighbours.row(i)) {
+        count += model.position[j].x > wall - 1e-6;
+      }
+    }
+    return count;
+  }
+};
+
+HeldCube held_in(Vec3d low, Vec3d high) {
+  return HeldCube(std::vector<Selection::Box>{{low, high}});
+}
+
+TEST(Cuts, PartPhyxelsThatAreHeldAlongAllAxes) {
+  const Selection::Box half{{-1, -1, -1}, {0.5, 2, 2}};
+  EXPECT_EQ(HeldCube({half}).pairs_across(0.5), 0);
+  EXPECT_EQ(HeldCube({half, half}, {{true, false, false}, {false, true, true}}).pairs_across(0.5),
+            0);
+  EXPECT_GT(HeldCube({half}, {{true, true, false}}).pairs_across(0.5), 100);
+}
+
+/// The layer in front of a box that begins 0.02 below a face has no room for phyxels on the box's
+/// boundary: it stays with those inside, whether the box ends with the body's sides, leaves a thin
+/// layer there, too, or is well inside.
+TEST(Cuts, LeaveNoThinLayerLoose) {
+  for (const Selection::Box& box :
+       {Selection::Box{{0.02, 0, 0}, {1, 1, 1}}, Selection::Box{{0.02, -1, -1}, {2, 2, 2}},
+        Selection::Box{{0.02, 1e-9, 0.03}, {1, 1 - 1e-9, 0.97}},
+        Selection::Box{{0.02, 0.3, 0.3}, {0.7, 0.8, 0.8}}}) {
+    const HeldCube cube = held_in(box.low, box.high);
+    EXPECT_TRUE(cube.model.degenerate.none()) << cube.model.degenerate.describe();
+    for (Index i = 0; i < cube.model.size(); ++i) {
+      const Vec3d x = cube.model.position[i];
+      if (x.x > 0 || std::max({std::abs(x.y - 0.55), std::abs(x.z - 0.55)}) > 0.2) continue;
+      const auto row = cube.model.neighbourhood.neighbours.row(i);
+      EXPECT_TRUE(std::any_of(row.begin(), row.end(), [&](Index j) {
+        return cube.scene.bodies[0].fixed[0].select.box->low.x <= cube.model.position[j].x;
+      }));
+    }
+  }
+}
+
+/// A box whose faces are the body's holds what a larger one does, with the same phyxels.
+TEST(Cuts, EndWithTheBodyWhereFacesAreTheSame) {
+  const HeldCube exact = held_in({0, 0, 0}, {0.5, 1, 1}),
+                 larger = held_in({-1, -1, -1}, {0.5, 2, 2});
+  EXPECT_EQ(exact.model.position, larger.model.position);
+  EXPECT_EQ(exact.model.volume, larger.model.volume);
+  EXPECT_EQ(exact.model.motions[0].phyxels, larger.model.motions[0].phyxels);
+  EXPECT_EQ(exact.model.neighbourhood.neighbours.indices,
+            larger.model.neighbourhood.neighbours.indices);
+}
+
+/// A box thinner than a spacing holds one layer, in its middle.
+TEST(Cuts, OfThinBoxesAreOneLayer) {
+  const HeldCube cube = held_in({0.47, -1, -1}, {0.49, 2, 2});
+  const std::vector<Index>& held = cube.model.motions[0].phyxels;
+  const auto in_the_middle = std::count_if(held.begin(), held.end(), [&](Index i) {
+    return std::abs(cube.model.position[i].x - 0.48) < 1e-6;
+  });
+  EXPECT_GT(in_the_middle, 60);  // 9 x 9 fill it; a few beside them lie in the box by chance
+  EXPECT_LT(held.size(), 100u);
+}
+
+TEST(Cuts, OfCopiesAreTheSame) {
+  BodyRequest body;
+  body.source.mesh = "cube.obj";
+  Selection select;
+  select.box = Selection::Box{{0.1, -1, -1}, {0.3, 2, 2}};
+  body.fixed = {{.select = select}};
+  const CutSource first = source_of(body);
+  int rounded = 0;
+  for (int k = 1; k < 20; ++k) {
+    const Vec3d by{0.7 * k, 0.1 * k, 0};
+    BodyRequest copy = body;
+    copy.translation += by;
+    copy.fixed[0].select.box = {select.box->low + by, select.box->high + by};
+    const CutSource other = source_of(copy);
+    rounded += !(other.cuts == first.cuts);
+    EXPECT_TRUE(is_same(first, other));
+    copy.fixed[0].select.box->high.x += 1e-9;
+    EXPECT_FALSE(is_same(first, source_of(copy)));
+  }
+  EXPECT_GT(rounded, 5);
+}
+
+/// Nothing is left to close in a body of which all is held.
+TEST(Cuts, OfAWhollyHeldBodyAreNone) {
+  const HeldCube cube = held_in({-1, -1, -1}, {2, 2, 2});
+  EXPECT_TRUE(cube.model.warnings.empty()) << cube.model.warnings[0];
+  EXPECT_EQ(cube.model.motions[0].phyxels.size(), 1000u);
 }
 
 }  // namespace

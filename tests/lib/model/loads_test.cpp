@@ -21,6 +21,7 @@ namespace phyxel {
 namespace {
 
 using namespace phyxel::testing;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr double pi = std::numbers::pi;
@@ -132,6 +133,19 @@ TEST(Loads, InOneLayerStayInIt) {
   expect_near(sums_of(model, model.loads[0]).torque, {0, 0.165, -0.3}, 1e-12);
 }
 
+TEST(Supports, OfTwoPhyxelsAreWarnedOf) {
+  const Cloud cloud = lattice(4, 4, 4, 0.1);
+  Scene scene = one_body();
+  scene.bodies[0].fixed = {{.select = in_box({0, 0, 0}, {0.1, 0.1, 0.2})},
+                           {.select = in_box({0.3, 0, 0}, {0.4, 0.1, 0.4})}};
+  scene.bodies[0].motions = {{.select = in_ball({0.35, 0.35, 0.35}, 0.05), .velocity = {1, 0, 0}}};
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  EXPECT_THAT(
+      model.warnings,
+      ElementsAre(HasSubstr("body \"body\", fixed 1: only 2 of its phyxels lie in the box"),
+                  HasSubstr("body \"body\", motion 1: only 1 of its phyxels lies in the ball")));
+}
+
 /// Total and torque of tractions: of a pressure on a face and on all of a body, of a traction in a
 /// box that cuts triangles, and of one by the direction of normals.
 TEST(Tractions, KeepTotalsAndTorques) {
@@ -160,6 +174,41 @@ TEST(Tractions, KeepTotalsAndTorques) {
   expect(2, (top + sides) * Vec3d{0, 7, -20}, {0.515, 0.2, height}, 0.01);
   expect(3, 0.4 * Vec3d{1, 2, 3}, {0.5, 0.2, 0.2}, 1e-9);
   EXPECT_EQ(model.loads[3].set, "traction 4");
+}
+
+/// A traction in a box that holds a face with a margin is spread over it as one on all of the face:
+/// triangles within the box are as fine as elsewhere.
+TEST(Tractions, AreSpreadOverTheirTriangles) {
+  const Cloud cloud = sample_surface(test::box({0, 0, 0}, {1, 0.4, 0.2}), {.phyxels = 900});
+  Scene scene = one_body();
+  scene.bodies[0].tractions = {
+      {.select = everywhere(), .traction = {1, 0, 0}, .normal = {1, 0, 0}},
+      {.select = in_box({0.5, -9, -9}, {9, 9, 9}), .traction = {1, 0, 0}, .normal = {1e-300, 0, 0}},
+      {.select = in_ball({1, 0.2, 0.1}, 3),
+       .traction = {1, 0, 0},
+       .normal = {0, 0, 1},
+       .angle = 90},
+      {.select = in_box({1, 0, 0}, {1, 0.4, 0.2}), .traction = {1, 0, 0}}};
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  for (const std::size_t k : {1u, 3u}) {
+    EXPECT_EQ(model.loads[k].phyxels, model.loads[0].phyxels);
+    EXPECT_EQ(model.loads[k].force, model.loads[0].force);
+  }
+  // All faces but the lower one, whose normal is opposite.
+  expect_near(model.loads[2].total, {2 * 0.08 + 2 * 0.2 + 0.4, 0, 0}, 1e-9);
+}
+
+/// In a flat box there is no volume for a force by volume; a force acts on the phyxels there.
+TEST(Loads, InFlatBoxes) {
+  const Cloud cloud = sample_surface(test::unit_cube(), {.phyxels = 1000});
+  Scene scene = one_body();
+  scene.bodies[0].loads = {{.select = in_box({1, 0, 0}, {1, 1, 1}), .force = {1, 0, 0}}};
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  EXPECT_GT(model.loads[0].phyxels.size(), 60u);
+  EXPECT_NEAR(model.loads[0].centroid.x, 1, 1e-12);
+  scene.bodies[0].loads[0] = {.select = in_box({1, 0, 0}, {1, 1, 1}), .force_density = {1, 0, 0}};
+  EXPECT_THAT(refusal_of([&] { build_model(scene, std::span(&cloud, 1)); }),
+              HasSubstr("this box holds no part of the inside of body \"body\""));
 }
 
 TEST(Tractions, NeedASurface) {

@@ -1,0 +1,164 @@
+#include "model/walls.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "model/assembly.hpp"
+#include "model/selection.hpp"
+#include "model/spatial_hash.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Calls visit(region, axes) for each support of a body that is given by a region of space.
+template <class Visit>
+void for_each_support(const BodyRequest& request, Visit&& visit) {
+  const auto one = [&](const auto& support) {
+    if (const auto region = region_of(support.select)) visit(*region, support.axes);
+  };
+  for (const FixRequest& fix : request.fixed) one(fix);
+  for (const MotionRequest& motion : request.motions) one(motion);
+}
+
+/// True if numbers differ by no more than the rounding of differences of numbers of size `shift`.
+bool nearly_equal(Vec3d a, Vec3d b, double shift) {
+  const auto near = [&](double x, double y) {
+    constexpr double few = 64 * std::numeric_limits<double>::epsilon();
+    return std::abs(x - y) <= few * (std::max(std::abs(x), std::abs(y)) + shift);
+  };
+  return near(a.x, b.x) && near(a.y, b.y) && near(a.z, b.z);
+}
+
+bool nearly_equal(const SpaceRegion& a, const SpaceRegion& b, double shift) {
+  for (int k = 0; k < 3; ++k) {
+    if (!nearly_equal(a.edge[k], b.edge[k], 0.0)) return false;
+  }
+  return a.is_ball == b.is_ball && nearly_equal(a.low, b.low, shift) &&
+         nearly_equal(a.high, b.high, shift) && nearly_equal(a.centre, b.centre, shift) &&
+         nearly_equal(Vec3d{a.radius, 0, 0}, Vec3d{b.radius, 0, 0}, shift);
+}
+
+/// The number of a room that is open to all others.
+constexpr std::size_t open_room = std::numeric_limits<std::size_t>::max();
+
+/// The room of each phyxel.
+std::vector<std::size_t> rooms_of(std::span<const Vec3d> position, const Walls& walls) {
+  std::vector<std::size_t> room =
+      tabulated(position.size(), [&](std::size_t i) { return walls.room_of(position[i]); });
+  const std::size_t outside = walls.regions.size();
+  std::vector<Vec3d> on_wall;
+  std::vector<std::pair<std::size_t, std::size_t>> beside;  // phyxels, and the walls beside them
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    if (room[i] != outside) continue;
+    bool lies_on = false;
+    std::size_t nearest = outside;
+    for (std::size_t k = 0; k < outside; ++k) {
+      const double distance = walls.regions[k].distance(position[i]);
+      lies_on = lies_on || distance <= walls.depth;
+      if (distance < walls.spacing) nearest = k;
+    }
+    if (lies_on) {
+      on_wall.push_back(position[i]);
+    } else if (nearest != outside) {
+      beside.emplace_back(i, nearest);
+    }
+  }
+  const SpatialHash hash(on_wall, walls.spacing);
+  for (const auto& [i, wall] : beside) {
+    const Vec3d foot = walls.regions[wall].nearest_on_boundary(position[i]);
+    const double reach = walls.spacing;
+    if (on_wall.empty() || hash.nearest(foot, reach).distance2 > reach * reach) room[i] = open_room;
+  }
+  return room;
+}
+
+}  // namespace
+
+std::size_t Walls::room_of(Vec3d point) const {
+  const auto inside = [&](const SpaceRegion& region) {
+    return region.shrunk(4 * depth).contains(point);
+  };
+  return static_cast<std::size_t>(std::find_if(regions.begin(), regions.end(), inside) -
+                                  regions.begin());
+}
+
+Walls walls_of(const BodyRequest& request, const Cloud& cloud) {
+  Walls walls{.regions = {}, .depth = cloud.cuts.depth, .spacing = cloud.cuts.spacing};
+  for (const SupportCut& cut : cloud.cuts.list) {
+    int axes = 0;
+    for_each_support(request, [&](const SpaceRegion& region, Axes held) {
+      if (region == cut.support) axes |= held.bits();
+    });
+    if (axes == Axes{}.bits()) walls.regions.push_back(cut.wall);
+  }
+  return walls;
+}
+
+void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls) {
+  if (walls.regions.empty()) return;
+  const std::vector<std::size_t> room = rooms_of(position, walls);
+  Csr& lists = hood.neighbours;
+  Offset kept = 0, from = 0;
+  for (Index i = 0; i < lists.rows(); ++i) {
+    const Offset end = lists.offsets[i + 1];
+    for (; from < end; ++from) {
+      const Index j = lists.indices[from];
+      if (room[i] == room[j] || room[i] == open_room || room[j] == open_room) {
+        lists.indices[kept++] = j;
+      }
+    }
+    lists.offsets[i + 1] = kept;
+  }
+  lists.indices.resize(static_cast<std::size_t>(kept));
+  if (!hood.symmetric) hood.inverse_lists = transpose(lists, lists.rows());
+}
+
+std::vector<SpaceRegion> support_regions(const BodyRequest& request) {
+  std::vector<SpaceRegion> regions;
+  for_each_support(request, [&](const SpaceRegion& region, Axes) {
+    if (std::count(regions.begin(), regions.end(), region) == 0) regions.push_back(region);
+  });
+  return regions;
+}
+
+CutSource source_of(const BodyRequest& request) {
+  CutSource made{request.source, {}, 0};
+  if (request.source.mesh.empty()) return made;
+  const Mat3d rotation = rotation_by(request);
+  for (const SpaceRegion& region : support_regions(request)) {
+    made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
+  }
+  made.shift = norm(request.translation) / request.scale;
+  return made;
+}
+
+bool is_same(const CutSource& a, const CutSource& b) {
+  return a.source == b.source &&
+         std::equal(a.cuts.begin(), a.cuts.end(), b.cuts.begin(), b.cuts.end(),
+                    [&](const SpaceRegion& one, const SpaceRegion& other) {
+                      return nearly_equal(one, other, a.shift + b.shift);
+                    });
+}
+
+void place_cuts(Cloud& cloud, const BodyRequest& request) {
+  cloud.cuts.depth *= request.scale;
+  cloud.cuts.spacing *= request.scale;
+  if (cloud.cuts.list.empty()) return;
+  const CutSource source = source_of(request);
+  const std::vector<SpaceRegion> placed = support_regions(request);
+  const Mat3d rotation = rotation_by(request);
+  std::vector<SupportCut> cuts;
+  for (std::size_t k = 0; k < source.cuts.size(); ++k) {
+    const auto cut =
+        std::find_if(cloud.cuts.list.begin(), cloud.cuts.list.end(), [&](const SupportCut& c) {
+          return nearly_equal(c.support, source.cuts[k], 2 * source.shift + cloud.cuts.shift);
+        });
+    if (cut == cloud.cuts.list.end()) continue;
+    cuts.push_back({placed[k], cut->wall.placed(request.scale, rotation, request.translation)});
+  }
+  cloud.cuts.list = std::move(cuts);
+}
+
+}  // namespace phyxel

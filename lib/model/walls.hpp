@@ -1,0 +1,53 @@
+/// Walls: the boundaries at which supports part the phyxels of a body.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "phyxel/cloud.hpp"
+#include "phyxel/neighbourhood.hpp"
+#include "phyxel/scene.hpp"
+
+namespace phyxel {
+
+/// Regions inside which all phyxels are held or moved along all axes.
+struct Walls {
+  std::vector<SpaceRegion> regions;
+  double depth = 0;    ///< `SupportCuts::depth` [m].
+  double spacing = 0;  ///< `SupportCuts::spacing` [m].
+
+  /// The index of the region that a point is in; their number if it is in none. Phyxels on the
+  /// boundary of a region are in none.
+  std::size_t room_of(Vec3d point) const;
+};
+
+/// The walls of a body, of whose cuts those count whose supports hold all axes, by one or several
+/// entries.
+Walls walls_of(const BodyRequest& request, const Cloud& cloud);
+
+/// Removes the pairs of phyxels that are not in the same room of a body. A phyxel beside a wall
+/// keeps them if no phyxel lies on the wall near it: as in a layer outside the wall that is too
+/// thin for others.
+void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls);
+
+/// The regions of space in which a body is held or moved, in place and without repetitions.
+std::vector<SpaceRegion> support_regions(const BodyRequest& request);
+
+/// The source of a body, with the regions at whose boundaries the body's supports end, before it
+/// is scaled and moved.
+struct CutSource {
+  BodySource source;
+  std::vector<SpaceRegion> cuts;
+  double shift = 0;  ///< Size of the numbers that the cuts' coordinates are differences of [m].
+};
+CutSource source_of(const BodyRequest& request);
+
+/// True if two sources are the same but for the rounding of their cuts, as those of copies of a
+/// body are.
+bool is_same(const CutSource& a, const CutSource& b);
+
+/// Moves the cuts of a cloud to where the supports of a body are; cuts of other supports are left
+/// out.
+void place_cuts(Cloud& cloud, const BodyRequest& request);
+
+}  // namespace phyxel
