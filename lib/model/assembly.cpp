@@ -30,10 +30,10 @@ Mat3d rotation_by(Vec3d radians) {
   return identity<double>() + std::sin(angle) * k + (1 - std::cos(angle)) * (k * k);
 }
 
-Mat3d rotation_by(const BodyRequest& request) { return rotation_by(degree * request.rotation); }
+Mat3d rotation_of(const BodyRequest& request) { return rotation_by(degree * request.rotation); }
 
 void place(Cloud& cloud, const BodyRequest& request) {
-  const Mat3d rotation = rotation_by(request);
+  const Mat3d rotation = rotation_of(request);
   const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {

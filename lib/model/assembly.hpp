@@ -29,7 +29,7 @@ std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
 Mat3d rotation_by(Vec3d radians);
 
 /// The rotation of a body.
-Mat3d rotation_by(const BodyRequest& request);
+Mat3d rotation_of(const BodyRequest& request);
 
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);

@@ -126,7 +126,7 @@ std::vector<SpaceRegion> support_regions(const BodyRequest& request) {
 CutSource source_of(const BodyRequest& request) {
   CutSource made{request.source, {}, 0};
   if (request.source.mesh.empty()) return made;
-  const Mat3d rotation = rotation_by(request);
+  const Mat3d rotation = rotation_of(request);
   for (const SpaceRegion& region : support_regions(request)) {
     made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
   }
@@ -148,7 +148,7 @@ void place_cuts(Cloud& cloud, const BodyRequest& request) {
   if (cloud.cuts.list.empty()) return;
   const CutSource source = source_of(request);
   const std::vector<SpaceRegion> placed = support_regions(request);
-  const Mat3d rotation = rotation_by(request);
+  const Mat3d rotation = rotation_of(request);
   std::vector<SupportCut> cuts;
   for (std::size_t k = 0; k < source.cuts.size(); ++k) {
     const auto cut =

