@@ -142,7 +142,8 @@ std::vector<SceneSection> make_sections() {
       {"body.load", "[[body.load]]", "selection",
        "A force on phyxels: exactly one of `force` and `force_density`. In a box or a ball it acts on "
        "the space there: its centroid, and with `force_density` its total, are those of the part of the "
-       "body's inside that lies in the region, if the body has a closed surface and one material."},
+       "body's inside that lies in the region, if the body has a closed surface and one material, and as far as the "
+       "phyxels there are not in one plane; the plan of a run says where each load acts."},
       {"body.traction", "[[body.traction]]", "selection",
        "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
        "body's surface lie in a `box` or a `ball`, or on `all` of it. The force keeps its size and "
@@ -151,9 +152,11 @@ std::vector<SceneSection> make_sections() {
       {"selection", "Selections", "",
        "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]` and `[[body.traction]]` has "
        "exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
-       "A box or ball that holds or moves a part of a body made from a `mesh` acts exactly there: "
-       "phyxels lie on its boundary, and if all axes are held, strains end at it. In other bodies, phyxels whose "
-       "centres lie in it are held, and the support ends with them."},
+       "A box or ball that holds or moves a part of a body made from a `mesh` acts where it ends: phyxels "
+       "lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
+       "has one layer of phyxels, in its middle; a ball that small has none of its own. In other bodies, "
+       "and where a layer of the body beside the boundary is too thin for phyxels on both, the support ends with "
+       "the phyxels whose centres lie in it."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
 }

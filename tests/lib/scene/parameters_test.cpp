@@ -103,6 +103,15 @@ ramp = 1 # body.load.ramp => ramp = 2
 [[body.load]]
 ball = {centre = [0, 0, 0], radius = 1} # selection.ball.radius => ball = {centre = [0, 0, 0], radius = 2}
 force_density = [1, 0, 0] # body.load.force_density => force_density = [2, 0, 0]
+[[body.traction]]
+all = true
+traction = [1, 0, 0] # body.traction.traction => traction = [2, 0, 0]
+normal = [1, 0, 0] # body.traction.normal => normal = [0, 1, 0]
+angle = 30 # body.traction.angle => angle = 40
+[[body.traction]]
+all = true
+pressure = 1 # body.traction.pressure => pressure = 2
+ramp = 1 # body.traction.ramp => ramp = 2
 [[body]]
 name = 'second'
 mesh = 'a.obj' # body.mesh => mesh = 'b.obj'

@@ -165,8 +165,7 @@ class Physics {
       const double slope = (energy_at(step) - energy_at(-step)) / (2 * step);
       return std::abs(expected + slope) / (1e-9 * scale + jump * 1e5 * 0.08 * step);
     };
-    EXPECT_LE(has_law_with_history() ? std::min(misses_by(1e-7), misses_by(1e-8))
-                                     : misses_by(1e-7),
+    EXPECT_LE(has_law_with_history() ? std::min(misses_by(1e-7), misses_by(1e-8)) : misses_by(1e-7),
               1);
   }
 
