@@ -120,6 +120,27 @@ struct Late {
   std::vector<std::string> names;
 };
 
+/// Tractions, and loads that act nowhere.
+std::vector<Late> refused_loads() {
+  const std::string step = "[time]\nend = 1.0\nstep = 1e-4\n";
+  return {
+      {with_bar("[[body.traction]]\nregion = 'x+'\npressure = 1\n"), {":13:", "box, ball, all"}},
+      {with_bar("[[body.traction]]\nall = true\n"), {":13:", "traction, pressure"}},
+      {with_bar("[[body.traction]]\nall = true\npressure = 1\ntraction = [1, 0, 0]\n"),
+       {"found together with", "exactly one of: traction, pressure"}},
+      {with_bar("[[body.traction]]\nall = true\npressure = nan\n"), {":15:", "pressure"}},
+      {with_bar("[[body.traction]]\nall = true\npressure = 1\nangle = 3\n"),
+       {":16:", "angle", "found without normal"}},
+      {with_bar("[[body.traction]]\nall = true\npressure = 1\nnormal = [0, 0, 0]\n"),
+       {":16:", "allowed: a direction"}},
+      {with_bar("[[body.traction]]\nbox = [[7, 7, 7], [8, 8, 8]]\npressure = 1\n"),
+       {":14:", "acts on no part of the surface of body \"beam\""}},
+      {with_bar("[[body.load]]\nbox = [[0.4, -9, -9], [0.4, 9, 9]]\nforce_density = [1, 0, 0]\n"),
+       {":14:", "holds no part of the inside of body \"beam\""}},
+      {step + bar + material + "[[body.traction]]\nall = true\npressure = 1\nramp = 1e-5\n",
+       {"time.step = 0.0001 s", "body.traction.ramp = 1e-05 s"}}};
+}
+
 /// What only shows when the model is built or its steps are planned.
 std::vector<Late> late_refusals() {
   const std::string implicit = "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
@@ -142,22 +163,6 @@ std::vector<Late> late_refusals() {
       {with_bar("[[body.fixed]]\nall = true\n[[body.fixed]]\nregion = 'x-'\n"),
        {":16:", "already fixed or moved"}},
       {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake), {":16:", "already fixed or moved"}},
-      // Tractions, and loads that act nowhere
-      {with_bar("[[body.traction]]\nregion = 'x+'\npressure = 1\n"), {":13:", "box, ball, all"}},
-      {with_bar("[[body.traction]]\nall = true\n"), {":13:", "traction, pressure"}},
-      {with_bar("[[body.traction]]\nall = true\npressure = 1\ntraction = [1, 0, 0]\n"),
-       {"found together with", "exactly one of: traction, pressure"}},
-      {with_bar("[[body.traction]]\nall = true\npressure = nan\n"), {":15:", "pressure"}},
-      {with_bar("[[body.traction]]\nall = true\npressure = 1\nangle = 3\n"),
-       {":16:", "angle", "found without normal"}},
-      {with_bar("[[body.traction]]\nall = true\npressure = 1\nnormal = [0, 0, 0]\n"),
-       {":16:", "allowed: a direction"}},
-      {with_bar("[[body.traction]]\nbox = [[7, 7, 7], [8, 8, 8]]\npressure = 1\n"),
-       {":14:", "acts on no part of the surface of body \"beam\""}},
-      {with_bar("[[body.load]]\nbox = [[0.4, -9, -9], [0.4, 9, 9]]\nforce_density = [1, 0, 0]\n"),
-       {":14:", "holds no part of the inside of body \"beam\""}},
-      {step("1e-4") + bar + material + "[[body.traction]]\nall = true\npressure = 1\nramp = 1e-5\n",
-       {"time.step = 0.0001 s", "body.traction.ramp = 1e-05 s"}},
       // Inclusions
       {with_bar("[[body.inclusion]]\nbox = [[7, 7, 7], [8, 8, 8]]\nyoung = 1e6\n"),
        {":14:", "selects no phyxel"}},
@@ -218,7 +223,9 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   bare.volume.clear();
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
-  for (const Late& late : late_refusals()) expect_named(late.text, late.names);
+  for (const std::vector<Late>& refusals : {late_refusals(), refused_loads()}) {
+    for (const Late& late : refusals) expect_named(late.text, late.names);
+  }
   EXPECT_GT(refused_, 30);
 }
 
