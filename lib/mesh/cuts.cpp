@@ -98,9 +98,9 @@ SpaceRegion beyond_body(const SpaceRegion& region, const Surface& surface, doubl
   return made;
 }
 
-/// Counts sample points inside a surface, up to about a hundred of each kind.
-/// @param kind kind(point) is the number of a kind of point that counts, or -1
-/// @param near near(middle, radius) is false if no point of a ball counts
+/// Counts sample points inside a surface by kind.
+/// @param kind kind(point) returns the kind of a point, 0 or 1, or -1 if the point does not count
+/// @param near near(middle, radius) returns false if no point of a ball counts
 template <class Kind, class Near>
 std::array<int, 2> count_points(const InsideSampler& sampler, double voxel, Kind&& kind,
                                 Near&& near) {

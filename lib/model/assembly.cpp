@@ -46,7 +46,8 @@ void place(Cloud& cloud, const BodyRequest& request) {
 }
 
 bool needs_lists_on_host(const BodyRequest& request) {
-  return may_close(request) || !request.inclusions.empty() || !source_of(request).cuts.empty();
+  const bool may_be_cut = !request.source.mesh.empty() && !support_regions(request).empty();
+  return may_close(request) || !request.inclusions.empty() || may_be_cut;
 }
 
 double hourglass_of(const BodyRequest& request) {
@@ -333,15 +334,14 @@ void BoundaryChoice::warn_of_few(const BodyRequest& request,
   const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < first_load; ++entry) {
     if (counts[entry] > 2 || !region_of(*selections[entry])) continue;
-    const bool is_fixed = entry < request.fixed.size();
-    warnings.push_back(
-        fmt::format("body \"{}\", {} {}: only {} of its phyxels {} in the {}, and a body can turn "
-                    "about so few: a "
-                    "larger {}, or more phyxels, hold it",
-                    request.name, is_fixed ? "fixed" : "motion",
-                    entry + 1 - (is_fixed ? 0 : request.fixed.size()), counts[entry],
-                    counts[entry] == 1 ? "lies" : "lie", selections[entry]->box ? "box" : "ball",
-                    selections[entry]->box ? "box" : "ball"));
+    const std::string name = entry < request.fixed.size()
+                                 ? entry_name("fixed", entry)
+                                 : entry_name("motion", entry - request.fixed.size());
+    const char* region = selections[entry]->box ? "box" : "ball";
+    warnings.push_back(fmt::format(
+        "body \"{}\", {}: only {} of its phyxels {} in the {}, and a body can turn about so few: a "
+        "larger {}, or more phyxels, hold it",
+        request.name, name, counts[entry], counts[entry] == 1 ? "lies" : "lie", region, region));
   }
 }
 
@@ -355,7 +355,7 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
     return phyxels;
   };
   const auto numbered = [](const char* kind, const auto& one, const auto& all) {
-    return fmt::format("{} {}", kind, &one - all.data() + 1);
+    return entry_name(kind, static_cast<std::size_t>(&one - all.data()));
   };
   for (const FixRequest& fix : request.fixed) {
     model.motions.push_back({.phyxels = next(),

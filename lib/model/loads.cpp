@@ -69,11 +69,11 @@ Vec3d direction_of(Vec3d v) {
   return largest > 0 ? normalised(v / largest) : Vec3d{};
 }
 
-std::string entry_of(const char* kind, std::size_t number) {
+}  // namespace
+
+std::string entry_name(const char* kind, std::size_t number) {
   return fmt::format("{} {}", kind, number + 1);
 }
-
-}  // namespace
 
 void LoadSums::add(double m, Vec3d x) {
   mass.add(m);
@@ -91,7 +91,10 @@ std::vector<ExactSum*> LoadSums::all() {
 std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
                                                     const Surface& surface) {
   std::vector<std::optional<BodyPiece>> pieces(request.loads.size());
-  if (!request.inclusions.empty() || !encloses_volume(surface)) return pieces;
+  const bool needs_none =
+      std::none_of(request.loads.begin(), request.loads.end(),
+                   [](const LoadRequest& load) { return region_of(load.select).has_value(); });
+  if (needs_none || !request.inclusions.empty() || !encloses_volume(surface)) return pieces;
   for (std::size_t l = 0; l < pieces.size(); ++l) {
     const auto region = region_of(request.loads[l].select);
     if (!region) continue;
@@ -103,8 +106,7 @@ std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
     } else if (request.loads[l].force_density != Vec3d{}) {
       throw InputError(fmt::format(
           "{}: this {} holds no part of the inside of body \"{}\", on which "
-          "body.load.force_density "
-          "acts; allowed: one that does, or body.load.force",
+          "body.load.force_density acts; allowed: one that does, or body.load.force",
           request.loads[l].select.where.empty() ? request.where : request.loads[l].select.where,
           region->is_ball ? "ball" : "box", request.name));
     }
@@ -121,7 +123,7 @@ Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> 
             .density = asked.force_density,
             .ramp = asked.ramp,
             .body = request.name,
-            .set = entry_of("load", number)};
+            .set = entry_name("load", number)};
   const double mass = sums.mass.value();
   const Vec3d mean = sums.moment.value() / mass;
   load.centroid = origin + mean;
@@ -166,13 +168,11 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
   }
   if (region) {
     const double tolerance = digits * box_around(position).extent();
-    std::vector<Facet> cut;
     for (const Triangle& t : facing) {
       add_facets_in(*region,
                     {position[t[0] - first], position[t[1] - first], position[t[2] - first]},
-                    longest, tolerance, cut);
+                    longest, tolerance, loaded.facets);
     }
-    loaded.facets = std::move(cut);
   } else {
     loaded.facets = facets_of(position, facing, first, longest);
   }
@@ -192,7 +192,7 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
 Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded) {
   Load load{.ramp = request.tractions[number].ramp,
             .body = request.name,
-            .set = entry_of("traction", number)};
+            .set = entry_name("traction", number)};
   double sizes = 0;
   Vec3d moment;
   const Vec3d origin = loaded.facets.front().centroid;

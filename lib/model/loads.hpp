@@ -15,6 +15,9 @@
 
 namespace phyxel {
 
+/// The name of an entry of a body in its scene, e.g. "fixed 1". @param number from 0
+std::string entry_name(const char* kind, std::size_t number);
+
 /// Sums over the phyxels that a load selects.
 struct LoadSums {
   ExactSum mass;                   ///< Σ m [kg]

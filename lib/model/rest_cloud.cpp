@@ -30,6 +30,7 @@ Cloud rest_cloud(const CutSource& from) {
                                     .on_surface = source.on_surface,
                                     .cuts = from.cuts},
                                    &report);
+      cloud.cuts.shift = from.shift;
       for (const std::string& warning : report.warnings) {
         cloud.warnings.push_back(fmt::format("{}: {}", source.mesh.string(), warning));
       }

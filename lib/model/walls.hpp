@@ -38,7 +38,7 @@ std::vector<SpaceRegion> support_regions(const BodyRequest& request);
 struct CutSource {
   BodySource source;
   std::vector<SpaceRegion> cuts;
-  double shift = 0;  ///< Size of the numbers that the cuts' coordinates are differences of [m].
+  double shift = 0;  ///< Length of the translation, whose digits the cuts' coordinates lack [m].
 };
 CutSource source_of(const BodyRequest& request);
 

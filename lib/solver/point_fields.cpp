@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "phyxel/diagnostics.hpp"
@@ -12,8 +13,8 @@
 namespace phyxel {
 namespace {
 
-/// Σ of a phyxel's motions and loads in the field "boundary".
-constexpr double is_held = 1, is_moved = 2, is_loaded = 4;
+/// Terms of the field "boundary", whose values are sums of them.
+constexpr int is_held = 1, is_moved = 2, is_loaded = 4;
 
 /// Cauchy stress σ = P Fᵀ / det F [Pa].
 Mat3d cauchy_stress(const Mat3d& piola, const Mat3d& grad_u) {
@@ -61,9 +62,9 @@ std::vector<double> boundary_of(const Model& model) {
     for (const Index i : phyxels) marks[i] = static_cast<int>(marks[i]) | kind;
   };
   for (const Motion& motion : model.motions) {
-    mark(motion.phyxels, static_cast<int>(motion.stands_still() ? is_held : is_moved));
+    mark(motion.phyxels, motion.stands_still() ? is_held : is_moved);
   }
-  for (const Load& load : model.loads) mark(load.phyxels, static_cast<int>(is_loaded));
+  for (const Load& load : model.loads) mark(load.phyxels, is_loaded);
   return marks;
 }
 

@@ -24,7 +24,9 @@ struct Surface {
 /// A region of space in which a body is held or moved, and on whose boundary phyxels lie.
 struct SupportCut {
   SpaceRegion support;  ///< The region as the scene has it.
-  SpaceRegion wall;     ///< The region whose boundary has phyxels: `support`, but beyond the body.
+  /// The region on whose boundary phyxels lie: `support`, with faces that are nearly the body's
+  /// moved outward.
+  SpaceRegion wall;
   bool operator==(const SupportCut&) const = default;
 };
 
@@ -33,9 +35,9 @@ struct SupportCut {
 /// being smeared over a support of its phyxels.
 struct SupportCuts {
   std::vector<SupportCut> list;
-  double depth = 0;  ///< Depth of phyxels on boundaries below them, at most; a rounding error [m].
+  double depth = 0;    ///< Largest depth of phyxels below their boundary, a rounding error [m].
   double spacing = 0;  ///< Distance within which each place of a boundary has a phyxel [m].
-  double shift = 0;    ///< Size of the numbers that coordinates of regions are differences of [m].
+  double shift = 0;    ///< Length of the body's translation, whose digits coordinates lack [m].
 };
 
 /// Rest points of one body, in the caller's order.

@@ -4,9 +4,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <numbers>
 #include <random>
 
@@ -19,6 +22,7 @@
 #include "phyxel/point_fields.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
+#include "support/mesh_content.hpp"
 #include "support/surfaces.hpp"
 
 namespace phyxel {
@@ -297,6 +301,30 @@ TEST(Cuts, OfCopiesAreTheSame) {
     EXPECT_FALSE(is_same(first, source_of(copy)));
   }
   EXPECT_GT(rounded, 5);
+}
+
+/// A copy near the origin, where coordinates have more digits, is cut as the copy far away is that
+/// its cloud was made for.
+TEST(Cuts, OfAFarBodyServeItsCopyNearby) {
+  const Vec3d far{1e5 / 3, 2e5 / 7, 0};
+  Scene scene = one_body();
+  const std::filesystem::path file =
+      std::filesystem::path(::testing::TempDir()) / fmt::format("cube_{}.stl", getpid());
+  std::ofstream(file, std::ios::binary) << test::binary_stl(test::unit_cube());
+  BodyRequest& body = scene.bodies[0];
+  body.source.mesh = file;
+  body.source.phyxels = 500;
+  Selection select;
+  select.box = Selection::Box{Vec3d{-1, -1, -1} + far, Vec3d{0.43, 2, 2} + far};
+  body.translation = far;
+  body.fixed = {{.select = select}};
+  BodyRequest copy = body;
+  copy.name = "copy";
+  copy.translation = {};
+  copy.fixed[0].select.box = Selection::Box{{-1, -1, -1}, {0.43, 2, 2}};
+  scene.bodies.push_back(copy);
+  for (const Cloud& cloud : make_clouds(scene, {})) EXPECT_EQ(cloud.cuts.list.size(), 1u);
+  std::filesystem::remove(file);
 }
 
 /// Nothing is left to close in a body of which all is held.
