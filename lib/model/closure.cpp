@@ -8,6 +8,7 @@
 
 #include "model/closing_areas.hpp"
 #include "model/closing_sums.hpp"
+#include "model/loads.hpp"
 #include "phyxel/error.hpp"
 #include "stage.hpp"
 
@@ -16,6 +17,7 @@ namespace {
 
 using closing::Bodies;
 using closing::Body;
+using closing::ease_area;
 using closing::ease_volume;
 using closing::Sums;
 using closing::Unknown;
@@ -246,6 +248,11 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   Bodies(model, parts).sum(&Body::volume, [&](const Body&, Index i) { return model.volume[i]; });
   for (const Body& part : parts) part.parts.front().volume = part.volume;
   follow_volumes(model, before);
+  std::vector<double> change_of_area(model.position.size());
+  bodies.for_each([&](const Body&, Index i) { change_of_area[i] = ease_area * found[i].area; });
+  for (Load& load : model.loads) {
+    if (load.on_surface) follow_areas(model, load, change_of_area);
+  }
   for (const Body* body : bodies) warn_of(model, *body);
   return std::nullopt;
 }

@@ -11,6 +11,8 @@
 #include "model/neighbour_search.hpp"
 #include "model/selection.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "rank_sums.hpp"
 
 namespace phyxel {
 namespace {
@@ -82,6 +84,11 @@ void LoadSums::add(double m, Vec3d x) {
   for (int k = 0; k < 6; ++k) second[k].add(m * terms[k]);
 }
 
+Sym3d LoadSums::second_moment() const {
+  return {second[0].value(), second[1].value(), second[2].value(),
+          second[3].value(), second[4].value(), second[5].value()};
+}
+
 std::vector<ExactSum*> LoadSums::all() {
   std::vector<ExactSum*> sums{&mass, &moment.x, &moment.y, &moment.z};
   for (ExactSum& sum : second) sums.push_back(&sum);
@@ -130,10 +137,11 @@ Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> 
   Vec3d gradient;
   if (piece) {
     Eigen::Matrix3d covariance;
-    for (int k = 0, row = 0; row < 3; ++row) {
-      for (int column = row; column < 3; ++column, ++k) {
-        covariance(row, column) = covariance(column, row) =
-            sums.second[k].value() / mass - component(mean, row) * component(mean, column);
+    const Mat3d second = full(sums.second_moment());
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        covariance(row, column) =
+            second(row, column) / mass - component(mean, row) * component(mean, column);
       }
     }
     gradient = weight_gradient(covariance, piece->centroid - load.centroid);
@@ -192,7 +200,8 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
 Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded) {
   Load load{.ramp = request.tractions[number].ramp,
             .body = request.name,
-            .set = entry_name("traction", number)};
+            .set = entry_name("traction", number),
+            .on_surface = true};
   double sizes = 0;
   Vec3d moment;
   const Vec3d origin = loaded.facets.front().centroid;
@@ -205,6 +214,53 @@ Load traction_load(const BodyRequest& request, std::size_t number, const LoadedF
   load.centroid = origin;
   if (sizes > 0) load.centroid += moment / sizes;
   return load;
+}
+
+namespace {
+
+/// Sums over the forces of a load on all ranks, about its centroid.
+struct ForceSums {
+  Vec3d force, torque;  ///< [N], [N m]
+  LoadSums sizes;       ///< Of the forces' sizes in place of masses.
+};
+ForceSums sums_of(const Model& model, const Load& load) {
+  ForceSums sums;
+  ExactVector force, torque;
+  for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+    const Vec3d f = load.force[k], x = model.position[load.phyxels[k]] - load.centroid;
+    force.add(f);
+    torque.add(cross(x, f));
+    sums.sizes.add(norm(f), x);
+  }
+  std::vector<ExactSum*> all = sums.sizes.all();
+  all.insert(all.end(), {&force.x, &force.y, &force.z, &torque.x, &torque.y, &torque.z});
+  add_over_ranks(model, all);
+  sums.force = force.value();
+  sums.torque = torque.value();
+  return sums;
+}
+
+}  // namespace
+
+void follow_areas(const Model& model, Load& load, const std::vector<double>& change) {
+  const ForceSums before = sums_of(model, load);
+  for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+    load.force[k] = (1 + change[load.phyxels[k]]) * load.force[k];
+  }
+  const ForceSums now = sums_of(model, load);
+  const double size = now.sizes.mass.value();
+  if (!(size > 0)) return;
+  // Forces |f| (a + b × (x - mean)) have the total a Σ|f| and, about the mean, the torque J b.
+  const Vec3d mean = now.sizes.moment.value() / size, force = before.force - now.force;
+  const Vec3d torque = before.torque - now.torque - cross(mean, force);
+  const Sym3d second = now.sizes.second_moment() + moment_term(mean, -size);
+  const double t = trace(second);
+  const Sym3d inertia = Sym3d{t, 0, 0, t, 0, t} + -1.0 * second;
+  const Vec3d a = force / size, b = pseudo_inverse(inertia).matrix * torque;
+  for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+    const Vec3d x = model.position[load.phyxels[k]] - load.centroid - mean;
+    load.force[k] += norm(load.force[k]) * (a + cross(b, x));
+  }
 }
 
 void add_tractions(Model& model, const Scene& scene) {

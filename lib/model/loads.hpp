@@ -25,6 +25,7 @@ struct LoadSums {
   std::array<ExactSum, 6> second;  ///< Σ m x xᵀ [kg m²]: xx, xy, xz, yy, yz, zz.
   /// Adds a phyxel. @param m mass [kg] @param x position from the origin [m]
   void add(double m, Vec3d x);
+  Sym3d second_moment() const;  ///< Σ m x xᵀ [kg m²]
   /// All sums, for exchanges between ranks.
   std::vector<ExactSum*> all();
 };
@@ -55,6 +56,12 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
 
 /// The load of traction `number` (from 0) of a body, without phyxels and forces.
 Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded);
+
+/// Makes a traction follow the areas of the phyxels that it acts on, so that it balances a uniform
+/// stress where that stress does: each force grows as the area does, and total and torque stay.
+/// Collective.
+/// @param change of the area of each phyxel of the model, relative
+void follow_areas(const Model& model, Load& load, const std::vector<double>& change);
 
 /// Adds the tractions of a scene to a whole model.
 void add_tractions(Model& model, const Scene& scene);

@@ -353,6 +353,14 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
   }
 }
 
+/// Adds what needs all bodies of a model.
+void finish(Model& model, const Scene& scene) {
+  add_tractions(model, scene);
+  find_moments(model);
+  close_gradients(model);
+  add_warnings(model, model.surfels.position.size());
+}
+
 Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
   validate(scene);
   Model model;
@@ -361,10 +369,7 @@ Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
     append(model.warnings, cloud.warnings);
     naming(request, [&] { add_body(model, request, cloud, surveyor); });
   });
-  add_tractions(model, scene);
-  find_moments(model);
-  close_gradients(model);
-  add_warnings(model, model.surfels.position.size());
+  finish(model, scene);
   return model;
 }
 
@@ -381,10 +386,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
     append(model.warnings, clouds[b].warnings);
     naming(scene.bodies[b], [&] { add_body(model, scene.bodies[b], clouds[b], surveyor); });
   }
-  add_tractions(model, scene);
-  find_moments(model);
-  close_gradients(model);
-  add_warnings(model, model.surfels.position.size());
+  finish(model, scene);
   return model;
 }
 

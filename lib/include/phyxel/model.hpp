@@ -111,6 +111,7 @@ struct Load {
   std::string body = {};     ///< Name of the body to which the phyxels belong.
   std::string set = {};      ///< Entry of that body in the scene, e.g. "load 1", "traction 2".
   Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
+  bool on_surface = false;   ///< True of a traction, which follows the areas of phyxels.
   /// Which share of the force acts at a time [s].
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
