@@ -166,7 +166,7 @@ class Simulation {
   std::vector<double> field(Quantity quantity) {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
-    return std::move(find_fields(model_, *backend_, {&quantity, 1}).at(quantity));
+    return std::move(find_fields(model_, *backend_, {&quantity, 1}, recovery()).at(quantity));
   }
   SurfelState surfels() {
     const auto turn = my_turn();
@@ -216,6 +216,12 @@ class Simulation {
     return lock;
   }
 
+  /// The recovery that the scene's output asks for, made when it is first needed; null: none.
+  const Recovery* recovery() {
+    if (scene_.output.recovery && !recovery_) recovery_ = std::make_unique<Recovery>(model_);
+    return recovery_.get();
+  }
+
   void write_one() {
     if (!recorder_) throw InputError("write_frame: nothing is recorded yet; needed first: record");
     const State state = solver_->state();
@@ -228,7 +234,7 @@ class Simulation {
       backend_->advect_surfels(surfels);
       frame.surfels = &surfels;
     }
-    frame.fields = find_fields(model_, *backend_, wanted_fields(scene_.output));
+    frame.fields = find_fields(model_, *backend_, wanted_fields(scene_.output), recovery());
     recorder_->write(frame);
   }
 
@@ -310,6 +316,7 @@ class Simulation {
   std::optional<StepControl> control_;
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
+  std::unique_ptr<const Recovery> recovery_;
   std::int64_t looked_ = 0;
   RunProgress told_;
   // When Python last heard of signals: across frames, which may be shorter than the interval.

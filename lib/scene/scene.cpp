@@ -60,6 +60,7 @@ OutputRequest read_output(const SceneTable& table) {
   table.read("phyxels", output.phyxels);
   table.read("surface", output.surface);
   table.read("fields", output.fields);
+  table.read("recovery", output.recovery);
   table.read("checkpoint_every", output.checkpoint_every);
   return output;
 }

@@ -179,6 +179,7 @@ void visit_run(const Scene& scene, Visit&& visit) {
   visit("output", "phyxels", scene.output.phyxels);
   visit("output", "surface", scene.output.surface);
   visit("output", "fields", scene.output.fields);
+  if (!scene.output.recovery) visit("output", "recovery", false);
   visit("output", "checkpoint_every", scene.output.checkpoint_every);
 }
 

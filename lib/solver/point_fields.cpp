@@ -87,6 +87,41 @@ class Arrays {
   FieldValues& values_;
 };
 
+void set_strains(Arrays& arrays, Index i, const Mat3d& grad_u) {
+  if (arrays.has(Quantity::volume_ratio)) {
+    arrays.set(Quantity::volume_ratio, i, std::array{1 + volume_change(grad_u)});
+  }
+  if (arrays.has(Quantity::strain)) {
+    arrays.set(Quantity::strain, i, components(full(green_strain(grad_u))));
+  }
+}
+
+void set_stresses(Arrays& arrays, Index i, const Mat3d& sigma) {
+  if (arrays.has(Quantity::von_mises)) {
+    arrays.set(Quantity::von_mises, i, std::array{von_mises_stress(sigma)});
+  }
+  if (arrays.has(Quantity::stress)) arrays.set(Quantity::stress, i, components(sigma));
+  if (arrays.has(Quantity::principal_stress)) {
+    arrays.set(Quantity::principal_stress, i, principal_values(sigma));
+  }
+}
+
+bool is_stress(Quantity quantity) {
+  return quantity == Quantity::von_mises || quantity == Quantity::stress ||
+         quantity == Quantity::principal_stress;
+}
+
+/// Recovered gradients, but for those whose det F differs too much from that of the phyxels' own.
+std::vector<Mat3d> recovered(const Recovery& recovery, const State& state,
+                             const std::vector<Mat3d>& own) {
+  std::vector<Mat3d> gradient = recovery.gradients(state.displacement);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const double ratio = (1 + volume_change(gradient[i])) / (1 + volume_change(own[i]));
+    if (!(ratio > 0.5 && ratio < 2)) gradient[i] = own[i];
+  }
+  return gradient;
+}
+
 }  // namespace
 
 std::span<const PointField> point_fields() {
@@ -110,44 +145,40 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output) {
   return wanted;
 }
 
-FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted) {
+std::unique_ptr<const Recovery> recovery_for(const OutputRequest& output, const Model& model) {
+  const std::vector<Quantity> wanted = wanted_fields(output);
+  const bool follows =
+      std::any_of(wanted.begin(), wanted.end(), [](Quantity q) { return q != Quantity::boundary; });
+  return output.recovery && follows ? std::make_unique<Recovery>(model) : nullptr;
+}
+
+FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,
+                        const Recovery* recovery) {
   FieldValues values;
   std::vector<Quantity> computed(wanted.begin(), wanted.end());
   if (std::erase(computed, Quantity::boundary) > 0) values[Quantity::boundary] = boundary_of(model);
   if (computed.empty()) return values;
   check_fits(model, backend);
-  std::vector<Mat3d> gradient;
-  backend.displacement_gradients(gradient);
-  Arrays arrays(values, computed, static_cast<Index>(gradient.size()));
-  const bool stresses = arrays.has(Quantity::von_mises) || arrays.has(Quantity::stress) ||
-                        arrays.has(Quantity::principal_stress);
+  std::vector<Mat3d> own;
+  backend.displacement_gradients(own);
+  const bool stresses = std::any_of(computed.begin(), computed.end(), is_stress);
   const std::vector<std::string> columns = history_columns(model);
   State state;
-  if (stresses && !columns.empty()) backend.download(state);
+  if (recovery || (stresses && !columns.empty())) backend.download(state);
+  const std::vector<Mat3d> gradient = recovery ? recovered(*recovery, state, own) : own;
+  Arrays arrays(values, computed, static_cast<Index>(own.size()));
   for (const Part& part : model.parts) {
     const PartLaw law(part.material);
     const PartHistory history(state, part.material, columns);
     std::vector<double> numbers(history.size());
     for (Index i = part.begin; i < part.owned_end(); ++i) {
-      const Mat3d& g = gradient[i];
-      if (arrays.has(Quantity::volume_ratio)) {
-        arrays.set(Quantity::volume_ratio, i, std::array{1 + volume_change(g)});
-      }
-      if (arrays.has(Quantity::strain)) {
-        const Mat3d green = 0.5 * (g + transpose(g) + transpose(g) * g);
-        arrays.set(Quantity::strain, i, components(green));
-      }
+      set_strains(arrays, i, gradient[i]);
       if (!stresses) continue;
+      // A history belongs to the phyxel's own gradient.
+      const Mat3d& g = history.size() > 0 ? own[i] : gradient[i];
       const PointResponse<double> response =
           law.after_step(g, history.of(i, numbers), state.history_interval);
-      const Mat3d sigma = cauchy_stress(response.first_piola_stress, g);
-      if (arrays.has(Quantity::von_mises)) {
-        arrays.set(Quantity::von_mises, i, std::array{von_mises_stress(sigma)});
-      }
-      if (arrays.has(Quantity::stress)) arrays.set(Quantity::stress, i, components(sigma));
-      if (arrays.has(Quantity::principal_stress)) {
-        arrays.set(Quantity::principal_stress, i, principal_values(sigma));
-      }
+      set_stresses(arrays, i, cauchy_stress(response.first_piola_stress, g));
     }
   }
   return values;

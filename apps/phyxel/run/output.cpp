@@ -58,7 +58,7 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
   }
   const std::vector<Quantity> wanted = wanted_fields(scene_.output);
   moment->optional.insert(moment->optional.end(), wanted.begin(), wanted.end());
-  frame.fields = find_fields(model(), *backend_, wanted);
+  frame.fields = find_fields(model(), *backend_, wanted, recovery_.get());
   hand_over(moment,
             [this, diagnostics = good->diagnostics, reactions = reactions_](ChunkedSource& values) {
               const Phase writing("writing a frame");

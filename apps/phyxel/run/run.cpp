@@ -28,6 +28,7 @@ Run::Run(const RunOptions& options)
                                                           scene_.solver.threads,
                                                           options_.transport);
                             })),
+      recovery_(spent_.timed("backend", [&] { return recovery_for(scene_.output, model()); })),
       plan_(alike([&] {
         return spent_.timed("time step", [&] {
           return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);

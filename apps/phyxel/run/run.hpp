@@ -182,6 +182,7 @@ class Run {
   std::optional<Checkpoint> begin_;                    // the checkpoint without arrays
   SharedModel shared_;
   std::unique_ptr<Backend> backend_;
+  std::unique_ptr<const Recovery> recovery_;  // of gradients for output; null if there is none
   StepPlan plan_;
   BoundarySize boundary_;  // of the whole model
   Solver solver_;

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/recovery.hpp"
 
 namespace phyxel {
 
@@ -29,6 +31,15 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output);
 /// Computes fields of the phyxels of a model, or of a rank's share, at the backend's present state.
 /// Stress is Cauchy's, σ = P Fᵀ / det F [Pa], strain is Green's, (FᵀF - I) / 2; both as xx, yy, zz,
 /// xy, yz, xz. Values of ghosts are 0.
-FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted);
+/// @param recovery of the model's gradients: fields are then of second order on the surface, too,
+///   but for the stress of laws with a history, which is the phyxel's own. A phyxel whose det F
+///   recovery would change by a factor of two, as at a kink, keeps its own gradient. Null: fields
+///   are of the gradients from which forces follow. Collective on a share, if not null
+FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,
+                        const Recovery* recovery = nullptr);
+
+/// The recovery that the output of a scene asks for; null if it asks for none, or for no field that
+/// follows from gradients.
+std::unique_ptr<const Recovery> recovery_for(const OutputRequest& output, const Model& model);
 
 }  // namespace phyxel
