@@ -287,6 +287,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   if (!body.region_of_entry.empty()) {  // its piece has been checked
     BoundaryChoice choice;
     choice.first_load = request.fixed.size() + request.motions.size();
+    choice.first_probe = choice.first_load + request.loads.size();
     for (const Selection* selection : selections_of(request)) {
       const int region = body.region_of_entry[choice.chosen.size()];
       choice.chosen.push_back(region >= 0
@@ -370,6 +371,7 @@ void gather_degenerate(const ShareSetup& setup, const WholeBodies& whole, LocalM
 void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   m.gravity = setup.scene.gravity;
+  for (const WholeBody& body : whole.bodies) m.walls.push_back(body.walls);
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       collect_ghost_neighbours(setup, whole, local, b);

@@ -56,6 +56,14 @@ class Maker {
         own.force.push_back(load.force[k]);
       }
     }
+    for (const Probe& probe : whole_.probes) {
+      Probe& own = m.probes.emplace_back(probe);
+      own.phyxels.clear();
+      for (const Index i : probe.phyxels) {
+        if (here_[i] >= 0) own.phyxels.push_back(here_[i]);
+      }
+    }
+    m.walls = whole_.walls;
     return std::move(out_);
   }
 

@@ -5,6 +5,7 @@
 
 #include "arrays.hpp"
 #include "files/frame_file.hpp"
+#include "phyxel/probes.hpp"
 #include "phyxel/state.hpp"
 
 namespace phyxel::python {
@@ -36,6 +37,28 @@ inline py::list dicts_of(const std::vector<Reaction>& reactions) {
     list.append(values);
   }
   return list;
+}
+
+/// Returns the values of readings, one row each, by their names.
+inline py::dict arrays_of(const std::vector<ProbeReading>& readings) {
+  std::vector<Vec3d> place, displacement, velocity;
+  std::vector<double> stress, strain, von_mises;
+  for (const ProbeReading& reading : readings) {
+    place.push_back(reading.place);
+    displacement.push_back(reading.displacement);
+    velocity.push_back(reading.velocity);
+    stress.insert(stress.end(), reading.stress.begin(), reading.stress.end());
+    strain.insert(strain.end(), reading.strain.begin(), reading.strain.end());
+    von_mises.push_back(reading.von_mises);
+  }
+  py::dict values;
+  values["rest"] = taken(std::move(place));
+  values["displacement"] = taken(std::move(displacement));
+  values["velocity"] = taken(std::move(velocity));
+  values["stress"] = taken(std::move(stress)).reshape({-1, 6});
+  values["strain"] = taken(std::move(strain)).reshape({-1, 6});
+  values["von_mises"] = taken(std::move(von_mises));
+  return values;
 }
 
 }  // namespace phyxel::python

@@ -11,6 +11,7 @@
 #include "files/trajectory_folder.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
+#include "phyxel/probes.hpp"
 #include "phyxel/reactions.hpp"
 
 namespace phyxel {
@@ -18,13 +19,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string log_header() {
-  std::string header = "step";
-  for (const DiagnosticColumn& column : diagnostic_columns()) {
-    header += fmt::format(",{} [{}]", column.name, column.unit);
+/// The first line of a log. @param first its first columns
+template <class Columns>
+std::string header_of(std::string first, const Columns& columns) {
+  for (const auto& column : columns) {
+    first += fmt::format(",{}", column.name);
+    if (*column.unit != '\0') first += fmt::format(" [{}]", column.unit);
   }
-  return header + "\n";
+  return first + "\n";
 }
+
+std::string log_header() { return header_of("step", diagnostic_columns()); }
 
 std::string log_line(const Diagnostics& now) {
   std::string line = std::to_string(now.step);
@@ -32,14 +37,6 @@ std::string log_line(const Diagnostics& now) {
     line += fmt::format(",{:.17g}", column.value(now));
   }
   return line + "\n";
-}
-
-std::string reactions_header() {
-  std::string header = "step,time [s],body,set";
-  for (const ReactionColumn& column : reaction_columns()) {
-    header += fmt::format(",{} [{}]", column.name, column.unit);
-  }
-  return header + "\n";
 }
 
 /// A text as a cell of a CSV file (RFC 4180).
@@ -50,14 +47,16 @@ std::string cell_of(const std::string& text) {
   return quoted + "\"";
 }
 
-/// The lines of the reactions at one instant. A number that is not known leaves its cell empty.
-std::string reaction_lines(const Diagnostics& now, const std::vector<Reaction>& reactions) {
+/// The lines of a log at one instant. A number that is not known leaves its cell empty.
+/// @param cells cells(row): what follows step and time in the line of a row
+template <class Row, class Columns, class Cells>
+std::string lines_of(const Diagnostics& now, const std::vector<Row>& rows, const Columns& columns,
+                     Cells&& cells) {
   std::string lines;
-  for (const Reaction& reaction : reactions) {
-    lines += fmt::format("{},{:.17g},{},{}", now.step, now.time, cell_of(reaction.body),
-                         cell_of(reaction.set));
-    for (const ReactionColumn& column : reaction_columns()) {
-      const double value = column.value(reaction);
+  for (const Row& row : rows) {
+    lines += fmt::format("{},{:.17g},{}", now.step, now.time, cells(row));
+    for (const auto& column : columns) {
+      const double value = column.value(row);
       lines += std::isnan(value) ? "," : fmt::format(",{:.17g}", value);
     }
     lines += '\n';
@@ -158,8 +157,15 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
       scene_(scene),
       directory_(scene.output.directory),
       writes_phyxels_(scene.output.phyxels),
-      writes_surface_(scene.output.surface && model.global_surfel_count() > 0),
-      writes_reactions_(!model.motions.empty()) {
+      writes_surface_(scene.output.surface && model.global_surfel_count() > 0) {
+  if (!model.motions.empty()) {
+    reactions_.emplace(directory_ / reactions_name,
+                       header_of("step,time [s],body,set", reaction_columns()));
+  }
+  if (!model.probes.empty()) {
+    probes_.emplace(directory_ / probes_name,
+                    header_of("step,time [s],probe,point", probe_columns()));
+  }
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -234,9 +240,8 @@ void Recorder::create_files() {
   if (writes_surface_) surface_.create(directory_ / "surface.hdf.series", {});
   write_whole_file(directory_ / log_name, log_header(), Durable::no);
   log_size_ = log_header().size();
-  if (!writes_reactions_) return;
-  write_whole_file(directory_ / reactions_name, reactions_header(), Durable::no);
-  reactions_size_ = reactions_header().size();
+  if (reactions_) reactions_->create();
+  if (probes_) probes_->create();
 }
 
 void Recorder::continue_after(const Continuation& point, bool overwrite) {
@@ -257,10 +262,8 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   };
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
-  std::string reactions;
-  if (writes_reactions_) {
-    reactions = kept_reactions(directory_ / reactions_name, reactions_header(), log.last_step);
-  }
+  const std::string reactions = reactions_ ? reactions_->kept(log.last_step) : "",
+                    probes = probes_ ? probes_->kept(log.last_step) : "";
   // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
   fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run
@@ -270,19 +273,18 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   }
   write_whole_file(directory_ / log_name, log.text, Durable::no);
   log_size_ = log.text.size();
-  if (!writes_reactions_) return;
-  write_whole_file(directory_ / reactions_name, reactions, Durable::no);
-  reactions_size_ = reactions.size();
+  if (reactions_) reactions_->create(reactions);
+  if (probes_) probes_->create(probes);
 }
 
 void Recorder::write(const Frame& frame) {
   check_frame(model_, frame);
   FrameSource values(model_, frame);
-  write(frame.diagnostics, values, frame.reactions);
+  write(frame.diagnostics, values, frame.readings);
 }
 
 void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
-                     const std::vector<Reaction>& reactions) {
+                     const Readings& readings) {
   const double time = diagnostics.time;
   if (writes_phyxels_) {
     const fs::path file = frame_file(directory_, "phyxels", frames_);
@@ -296,10 +298,16 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
     unsynced_.push_back(file);
     surface_.append({file, time});
   }
-  if (writes_reactions_ && !reactions.empty()) {
-    const std::string lines = reaction_lines(diagnostics, reactions);
-    replace_tail(directory_ / reactions_name, reactions_size_, lines);
-    reactions_size_ += lines.size();
+  if (reactions_ && !readings.reactions.empty()) {
+    reactions_->append(
+        lines_of(diagnostics, readings.reactions, reaction_columns(),
+                 [](const Reaction& r) { return cell_of(r.body) + "," + cell_of(r.set); }));
+  }
+  if (probes_ && !readings.probes.empty()) {
+    probes_->append(
+        lines_of(diagnostics, readings.probes, probe_columns(), [](const ProbeReading& r) {
+          return fmt::format("{},{}", cell_of(r.probe), r.number + 1);
+        }));
   }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
@@ -323,7 +331,8 @@ std::vector<fs::path> Recorder::files() const {
   if (writes_phyxels_) files.push_back(phyxels_.file());
   if (writes_surface_) files.push_back(surface_.file());
   files.push_back(directory_ / log_name);
-  if (writes_reactions_) files.push_back(directory_ / reactions_name);
+  if (reactions_) files.push_back(reactions_->file());
+  if (probes_) files.push_back(probes_->file());
   return files;
 }
 

@@ -22,8 +22,8 @@ constexpr std::size_t largest_log = std::size_t{1} << 30;
 /// True for the name of a file of a trajectory, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
-  for (const char* one :
-       {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name, summary_name}) {
+  for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name,
+                          probes_name, summary_name}) {
     if (name == one) return true;
   }
   const auto numbered = [name](std::string_view prefix, std::string_view suffix) {
@@ -157,24 +157,35 @@ std::vector<std::string_view> lines_of(const std::string& text) {
 }
 }  // namespace
 
-std::string kept_reactions(const fs::path& file, const std::string& header, double last_step) {
-  if (!fs::exists(file)) return header;
-  const std::string text = read_text_file(file, largest_log);
+std::string FrameLog::kept(double last_step) const {
+  if (!fs::exists(file_)) return {};
+  const std::string text = read_text_file(file_, largest_log);
   const std::vector<std::string_view> lines = lines_of(text);
-  const std::string_view wanted(header.data(), header.size() - 1);  // without the line's end
+  const std::string_view wanted(header_.data(), header_.size() - 1);  // without the line's end
   if (lines.empty() || lines[0] != wanted) {
     throw InputError(
         fmt::format("{}: begins with \"{}\", needed is \"{}\": it belongs to another run, or was "
                     "changed; it is "
                     "kept; allowed: another folder (--resume CHECKPOINT --out FOLDER)",
-                    file.string(), lines.empty() ? std::string_view() : lines[0], wanted));
+                    file_.string(), lines.empty() ? std::string_view() : lines[0], wanted));
   }
-  std::string kept = header;
+  std::string kept;
   for (std::size_t l = 1; l < lines.size(); ++l) {
     if (!(number_in(cell(lines[l], 0)) <= last_step)) break;
     kept.append(lines[l]).push_back('\n');
   }
   return kept;
+}
+
+void FrameLog::create(const std::string& lines) {
+  const std::string text = header_ + lines;
+  write_whole_file(file_, text, Durable::no);
+  size_ = text.size();
+}
+
+void FrameLog::append(const std::string& lines) {
+  replace_tail(file_, size_, lines);
+  size_ += lines.size();
 }
 
 KeptLog kept_log(const fs::path& file, const Continuation& point) {

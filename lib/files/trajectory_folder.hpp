@@ -12,6 +12,7 @@ namespace phyxel {
 
 inline constexpr const char* log_name = "energy.csv";
 inline constexpr const char* reactions_name = "reactions.csv";
+inline constexpr const char* probes_name = "probes.csv";
 inline constexpr const char* summary_name = "run.json";
 
 std::filesystem::path frame_file(const std::filesystem::path& directory, const char* family,
@@ -43,13 +44,6 @@ struct KeptLog {
 /// Reads the energy log up to a checkpoint.
 /// @throws InputError if the log has too few lines, or belongs to another run
 KeptLog kept_log(const std::filesystem::path& file, const Continuation& point);
-
-/// Reads the log of reactions up to a step. A folder without that log, of an earlier version of the
-/// program, has none to keep.
-/// @param header its first line. @returns the header and the lines of steps up to `last_step`
-/// @throws InputError if the log has another header
-std::string kept_reactions(const std::filesystem::path& file, const std::string& header,
-                           double last_step);
 
 /// The part of a series up to a checkpoint, and the files of later frames.
 struct KeptSeries {

@@ -263,6 +263,9 @@ std::vector<const Selection*> selections_of(const BodyRequest& request) {
   for (const FixRequest& fix : request.fixed) all.push_back(&fix.select);
   for (const MotionRequest& motion : request.motions) all.push_back(&motion.select);
   for (const LoadRequest& load : request.loads) all.push_back(&load.select);
+  for (const ProbeRequest& probe : request.probes) {
+    if (probe.select) all.push_back(&*probe.select);
+  }
   return all;
 }
 
@@ -275,6 +278,7 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
   for (const MotionRequest& motion : request.motions) axes.push_back(motion.axes);
   const SomePhyxels here{cloud, number, size};
   choice.first_load = request.fixed.size() + request.motions.size();
+  choice.first_probe = choice.first_load + request.loads.size();
   for (const Selection* selection : selections_of(request)) {
     const std::size_t entry = choice.chosen.size();
     const int bits = entry < choice.first_load ? axes[entry].bits() : 0;
@@ -311,7 +315,7 @@ std::vector<std::int64_t> BoundaryChoice::counts() const {
 std::vector<LoadSums> BoundaryChoice::load_sums(const Model& model, Index shift,
                                                 Vec3d origin) const {
   std::vector<LoadSums> sums;
-  for (std::size_t entry = first_load; entry < chosen.size(); ++entry) {
+  for (std::size_t entry = first_load; entry < first_probe; ++entry) {
     LoadSums& sum = sums.emplace_back();
     for (const Index i : chosen[entry]) {
       sum.add(model.mass[shift + i], model.position[shift + i] - origin);
@@ -380,6 +384,13 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
     std::vector<Index> phyxels = next();
     model.loads.push_back(
         load_of(request, l, std::move(phyxels), model, loaded[l], origin, pieces[l]));
+  }
+  for (const ProbeRequest& probe : request.probes) {
+    model.probes.push_back({.name = probe.name,
+                            .body = request.name,
+                            .points = probe.points,
+                            .phyxels = probe.select ? next() : std::vector<Index>{},
+                            .where = probe.where});
   }
 }
 

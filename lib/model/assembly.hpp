@@ -107,14 +107,14 @@ struct BodySums {
   void tell(Part& part) const;
 };
 
-/// What a body's boundary selects, entry by entry: what is fixed, then motions, then loads, as the
-/// scene has them.
+/// What a body's boundary selects, entry by entry: what is fixed, then motions, then loads, then
+/// regions of probes, as the scene has them.
 std::vector<const Selection*> selections_of(const BodyRequest& request);
 
 /// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
-  std::size_t first_load = 0;
+  std::size_t first_load = 0, first_probe = 0;
 
   /// Phyxel i of the cloud is phyxel place[i] of the body.
   void renumber(const std::vector<Index>& place);

@@ -212,6 +212,10 @@ void check_boundary(const Model& m) {
     check_finite(name + "force", load.force);
     check_finite(name + "ramp", load.ramp);
   }
+  for (std::size_t k = 0; k < m.probes.size(); ++k) {
+    check_indices(fmt::format("probes[{}].phyxels", k), m.probes[k].phyxels, m.size());
+    check_finite(fmt::format("probes[{}].points", k), m.probes[k].points);
+  }
   check_finite("gravity", m.gravity);
 }
 

@@ -201,8 +201,8 @@ double add_parts(Model& model, const BodyRequest& request, std::span<const Mater
   return body.volume;
 }
 
-/// Adds the fixed, moved and loaded phyxels of a body, which its scene selects by the order of
-/// `given`. @param sorted the cloud in the model's order; null: that of `given`
+/// Adds the fixed, moved, loaded and probed phyxels of a body, which its scene selects by the order
+/// of `given`. @param sorted the cloud in the model's order; null: that of `given`
 void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
                   const SortedCloud* sorted, Index shift) {
   BoundaryChoice choice =
@@ -256,6 +256,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
     part.automatic_closure = !request.closure;
   }
   add_boundary(model, request, given, sorted ? &*sorted : nullptr, shift);
+  model.walls.push_back(walls_of(request, cloud));
 }
 
 }  // namespace

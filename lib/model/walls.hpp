@@ -1,4 +1,4 @@
-/// Walls: the boundaries at which supports part the phyxels of a body.
+/// Walls of bodies: where they are, and which neighbours they part.
 #pragma once
 
 #include <span>
@@ -9,17 +9,6 @@
 #include "phyxel/scene.hpp"
 
 namespace phyxel {
-
-/// Regions inside which all phyxels are held or moved along all axes.
-struct Walls {
-  std::vector<SpaceRegion> regions;
-  double depth = 0;    ///< `SupportCuts::depth` [m].
-  double spacing = 0;  ///< `SupportCuts::spacing` [m].
-
-  /// The index of the region that a point is in; their number if it is in none. Phyxels on the
-  /// boundary of a region are in none.
-  std::size_t room_of(Vec3d point) const;
-};
 
 /// The walls of a body, of whose cuts those count whose supports hold all axes, by one or several
 /// entries.

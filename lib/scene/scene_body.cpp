@@ -197,32 +197,6 @@ Selection::Ball read_ball(const SceneTable& table) {
   return ball;
 }
 
-Selection read_selection(const SceneTable& table) {
-  const std::vector<const char*> kinds = {"region", "indices", "box", "ball", "all"};
-  table.expect_one_of(kinds);
-  Selection select;
-  for (const char* kind : kinds) {
-    if (table.has(kind)) select.where = table.where(kind);
-  }
-  table.read("region", select.region);
-  table.read("indices", select.indices);
-  table.read("box", select.box);
-  if (table.has("ball")) select.ball = read_ball(table.table("ball"));
-  table.read("all", select.all);
-  if (table.has("all") && !select.all) {
-    table.refuse("all", "false found, which selects nothing; allowed: true");
-  }
-  if (select.box) {
-    const auto [low, high] = *select.box;
-    if (low.x > high.x || low.y > high.y || low.z > high.z) {
-      table.refuse("box", fmt::format("[[{:g}, {:g}, {:g}], [{:g}, {:g}, {:g}]] found; allowed: "
-                                      "[lowest, highest] corner, lowest <= highest along each axis",
-                                      low.x, low.y, low.z, high.x, high.y, high.z));
-    }
-  }
-  return select;
-}
-
 InclusionRequest read_inclusion(const SceneTable& table, Material material) {
   const Selection select = read_selection(table);
   read_law(table, material, true);
@@ -384,6 +358,32 @@ std::vector<BodyRequest> copies(const BodyRequest& body, const SceneTable& array
 }
 
 }  // namespace
+
+Selection read_selection(const SceneTable& table) {
+  const std::vector<const char*> kinds = {"region", "indices", "box", "ball", "all"};
+  table.expect_one_of(kinds);
+  Selection select;
+  for (const char* kind : kinds) {
+    if (table.has(kind)) select.where = table.where(kind);
+  }
+  table.read("region", select.region);
+  table.read("indices", select.indices);
+  table.read("box", select.box);
+  if (table.has("ball")) select.ball = read_ball(table.table("ball"));
+  table.read("all", select.all);
+  if (table.has("all") && !select.all) {
+    table.refuse("all", "false found, which selects nothing; allowed: true");
+  }
+  if (select.box) {
+    const auto [low, high] = *select.box;
+    if (low.x > high.x || low.y > high.y || low.z > high.z) {
+      table.refuse("box", fmt::format("[[{:g}, {:g}, {:g}], [{:g}, {:g}, {:g}]] found; allowed: "
+                                      "[lowest, highest] corner, lowest <= highest along each axis",
+                                      low.x, low.y, low.z, high.x, high.y, high.z));
+    }
+  }
+  return select;
+}
 
 double default_hourglass(const BodyRequest& body) {
   return is_paper_shape(body.source.shape.name) || body.neighbourhood.one_sided() ? 0 : 0.1;

@@ -10,6 +10,9 @@ namespace phyxel {
 
 constexpr std::size_t most_bodies = 10000;
 
+/// A selection of phyxels. @throws InputError unless the table has exactly one of its keys
+Selection read_selection(const SceneTable& table);
+
 /// One request, or one for each copy of an array.
 std::vector<BodyRequest> body_requests(const SceneTable& body);
 

@@ -1,4 +1,4 @@
-/// All sections and keys of a scene file: one entry each.
+/// All keys of a scene file: one entry each.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -91,76 +91,6 @@ std::vector<SceneKey> law_keys(const std::string& section) {
   return keys;
 }
 
-std::vector<SceneSection> make_sections() {
-  return {
-      {"", "At the top of the file", "", "Before the first section."},
-      {"time", "[time]", "", "How long to simulate, and in which steps."},
-      {"solver", "[solver]", "", "What computes, and in which precision."},
-      {"output", "[output]", "", "What is written, where and how often."},
-      {"render", "[render]", "", "Pictures made at the end of a run."},
-      {"body", "[[body]]", "",
-       "One such section for each body. Exactly one of `shape`, `mesh`, `file` and `cloud` says "
-       "where its rest shape comes from:\n\n"
-       "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
-       "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
-       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
-       "along x from the origin, with its axis on the x axis; the others are centred on the "
-       "origin, the cylinder along z.\n"
-       "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
-       "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
-       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`.\n"
-       "- `file` needs nothing else.\n"
-       "- `cloud` names what a program that links phyxel, or uses it from Python, passes along with "
-       "the scene: it needs nothing else either.\n\n"
-       "The shape is scaled, then rotated, then translated."},
-      {"body.material", "[body.material]", "", "What the body is made of. Required."},
-      {"body.inclusion", "[[body.inclusion]]", "selection",
-       "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
-       "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
-       "phyxels of a body with inclusions are numbered material by material."},
-      {"body.neighbours", "[body.neighbours]", "",
-       "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
-       "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
-      {"body.array", "[body.array]", "",
-       "Repeats the body on a grid, with everything it has: the copies of `name = \"dino\"` are "
-       "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
-       "Box and ball selections move along with each copy."},
-      {"body.fixed", "[[body.fixed]]", "selection",
-       "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
-       "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
-       "of its own in `reactions.csv`, which has one line for each frame and set, named by its body and "
-       "entry, e.g. `fixed 1`, `motion 2`: force [N] and torque [N m] of the support on the body, and the "
-       "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
-       "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
-       "both sets, along their axes."},
-      {"body.motion", "[[body.motion]]", "selection",
-       "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
-       "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
-       "to s = 1, and turned by rotation * smoothstep(t / duration). At least one of the four terms "
-       "is needed; `displacement` and `rotation` need `duration`, and `amplitude` and `frequency` "
-       "go together."},
-      {"body.load", "[[body.load]]", "selection",
-       "A force on phyxels: exactly one of `force` and `force_density`. In a box or a ball it acts on "
-       "the space there: its centroid, and with `force_density` its total, are those of the part of the "
-       "body's inside that lies in the region, if the body has a closed surface and one material, and as far as the "
-       "phyxels there are not in one plane; the plan of a run says where each load acts."},
-      {"body.traction", "[[body.traction]]", "selection",
-       "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
-       "body's surface lie in a `box` or a `ball`, or on `all` of it. The force keeps its size and "
-       "direction as the body deforms. Phyxels get their shares such that total, centroid and torque are "
-       "those on the triangles."},
-      {"selection", "Selections", "",
-       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]` and `[[body.traction]]` has "
-       "exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
-       "A box or ball that holds or moves a part of a body made from a `mesh` acts where it ends: phyxels "
-       "lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
-       "has one layer of phyxels, in its middle; a ball that small has none of its own. In other bodies, "
-       "and where a layer of the body beside the boundary is too thin for phyxels on both, the support ends with "
-       "the phyxels whose centres lie in it."},
-      {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
-  };
-}
-
 std::vector<SceneKey> top_keys() {
   return {
       {.name = "title", .type = KeyType::text, .otherwise = "none",
@@ -177,6 +107,8 @@ std::vector<SceneKey> top_keys() {
        .meaning = "Pictures."},
       {.name = "body", .type = KeyType::tables, .required = true,
        .meaning = "The bodies; at most 10000, copies included."},
+      {.name = "probe", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Places whose values are logged."},
   };
 }
 
@@ -446,6 +378,19 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "body.traction", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
 
+      {.section = "probe", .name = "name", .type = KeyType::text, .otherwise = "\"probe 1\", \"probe 2\", ...",
+       .meaning = "In `probes.csv`."},
+      {.section = "probe", .name = "body", .type = KeyType::text, .otherwise = "the only body",
+       .meaning = "The name of the body that it is in."},
+      {.section = "probe", .name = "point", .type = KeyType::vector, .unit = "m", .otherwise = "none",
+       .range = within(10 * longest), .meaning = "At rest; not farther from a phyxel of the body than half a support radius, about a spacing."},
+      {.section = "probe", .name = "from", .type = KeyType::vector, .unit = "m", .otherwise = "none",
+       .range = within(10 * longest), .meaning = "Start of a line of points, likewise."},
+      {.section = "probe", .name = "to", .type = KeyType::vector, .unit = "m", .otherwise = "none",
+       .range = within(10 * longest), .meaning = "Its end."},
+      {.section = "probe", .name = "points", .type = KeyType::integer, .fallback = "11",
+       .range = between(2, 1000), .meaning = "Number of points on the line, ends included."},
+
       {.section = "selection", .name = "region", .type = KeyType::text, .otherwise = "none",
        .meaning = "A named region of the body: \"x-\", \"x+\", \"y-\", \"y+\", \"z-\", \"z+\" are "
            "the outermost layers of a beam or block, \"z-\" and \"z+\" the ends of a "
@@ -470,11 +415,6 @@ std::vector<SceneKey> boundary_keys() {
 // clang-format on
 
 }  // namespace
-
-std::span<const SceneSection> scene_sections() {
-  static const std::vector<SceneSection> sections = make_sections();
-  return sections;
-}
 
 std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {

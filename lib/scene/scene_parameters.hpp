@@ -166,6 +166,19 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
   });
 }
 
+/// `visit(entry, probe, values)` for each probe of a body, as `visit_lists`.
+template <class Visit>
+void visit_probes(const BodyRequest& body, Visit&& visit) {
+  for (std::size_t k = 0; k < body.probes.size(); ++k) {
+    const ProbeRequest& probe = body.probes[k];
+    visit(k + 1, probe, [&](auto&& inner) {
+      inner("probe", "name", probe.name);
+      for (const Vec3d& point : probe.points) inner("probe", "point", point);
+      if (probe.select) visit_selection(*probe.select, inner);
+    });
+  }
+}
+
 template <class Visit>
 void visit_run(const Scene& scene, Visit&& visit) {
   visit("", "gravity", scene.gravity);
@@ -204,6 +217,9 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
           detail::visit_selection(select, inner);
           values(inner);
         });
+    detail::visit_probes(body, [&](std::size_t entry, const ProbeRequest& probe, auto&& values) {
+      values(of({&body, b + 1, "probe", entry, &probe.where}));
+    });
   }
 }
 

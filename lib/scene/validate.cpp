@@ -90,6 +90,15 @@ void validate(const Scene& scene) {
     detail::visit_lists(body, [&](std::size_t, const char*, const Selection& select, auto&&) {
       check_one_choice(body, select);
     });
+    for (const ProbeRequest& probe : body.probes) {
+      if (probe.select) check_one_choice(body, *probe.select);
+      if (probe.select.has_value() != probe.points.empty()) {
+        throw InputError(fmt::format(
+            "{}{}probe \"{}\" of body \"{}\" has {} points and {} selection; allowed: either",
+            probe.where, probe.where.empty() ? "" : ": ", probe.name, body.name,
+            probe.points.size(), probe.select ? "a" : "no"));
+      }
+    }
   }
 }
 

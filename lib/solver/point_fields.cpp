@@ -1,60 +1,19 @@
 #include "phyxel/point_fields.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
-#include <cmath>
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/history.hpp"
 #include "solver/first_error.hpp"
 #include "solver/part_law.hpp"
+#include "solver/tensors.hpp"
 
 namespace phyxel {
 namespace {
 
 /// Terms of the field "boundary", whose values are sums of them.
 constexpr int is_held = 1, is_moved = 2, is_loaded = 4;
-
-/// Cauchy stress σ = P Fᵀ / det F [Pa].
-Mat3d cauchy_stress(const Mat3d& piola, const Mat3d& grad_u) {
-  const Mat3d f = identity<double>() + grad_u;
-  return (1 / determinant(f)) * (piola * transpose(f));
-}
-
-/// Von Mises stress sqrt(3/2 s:s) [Pa], s the deviator of σ.
-double von_mises_stress(Mat3d sigma) {
-  const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
-  for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
-  double largest = 0;  // scales the entries, so that squares neither overflow nor vanish
-  for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
-  if (!(largest > 0) || !std::isfinite(largest)) return largest;
-  double squares = 0;
-  for (int e = 0; e < 9; ++e) {
-    const double share = sigma(e / 3, e % 3) / largest;
-    squares += share * share;
-  }
-  return largest * std::sqrt(1.5 * squares);
-}
-
-/// Principal values of a symmetric matrix, the largest first.
-std::array<double, 3> principal_values(const Mat3d& m) {
-  Eigen::Matrix3d matrix;
-  for (int e = 0; e < 9; ++e) matrix(e / 3, e % 3) = 0.5 * (m(e / 3, e % 3) + m(e % 3, e / 3));
-  const Eigen::Vector3d found =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
-  return {found[2], found[1], found[0]};
-}
-
-/// The components of a symmetric matrix in the order of fields.
-std::array<double, 6> components(const Mat3d& m) {
-  return {m(0, 0),
-          m(1, 1),
-          m(2, 2),
-          0.5 * (m(0, 1) + m(1, 0)),
-          0.5 * (m(1, 2) + m(2, 1)),
-          0.5 * (m(0, 2) + m(2, 0))};
-}
 
 std::vector<double> boundary_of(const Model& model) {
   std::vector<double> marks(static_cast<std::size_t>(model.size()), 0);

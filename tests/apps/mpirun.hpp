@@ -55,6 +55,13 @@ indices = [3, 40, 200, 201, 202, 203]
 amplitude = [0.0, 0.0, 0.01]
 frequency = 8
 axes = "z"
+[[probe]]
+body = "beam"
+from = [0.0, 0.0, 0.0]
+to = [0.8, 0.1, 0.1]
+[[probe]]
+body = "beam"
+region = "x+"
 )");
   }
   void use_ranks(int count) {

@@ -463,6 +463,31 @@ def test_reactions_carry_the_weight_and_come_back(tmp_path):
     assert simulation().reactions() == []
 
 
+def test_points_are_read(tmp_path):
+    s = simulation(body={"fixed": [{"region": "x-"}]}, gravity=[0, 0, -9.81],
+                   probe=[{"name": "tip", "point": [0.9, 0, 0]}, {"region": "x+"}],
+                   solver={"device": "cpu", "precision": "double", "method": "equilibrium"})
+    s.record(tmp_path / "out")
+    s.run()
+    x = s.rest[[3, 40, 77]]
+    found = s.at(x)
+    assert np.allclose(found["displacement"], s.displacement[[3, 40, 77]], rtol=0.05, atol=1e-5)
+    assert found["stress"].shape == found["strain"].shape == (3, 6)
+    assert found["von_mises"].shape == (3,)
+    assert np.array_equal(found["rest"], x)
+    probes = s.probes()
+    assert list(probes) == ["tip", "probe 2"]
+    assert np.array_equal(probes["tip"]["stress"], s.at([[0.9, 0, 0]])["stress"])
+    written = phyxel.Trajectory(tmp_path / "out").probes
+    assert list(written) == [("tip", 1), ("probe 2", 1)]
+    assert written["tip", 1]["displacement_z"][-1] == probes["tip"]["displacement"][0, 2]
+    with pytest.raises(phyxel.InputError, match="from the nearest phyxel"):
+        s.at([[9, 9, 9]])
+    with pytest.raises(phyxel.InputError, match="which the model lacks"):
+        s.at([[0.9, 0, 0]], body="cow")
+    assert simulation().probes() == {}
+
+
 def test_surfaces_follow():
     s = simulation(body={"velocity": [1, 0, 0]})
     s.step(50)

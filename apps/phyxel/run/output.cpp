@@ -60,9 +60,9 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
   moment->optional.insert(moment->optional.end(), wanted.begin(), wanted.end());
   frame.fields = find_fields(model(), *backend_, wanted, recovery_.get());
   hand_over(moment,
-            [this, diagnostics = good->diagnostics, reactions = reactions_](ChunkedSource& values) {
+            [this, diagnostics = good->diagnostics, readings = readings_](ChunkedSource& values) {
               const Phase writing("writing a frame");
-              recorder_->write(diagnostics, values, reactions);
+              recorder_->write(diagnostics, values, readings);
             });
 }
 

@@ -29,6 +29,7 @@ Run::Run(const RunOptions& options)
                                                           options_.transport);
                             })),
       recovery_(spent_.timed("backend", [&] { return recovery_for(scene_.output, model()); })),
+      probes_(alike([&] { return Probes(model()); })),
       plan_(alike([&] {
         return spent_.timed("time step", [&] {
           return plan_steps(scene_, model(), *backend_, options.overrides.unsafe_step);
@@ -100,7 +101,7 @@ void Run::execute() {
       begin_ ? begin_->info.watched
              : Watched{now_.total_energy(), now_.largest_speed, now_.kinetic_and_elastic_energy()};
   peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
-  reactions_ = find_reactions(model(), *backend_, solver_);
+  readings_ = read_off();
   if (finished) checkpoint_ = resumed_from_;
   if (!finished) step_to_end();
   draw_and_sum_up();
@@ -165,10 +166,7 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     if (frame) writer_.wait_for_room();
     const auto look_start = Clock::now();
     now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
-    if (frame) {
-      reactions_ =
-          spent_.timed("energies", [&] { return find_reactions(model(), *backend_, solver_); });
-    }
+    if (frame) readings_ = read_off();
     watch.check(now_, &control_);
     control_.see(solver_);
     show_progress(progress, now_);
@@ -195,6 +193,13 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     }
     stepping_since = Clock::now();
   }
+}
+
+Readings Run::read_off() {
+  return spent_.timed("energies", [&] {
+    return Readings{find_reactions(model(), *backend_, solver_),
+                    probes_.read(*backend_, recovery_.get())};
+  });
 }
 
 bool Run::summary_is_missing() const {

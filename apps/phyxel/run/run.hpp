@@ -130,6 +130,9 @@ class Run {
 
   void check_resumed() const;
 
+  /// Reactions and probes at the present state. Collective.
+  Readings read_off();
+
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const;
 
   /// True if a core is free for the writer. Threads that occupy all cores synchronise twice a step,
@@ -167,6 +170,8 @@ class Run {
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
   /// Prints the reactions at the end.
   void say_reactions() const;
+  /// Prints what probes read at the end.
+  void say_probes() const;
 
   const RunOptions& options_;
   StopSignal signals_{ranks().rank() == 0};  // first, to catch signals during set-up
@@ -183,6 +188,7 @@ class Run {
   SharedModel shared_;
   std::unique_ptr<Backend> backend_;
   std::unique_ptr<const Recovery> recovery_;  // of gradients for output; null if there is none
+  Probes probes_;
   StepPlan plan_;
   BoundarySize boundary_;  // of the whole model
   Solver solver_;
@@ -190,7 +196,7 @@ class Run {
   std::int64_t first_step_ = 0;
   int halvings_told_ = plan_.halvings;  // largest number of halvings printed so far
   Diagnostics start_diagnostics_, now_;
-  std::vector<Reaction> reactions_;        // of the start, or the last frame
+  Readings readings_;                      // of the start, or the last frame
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // transport between ranks
   std::vector<int> gpus_;                  // GPU of each rank

@@ -40,6 +40,9 @@ nlohmann::ordered_json json_of(const std::vector<Load>& loads) {
   return list;
 }
 
+/// Reactions, and readings of probes, that a summary prints.
+constexpr std::size_t most_printed = 8;
+
 nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Reaction& r : reactions) {
@@ -51,6 +54,21 @@ nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
              {"centre_m", json_of(r.centre)},
              {"work_j", nullptr}};
     if (std::isfinite(r.work)) entry["work_j"] = r.work;
+  }
+  return list;
+}
+
+nlohmann::ordered_json json_of(const std::vector<ProbeReading>& readings) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const ProbeReading& r : readings) {
+    list.push_back({{"probe", r.probe},
+                    {"point", r.number + 1},
+                    {"place_m", json_of(r.place)},
+                    {"displacement_m", json_of(r.displacement)},
+                    {"velocity_m_s", json_of(r.velocity)},
+                    {"stress_pa", r.stress},
+                    {"von_mises_pa", r.von_mises},
+                    {"strain", r.strain}});
   }
   return list;
 }
@@ -188,7 +206,8 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"internal_torque_balance", torque_balance(now)},
             {"inverted_phyxels", now.inverted},
             {"loads", json_of(model().loads)},
-            {"reactions", json_of(reactions_)},
+            {"reactions", json_of(readings_.reactions)},
+            {"probes", json_of(readings_.probes)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
@@ -196,11 +215,24 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
   return j;
 }
 
-void Run::say_reactions() const {
-  constexpr std::size_t most_printed = 8;
-  const std::size_t printed = std::min(reactions_.size(), most_printed);
+void Run::say_probes() const {
+  const std::size_t printed = std::min(readings_.probes.size(), most_printed);
   for (std::size_t k = 0; k < printed; ++k) {
-    const Reaction& r = reactions_[k];
+    const ProbeReading& r = readings_.probes[k];
+    fmt::print(
+        "  probe       {}{}: displacement ({:.4g}, {:.4g}, {:.4g}) m, von Mises stress {:.4g} Pa\n",
+        r.probe, r.number > 0 ? fmt::format(", point {}", r.number + 1) : "", r.displacement.x,
+        r.displacement.y, r.displacement.z, r.von_mises);
+  }
+  if (printed < readings_.probes.size()) {
+    fmt::print("              {} more: probes.csv\n", readings_.probes.size() - printed);
+  }
+}
+
+void Run::say_reactions() const {
+  const std::size_t printed = std::min(readings_.reactions.size(), most_printed);
+  for (std::size_t k = 0; k < printed; ++k) {
+    const Reaction& r = readings_.reactions[k];
     fmt::print(
         "  reaction    {}, {}: force ({:.4g}, {:.4g}, {:.4g}) N, torque ({:.4g}, {:.4g}, {:.4g}) N "
         "m "
@@ -209,8 +241,8 @@ void Run::say_reactions() const {
         r.centre.x, r.centre.y, r.centre.z,
         std::isnan(r.work) || r.work == 0 ? "" : fmt::format(", work {:.4g} J", r.work));
   }
-  if (printed < reactions_.size()) {
-    fmt::print("              {} more sets: reactions.csv\n", reactions_.size() - printed);
+  if (printed < readings_.reactions.size()) {
+    fmt::print("              {} more sets: reactions.csv\n", readings_.reactions.size() - printed);
   }
 }
 
@@ -262,6 +294,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
   fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
              force_balance(now), torque_balance(now));
   say_reactions();
+  say_probes();
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

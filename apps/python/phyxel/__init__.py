@@ -130,7 +130,7 @@ class _Family:
 
 class Trajectory:
     """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
-    energy.csv, and `reactions`, those of reactions.csv.
+    energy.csv, `reactions`, those of reactions.csv, and `probes`, those of probes.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -161,7 +161,17 @@ class Trajectory:
     def reactions(self):
         """{(body, set): {column: values}}, one for each frame; forces [N], torques [N m], work [J].
         Sets are entries of fixed and motion, e.g. ("beam", "fixed 1"). Empty without any."""
-        file = self.directory / "reactions.csv"
+        return self._log("reactions.csv", str)
+
+    @property
+    def probes(self):
+        """{(probe, point): {column: values}}, one for each frame; points are counted from 1. Empty
+        without any."""
+        return self._log("probes.csv", int)
+
+    def _log(self, name, second):
+        """The rows of a log by their third and fourth cells, of which the latter is a `second`."""
+        file = self.directory / name
         if not file.exists():
             return {}
         with open(file, newline="") as text:
@@ -169,7 +179,7 @@ class Trajectory:
         names = [name.split(" [")[0] for name in header]
         sets = {}
         for row in rows:
-            sets.setdefault((row[2], row[3]), []).append(
+            sets.setdefault((row[2], second(row[3])), []).append(
                 [float(cell or "nan") for cell in row[:2] + row[4:]])
         columns = names[:2] + names[4:]
         return {key: dict(zip(columns, numpy.array(table).T)) for key, table in sets.items()}

@@ -12,6 +12,7 @@
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/share.hpp"
+#include "phyxel/space_region.hpp"
 
 namespace phyxel {
 
@@ -116,6 +117,15 @@ struct Load {
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
 
+/// A place in a body whose values are logged: points at rest, or the phyxels of a region.
+struct Probe {
+  std::string name;
+  std::string body;            ///< Name of the body.
+  std::vector<Vec3d> points;   ///< At rest [m]; none: the phyxels are meant.
+  std::vector<Index> phyxels;  ///< In a share, those that are here.
+  std::string where = {};      ///< "scene.toml:30:1", for errors.
+};
+
 /// Surfels and the phyxels that carry each.
 struct Surfels {
   std::vector<Vec3d> position;  ///< At rest [m], shape [n_surfels, 3].
@@ -144,7 +154,9 @@ struct Model {
   Surfels surfels;
   std::vector<Motion> motions;  ///< Fixed and prescribed phyxels.
   std::vector<Load> loads;
-  Vec3d gravity;  ///< [m/s^2]
+  std::vector<Probe> probes;
+  std::vector<Walls> walls;  ///< Of each body.
+  Vec3d gravity;             ///< [m/s^2]
   Degenerate degenerate;
   std::vector<std::string> warnings;   ///< For the summary.
   std::shared_ptr<const Share> share;  ///< Null: this is the whole model.

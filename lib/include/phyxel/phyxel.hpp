@@ -17,6 +17,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/point_fields.hpp"
+#include "phyxel/probes.hpp"
 #include "phyxel/progress.hpp"
 #include "phyxel/ranks.hpp"
 #include "phyxel/reactions.hpp"

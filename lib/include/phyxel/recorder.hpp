@@ -6,24 +6,32 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/point_fields.hpp"
+#include "phyxel/probes.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/state.hpp"
 
 namespace phyxel {
+
+/// What is read off at each frame.
+struct Readings {
+  std::vector<Reaction> reactions;   ///< Of supports (`find_reactions`), or none.
+  std::vector<ProbeReading> probes;  ///< Of the scene's probes (`Probes::read`), or none.
+};
 
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
 struct Frame {
   const State* state = nullptr;
   const SurfelState* surfels = nullptr;  ///< Surfels; null without a surface family.
   Diagnostics diagnostics;
-  std::vector<Reaction> reactions;  ///< Reactions of supports (`find_reactions`), or none.
-  FieldValues fields;               ///< Computed fields (`find_fields`); others are not written.
+  Readings readings;
+  FieldValues fields;  ///< Computed fields (`find_fields`); others are not written.
 };
 
 /// This rank's values of a quantity, in the order of its model; empty if the frame lacks it.
@@ -72,6 +80,28 @@ class SeriesFile {
   bool empty_ = true;
 };
 
+/// A log with some lines for each frame, as CSV.
+class FrameLog {
+ public:
+  /// @param header first line, with its end
+  FrameLog(std::filesystem::path file, std::string header)
+      : file_(std::move(file)), header_(std::move(header)) {}
+  /// Reads the lines of steps up to `last_step`, below the header. A folder without the file, of an
+  /// earlier version of the program, has none. @throws InputError if it has another header
+  std::string kept(double last_step) const;
+  /// Writes the file anew. @param lines below the header
+  void create(const std::string& lines = {});
+  /// Adds lines at the end. @throws OutputError
+  void append(const std::string& lines);
+  /// Path of the file.
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+  std::string header_;
+  std::size_t size_ = 0;  // of the file [bytes]
+};
+
 /// The point at which a trajectory is continued, from a checkpoint.
 struct Continuation {
   std::int64_t frames = 0;  ///< Number of frames written before.
@@ -93,6 +123,7 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   phyxels.hdf.series surface_000000.hdf ...  VTKHDF UnstructuredGrid 1.0, triangles;
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
 ///   reactions.csv                              of a scene with supports: one line a frame and set
+///   probes.csv                                 of a scene with probes: one line a frame and point
 ///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
@@ -114,8 +145,7 @@ class Recorder {
   ///   writing fails: earlier frames stay intact
   void write(const Frame& frame);
   /// Writes a frame whose values come from a source, chunk by chunk. @throws OutputError likewise
-  void write(const Diagnostics& diagnostics, ChunkedSource& values,
-             const std::vector<Reaction>& reactions = {});
+  void write(const Diagnostics& diagnostics, ChunkedSource& values, const Readings& readings = {});
 
   /// Flushes all frames to the disk, so that a checkpoint that counts them finds them after a power
   /// cut.
@@ -141,12 +171,12 @@ class Recorder {
   const Model& model_;
   const Scene& scene_;
   std::filesystem::path directory_;
-  bool writes_phyxels_, writes_surface_, writes_reactions_;
+  bool writes_phyxels_, writes_surface_;
   std::int64_t frames_ = 0;
   SeriesFile phyxels_, surface_;
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
-  std::size_t reactions_size_ = 0;               // size of reactions.csv [bytes]
+  std::optional<FrameLog> reactions_, probes_;   // set if the model has supports, and probes
 };
 
 /// The content of a frame.

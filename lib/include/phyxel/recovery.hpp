@@ -11,10 +11,10 @@ namespace phyxel {
 /// A recovery of gradients. The linear fit of a phyxel's neighbourhood is of second order inside,
 /// where neighbours lie on all sides, but of first order on the surface: a quadratic term ½ xᵀ H x
 /// of the displacement leaves A⁻¹ Σ w x ½ xᵀ H x there. Recovery subtracts it, with H from the
-/// linear fit of the neighbours' gradients, in four sweeps. Each sweep leaves about half of the error,
-/// so that the last change once more (Aitken's extrapolation) is most of what is left. For quadratic
-/// displacements the limit is exact. Neighbours of another part do not count,
-/// so that gradients may jump where the material does.
+/// linear fit of the neighbours' gradients, in four sweeps. Each sweep leaves about half of the
+/// error, so that the last change once more (Aitken's extrapolation) is most of what is left. For
+/// quadratic displacements the limit is exact. Neighbours of another part do not count, so that
+/// gradients may jump where the material does.
 ///
 /// Forces and energies do not change. Costs neighbour lists of its own where a device has those of
 /// the model.

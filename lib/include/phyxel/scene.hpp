@@ -113,6 +113,15 @@ struct TractionRequest {
   double ramp = 0;      ///< [s]
 };
 
+/// A place whose values a run logs at each frame: points of a body at rest, or phyxels of it over
+/// which values are averaged.
+struct ProbeRequest {
+  std::string name;
+  std::vector<Vec3d> points;        ///< At rest [m]; of a line, from its start to its end.
+  std::optional<Selection> select;  ///< Set if there are no points.
+  std::string where;                ///< "scene.toml:30:1", for errors.
+};
+
 /// The source of a body's rest shape. Exactly one of `shape.name`, `mesh`, `file` and `cloud` is
 /// set.
 struct BodySource {
@@ -156,6 +165,7 @@ struct BodyRequest {
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;
   std::vector<TractionRequest> tractions;
+  std::vector<ProbeRequest> probes;
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <vector>
 
 #include "phyxel/types.hpp"
 
@@ -33,6 +35,18 @@ struct SpaceRegion {
   SpaceRegion scaled(double factor) const;
 
   bool operator==(const SpaceRegion&) const = default;
+};
+
+/// The boundaries at which supports part the phyxels of a body: regions inside which all phyxels
+/// are held or moved along all axes.
+struct Walls {
+  std::vector<SpaceRegion> regions;
+  double depth = 0;    ///< `SupportCuts::depth` [m].
+  double spacing = 0;  ///< `SupportCuts::spacing` [m].
+
+  /// The index of the region that a point is in; their number if it is in none. Phyxels on the
+  /// boundary of a region are in none.
+  std::size_t room_of(Vec3d point) const;
 };
 
 }  // namespace phyxel

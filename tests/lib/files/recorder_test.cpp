@@ -208,7 +208,7 @@ TEST_F(Recording, ReactionsHaveOneLineAFrameAndSetAndAreCutBackToTheCheckpoint) 
     const test::TwoBodiesFrame data(model_, k);
     frame.state = &data.state;
     frame.surfels = &data.surfels;
-    frame.reactions = {{.body = "a, \"b\"", .set = "fixed 1", .force = {0.1 * k, 2, 3}},
+    frame.readings.reactions = {{.body = "a, \"b\"", .set = "fixed 1", .force = {0.1 * k, 2, 3}},
                        {.body = "c",
                         .set = "motion 1",
                         .torque = {1, 2, 3},

@@ -9,6 +9,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/probes.hpp"
 #include "phyxel/solver.hpp"
 #include "scene/scene_error.hpp"
 #include "support/clouds.hpp"
@@ -30,6 +31,7 @@ class EveryRefusal : public SceneFiles {
       const Scene scene = read_scene(file);
       const Model model = build_model(scene);
       const auto backend = make_cpu_backend(model, scene.solver.precision, 1);
+      const Probes probes(model);
       const StepPlan plan = plan_steps(scene, model, *backend);
       const State start = initial_state(model, scene, plan.dt);
       if (scene.solver.method != Method::equilibrium) return "accepted";
@@ -141,6 +143,24 @@ std::vector<Late> refused_loads() {
        {"time.step = 0.0001 s", "body.traction.ramp = 1e-05 s"}}};
 }
 
+/// Probes that are nowhere, or of nothing.
+std::vector<Late> refused_probes() {
+  const std::string one = "[[probe]]\n";
+  return {{with_bar(one), {":13:", "exactly one of: point, from, region, indices, box, ball, all"}},
+          {with_bar(one + "point = [0, 0, 0]\nall = true\n"), {"exactly one of"}},
+          {with_bar(one + "from = [0, 0, 0]\n"), {"from", "to"}},
+          {with_bar(one + "point = [0, 0, 0]\npoints = 4\n"), {":15:", "points", "from and to"}},
+          {with_bar(one + "from = [0, 0, 0]\nto = [0.1, 0, 0]\npoints = 1\n"), {":16:", "points"}},
+          {with_bar(one + "point = [0, 0, 0]\nbody = 'cow'\n"), {":15:", "\"cow\"", "\"beam\""}},
+          {with_bar(one + "point = [0, 0, 0]\n[[probe]]\nname = 'probe 1'\nall = true\n"),
+           {":16:", "\"probe 1\"", "a name of its own"}},
+          {with_bar(one + "point = [0, 0, 0.3]\n"),
+           {":13:1: ", "probe \"probe 1\"", "[0, 0, 0.3]", "nearest phyxel of body \"beam\"",
+            "at most"}},
+          {with_bar(one + "region = 'left'\n"), {":14:", "no region \"left\""}},
+          {with_bar(one + "box = [[7, 7, 7], [8, 8, 8]]\n"), {":14:", "selects no phyxel"}}};
+}
+
 /// What only shows when the model is built or its steps are planned.
 std::vector<Late> late_refusals() {
   const std::string implicit = "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
@@ -223,7 +243,7 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   bare.volume.clear();
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
-  for (const std::vector<Late>& refusals : {late_refusals(), refused_loads()}) {
+  for (const std::vector<Late>& refusals : {late_refusals(), refused_loads(), refused_probes()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);

@@ -36,6 +36,7 @@ frames_per_second = 10 # output.frames_per_second => frames_per_second = 20
 phyxels = true # output.phyxels => phyxels = false
 surface = true # output.surface => surface = false
 fields = ['displacement'] # output.fields => fields = ['displacement', 'mass']
+recovery = true # output.recovery => recovery = false
 checkpoint_every = 10 # output.checkpoint_every => checkpoint_every = 20
 [render]
 pictures = true # render.pictures => pictures = false
@@ -208,6 +209,15 @@ yield_stress = 1e3 # body.inclusion.yield_stress => yield_stress = 2e3
 hardening = 1e2 # body.inclusion.hardening => hardening = 2e2
 saturation_stress = 4e3 # body.inclusion.saturation_stress => saturation_stress = 5e3
 saturation_rate = 3 # body.inclusion.saturation_rate => saturation_rate = 4
+[[probe]]
+name = 'tip' # probe.name => name = 'top'
+body = 'third' # probe.body => body = 'fourth'
+point = [0, 0, 0] # probe.point => point = [0, 0, 1]
+[[probe]]
+body = 'third'
+from = [0, 0, 0] # probe.from => from = [0, 0, 1]
+to = [0, 1, 0] # probe.to => to = [0, 2, 0]
+points = 3 # probe.points => points = 4
 )";
 
 /// The text with the value of one key changed, or of none.
@@ -244,7 +254,11 @@ TEST_F(Parameters, EveryKeyIsComparedByNameOrFreeForAReason) {
       {"body.array.count", "bodies: 8 then, 9 now"},
       {"body.array.spacing",
        "body.translation of body 3 (\"second 2\"): [5, 0, 0] then, "
-       "[6, 0, 0] now"}};
+       "[6, 0, 0] now"},
+      {"probe.body", "probe.point of body 5 (\"fourth\"), probe 1: nothing then"},
+      {"probe.from", "[0, 1, 0] then, [0, 0, 1], "},
+      {"probe.to", "[0, 1, 0] then, [0, 0, 0], [0, 1, 0], [0, 2, 0] now"},
+      {"probe.points", "[0, 1, 0] then, [0, 0, 0], [0, 0.3333333333333333, 0], "}};
   const std::vector<Parameter> base = of(with_other(""));
   EXPECT_EQ(parameter_differences(base, base), "");
   int compared = 0, free = 0;

@@ -1,0 +1,144 @@
+/// Bodies from meshes on several ranks under mpirun: supports, loads and probes in space, and the
+/// sampler's warnings.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "mpirun.hpp"
+#include "support/mesh_content.hpp"
+
+namespace phyxel {
+namespace {
+
+using test::Outcome;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// The lines of a plan that tell the loads.
+std::vector<std::string> loads_said(const std::string& plan) {
+  std::vector<std::string> lines;
+  std::istringstream in(plan);
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("  load ")) lines.push_back(line);
+  }
+  return lines;
+}
+
+/// A cube made from a mesh, of two materials, is held in a box and moved in a ball that end inside
+/// it, loaded in a ball and pressed upon. A second one, of one material, hangs by its own box.
+TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
+  write("cube.stl", test::binary_stl(test::unit_cube()));
+  write("cube.toml", R"([time]
+end = 0.05
+[solver]
+threads = 1
+device = "cpu"
+[output]
+frames_per_second = 40
+fields = ["displacement", "stress", "strain", "principal_stress", "boundary"]
+[[body]]
+name = "two"
+mesh = "cube.stl"
+phyxels = 1500
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+[[body.inclusion]]
+box = [[0.4, 0, 0], [0.7, 1, 1]]
+young = 8e4
+[[body.fixed]]
+box = [[-1, -1, -1], [0.33, 2, 2]]
+[[body.motion]]
+ball = { centre = [1, 0.5, 0.5], radius = 0.31 }
+displacement = [0.02, 0, 0]
+rotation = [20, 0, 0]
+about = [1, 0.5, 0.5]
+duration = 0.05
+[[body.load]]
+ball = { centre = [0.6, 1, 1], radius = 0.25 }
+force = [0, 30, 10]
+[[body.traction]]
+box = [[0.5, 0.2, 0.9], [0.8, 0.9, 1.1]]
+pressure = 200
+ramp = 0.02
+[[body]]
+name = "one"
+mesh = "cube.stl"
+phyxels = 700
+translation = [2, 0, 0]
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+viscosity = 1e-3
+[[body.fixed]]
+box = [[0, 0, 0.7], [9, 9, 9]]
+[[body.load]]
+box = [[0, 0, -1], [2.7, 9, 0.4]]
+force_density = [0, 0, -5000]
+[[body.traction]]
+all = true
+normal = [1, 0, 0]
+traction = [0, 100, 0]
+[[probe]]
+body = "two"
+from = [0.2, 0.5, 0.5]
+to = [1, 0.5, 0.5]
+points = 9
+[[probe]]
+body = "one"
+point = [2.5, 0.5, 0]
+[[probe]]
+body = "one"
+ball = { centre = [2.5, 0.5, 0.5], radius = 0.3 }
+)");
+  const Outcome alone = run_on(0, {"run", "cube.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));
+  for (const int ranks : {2, 3}) {
+    const std::string name = std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "cube.toml", "--out", name});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", name);
+    EXPECT_EQ(loads_said(alone.out), loads_said(outcome.out));
+  }
+  // The load by volume acts on 0.7 x 1 x 0.4 m³, the pressure on 0.3 x 0.7 m².
+  EXPECT_THAT(loads_said(alone.out),
+              ElementsAre(HasSubstr("two, load 1: [0, 30, 10] N"),
+                          HasSubstr("one, load 1: [0, 0, -1400] N about [2.35, 0.5, 0.2] m"),
+                          HasSubstr("two, traction 1"), HasSubstr("one, traction 1")));
+}
+
+/// The sampler warns of a vertex that no triangle uses; all ranks sample, and one prints the
+/// warning.
+TEST_F(Mpirun, WarningsOfMeshesAreShownOnce) {
+  write("t.obj",
+        "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 2 4 3\nf 2 3 5\nf 3 4 5\nf 2 5 4\n");
+  write("t.toml", R"([time]
+end = 0.01
+[solver]
+device = "cpu"
+[[body]]
+mesh = "t.obj"
+phyxels = 200
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)");
+  launcher_.clear();
+  const std::string warning = "vertices that no triangle uses";
+  ASSERT_THAT(run({"run", "t.toml", "--dry-run"}).out, HasSubstr(warning));
+  use_ranks(2);
+  const Outcome outcome = run({"run", "t.toml", "--dry-run"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::size_t at = outcome.out.find(warning);
+  ASSERT_NE(at, std::string::npos) << outcome.out;
+  EXPECT_EQ(outcome.out.find(warning, at + 1), std::string::npos) << outcome.out;
+}
+
+}  // namespace
+}  // namespace phyxel
