@@ -209,10 +209,10 @@ TEST_F(Recording, ReactionsHaveOneLineAFrameAndSetAndAreCutBackToTheCheckpoint) 
     frame.state = &data.state;
     frame.surfels = &data.surfels;
     frame.readings.reactions = {{.body = "a, \"b\"", .set = "fixed 1", .force = {0.1 * k, 2, 3}},
-                       {.body = "c",
-                        .set = "motion 1",
-                        .torque = {1, 2, 3},
-                        .work = std::numeric_limits<double>::quiet_NaN()}};
+                                {.body = "c",
+                                 .set = "motion 1",
+                                 .torque = {1, 2, 3},
+                                 .work = std::numeric_limits<double>::quiet_NaN()}};
     recorder.write(frame);
   };
   {
