@@ -471,7 +471,8 @@ def test_points_are_read(tmp_path):
     s.run()
     x = s.rest[[3, 40, 77]]
     found = s.at(x)
-    assert np.allclose(found["displacement"], s.displacement[[3, 40, 77]], rtol=0.05, atol=1e-5)
+    largest = abs(s.displacement).max()  # five phyxels across bend: a fit smooths that
+    assert np.allclose(found["displacement"], s.displacement[[3, 40, 77]], rtol=0, atol=0.01 * largest)
     assert found["stress"].shape == found["strain"].shape == (3, 6)
     assert found["von_mises"].shape == (3,)
     assert np.array_equal(found["rest"], x)

@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 
 #include "files/atomic_file.hpp"
 #include "files/hdf5_file.hpp"
 #include "files/sealed_file.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/physics/strain.hpp"
+#include "phyxel/point_fields.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -23,11 +24,11 @@ constexpr double most_relaxed = 3e8;                         // phyxels times sw
 constexpr std::size_t largest_scene = std::size_t{2} << 20;  // [bytes], as for scene files
 
 /// Equivalent strain sqrt(2/3 E':E'), where E' is the deviator of Green's strain.
-double equivalent_strain(const Mat3d& gradient) {
-  const Sym3d e = green_strain(gradient);
-  const double mean = (e.xx + e.yy + e.zz) / 3;
-  const double x = e.xx - mean, y = e.yy - mean, z = e.zz - mean;
-  return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e.xy * e.xy + e.xz * e.xz + e.yz * e.yz)) / 3);
+/// @param e xx, yy, zz, xy, yz, xz
+double equivalent_strain(std::span<const double, 6> e) {
+  const double mean = (e[0] + e[1] + e[2]) / 3;
+  const double x = e[0] - mean, y = e[1] - mean, z = e[2] - mean;
+  return std::sqrt(2 * (x * x + y * y + z * z + 2 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5])) / 3);
 }
 
 /// Approximate number of phyxels of a source; 0 if it is not known in advance.
@@ -120,6 +121,7 @@ Rebuilt::Rebuilt(Scene scene, std::size_t phyxels)
     throw InputError(fmt::format("it has {} phyxels now, the frames {}", model_.size(), phyxels));
   }
   backend_ = make_cpu_backend(model_, scene_.solver.precision, scene_.solver.threads);
+  if (scene_.output.recovery) recovery_.emplace(model_);
 }
 
 void Rebuilt::add_fields(const FrameData& frame, std::vector<Field>& fields) {
@@ -139,17 +141,20 @@ void Rebuilt::add_fields(const FrameData& frame, std::vector<Field>& fields) {
     }
   }
   backend_->upload(state);
-  std::vector<Mat3d> gradients;
-  backend_->displacement_gradients(gradients);
+  const Quantity wanted[] = {Quantity::strain, Quantity::von_mises, Quantity::volume_ratio};
+  FieldValues found = find_fields(model_, *backend_, wanted, recovery_ ? &*recovery_ : nullptr);
   Field strain{"strain (equivalent)", "", {}};
-  for (const Mat3d& gradient : gradients) strain.values.push_back(equivalent_strain(gradient));
-  std::vector<double> von_mises, volume_ratio;
-  stress_fields(model_, *backend_, &von_mises, &volume_ratio);
+  const std::vector<double>& green = found[Quantity::strain];
+  for (std::size_t i = 0; i < frame.point.size(); ++i) {
+    strain.values.push_back(equivalent_strain(std::span(green).subspan(6 * i).first<6>()));
+  }
   fields.push_back(std::move(strain));
   if (!has("stress (von Mises)")) {
-    fields.push_back({"stress (von Mises)", "Pa", std::move(von_mises)});
+    fields.push_back({"stress (von Mises)", "Pa", std::move(found[Quantity::von_mises])});
   }
-  if (!has("volume ratio")) fields.push_back({"volume ratio", "", std::move(volume_ratio)});
+  if (!has("volume ratio")) {
+    fields.push_back({"volume ratio", "", std::move(found[Quantity::volume_ratio])});
+  }
 }
 
 }  // namespace phyxel::app

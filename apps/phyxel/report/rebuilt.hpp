@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
+#include "phyxel/recovery.hpp"
 #include "phyxel/scene.hpp"
 
 namespace phyxel::app {
@@ -42,6 +44,7 @@ class Rebuilt {
   Scene scene_;
   Model model_;
   std::unique_ptr<Backend> backend_;
+  std::optional<Recovery> recovery_;
 };
 
 }  // namespace phyxel::app
