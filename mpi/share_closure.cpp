@@ -95,8 +95,8 @@ void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel
         naming(request, [&] {
           const double longest = longest_edge(whole.bodies[b].reach, surface.position,
                                               surface.triangle, 0, whole.bodies[b].size);
-          loaded = loaded_facets(request, request.tractions[t], surface.position, surface.triangle,
-                                 0, longest);
+          loaded = loaded_facets(request, request.tractions[t],
+                                 {surface.position, surface.triangle, 0, surface.groups}, longest);
         });
       });
       const NearFacets here = facets_near(setup, whole, local, b, loaded.facets);

@@ -56,6 +56,15 @@ Surface read_surface(const Hdf5Reader& in) {
   for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
     surface.triangle[t] = {corners[3 * t], corners[3 * t + 1], corners[3 * t + 2]};
   }
+  if (in.has("/surface/groups")) {
+    for (const std::string& name : in.names("/surface/groups")) {
+      const std::string path = "/surface/groups/" + name;
+      std::vector<Index> triangles = in.array<Index>(path);
+      check_range(in, path, triangles, surface.triangle.size());
+      sort_unique(triangles);
+      surface.groups[name] = std::move(triangles);
+    }
+  }
   return surface;
 }
 
@@ -79,6 +88,9 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
     out.vectors("/surface/normal", surface.normal, false);
     const Index* corners = surface.triangle.empty() ? nullptr : surface.triangle.front().data();
     out.array<Index>("/surface/triangle", std::span(corners, 3 * surface.triangle.size()), 3);
+    for (const auto& [name, triangles] : surface.groups) {
+      out.array<Index>("/surface/groups/" + name, triangles);
+    }
   }
   for (const auto& [name, phyxels] : cloud.regions) out.array<Index>("/regions/" + name, phyxels);
   write_sealed(file, kind, out.content(), Durable::yes);

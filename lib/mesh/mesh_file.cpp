@@ -9,6 +9,7 @@
 #include "mesh/mesh_formats.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "sort_unique.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -48,6 +49,47 @@ MeshFormat format_of(const std::filesystem::path& file) {
 }
 
 }  // namespace
+
+void FaceGroups::add(std::string_view name, Index face) {
+  if (name.empty()) return;
+  auto at = faces_.find(name);
+  if (at == faces_.end()) {
+    if (faces_.size() > most_groups) return;
+    at = faces_.try_emplace(std::string(name)).first;
+  }
+  if (at->second.empty() || at->second.back() != face) at->second.push_back(face);
+}
+
+std::map<std::string, std::vector<Index>> FaceGroups::of_triangles(
+    std::span<const std::size_t> first_triangle) const {
+  std::map<std::string, std::vector<Index>> groups;
+  if (faces_.size() > most_groups) return groups;
+  for (const auto& [name, faces] : faces_) {
+    std::string safe = name;
+    std::replace(safe.begin(), safe.end(), '/', '_');
+    if (safe.find_first_not_of('.') == std::string::npos) safe = "_" + safe;
+    std::vector<Index>& triangles = groups[safe];
+    for (const Index face : faces) {
+      for (std::size_t t = first_triangle[face]; t < first_triangle[face + 1]; ++t) {
+        triangles.push_back(static_cast<Index>(t));
+      }
+    }
+    sort_unique(triangles);  // names that differ in a "/" only are one
+    if (triangles.empty()) groups.erase(safe);
+  }
+  return groups;
+}
+
+void append_polygons(std::span<const Index> corner, std::span<const std::size_t> face_start,
+                     const FaceGroups& groups, Surface& surface) {
+  std::vector<std::size_t> first_triangle{0};
+  for (std::size_t f = 0; f + 1 < face_start.size(); ++f) {
+    append_polygon(corner.subspan(face_start[f], face_start[f + 1] - face_start[f]),
+                   surface.position, surface.triangle);
+    first_triangle.push_back(surface.triangle.size());
+  }
+  surface.groups = groups.of_triangles(first_triangle);
+}
 
 Surface parse_mesh(std::string_view content, MeshFormat format, const std::string& name) {
   if (content.empty()) throw InputError(fmt::format("{}: the file is empty", name));

@@ -28,6 +28,7 @@ constexpr std::string_view keywords[] = {
 struct CheckedText {
   std::string text;
   std::vector<Vec3d> position;
+  FaceGroups groups;  ///< Of `g`, `o` and `usemtl`.
 };
 
 class LineCheck {
@@ -77,8 +78,18 @@ class LineCheck {
     if (keyword.empty() || keyword.front() == '#') return;
     if (keyword == "v") return check_vertex(words);
     if (keyword == "f") return check_face(words);
+    if (keyword == "g") return read_names(words, groups_);
+    if (keyword == "o") return read_names(words, object_);
+    if (keyword == "usemtl") return read_names(words, material_);
     if (std::ranges::find(keywords, keyword) == std::end(keywords)) {
       fail(fmt::format("\"{}\" is not a keyword of the OBJ format", printable(keyword)));
+    }
+  }
+
+  static void read_names(TextCursor& words, std::vector<std::string>& names) {
+    names.clear();
+    for (std::string_view word = words.word(); !word.empty(); word = words.word()) {
+      names.emplace_back(word);
     }
   }
 
@@ -128,11 +139,17 @@ class LineCheck {
       fail(fmt::format("a face with {} corners; at most {} are allowed", corners, largest_polygon));
     }
     checked_.text += '\n';
+    for (const auto* names : {&groups_, &object_, &material_}) {
+      for (const std::string& name : *names) checked_.groups.add(name, faces_);
+    }
+    ++faces_;
   }
 
   std::string_view content_;
   const std::string& name_;
   std::size_t line_ = 1, greatest_ = 0, greatest_line_ = 0;
+  Index faces_ = 0;
+  std::vector<std::string> groups_, object_, material_;  // names that the next face has
   CheckedText checked_;
 };
 
@@ -160,11 +177,7 @@ Surface parse_obj(std::string_view content, const std::string& name) {
 
   Surface surface;
   surface.position = std::move(checked.position);
-  for (std::size_t f = 0; f + 1 < polygons.face_start.size(); ++f) {
-    const std::size_t first = polygons.face_start[f];
-    append_polygon({polygons.corner.data() + first, polygons.face_start[f + 1] - first},
-                   surface.position, surface.triangle);
-  }
+  append_polygons(polygons.corner, polygons.face_start, checked.groups, surface);
   return surface;
 }
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -79,10 +80,7 @@ class PlyReader {
     }
     check_end();
     // Faces may come before the vertices, so polygons are triangulated at the end.
-    for (std::size_t f = 0; f + 1 < face_start_.size(); ++f) {
-      append_polygon({corner_.data() + face_start_[f], face_start_[f + 1] - face_start_[f]},
-                     surface_.position, surface_.triangle);
-    }
+    append_polygons(corner_, face_start_, colours_, surface_);
     return std::move(surface_);
   }
 
@@ -294,7 +292,12 @@ class PlyReader {
     }
     if (!corners) fail("the faces have no list \"vertex_indices\"");
     for (std::size_t e = 0; e < element.count; ++e) {
+      std::array<int, 3> colour{-1, -1, -1};
       for (const Property& property : element.properties) {
+        if (const int channel = channel_of(property); channel >= 0) {
+          colour[static_cast<std::size_t>(channel)] = static_cast<int>(scalar(property.value));
+          continue;
+        }
         if (&property != corners) {
           skip(property);
           continue;
@@ -315,7 +318,18 @@ class PlyReader {
         }
         face_start_.push_back(corner_.size());
       }
+      if (*std::min_element(colour.begin(), colour.end()) < 0) continue;
+      colours_.add(fmt::format("#{:02x}{:02x}{:02x}", colour[0], colour[1], colour[2]),
+                   static_cast<Index>(e));
     }
+  }
+
+  /// The channel of a face's colour that a property is, 0 to 2; -1 if it is none.
+  static int channel_of(const Property& property) {
+    if (property.is_list || property.value != Kind::uint8) return -1;
+    constexpr std::string_view channels[] = {"red", "green", "blue"};
+    const auto* const found = std::find(std::begin(channels), std::end(channels), property.name);
+    return found == std::end(channels) ? -1 : static_cast<int>(found - std::begin(channels));
   }
 
   enum class Encoding { none, ascii, little, big };
@@ -331,6 +345,7 @@ class PlyReader {
   Surface surface_;
   std::vector<Index> corner_;
   std::vector<std::size_t> face_start_{0};
+  FaceGroups colours_;  ///< "#rrggbb"
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <unordered_map>
 
 #include "mesh/mesh_formats.hpp"
@@ -59,11 +60,19 @@ std::uint32_t little_endian(const char* bytes) {
   return value;
 }
 
+/// Groups of triangles, each of which is a face of its own.
+std::map<std::string, std::vector<Index>> one_by_one(const FaceGroups& groups, std::size_t faces) {
+  std::vector<std::size_t> first(faces + 1);
+  std::iota(first.begin(), first.end(), std::size_t{0});
+  return groups.of_triangles(first);
+}
+
 Surface parse_binary(std::string_view content, const std::string& name) {
   const std::size_t facets = (content.size() - header_bytes) / facet_bytes;
   Surface surface;
   surface.triangle.reserve(facets);
   CornerMerger merger(surface.position);
+  FaceGroups groups;
   for (std::size_t f = 0; f < facets; ++f) {
     const std::size_t at = header_bytes + f * facet_bytes;
     Triangle triangle;
@@ -81,7 +90,13 @@ Surface parse_binary(std::string_view content, const std::string& name) {
       triangle[corner] = merger.vertex(p);
     }
     surface.triangle.push_back(triangle);
+    // Programs that colour triangles put a colour there, each in a way of its own.
+    const auto* attribute =
+        reinterpret_cast<const unsigned char*>(content.data()) + at + facet_bytes - 2;
+    const int value = attribute[0] | attribute[1] << 8;
+    if (value != 0) groups.add(fmt::format("attribute {}", value), static_cast<Index>(f));
   }
+  surface.groups = one_by_one(groups, facets);
   return surface;
 }
 
@@ -92,14 +107,14 @@ class AsciiStl {
   Surface read() {
     CornerMerger merger(surface_.position);
     expect("solid");
-    words_.rest_of_line();
+    solid_ = named(words_.rest_of_line());
     bool open = true;  // between "solid" and "endsolid"
     for (std::string_view word = words_.word(); !word.empty(); word = words_.word()) {
       if (same(word, "endsolid")) {
         words_.rest_of_line();
         open = false;
       } else if (same(word, "solid")) {
-        words_.rest_of_line();
+        solid_ = named(words_.rest_of_line());
         open = true;
       } else if (same(word, "facet") && open) {
         read_facet(merger);
@@ -108,12 +123,20 @@ class AsciiStl {
       }
     }
     if (open) fail("the file ends before \"endsolid\": is it truncated?");
+    surface_.groups = one_by_one(solids_, surface_.triangle.size());
     return std::move(surface_);
   }
 
  private:
   [[noreturn]] void fail(const std::string& what) const {
     throw InputError(fmt::format("{}:{}: {}", name_, words_.line(), what));
+  }
+
+  /// The name on the rest of a line, without white space around it.
+  static std::string named(std::string_view line) {
+    const auto first = line.find_first_not_of(" \t\r\n");
+    if (first == std::string_view::npos) return {};
+    return std::string(line.substr(first, line.find_last_not_of(" \t\r\n") - first + 1));
   }
 
   static bool same(std::string_view word, std::string_view wanted) {
@@ -147,6 +170,7 @@ class AsciiStl {
       }
       corner = merger.vertex({value[0], value[1], value[2]});
     }
+    solids_.add(solid_, static_cast<Index>(surface_.triangle.size()));
     surface_.triangle.push_back(triangle);
     expect("endloop");
     expect("endfacet");
@@ -155,6 +179,8 @@ class AsciiStl {
   TextCursor words_;
   const std::string& name_;
   Surface surface_;
+  std::string solid_;  // name of the present one
+  FaceGroups solids_;
 };
 
 }  // namespace

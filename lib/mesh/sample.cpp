@@ -5,16 +5,19 @@
 #include <cmath>
 #include <numeric>
 
+#include "mesh/face_relaxation.hpp"
 #include "mesh/inside_filling.hpp"
 #include "mesh/lattice_filling.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/scattered_filling.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
+#include "model/closing_areas.hpp"
 #include "model/cloud_check.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
+#include "sort_unique.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -247,6 +250,32 @@ double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& s
   return inside.spacing;
 }
 
+/// The phyxels on the triangles of each named group, or, if all phyxels lie inside, those within a
+/// spacing of them: regions of the cloud.
+/// @param on_surface number of phyxels on the surface, which come first
+void add_regions(Cloud& cloud, const Surface& surface, std::size_t on_surface, double spacing) {
+  if (surface.groups.empty()) return;
+  const std::size_t count = on_surface > 0 ? on_surface : cloud.position.size();
+  const double within = (on_surface > 0 ? 1e-3 : 1.0) * spacing;
+  const SpatialHash hash(std::span(cloud.position).first(count), spacing);
+  for (const auto& [name, triangles] : surface.groups) {
+    std::vector<Index> region;
+    for (const Index t : triangles) {
+      const auto [a, b, c] = surface.triangle[t];
+      const Triangle alone{0, 1, 2};
+      const Vec3d corner[] = {surface.position[a], surface.position[b], surface.position[c]};
+      for (const Facet& piece : facets_of(corner, {&alone, 1}, 0, spacing)) {
+        hash.visit_ball(piece.centroid, spacing + within, [&](const SpatialHash::Entry& e) {
+          const Vec3d nearest = nearest_on_triangle(e.position, corner[0], corner[1], corner[2]);
+          if (norm(e.position - nearest) <= within) region.push_back(e.index);
+        });
+      }
+    }
+    sort_unique(region);
+    cloud.regions[name] = std::move(region);
+  }
+}
+
 }  // namespace
 
 Cloud sample_surface(const Surface& surface, const SampleRequest& request, SampleReport* report) {
@@ -292,6 +321,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   for (double& v : cloud.volume) v *= found.volume / total;
 
   measure_gaps(cloud.position, spacing, found);
+  add_regions(cloud, prepared.surface, sites.position.size(), spacing);
   cloud.surface = std::move(prepared.surface);
   order_along_curve(cloud);
 

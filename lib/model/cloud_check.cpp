@@ -112,6 +112,17 @@ void check_regions(const CloudFault& fault, const Cloud& cloud, bool ascending) 
   }
 }
 
+void check_groups(const CloudFault& fault, const Surface& surface) {
+  const auto n = static_cast<Offset>(surface.triangle.size());
+  for (const auto& [name, triangles] : surface.groups) {
+    for (const Index t : triangles) {
+      if (t >= 0 && t < n) continue;
+      fault.refuse(
+          fmt::format("has triangle {} in group \"{}\"; allowed: 0 to {}", t, name, n - 1));
+    }
+  }
+}
+
 }  // namespace
 
 void check_triangles(std::span<const Triangle> triangles, std::size_t vertices) {
@@ -152,6 +163,7 @@ void check_cloud(const Cloud& cloud, const std::string& where, const std::string
   const CloudFault fault(where, whose);
   check_phyxels(fault, cloud);
   check_surfels(fault, cloud.surface);
+  check_groups(fault, cloud.surface);
   check_corners(fault, cloud.surface.triangle, cloud.surface.position.size(), "surfel");
   check_regions(fault, cloud, true);
 }

@@ -1,6 +1,7 @@
 #include "model/loads.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -13,6 +14,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "rank_sums.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -158,38 +160,59 @@ Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> 
   return load;
 }
 
+namespace {
+
+/// The triangles on which a traction may act: those of its group, or all.
+std::vector<Triangle> chosen_triangles(const BodyRequest& request, const TractionRequest& traction,
+                                       const BodySurface& surface) {
+  if (!traction.select.region) return {surface.triangle.begin(), surface.triangle.end()};
+  const auto found = surface.groups.find(*traction.select.region);
+  if (found == surface.groups.end()) {
+    std::vector<std::string> names;
+    for (const auto& [name, triangles] : surface.groups) names.push_back(name);
+    throw InputError(fmt::format(
+        "{}: the surface of body \"{}\" has no group \"{}\"{}; it has: {}", traction.select.where,
+        request.name, *traction.select.region, did_you_mean(*traction.select.region, names),
+        names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  }
+  return tabulated(found->second.size(),
+                   [&](std::size_t k) { return surface.triangle[found->second[k]]; });
+}
+
+}  // namespace
+
 LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& traction,
-                           std::span<const Vec3d> position, std::span<const Triangle> triangles,
-                           Index first, double longest) {
+                           const BodySurface& surface, double longest) {
   LoadedFacets loaded;
   const std::optional<SpaceRegion> region = region_of(traction.select);
   const double least = std::cos(traction.angle * std::numbers::pi / 180);
   const Vec3d direction = direction_of(traction.normal);
   constexpr double digits = 1e-9;  // of cosines, and of places in units of the surface's size
+  const auto corner = [&](Index vertex) { return surface.position[vertex - surface.first]; };
   std::vector<Triangle> facing;
-  for (const Triangle& t : triangles) {
-    const Vec3d a = position[t[0] - first];
-    const Vec3d area = cross(position[t[1] - first] - a, position[t[2] - first] - a);
+  for (const Triangle& t : chosen_triangles(request, traction, surface)) {
+    const Vec3d a = corner(t[0]);
+    const Vec3d area = cross(corner(t[1]) - a, corner(t[2]) - a);
     const bool is_facing =
         direction == Vec3d{} || dot(area, direction) >= (least - digits) * norm(area);
     if (is_facing) facing.push_back(t);
   }
   if (region) {
-    const double tolerance = digits * box_around(position).extent();
+    const double tolerance = digits * box_around(surface.position).extent();
     for (const Triangle& t : facing) {
-      add_facets_in(*region,
-                    {position[t[0] - first], position[t[1] - first], position[t[2] - first]},
-                    longest, tolerance, loaded.facets);
+      add_facets_in(*region, {corner(t[0]), corner(t[1]), corner(t[2])}, longest, tolerance,
+                    loaded.facets);
     }
   } else {
-    loaded.facets = facets_of(position, facing, first, longest);
+    loaded.facets = facets_of(surface.position, facing, surface.first, longest);
   }
   if (loaded.facets.empty()) {
     throw InputError(fmt::format(
-        "{}: this traction acts on no part of the surface of body \"{}\"{}; allowed: a box, a ball "
+        "{}: this traction acts on no part of the surface of body \"{}\"{}; allowed: a group, a "
+        "box, a ball "
         "or a normal that some of its {} triangles are in or have",
         traction.select.where.empty() ? request.where : traction.select.where, request.name,
-        triangles.empty() ? ", which has no triangles" : "", triangles.size()));
+        surface.triangle.empty() ? ", which has no triangles" : "", surface.triangle.size()));
   }
   for (const Facet& facet : loaded.facets) {
     loaded.force.push_back(norm(facet.area) * traction.traction - traction.pressure * facet.area);
@@ -283,8 +306,11 @@ void add_tractions(Model& model, const Scene& scene) {
                           : longest_edge(*std::max_element(support.begin(), support.end()), surfel,
                                          triangles, part.surfel_begin, static_cast<Index>(count));
     for (std::size_t t = 0; t < request.tractions.size(); ++t) {
-      const LoadedFacets loaded = loaded_facets(request, request.tractions[t], surfel, triangles,
-                                                part.surfel_begin, longest);
+      const LoadedFacets loaded =
+          loaded_facets(request, request.tractions[t],
+                        {surfel, triangles, part.surfel_begin,
+                         model.surfels.groups[static_cast<std::size_t>(part.body)]},
+                        longest);
       std::vector<Vec3d> centroids;
       for (const Facet& f : loaded.facets) centroids.push_back(f.centroid);
       const std::vector<Vec3d> force = distribute(

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -48,11 +49,17 @@ struct LoadedFacets {
   std::vector<Facet> facets;
   std::vector<Vec3d> force;  ///< [N], shape [facets]
 };
+/// The surface of a body, in a model or by itself.
+struct BodySurface {
+  std::span<const Vec3d> position;
+  std::span<const Triangle> triangle;
+  Index first = 0;  ///< Number of the surface's first vertex in `triangle`.
+  const std::map<std::string, std::vector<Index>>& groups;  ///< Of triangles.
+};
 /// Finds where a traction acts. @param longest greatest edge of a facet [m]
-/// @throws InputError if it acts nowhere
+/// @throws InputError if it acts nowhere, or on a group that the surface lacks
 LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& traction,
-                           std::span<const Vec3d> position, std::span<const Triangle> triangles,
-                           Index first, double longest);
+                           const BodySurface& surface, double longest);
 
 /// The load of traction `number` (from 0) of a body, without phyxels and forces.
 Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded);

@@ -257,6 +257,7 @@ void add_body(Model& model, const BodyRequest& request, const Cloud& given,
   }
   add_boundary(model, request, given, sorted ? &*sorted : nullptr, shift);
   model.walls.push_back(walls_of(request, cloud));
+  model.surfels.groups.push_back(cloud.surface.groups);
 }
 
 }  // namespace

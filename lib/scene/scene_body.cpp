@@ -255,7 +255,7 @@ LoadRequest read_load(const SceneTable& table) {
 
 TractionRequest read_traction(const SceneTable& table) {
   TractionRequest traction;
-  table.expect_one_of({"box", "ball", "all"});
+  table.expect_one_of({"region", "box", "ball", "all"});
   traction.select = read_selection(table);
   table.expect_one_of({"traction", "pressure"});
   table.read("traction", traction.traction);

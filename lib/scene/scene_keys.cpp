@@ -395,7 +395,7 @@ std::vector<SceneKey> boundary_keys() {
        .meaning = "A named region of the body: \"x-\", \"x+\", \"y-\", \"y+\", \"z-\", \"z+\" are "
            "the outermost layers of a beam or block, \"z-\" and \"z+\" the ends of a "
            "cylinder; the alien head has a \"neck\", the horn bug a \"leg\", the dino a "
-           "\"mouth\"."},
+           "\"mouth\". Of a mesh, a named group of its triangles."},
       {.section = "selection", .name = "indices", .type = KeyType::indices, .otherwise = "none",
        .range = between(0, largest_index), .meaning = "Phyxels of the body, counted from 0."},
       {.section = "selection", .name = "box", .type = KeyType::box, .unit = "m",

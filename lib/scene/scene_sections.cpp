@@ -23,7 +23,10 @@ std::vector<SceneSection> make_sections() {
        "origin, the cylinder along z.\n"
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
        "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
-       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`.\n"
+       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`. Named groups of its triangles "
+       "are regions: an OBJ file's groups, objects and materials, the solids of an STL file, and colours: "
+       "`\"#ff0000\"` of the faces of a PLY file, `\"attribute 31\"` of the triangles of a binary STL file. A region has "
+       "the phyxels on its triangles; if all phyxels lie inside, those within a spacing of them.\n"
        "- `file` needs nothing else.\n"
        "- `cloud` names what a program that links phyxel, or uses it from Python, passes along with "
        "the scene: it needs nothing else either.\n\n"
@@ -61,7 +64,8 @@ std::vector<SceneSection> make_sections() {
        "phyxels there are not in one plane; the plan of a run says where each load acts."},
       {"body.traction", "[[body.traction]]", "selection",
        "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
-       "body's surface lie in a `box` or a `ball`, or on `all` of it. The force keeps its size and "
+       "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
+       "`all`. The force keeps its size and "
        "direction as the body deforms. Phyxels get their shares such that total, centroid and torque are "
        "those on the triangles."},
       {"probe", "[[probe]]", "selection",

@@ -19,6 +19,8 @@ struct Surface {
   std::vector<Vec3d> position;     ///< Vertex positions [m], shape [n_surfels, 3].
   std::vector<Vec3d> normal;       ///< Outward unit normals, shape [n_surfels, 3].
   std::vector<Triangle> triangle;  ///< Vertex indices, counter-clockwise seen from outside.
+  /// Named groups of triangles (ascending indices), which may overlap.
+  std::map<std::string, std::vector<Index>> groups = {};
 };
 
 /// A region of space in which a body is held or moved, and on whose boundary phyxels lie.

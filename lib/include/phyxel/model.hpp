@@ -133,6 +133,8 @@ struct Surfels {
   std::vector<Triangle> triangle;
   Csr carriers;         ///< Row s: phyxels near surfel s.
   Index unreached = 0;  ///< Surfels outside every support, carried by the nearest phyxel.
+  /// Named groups of the triangles of each body, counted from its first; none in a share.
+  std::vector<std::map<std::string, std::vector<Index>>> groups;
 
   /// The triangles of a body, in a model that is no share: there they stand body by body.
   std::span<const Triangle> triangles_of(const Part& first_part) const;
