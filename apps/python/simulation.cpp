@@ -91,7 +91,7 @@ void add_simulation(py::module_& module) {
           "points"_a, "body"_a = "",
           "Values at points at rest [m], (m, 3), of a body: a dict of displacement [m] and\n"
           "velocity [m/s], (m, 3), Cauchy stress [Pa] and Green's strain, (m, 6): xx, yy, zz, xy,\n"
-          "yz, xz, and von_mises [Pa], (m,). Of second order, on the surface as well.")
+          "yz, xz, and von_mises [Pa], (m,). From a fit through phyxels within a support.")
       .def(
           "probes",
           [](Simulation& s) {

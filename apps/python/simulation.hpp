@@ -179,8 +179,10 @@ class Simulation {
       }
       body = scene_.bodies.front().name;
     }
+    if (points.empty()) return {};
     const py::gil_scoped_release others;
-    return Probes(model_, {{.name = "points", .body = body, .points = points}}).read(*backend_);
+    return Probes(model_, {{.name = "points", .body = body, .points = points}})
+        .read(*backend_, recovery());
   }
   /// The readings of the scene's probes.
   std::vector<ProbeReading> readings() {

@@ -170,9 +170,20 @@ std::string FrameLog::kept(double last_step) const {
                     file_.string(), lines.empty() ? std::string_view() : lines[0], wanted));
   }
   std::string kept;
+  double reached = -1;
   for (std::size_t l = 1; l < lines.size(); ++l) {
-    if (!(number_in(cell(lines[l], 0)) <= last_step)) break;
+    const double step = number_in(cell(lines[l], 0));
+    if (!(step <= last_step)) break;
+    reached = step;
     kept.append(lines[l]).push_back('\n');
+  }
+  if (reached < last_step) {
+    throw InputError(fmt::format(
+        "{}: ends at step {:g}, and {} goes on to step {:g}: lines are missing; it is kept; "
+        "allowed: "
+        "put them back, remove the file, or go on in another folder (--resume CHECKPOINT --out "
+        "FOLDER)",
+        file_.string(), std::max(reached, 0.0), log_name, last_step));
   }
   return kept;
 }

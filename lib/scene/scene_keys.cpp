@@ -156,9 +156,8 @@ std::vector<SceneKey> run_keys() {
        .fallback = "[\"displacement\", \"velocity\"]",
        .words = field_names(), .meaning = field_meanings()},
       {.section = "output", .name = "recovery", .type = KeyType::boolean, .fallback = "true",
-       .meaning = "Whether stresses and strains are those of recovered gradients, which are of second order "
-           "on the surface, too. Laws that remember keep their own stress. false: those that the forces "
-           "follow from."},
+       .meaning = "Whether stresses and strains on the surface follow from recovered gradients, with the traction "
+           "that forces determine; those of laws that remember do not. false: all are those that forces follow from."},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},

@@ -39,6 +39,9 @@ ProbeRequest read_probe(const SceneTable& table, std::size_t number) {
                  "found without from and to; allowed: with both, for points along a line");
   }
   ProbeRequest probe{.name = fmt::format("probe {}", number), .where = table.where()};
+  for (const char* key : {"point", "from"}) {
+    if (table.has(key)) probe.where = table.where(key);
+  }
   table.read("name", probe.name);
   if (table.has("point") || table.has("from")) {
     probe.points = read_points(table);
@@ -78,7 +81,7 @@ void read_probes(const SceneTable& root, std::vector<BodyRequest>& bodies) {
     ProbeRequest probe = read_probe(table, ++number);
     const auto [earlier, is_new] = places.emplace(probe.name, probe.where);
     if (!is_new) {
-      table.refuse(table.has("name") ? "name" : "body",
+      table.refuse("name",
                    fmt::format("{} found, the name of the probe at {} too; allowed: a name of its "
                                "own for each probe",
                                in_quotes(probe.name), earlier->second));

@@ -72,9 +72,8 @@ std::vector<SceneSection> make_sections() {
        "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
        "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "
        "time, the probe's name, the number of the point, its position at rest, displacement [m], velocity [m/s], "
-       "Cauchy stress [Pa], its von Mises equivalent, and Green's strain. At points the values follow from "
-       "a fit of second order over the thirty nearest phyxels, which end where materials and supports do; the stress of a "
-       "law that remembers is fitted itself."},
+       "Cauchy stress [Pa], its von Mises equivalent, and Green's strain. At a point the values are those of a "
+       "quadratic polynomial through the phyxels within a support, which ends where materials and supports do."},
       {"selection", "Selections", "",
        "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]`, `[[body.traction]]` and each "
        "`[[probe]]` without points has exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"

@@ -1,5 +1,6 @@
 #include "phyxel/point_fields.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 
@@ -70,15 +71,45 @@ bool is_stress(Quantity quantity) {
          quantity == Quantity::principal_stress;
 }
 
-/// Recovered gradients, but for those whose det F differs too much from that of the phyxels' own.
-std::vector<Mat3d> recovered(const Recovery& recovery, const State& state,
-                             const std::vector<Mat3d>& own) {
-  std::vector<Mat3d> gradient = recovery.gradients(state.displacement);
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    const double ratio = (1 + volume_change(gradient[i])) / (1 + volume_change(own[i]));
-    if (!(ratio > 0.5 && ratio < 2)) gradient[i] = own[i];
+/// A gradient that differs from `grad_u` by a nᵀ and has the traction P n of another one, found by
+/// Newton's method. @returns `fallback` if it is not found
+Mat3d with_traction(const PartLaw& law, const Mat3d& grad_u, Vec3d traction, Vec3d normal,
+                    const Mat3d& fallback) {
+  constexpr int most_steps = 5;
+  constexpr double difference = 1e-7, tolerance = 1e-6;
+  const auto traction_at = [&](const Mat3d& g) {
+    return law.after_step(g, {}, 0).first_piola_stress * normal;
+  };
+  Mat3d g = grad_u;
+  Vec3d here = traction_at(g);
+  const double size = norm(here) + norm(traction);
+  for (int step = 0; step < most_steps; ++step) {
+    const Vec3d left = traction - here;
+    if (norm(left) <= tolerance * size) return g;
+    Eigen::Matrix3d slope;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d along{k == 0 ? difference : 0, k == 1 ? difference : 0, k == 2 ? difference : 0};
+      const Vec3d change = (traction_at(g + outer(along, normal)) - here) / difference;
+      slope.col(k) = Eigen::Vector3d(change.x, change.y, change.z);
+    }
+    const Eigen::Vector3d a = slope.fullPivLu().solve(Eigen::Vector3d(left.x, left.y, left.z));
+    g += outer(Vec3d{a[0], a[1], a[2]}, normal);
+    here = traction_at(g);
   }
-  return gradient;
+  return norm(traction - here) <= tolerance * size ? g : fallback;
+}
+
+/// The gradient of a phyxel's fields: the recovered one, with the traction of its own.
+Mat3d field_gradient(const PartLaw& law, const Recovery& recovery, Index i, const Mat3d& own,
+                     const Mat3d& recovered) {
+  const double share = recovery.share(i);
+  if (!(share > 0)) return own;
+  const Vec3d normal = recovery.normal(i);
+  const Vec3d traction = law.after_step(own, {}, 0).first_piola_stress * normal;
+  const Mat3d kept = with_traction(law, recovered, traction, normal, own);
+  const Mat3d mixed = own + share * (kept - own);
+  const double ratio = (1 + volume_change(mixed)) / (1 + volume_change(own));
+  return ratio > 0.5 && ratio < 2 ? mixed : own;
 }
 
 }  // namespace
@@ -124,17 +155,18 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   const std::vector<std::string> columns = history_columns(model);
   State state;
   if (recovery || (stresses && !columns.empty())) backend.download(state);
-  const std::vector<Mat3d> gradient = recovery ? recovered(*recovery, state, own) : own;
+  std::vector<Mat3d> recovered;
+  if (recovery) recovered = recovery->gradients(state.displacement);
   Arrays arrays(values, computed, static_cast<Index>(own.size()));
   for (const Part& part : model.parts) {
     const PartLaw law(part.material);
     const PartHistory history(state, part.material, columns);
+    const bool recovers = recovery && history.size() == 0;  // a history is of the own gradient
     std::vector<double> numbers(history.size());
     for (Index i = part.begin; i < part.owned_end(); ++i) {
-      set_strains(arrays, i, gradient[i]);
+      const Mat3d g = recovers ? field_gradient(law, *recovery, i, own[i], recovered[i]) : own[i];
+      set_strains(arrays, i, g);
       if (!stresses) continue;
-      // A history belongs to the phyxel's own gradient.
-      const Mat3d& g = history.size() > 0 ? own[i] : gradient[i];
       const PointResponse<double> response =
           law.after_step(g, history.of(i, numbers), state.history_interval);
       set_stresses(arrays, i, cauchy_stress(response.first_piola_stress, g));

@@ -14,14 +14,13 @@
 #include "phyxel/share.hpp"
 #include "rank_sums.hpp"
 #include "solver/first_error.hpp"
-#include "solver/part_law.hpp"
 #include "solver/point_fit.hpp"
 #include "solver/tensors.hpp"
 
 namespace phyxel {
 namespace {
 
-constexpr std::size_t phyxels_of_fit = 30;
+constexpr std::size_t most_phyxels = 64;  // of a fit
 
 /// A phyxel near a point.
 struct Near {
@@ -111,27 +110,13 @@ std::span<const Part> parts_named(const Model& model, const std::string& name) {
                   name, model.parts.empty() ? "" : model.parts.front().name));
 }
 
-/// Sums over the phyxels of a point: of values, and of values times the gradient's shares.
-struct PointSums {
-  ExactVector displacement, velocity;
-  std::array<ExactVector, 3> gradient;  ///< Along x, y and z.
-  std::array<ExactSum, 6> stress;
-  std::vector<ExactSum*> all() {
-    std::vector<ExactSum*> sums;
-    for (ExactVector* v : {&displacement, &velocity, &gradient[0], &gradient[1], &gradient[2]}) {
-      sums.insert(sums.end(), {&v->x, &v->y, &v->z});
-    }
-    for (ExactSum& sum : stress) sums.push_back(&sum);
-    return sums;
-  }
-};
-/// Sums over the phyxels of a region, by volume.
-struct RegionSums {
-  ExactSum volume, von_mises;
+/// Weighted sums over phyxels.
+struct WeightedSums {
+  ExactSum weight, von_mises;
   ExactVector place, displacement, velocity;
   std::array<ExactSum, 6> stress, strain;
   std::vector<ExactSum*> all() {
-    std::vector<ExactSum*> sums{&volume, &von_mises};
+    std::vector<ExactSum*> sums{&weight, &von_mises};
     for (ExactVector* v : {&place, &displacement, &velocity}) {
       sums.insert(sums.end(), {&v->x, &v->y, &v->z});
     }
@@ -139,6 +124,31 @@ struct RegionSums {
       for (ExactSum& sum : *tensor) sums.push_back(&sum);
     }
     return sums;
+  }
+  /// Adds phyxel i.
+  void add(double w, Index i, const Model& model, const State& state, const FieldValues& fields) {
+    weight.add(w);
+    place.add(w * model.position[i]);
+    displacement.add(w * state.displacement[i]);
+    velocity.add(w * state.velocity[i]);
+    von_mises.add(w * fields.at(Quantity::von_mises)[i]);
+    for (int k = 0; k < 6; ++k) {
+      stress[k].add(w * fields.at(Quantity::stress)[6 * i + k]);
+      strain[k].add(w * fields.at(Quantity::strain)[6 * i + k]);
+    }
+  }
+  /// The reading of which these are the values, but for a factor.
+  ProbeReading reading(double factor) const {
+    ProbeReading found;
+    found.place = factor * place.value();
+    found.displacement = factor * displacement.value();
+    found.velocity = factor * velocity.value();
+    found.von_mises = factor * von_mises.value();
+    for (int k = 0; k < 6; ++k) {
+      found.stress[k] = factor * stress[k].value();
+      found.strain[k] = factor * strain[k].value();
+    }
+    return found;
   }
 };
 
@@ -149,37 +159,6 @@ void add_all_over_ranks(const Model& model, std::vector<Sums>& sums) {
     for (ExactSum* sum : of_one.all()) all.push_back(sum);
   }
   add_over_ranks(model, all);
-}
-
-RegionSums sums_over(const Model& model, const Probe& probe, const State& state,
-                     const FieldValues& fields) {
-  RegionSums sums;
-  for (const Index i : probe.phyxels) {
-    if (!model.owns(i)) continue;
-    const double v = model.volume[i];
-    sums.volume.add(v);
-    sums.place.add(v * model.position[i]);
-    sums.displacement.add(v * state.displacement[i]);
-    sums.velocity.add(v * state.velocity[i]);
-    sums.von_mises.add(v * fields.at(Quantity::von_mises)[i]);
-    for (int k = 0; k < 6; ++k) {
-      sums.stress[k].add(v * fields.at(Quantity::stress)[6 * i + k]);
-      sums.strain[k].add(v * fields.at(Quantity::strain)[6 * i + k]);
-    }
-  }
-  return sums;
-}
-
-void set_means(ProbeReading& reading, const RegionSums& sums) {
-  const double volume = sums.volume.value();
-  reading.place = sums.place.value() / volume;
-  reading.displacement = sums.displacement.value() / volume;
-  reading.velocity = sums.velocity.value() / volume;
-  reading.von_mises = sums.von_mises.value() / volume;
-  for (int k = 0; k < 6; ++k) {
-    reading.stress[k] = sums.stress[k].value() / volume;
-    reading.strain[k] = sums.strain[k].value() / volume;
-  }
 }
 
 }  // namespace
@@ -220,32 +199,36 @@ void Probes::add_points() {
           probe.where, probe.where.empty() ? "" : ": ", probe.name, x.x, x.y, x.z, distance,
           probe.body, allowed));
     }
-    points_[k].part = static_cast<std::size_t>(nearest[k].front().part);
   }
 #pragma omp parallel for schedule(dynamic)
   for (std::ptrdiff_t k = 0; k < count; ++k) {
-    const Part& part = model_.parts[points_[k].part];
+    const Near& first = nearest[k].front();
+    const Part& part = model_.parts[static_cast<std::size_t>(first.part)];
     const auto body = static_cast<std::size_t>(part.body);
     const Walls* walls = body < model_.walls.size() ? &model_.walls[body] : nullptr;
     const std::size_t room = walls ? walls->room_of(points_[k].place) : 0;
-    near[k] = nearest_here(model_, {&part, 1}, points_[k].place, phyxels_of_fit, [&](Index i) {
-      return !walls || walls->room_of(model_.position[i]) == room;
+    near[k] = nearest_here(model_, {&part, 1}, points_[k].place, most_phyxels, [&](Index i) {
+      const Vec3d x = model_.position[i] - points_[k].place;
+      return dot(x, x) <= first.support * first.support &&
+             (!walls || walls->room_of(model_.position[i]) == room);
     });
   }
-  merge_over_ranks(model_, near, phyxels_of_fit);
+  merge_over_ranks(model_, near, most_phyxels);
   for (std::size_t k = 0; k < points_.size(); ++k) {
     std::vector<Near>& list = near[k];
     // A room may be thinner than its phyxels' distance from the wall.
     if (list.empty()) list = nearest[k];
     std::vector<Vec3d> places;
     for (const Near& phyxel : list) places.push_back(phyxel.place);
-    const double reach = 1.05 * std::sqrt(list.back().distance_squared) + 1e-300;
-    const PointFit fit = fit_at(points_[k].place, places, reach);
+    const double support = nearest[k].front().support,
+                 farthest = std::sqrt(list.back().distance_squared);
+    const std::vector<double> share =
+        shares_at(points_[k].place, places,
+                  list.size() < most_phyxels ? std::max(support, 1.05 * farthest) : farthest);
     for (std::size_t i = 0; i < list.size(); ++i) {
       if (list[i].local < 0) continue;
       points_[k].phyxels.push_back(list[i].local);
-      points_[k].value.push_back(fit.value[i]);
-      points_[k].gradient.push_back(fit.gradient[i]);
+      points_[k].share.push_back(share[i]);
     }
   }
 }
@@ -255,70 +238,40 @@ std::vector<ProbeReading> Probes::read(Backend& backend, const Recovery* recover
   check_fits(model_, backend);
   State state;
   backend.download(state);
-  const std::vector<std::string> columns = history_columns(model_);
-  const auto remembers = [&](const Part& part) {
-    return PartHistory(state, part.material, columns).size() > 0;
-  };
-  const bool has_regions = std::any_of(probes_.begin(), probes_.end(),
-                                       [](const Probe& probe) { return probe.points.empty(); });
-  const bool fits_stress = std::any_of(points_.begin(), points_.end(), [&](const Point& point) {
-    return remembers(model_.parts[point.part]);
-  });
-  FieldValues fields;
-  if (has_regions || fits_stress) {
-    const Quantity wanted[] = {Quantity::stress, Quantity::strain, Quantity::von_mises};
-    fields = find_fields(model_, backend, wanted, recovery);
-  }
-  std::vector<PointSums> at_points(points_.size());
-  for (std::size_t p = 0; p < points_.size(); ++p) {
-    const Point& point = points_[p];
-    const bool fits = remembers(model_.parts[point.part]);
-    PointSums& sums = at_points[p];
-    for (std::size_t k = 0; k < point.phyxels.size(); ++k) {
-      const Index i = point.phyxels[k];
-      const Vec3d u = state.displacement[i], g = point.gradient[k];
-      sums.displacement.add(point.value[k] * u);
-      sums.velocity.add(point.value[k] * state.velocity[i]);
-      for (int a = 0; a < 3; ++a) sums.gradient[a].add(component(g, a) * u);
-      for (int e = 0; fits && e < 6; ++e) {
-        sums.stress[e].add(point.value[k] * fields.at(Quantity::stress)[6 * i + e]);
-      }
-    }
-  }
-  add_all_over_ranks(model_, at_points);
-  std::vector<RegionSums> over_regions;
-  for (const Probe& probe : probes_) {
-    if (probe.points.empty()) over_regions.push_back(sums_over(model_, probe, state, fields));
-  }
-  add_all_over_ranks(model_, over_regions);
-
-  std::vector<ProbeReading> readings;
+  const Quantity wanted[] = {Quantity::stress, Quantity::strain, Quantity::von_mises};
+  const FieldValues fields = find_fields(model_, backend, wanted, recovery);
+  std::vector<WeightedSums> sums;
   auto point = points_.begin();
-  auto sums = at_points.begin();
-  auto region = over_regions.begin();
   for (std::size_t p = 0; p < probes_.size(); ++p) {
     if (probes_[p].points.empty()) {
-      set_means(readings.emplace_back(ProbeReading{.probe = probes_[p].name}), *region++);
+      WeightedSums& mean = sums.emplace_back();
+      for (const Index i : probes_[p].phyxels) {
+        if (model_.owns(i)) mean.add(model_.volume[i], i, model_, state, fields);
+      }
     }
-    for (; point != points_.end() && point->probe == p; ++point, ++sums) {
-      ProbeReading& reading = readings.emplace_back(
-          ProbeReading{.probe = probes_[p].name, .number = point->number, .place = point->place});
-      reading.displacement = sums->displacement.value();
-      reading.velocity = sums->velocity.value();
-      Mat3d grad_u;
-      for (int a = 0; a < 3; ++a) {
-        const Vec3d column = sums->gradient[a].value();
-        for (int k = 0; k < 3; ++k) grad_u(k, a) = component(column, k);
+    for (; point != points_.end() && point->probe == p; ++point) {
+      WeightedSums& value = sums.emplace_back();
+      for (std::size_t k = 0; k < point->phyxels.size(); ++k) {
+        value.add(point->share[k], point->phyxels[k], model_, state, fields);
       }
-      const Part& part = model_.parts[point->part];
-      reading.strain = components(full(green_strain(grad_u)));
-      if (remembers(part)) {
-        for (int e = 0; e < 6; ++e) reading.stress[e] = sums->stress[e].value();
-      } else {
-        const PartLaw law(part.material);
-        reading.stress =
-            components(cauchy_stress(law.after_step(grad_u, {}, 0).first_piola_stress, grad_u));
-      }
+    }
+  }
+  add_all_over_ranks(model_, sums);
+
+  std::vector<ProbeReading> readings;
+  point = points_.begin();
+  auto sum = sums.begin();
+  for (std::size_t p = 0; p < probes_.size(); ++p) {
+    if (probes_[p].points.empty()) {
+      readings.push_back(sum->reading(1 / sum->weight.value()));
+      readings.back().probe = probes_[p].name;
+      ++sum;
+    }
+    for (; point != points_.end() && point->probe == p; ++point, ++sum) {
+      ProbeReading& reading = readings.emplace_back(sum->reading(1));
+      reading.probe = probes_[p].name;
+      reading.number = point->number;
+      reading.place = point->place;
       reading.von_mises = von_mises_stress(matrix_of(reading.stress));
     }
   }

@@ -12,6 +12,15 @@ namespace phyxel {
 namespace {
 
 constexpr int sweeps = 4;
+/// Shift, in supports, from which on a phyxel counts as one on the surface, where it is 0.2.
+constexpr double least_shift = 0.1;
+
+/// Whether two phyxels of a body are of the same part.
+bool is_of_part(const Model& model, Index i, Index j) {
+  const auto after = std::upper_bound(model.parts.begin(), model.parts.end(), i,
+                                      [](Index at, const Part& part) { return at < part.end; });
+  return after != model.parts.end() && j >= after->begin && j < after->end;
+}
 
 /// The neighbours of the phyxels of one body, counted from its first.
 Csr lists_of_body(const Model& model, Index begin, Index end) {
@@ -39,27 +48,12 @@ Curvature curvature_of(const std::array<Mat3d, 3>& slope) {
 
 }  // namespace
 
-Recovery::Recovery(const Model& model) : model_(model), inverse_moment_(model.position.size()) {
-  rows_.offsets.reserve(model.position.size() + 1);
-  for (auto part = model.parts.begin(); part != model.parts.end();) {
-    const std::span<const Part> parts = model.parts_of_body(*part);
-    const Index first = parts.front().begin;
-    Csr found;
-    if (!model.has_lists()) found = lists_of_body(model, first, parts.back().end);
-    for (const Part& own : parts) {
-      for (Index i = own.begin; i < own.end; ++i) {
-        if (i < own.owned_end()) {
-          for (const Index j :
-               model.has_lists() ? model.neighbourhood.neighbours.row(i) : found.row(i - first)) {
-            const Index k = model.has_lists() ? j : first + j;
-            if (k >= own.begin && k < own.end) rows_.indices.push_back(k);
-          }
-        }
-        rows_.offsets.push_back(static_cast<Offset>(rows_.indices.size()));
-      }
-    }
-    part += static_cast<std::ptrdiff_t>(parts.size());
-  }
+Recovery::Recovery(const Model& model)
+    : model_(model),
+      inverse_moment_(model.position.size()),
+      share_(model.position.size()),
+      normal_(model.position.size()) {
+  find_rows();
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < rows_.rows(); ++i) {
     const auto begin = rows_.indices.begin() + rows_.offsets[i],
@@ -67,20 +61,58 @@ Recovery::Recovery(const Model& model) : model_(model), inverse_moment_(model.po
     std::sort(begin, end,
               [&](Index a, Index b) { return model.global_id(a) < model.global_id(b); });
     const double h = model.neighbourhood.support[i];
-    Sym3d moment;
+    Sym3d moment, of_part;
+    Vec3d third;  // Σ w x |x|²
     std::for_each(begin, end, [&](Index j) {
       const Vec3d x = model.position[j] - model.position[i];
-      moment += moment_term(x, weight_shape(dot(x, x), 1 / (h * h)));
+      const double w = weight_shape(dot(x, x), 1 / (h * h));
+      moment += moment_term(x, w);
+      if (!is_of_part(model, i, j)) return;
+      of_part += moment_term(x, w);
+      third += w * dot(x, x) * x;
     });
-    inverse_moment_[i] = pseudo_inverse(moment).matrix;
+    const PseudoInverse<double> inverse = pseudo_inverse(of_part);
+    inverse_moment_[i] = inverse.matrix;
+    // In half of a ball the fit of any quadratic displacement is its gradient at this distance.
+    const Vec3d shift = 0.25 * (inverse.matrix * third);
+    const double distance = norm(shift);
+    if (distance > 0) normal_[i] = -shift / distance;
+    if (inverse.rank == pseudo_inverse(moment).rank) {
+      share_[i] = std::min(1.0, distance / (least_shift * h));
+    }
+  }
+}
+
+void Recovery::find_rows() {
+  rows_.offsets.reserve(model_.position.size() + 1);
+  for (auto part = model_.parts.begin(); part != model_.parts.end();) {
+    const std::span<const Part> parts = model_.parts_of_body(*part);
+    const Index first = parts.front().begin;
+    Csr found;
+    if (!model_.has_lists()) found = lists_of_body(model_, first, parts.back().end);
+    for (const Part& own : parts) {
+      for (Index i = own.begin; i < own.end; ++i) {
+        if (i < own.owned_end()) {
+          const bool has_lists = model_.has_lists();
+          for (const Index j :
+               has_lists ? model_.neighbourhood.neighbours.row(i) : found.row(i - first)) {
+            rows_.indices.push_back(has_lists ? j : first + j);
+          }
+        }
+        rows_.offsets.push_back(static_cast<Offset>(rows_.indices.size()));
+      }
+    }
+    part += static_cast<std::ptrdiff_t>(parts.size());
   }
 }
 
 std::vector<Mat3d> Recovery::gradients(std::vector<Vec3d> displacement) const {
-  // For each neighbour of a phyxel: use(its index, w x).
+  const bool several = model_.has_inclusions();
+  // For each neighbour of the same part: use(its index, x, w x).
   const auto for_each_neighbour = [&](Index i, auto&& use) {
     const double h = model_.neighbourhood.support[i], inverse = 1 / (h * h);
     for (const Index j : rows_.row(i)) {
+      if (several && !is_of_part(model_, i, j)) continue;
       const Vec3d x = model_.position[j] - model_.position[i];
       use(j, x, weight_shape(dot(x, x), inverse) * x);
     }

@@ -22,7 +22,11 @@ inline double von_mises_stress(Mat3d sigma) {
   const double mean = (sigma(0, 0) + sigma(1, 1) + sigma(2, 2)) / 3;
   for (int k = 0; k < 3; ++k) sigma(k, k) -= mean;
   double largest = 0;  // scales the entries, so that squares neither overflow nor vanish
-  for (int e = 0; e < 9; ++e) largest = std::max(largest, std::abs(sigma(e / 3, e % 3)));
+  for (int e = 0; e < 9; ++e) {
+    const double size = std::abs(sigma(e / 3, e % 3));
+    if (std::isnan(size)) return size;
+    largest = std::max(largest, size);
+  }
   if (!(largest > 0) || !std::isfinite(largest)) return largest;
   double squares = 0;
   for (int e = 0; e < 9; ++e) {

@@ -95,6 +95,29 @@ point = [2.5, 0.5, 0]
 body = "one"
 ball = { centre = [2.5, 0.5, 0.5], radius = 0.3 }
 )");
+  write("groups.obj", test::cube_vertices +
+                          "g side\nf 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\ng left\n"
+                          "f 1 5 7 3\ng right\nf 2 4 8 6\n");
+  write("cube.toml", test::text_of(folder_ / "cube.toml") + R"(
+[[body]]
+name = "three"
+mesh = "groups.obj"
+phyxels = 600
+translation = [4, 0, 0]
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+[[body.fixed]]
+region = "left"
+[[body.traction]]
+region = "right"
+traction = [100, 0, 50]
+[[probe]]
+name = "end"
+body = "three"
+region = "right"
+)");
   const Outcome alone = run_on(0, {"run", "cube.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));
@@ -109,7 +132,8 @@ ball = { centre = [2.5, 0.5, 0.5], radius = 0.3 }
   EXPECT_THAT(loads_said(alone.out),
               ElementsAre(HasSubstr("two, load 1: [0, 30, 10] N"),
                           HasSubstr("one, load 1: [0, 0, -1400] N about [2.35, 0.5, 0.2] m"),
-                          HasSubstr("two, traction 1"), HasSubstr("one, traction 1")));
+                          HasSubstr("two, traction 1"), HasSubstr("one, traction 1"),
+                          HasSubstr("three, traction 1: [100, 0, 50] N about [5, 0.5, 0.5] m")));
 }
 
 /// The sampler warns of a vertex that no triangle uses; all ranks sample, and one prints the

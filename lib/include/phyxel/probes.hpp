@@ -33,12 +33,10 @@ struct ProbeColumn {
 /// The numbers of a reading, in the order of the columns.
 std::span<const ProbeColumn> probe_columns();
 
-/// The probes of a model, ready to be read. At a point, displacement and its gradient are those of
-/// a quadratic polynomial, fitted by weighted least squares to the thirty nearest phyxels of the
-/// same material, on the same side of each wall: of second order, on the surface as well. Stress
-/// follows from the gradient by the law; that of a law with a history is fitted itself. Directions
-/// that the phyxels do not span have no derivatives, and where they are too few for a quadratic
-/// polynomial, the fit is linear. Readings are the same on any number of ranks.
+/// The probes of a model, ready to be read. At a point, each value is that of a quadratic
+/// polynomial, fitted by weighted least squares to the values of the phyxels of the same material
+/// within the support of the nearest one, on the same side of each wall (`shares_at`). Stress and
+/// strain are the fields of `find_fields`. Readings are the same on any number of ranks.
 class Probes {
  public:
   /// The probes of the model's scene. Collective on a share.
@@ -50,21 +48,20 @@ class Probes {
   /// Other probes. @throws InputError likewise, and for a body that the model lacks
   Probes(const Model& model, std::vector<Probe> probes);
 
+  /// True if there are no probes.
   bool empty() const { return probes_.empty(); }
   /// Reads all probes at the backend's present state, in their order. Collective on a share.
-  /// @param recovery for the stresses and strains over regions (`find_fields`), or null
+  /// @param recovery for stresses and strains (`find_fields`), or null
   std::vector<ProbeReading> read(Backend& backend, const Recovery* recovery = nullptr) const;
 
  private:
-  /// A point, and the phyxels of this rank with their shares in the value and the gradient there.
+  /// A point, and the phyxels of this rank with their shares in a value there.
   struct Point {
     std::size_t probe = 0;
     Index number = 0;
     Vec3d place;
-    std::size_t part = 0;
     std::vector<Index> phyxels;
-    std::vector<double> value;    // of each phyxel
-    std::vector<Vec3d> gradient;  // of each phyxel [1/m]
+    std::vector<double> share;  // of each phyxel
   };
   void add_points();
 

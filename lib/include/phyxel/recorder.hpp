@@ -87,7 +87,8 @@ class FrameLog {
   FrameLog(std::filesystem::path file, std::string header)
       : file_(std::move(file)), header_(std::move(header)) {}
   /// Reads the lines of steps up to `last_step`, below the header. A folder without the file, of an
-  /// earlier version of the program, has none. @throws InputError if it has another header
+  /// earlier version of the program, has none. @throws InputError if it has another header, or ends
+  /// before that step
   std::string kept(double last_step) const;
   /// Writes the file anew. @param lines below the header
   void create(const std::string& lines = {});

@@ -194,7 +194,7 @@ struct OutputRequest {
   /// Phyxel fields beside the positions: "displacement", "velocity", "mass", "volume", "body",
   /// "history", and the computed ones (`point_fields`).
   std::vector<std::string> fields = {"displacement", "velocity"};
-  bool recovery = true;  ///< Computed fields of second order on the surface, too (`Recovery`).
+  bool recovery = true;  ///< Recovers gradients on the surface for computed fields (`Recovery`).
   double checkpoint_every = 300;  ///< Wall-clock seconds between checkpoints; 0: only at the end.
   /// True if `fields` contains the field.
   bool wants(std::string_view field) const;

@@ -126,7 +126,8 @@ struct Late {
 std::vector<Late> refused_loads() {
   const std::string step = "[time]\nend = 1.0\nstep = 1e-4\n";
   return {
-      {with_bar("[[body.traction]]\nregion = 'x+'\npressure = 1\n"), {":13:", "box, ball, all"}},
+      {with_bar("[[body.traction]]\nregion = 'x+'\npressure = 1\n"),
+       {":14:", "the surface of body \"beam\" has no group \"x+\"; it has: none"}},
       {with_bar("[[body.traction]]\nall = true\n"), {":13:", "traction, pressure"}},
       {with_bar("[[body.traction]]\nall = true\npressure = 1\ntraction = [1, 0, 0]\n"),
        {"found together with", "exactly one of: traction, pressure"}},
@@ -155,7 +156,7 @@ std::vector<Late> refused_probes() {
           {with_bar(one + "point = [0, 0, 0]\n[[probe]]\nname = 'probe 1'\nall = true\n"),
            {":16:", "\"probe 1\"", "a name of its own"}},
           {with_bar(one + "point = [0, 0, 0.3]\n"),
-           {":13:1: ", "probe \"probe 1\"", "[0, 0, 0.3]", "nearest phyxel of body \"beam\"",
+           {":14:9: ", "probe \"probe 1\"", "[0, 0, 0.3]", "nearest phyxel of body \"beam\"",
             "at most"}},
           {with_bar(one + "region = 'left'\n"), {":14:", "no region \"left\""}},
           {with_bar(one + "box = [[7, 7, 7], [8, 8, 8]]\n"), {":14:", "selects no phyxel"}}};

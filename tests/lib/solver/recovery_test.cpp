@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "phyxel/equilibrium.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/point_fields.hpp"
 #include "support/backend.hpp"
@@ -145,31 +146,111 @@ TEST(Recovery, DoesNotLookAcrossMaterials) {
   }
 }
 
-/// Fields follow, but for the stress of a law with a history, and what recovery would turn inside
-/// out.
+/// The largest difference of a field from what it would be without recovery.
+double largest_change(const Scene& scene, const Cloud& cloud, const Quadratic& by, Quantity field) {
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  const auto backend = make_test_backend(model, Precision::double_);
+  backend->upload(state_of(displaced(model, by)));
+  const Recovery recovery(model);
+  const std::vector<double> own = find_fields(model, *backend, {&field, 1}).at(field),
+                            better = find_fields(model, *backend, {&field, 1}, &recovery).at(field);
+  double largest = 0;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    largest = std::max(largest, std::abs(own[k] - better[k]));
+  }
+  return largest;
+}
+
+/// Fields follow, but for laws with a history, and a layer of one phyxel of another material, whose
+/// neighbours of its own kind do not tell how it stretches across.
 TEST(Recovery, ServesFields) {
   Scene scene = one_body();
-  const Cloud cloud = lattice(6, 6, 6, 0.1);
+  const Cloud cloud = lattice(7, 6, 6, 0.1);
   const Quadratic bent = some_quadratic(1e-2, 1e-2);
-  const Quantity wanted[] = {Quantity::stress, Quantity::strain};
-  const auto largest_difference = [&](Quantity quantity) {
-    const Model model = build_model(scene, std::span(&cloud, 1));
-    const auto backend = make_test_backend(model, Precision::double_);
-    backend->upload(state_of(displaced(model, bent)));
-    const Recovery recovery(model);
-    const FieldValues own = find_fields(model, *backend, wanted),
-                      better = find_fields(model, *backend, wanted, &recovery);
-    double largest = 0;
-    for (std::size_t k = 0; k < own.at(quantity).size(); ++k) {
-      largest = std::max(largest, std::abs(own.at(quantity)[k] - better.at(quantity)[k]));
-    }
-    return largest;
-  };
-  EXPECT_GT(largest_difference(Quantity::stress), 1e-4 * scene.bodies[0].material.young);
-  EXPECT_GT(largest_difference(Quantity::strain), 1e-4);
+  const double young = scene.bodies[0].material.young;
+  EXPECT_GT(largest_change(scene, cloud, bent, Quantity::stress), 1e-4 * young);
+  EXPECT_GT(largest_change(scene, cloud, bent, Quantity::strain), 1e-4);
   scene.bodies[0].material.viscosity = 1e-3;
-  EXPECT_EQ(largest_difference(Quantity::stress), 0);
-  EXPECT_GT(largest_difference(Quantity::strain), 1e-4);
+  EXPECT_EQ(largest_change(scene, cloud, bent, Quantity::stress), 0);
+  EXPECT_EQ(largest_change(scene, cloud, bent, Quantity::strain), 0);
+  scene.bodies[0].material.viscosity = 0;
+  Selection layer;
+  layer.box = Selection::Box{{0.3, -1, -1}, {0.4, 1, 1}};
+  scene.bodies[0].inclusions = {{.select = layer, .material = scene.bodies[0].material}};
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  const Recovery recovery(model);
+  ASSERT_EQ(model.parts.size(), 2u);
+  for (Index i = model.parts[1].begin; i < model.parts[1].end; ++i) {
+    EXPECT_EQ(recovery.share(i), 0);
+  }
+}
+
+/// On each face the normal points outward, and the traction is that of the phyxel's own stress; the
+/// stress along the face is that of the displacement: here a bar whose shear strain is linear in
+/// depth.
+TEST(Recovery, KeepsTractions) {
+  Material material = rubber();
+  material.law = "small-strain";
+  const Scene scene = one_body(material);
+  const Cloud cloud = sample_surface(test::box({0, 0, 0}, {1, 0.4, 0.5}), {.phyxels = 1000});
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  Quadratic bent;
+  bent.curvature[0] = {0, 0, 1e-2, 0, 0, 0};  // u_x = x z 1e-2: ε_xx grows with z
+  const auto backend = make_test_backend(model, Precision::double_);
+  backend->upload(state_of(displaced(model, bent)));
+  const Recovery recovery(model);
+  const Quantity wanted[] = {Quantity::stress, Quantity::strain};
+  const FieldValues own = find_fields(model, *backend, wanted),
+                    better = find_fields(model, *backend, wanted, &recovery);
+  Index on_top = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    const Vec3d x = model.position[i];
+    const bool inside = x.x > 0.2 && x.x < 0.8 && x.y > 0.15 && x.y < 0.25;
+    if (!inside || x.z < 0.5 - 1e-6) continue;
+    ++on_top;
+    EXPECT_GT(recovery.normal(i).z, 0.98);
+    EXPECT_EQ(recovery.share(i), 1);
+    const auto at = [&](const FieldValues& fields, Quantity q, int k) {
+      return fields.at(q)[6 * i + k];
+    };
+    // Traction along z, but for the normal's tilt of up to 0.2.
+    EXPECT_NEAR(at(better, Quantity::stress, 2), at(own, Quantity::stress, 2),
+                0.1 * material.young * 5e-3);
+    const double right = 1e-2 * 0.5, error = std::abs(at(better, Quantity::strain, 0) - right);
+    EXPECT_LT(error, 0.05 * right);
+    EXPECT_GT(std::abs(at(own, Quantity::strain, 0) - right), 2 * error);
+  }
+  EXPECT_GT(on_top, 5);
+}
+
+/// A cube under its own weight, on a smooth floor: σ_zz = -ρ g (1 - z) throughout. Recovered stress
+/// is as good as that which the balance of forces determines.
+TEST(Recovery, LeavesWhatEquilibriumDetermines) {
+  const Cloud cloud = sample_surface(test::unit_cube(), {.phyxels = 1000});
+  Material material = rubber();
+  material.law = "small-strain";
+  material.poisson = 0;
+  Scene scene = one_body(material);
+  scene.gravity = {0, 0, -10};
+  Selection floor;
+  floor.box = Selection::Box{{-1, -1, -1}, {2, 2, 0}};
+  scene.bodies[0].fixed = {{.select = floor}};
+  scene.solver.method = Method::equilibrium;
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  const auto backend = make_test_backend(model, Precision::double_);
+  find_equilibrium(model, *backend);
+  const Recovery recovery(model);
+  const double largest = material.density * 10;
+  const auto error = [&](const Recovery* by) {
+    const Quantity wanted[] = {Quantity::stress};
+    const std::vector<double> stress = find_fields(model, *backend, wanted, by).at(wanted[0]);
+    double squares = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      squares += std::pow(stress[6 * i + 2] / largest + 1 - model.position[i].z, 2);
+    }
+    return std::sqrt(squares / model.size());
+  };
+  EXPECT_LT(error(&recovery), 1.1 * error(nullptr));
 }
 
 }  // namespace
