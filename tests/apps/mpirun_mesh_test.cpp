@@ -26,11 +26,8 @@ std::vector<std::string> loads_said(const std::string& plan) {
   return lines;
 }
 
-/// A cube made from a mesh, of two materials, is held in a box and moved in a ball that end inside
-/// it, loaded in a ball and pressed upon. A second one, of one material, hangs by its own box.
-TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
-  write("cube.stl", test::binary_stl(test::unit_cube()));
-  write("cube.toml", R"([time]
+/// Two cubes with supports, loads and probes in space.
+const char* const cut_cubes = R"([time]
 end = 0.05
 [solver]
 threads = 1
@@ -94,11 +91,13 @@ point = [2.5, 0.5, 0]
 [[probe]]
 body = "one"
 ball = { centre = [2.5, 0.5, 0.5], radius = 0.3 }
-)");
-  write("groups.obj", test::cube_vertices +
-                          "g side\nf 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\ng left\n"
-                          "f 1 5 7 3\ng right\nf 2 4 8 6\n");
-  write("cube.toml", test::text_of(folder_ / "cube.toml") + R"(
+)";
+
+/// A cube whose end faces have names.
+const std::string grouped_cube = test::cube_vertices +
+                                 "g side\nf 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\ng left\n"
+                                 "f 1 5 7 3\ng right\nf 2 4 8 6\n";
+const char* const cube_of_groups = R"(
 [[body]]
 name = "three"
 mesh = "groups.obj"
@@ -117,7 +116,14 @@ traction = [100, 0, 50]
 name = "end"
 body = "three"
 region = "right"
-)");
+)";
+
+/// A cube made from a mesh, of two materials, is held in a box and moved in a ball that end inside
+/// it, loaded in a ball and pressed upon. A second one, of one material, hangs by its own box.
+TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
+  write("cube.stl", test::binary_stl(test::unit_cube()));
+  write("groups.obj", grouped_cube);
+  write("cube.toml", std::string(cut_cubes) + cube_of_groups);
   const Outcome alone = run_on(0, {"run", "cube.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));

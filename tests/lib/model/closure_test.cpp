@@ -166,7 +166,7 @@ TEST(Closure, TrianglesMayBeLarge) {
 /// edges and corners share, and a pressure around a ball.
 TEST(Closure, TractionsOfAUniformStressBalanceIt) {
   const auto largest_rest = [](const Surface& mesh, const Mat3d& g, auto&& tractions_for) {
-    const Cloud cloud = sample_surface(mesh, {.phyxels = 1500});
+    const Cloud cloud = sample_surface(mesh, {.phyxels = 700});
     Scene scene = scene_of(1e-10, linear_rubber());
     const Mat3d stress = under(build_model(scene, std::span(&cloud, 1)), g).stress;
     scene.bodies[0].tractions = tractions_for(stress);
@@ -195,9 +195,9 @@ TEST(Closure, TractionsOfAUniformStressBalanceIt) {
     }
     return tractions;
   };
-  // The areas of edges change once, for all faces; each traction keeps its total. Seen: 3e-4; 0.08
+  // The areas of edges change once, for all faces; each traction keeps its total. Seen: 2e-3; 0.08
   // if tractions do not follow.
-  EXPECT_LT(largest_rest(test::box({0, 0, 0}, {1, 0.4, 0.5}), some_gradient(), on_faces), 1e-3);
+  EXPECT_LT(largest_rest(test::box({0, 0, 0}, {1, 0.4, 0.5}), some_gradient(), on_faces), 4e-3);
   Mat3d smaller{};
   for (int e = 0; e < 9; e += 4) smaller(e / 3, e % 3) = -1e-3;
   EXPECT_LT(largest_rest(test::sphere({0, 0, 0}, 0.5, 3), smaller,
