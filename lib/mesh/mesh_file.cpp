@@ -67,7 +67,7 @@ std::map<std::string, std::vector<Index>> FaceGroups::of_triangles(
   for (const auto& [name, faces] : faces_) {
     std::string safe = name;
     std::replace(safe.begin(), safe.end(), '/', '_');
-    if (safe.find_first_not_of('.') == std::string::npos) safe = "_" + safe;
+    if (safe.find_first_not_of('.') == std::string::npos) safe.insert(0, "_");
     std::vector<Index>& triangles = groups[safe];
     for (const Index face : faces) {
       for (std::size_t t = first_triangle[face]; t < first_triangle[face + 1]; ++t) {
