@@ -177,7 +177,9 @@ std::string FrameLog::kept(double last_step) const {
     reached = step;
     kept.append(lines[l]).push_back('\n');
   }
-  if (reached < last_step) {
+  // A log that had been removed begins again where the run went on.
+  const bool begins_later = lines.size() > 1 && number_in(cell(lines[1], 0)) > last_step;
+  if (reached < last_step && !begins_later) {
     throw InputError(fmt::format(
         "{}: ends at step {:g}, and {} goes on to step {:g}: lines are missing; it is kept; "
         "allowed: "

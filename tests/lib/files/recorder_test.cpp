@@ -244,14 +244,19 @@ TEST_F(Recording, ReactionsHaveOneLineAFrameAndSetAndAreCutBackToTheCheckpoint) 
   record_with(again, 3);
   EXPECT_EQ(text_of(file), log.substr(0, log.find('\n') + 1) + log.substr(log.find("30,0.3")));
 
+  const auto expect_refused = [&](const char* why) {
+    try {
+      Recorder(model_, scene_, false, Continuation{3});
+      ADD_FAILURE() << "another file was taken for a log of reactions";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(why));
+      EXPECT_THAT(error.what(), HasSubstr("another folder"));
+    }
+  };
+  write("out/reactions.csv", log.substr(0, log.find("20,0.2")));
+  expect_refused("reactions.csv: ends at step 10, and energy.csv goes on to step 20");
   write("out/reactions.csv", "step,force\n");
-  try {
-    Recorder(model_, scene_, false, Continuation{3});
-    ADD_FAILURE() << "another file was taken for a log of reactions";
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("reactions.csv: begins with \"step,force\""));
-    EXPECT_THAT(error.what(), HasSubstr("allowed: another folder"));
-  }
+  expect_refused("reactions.csv: begins with \"step,force\"");
 }
 
 TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
