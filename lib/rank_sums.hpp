@@ -34,6 +34,18 @@ inline void add_over_ranks(const Communicator& ranks, std::vector<ExactSum>& sum
   add_over_ranks(ranks, all);
 }
 
+/// Adds the sums of all ranks, in place, of objects with several sums each, which `all()` lists.
+/// Nothing is added if the model is no share.
+template <class Sums>
+void add_each_over_ranks(const Model& model, std::vector<Sums>& objects) {
+  if (!model.share) return;
+  std::vector<ExactSum*> all;
+  for (Sums& sums : objects) {
+    for (ExactSum* sum : sums.all()) all.push_back(sum);
+  }
+  add_over_ranks(*model.share->communicator, all);
+}
+
 /// Adds the sums of all ranks if the model is a share; a whole model has them already.
 template <class Sums>
 void add_over_ranks(const Model& model, Sums& sums) {

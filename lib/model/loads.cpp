@@ -1,7 +1,6 @@
 #include "model/loads.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -168,12 +167,9 @@ std::vector<Triangle> chosen_triangles(const BodyRequest& request, const Tractio
   if (!traction.select.region) return {surface.triangle.begin(), surface.triangle.end()};
   const auto found = surface.groups.find(*traction.select.region);
   if (found == surface.groups.end()) {
-    std::vector<std::string> names;
-    for (const auto& [name, triangles] : surface.groups) names.push_back(name);
-    throw InputError(fmt::format(
-        "{}: the surface of body \"{}\" has no group \"{}\"{}; it has: {}", traction.select.where,
-        request.name, *traction.select.region, did_you_mean(*traction.select.region, names),
-        names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+    throw InputError(fmt::format("{}: the surface of body \"{}\" has no group \"{}\"{}",
+                                 traction.select.where, request.name, *traction.select.region,
+                                 alternatives_to(*traction.select.region, surface.groups)));
   }
   return tabulated(found->second.size(),
                    [&](std::size_t k) { return surface.triangle[found->second[k]]; });

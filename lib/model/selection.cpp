@@ -24,12 +24,9 @@ std::vector<Index> of_region(const Selection& selection, const Cloud& cloud,
                              const std::string& body) {
   const auto found = cloud.regions.find(*selection.region);
   if (found != cloud.regions.end()) return found->second;
-  std::vector<std::string> names;
-  for (const auto& [name, members] : cloud.regions) names.push_back(name);
-  throw InputError(fmt::format("{}: body \"{}\" has no region \"{}\"{}; it has: {}",
-                               selection.where, body, *selection.region,
-                               did_you_mean(*selection.region, names),
-                               names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  throw InputError(fmt::format("{}: body \"{}\" has no region \"{}\"{}", selection.where, body,
+                               *selection.region,
+                               alternatives_to(*selection.region, cloud.regions)));
 }
 
 std::vector<Index> of_indices(const Selection& selection, const SomePhyxels& body,
@@ -54,6 +51,14 @@ std::vector<Index> of_indices(const Selection& selection, const SomePhyxels& bod
 }
 
 }  // namespace
+
+std::string alternatives_to(const std::string& name,
+                            const std::map<std::string, std::vector<Index>>& named) {
+  std::vector<std::string> names;
+  for (const auto& [known, members] : named) names.push_back(known);
+  return fmt::format("{}; it has: {}", did_you_mean(name, names),
+                     names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")));
+}
 
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
                           const std::string& name) {

@@ -1,6 +1,7 @@
 /// Which phyxels of a body a scene means.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,6 +26,11 @@ struct SomePhyxels {
 /// @throws InputError if a region is unknown or an index out of range.
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
                           const std::string& name);
+
+/// Words for a message about a name that is not among the `named` sets, e.g.
+/// ` (did you mean "x-"?); it has: x-, x+`.
+std::string alternatives_to(const std::string& name,
+                            const std::map<std::string, std::vector<Index>>& named);
 
 /// The part of space that a selection means; unset if it means none.
 std::optional<SpaceRegion> region_of(const Selection& selection);

@@ -156,8 +156,9 @@ std::vector<SceneKey> run_keys() {
        .fallback = "[\"displacement\", \"velocity\"]",
        .words = field_names(), .meaning = field_meanings()},
       {.section = "output", .name = "recovery", .type = KeyType::boolean, .fallback = "true",
-       .meaning = "Whether stresses and strains on the surface follow from recovered gradients, with the traction "
-           "that forces determine; those of laws that remember do not. false: all are those that forces follow from."},
+       .meaning = "Recovers the gradients of phyxels on the surface for stresses and strains of frames and "
+           "probes, and keeps the tractions that the balance of forces gives. Phyxels whose law has a history keep their "
+           "own gradients. false: all phyxels keep them."},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},
@@ -378,15 +379,15 @@ std::vector<SceneKey> boundary_keys() {
        .meaning = "Time over which the force grows from zero; 0: at once."},
 
       {.section = "probe", .name = "name", .type = KeyType::text, .otherwise = "\"probe 1\", \"probe 2\", ...",
-       .meaning = "In `probes.csv`."},
+       .meaning = "The probe's name in `probes.csv`."},
       {.section = "probe", .name = "body", .type = KeyType::text, .otherwise = "the only body",
-       .meaning = "The name of the body that it is in."},
+       .meaning = "The name of the body that the probe is in."},
       {.section = "probe", .name = "point", .type = KeyType::vector, .unit = "m", .otherwise = "none",
        .range = within(10 * longest), .meaning = "At rest; not farther from a phyxel of the body than half a support radius, about a spacing."},
       {.section = "probe", .name = "from", .type = KeyType::vector, .unit = "m", .otherwise = "none",
-       .range = within(10 * longest), .meaning = "Start of a line of points, likewise."},
+       .range = within(10 * longest), .meaning = "Start of a line of points, as near to a phyxel as a `point`."},
       {.section = "probe", .name = "to", .type = KeyType::vector, .unit = "m", .otherwise = "none",
-       .range = within(10 * longest), .meaning = "Its end."},
+       .range = within(10 * longest), .meaning = "End of the line."},
       {.section = "probe", .name = "points", .type = KeyType::integer, .fallback = "11",
        .range = between(2, 1000), .meaning = "Number of points on the line, ends included."},
 

@@ -139,7 +139,8 @@ std::unique_ptr<const Recovery> recovery_for(const OutputRequest& output, const 
   const std::vector<Quantity> wanted = wanted_fields(output);
   const bool follows =
       std::any_of(wanted.begin(), wanted.end(), [](Quantity q) { return q != Quantity::boundary; });
-  return output.recovery && follows ? std::make_unique<Recovery>(model) : nullptr;
+  return output.recovery && (follows || !model.probes.empty()) ? std::make_unique<Recovery>(model)
+                                                               : nullptr;
 }
 
 FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,

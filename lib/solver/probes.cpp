@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -36,8 +35,8 @@ struct Near {
 };
 static_assert(std::is_trivially_copyable_v<Near>);
 
-/// The lists of all ranks for each point, merged: the first `most` phyxels in order, those of other
-/// ranks with local = -1. Collective on a share.
+/// Merges the lists of all ranks for each point and keeps the nearest `most` phyxels, in order.
+/// Phyxels of other ranks have local = -1. Collective on a share.
 void merge_over_ranks(const Model& model, std::vector<std::vector<Near>>& of_points,
                       std::size_t most) {
   if (!model.share) return;
@@ -71,8 +70,8 @@ void merge_over_ranks(const Model& model, std::vector<std::vector<Near>>& of_poi
   }
 }
 
-/// The nearest `most` phyxels that this rank owns of some parts, of which may_be(phyxel) holds, in
-/// order.
+/// Finds the nearest `most` phyxels of some parts that this rank owns and for which may_be(phyxel)
+/// is true, in order.
 template <class MayBe>
 std::vector<Near> nearest_here(const Model& model, std::span<const Part> parts, Vec3d point,
                                std::size_t most, MayBe&& may_be) {
@@ -137,7 +136,7 @@ struct WeightedSums {
       strain[k].add(w * fields.at(Quantity::strain)[6 * i + k]);
     }
   }
-  /// The reading of which these are the values, but for a factor.
+  /// Returns the reading whose values are the sums times a factor.
   ProbeReading reading(double factor) const {
     ProbeReading found;
     found.place = factor * place.value();
@@ -151,15 +150,6 @@ struct WeightedSums {
     return found;
   }
 };
-
-template <class Sums>
-void add_all_over_ranks(const Model& model, std::vector<Sums>& sums) {
-  std::vector<ExactSum*> all;
-  for (Sums& of_one : sums) {
-    for (ExactSum* sum : of_one.all()) all.push_back(sum);
-  }
-  add_over_ranks(model, all);
-}
 
 }  // namespace
 
@@ -256,7 +246,7 @@ std::vector<ProbeReading> Probes::read(Backend& backend, const Recovery* recover
       }
     }
   }
-  add_all_over_ranks(model_, sums);
+  add_each_over_ranks(model_, sums);
 
   std::vector<ProbeReading> readings;
   point = points_.begin();

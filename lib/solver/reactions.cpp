@@ -23,16 +23,6 @@ struct ReactionSums {
   }
 };
 
-/// Adds the sums of all ranks.
-template <class Sums>
-void add_of_motions(const Model& model, std::vector<Sums>& of_motions) {
-  std::vector<ExactSum*> all;
-  for (Sums& sums : of_motions) {
-    for (ExactSum* sum : sums.all()) all.push_back(sum);
-  }
-  add_over_ranks(model, all);
-}
-
 /// Returns the centre of mass of each motion's phyxels at rest [m].
 std::vector<Vec3d> centres_of(const Model& model) {
   std::vector<CentreSums> sums(model.motions.size());
@@ -42,7 +32,7 @@ std::vector<Vec3d> centres_of(const Model& model) {
       sums[m].moment.add(model.mass[i] * model.position[i]);
     });
   }
-  add_of_motions(model, sums);
+  add_each_over_ranks(model, sums);
   std::vector<Vec3d> centres;
   for (CentreSums& of : sums) {
     const double mass = of.mass.value();
@@ -84,7 +74,7 @@ std::vector<Reaction> find_reactions(const Model& model, Backend& backend, const
       if (!motion.stands_still()) sums[m].rest_of_work.add(dot(force, rest.at(x)));
     });
   }
-  add_of_motions(model, sums);
+  add_each_over_ranks(model, sums);
   SupportWork work = no_support_work(model);
   add_words(work, solver.support_work());
   std::vector<Reaction> reactions;

@@ -67,6 +67,20 @@ TEST_F(ProbesOfRuns, ContinueWithARun) {
   EXPECT_EQ(text_of(folder_ / "whole" / "probes.csv"), text_of(folder_ / "parts" / "probes.csv"));
 }
 
+/// Readings do not depend on the fields of frames, but on the recovery of gradients.
+TEST_F(ProbesOfRuns, AreRecoveredWhateverFramesHold) {
+  write_probed_beam("0.1");
+  const auto log_with = [&](const std::string& keys) {
+    replace_in_beam("[output]\n", "[output]\n" + keys);
+    EXPECT_EQ(run({"run", "beam.toml", "--force"}).code, 0);
+    replace_in_beam("[output]\n" + keys, "[output]\n");
+    return text_of(folder_ / "out" / "probes.csv");
+  };
+  const std::string plain = log_with("");
+  EXPECT_TRUE(plain == log_with("fields = [\"displacement\", \"stress\"]\n"));
+  EXPECT_FALSE(plain == log_with("recovery = false\n"));
+}
+
 TEST_F(ProbesOfRuns, WithoutProbesThereIsNoFile) {
   write_beam("0.02");
   ASSERT_EQ(run({"run", "beam.toml"}).code, 0);

@@ -39,8 +39,8 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output);
 FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,
                         const Recovery* recovery = nullptr);
 
-/// The recovery that the output of a scene asks for; null if it asks for none, or for no field that
-/// follows from gradients.
+/// Makes the recovery that the output of a scene asks for; null if it asks for none, or if there
+/// are neither probes nor fields that follow from gradients.
 std::unique_ptr<const Recovery> recovery_for(const OutputRequest& output, const Model& model);
 
 }  // namespace phyxel

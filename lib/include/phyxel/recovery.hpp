@@ -17,8 +17,8 @@ namespace phyxel {
 /// displacements the limit is exact. Neighbours of another part do not count, so that gradients may
 /// jump where the material does.
 ///
-/// What equilibrium determines is better without: the traction of a phyxel's own stress on the
-/// surface. `find_fields` keeps that (`Recovery::normal`).
+/// The balance of forces determines the traction of a phyxel's own stress on the surface better
+/// than recovery does: `find_fields` keeps that traction (`Recovery::normal`).
 ///
 /// Forces and energies do not change. Costs neighbour lists of its own where a device has those of
 /// the model.
@@ -31,8 +31,8 @@ class Recovery {
   /// @param displacement [m], shape [n]; ghosts receive their owners' values
   std::vector<Mat3d> gradients(std::vector<Vec3d> displacement) const;
   /// The share of a recovered gradient in the field of a phyxel: 1 on the surface, 0 where all
-  /// neighbours lie evenly on all sides, and where those of the same material do not span as much
-  /// as all, as in a layer of one phyxel.
+  /// neighbours lie evenly on all sides, and where the neighbours of the same material span fewer
+  /// directions than all neighbours, as in a layer of one phyxel.
   double share(Index phyxel) const { return share_[phyxel]; }
   /// The outward normal at a phyxel on the surface, as its neighbourhood tells it; elsewhere some
   /// unit vector, or zero.
