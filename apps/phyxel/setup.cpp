@@ -152,8 +152,9 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
     const bool total = load.density == Vec3d{};
     const Vec3d f = total ? load.total : load.density, x = load.centroid;
     text += fmt::format(
-        "  load        {}, {}: [{:.4g}, {:.4g}, {:.4g}] {} about [{:.4g}, {:.4g}, {:.4g}] m\n",
-        load.body, load.set, f.x, f.y, f.z, total ? "N" : "N/m^3", x.x, x.y, x.z);
+        "  load        {}, {}: [{:.4g}, {:.4g}, {:.4g}] {} about [{:.4g}, {:.4g}, {:.4g}] m{}\n",
+        load.body, load.set, f.x, f.y, f.z, total ? "N" : "N/m^3", x.x, x.y, x.z,
+        load.follows ? " at rest, following the surface" : "");
   }
   if (model.loads.size() > most_loads) {
     text += fmt::format("              and {} more loads\n", model.loads.size() - most_loads);

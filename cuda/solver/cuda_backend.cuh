@@ -248,6 +248,9 @@ class CudaBackend final : public Backend {
     if (path_.residence) {
       list.push_back({"what stays in shared memory", path_.residence->bytes()});
     }
+    if (boundary_.following_bytes() > 0) {
+      list.push_back({"loads that follow the surface", boundary_.following_bytes()});
+    }
     if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
@@ -311,9 +314,10 @@ class CudaBackend final : public Backend {
   }
   /// Launches one step of the present size from a time [s].
   void launch_step(double time, const Advection* surfels) {
+    boundary_.sum_loads(time);
+    boundary_.add_following(*passes_);
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
-    boundary_.sum_loads(time);
     if (fresh_ || boundary_.changes()) {
       passes_->advance(m_.dt());
       boundary_.follow_paths(time, m_.dt());

@@ -146,6 +146,9 @@ class DeviceModel {
     if (load_.size()) return;
     load_ = {3 * places(), "loads of " + subject_};
     fields_.load = load_.data();
+    if (!model_.has_following_loads()) return;
+    following_ = {3 * places(), "loads of " + subject_};
+    fields_.following = following_.data();
   }
   /// Sets the caller's forces [N], shape [3, places], which `loads` includes and whose energy is
   /// not counted. An empty list clears them, and `loads` too if the scene has no loads.
@@ -161,6 +164,8 @@ class DeviceModel {
     fields_.external = external_.data();
   }
   Real* loads() const { return load_.data(); }  ///< [3, places], or null.
+  /// Forces at rest of loads that follow the surface, [3, places], or null.
+  Real* following() const { return following_.data(); }
 
   /// Uploads a state. @throws InputError for a history of other laws
   void put(const State& state) {
@@ -272,7 +277,7 @@ class DeviceModel {
     if (tiling_.inverse) list.push_back({"inverse neighbour lists", tiling_.inverse->bytes()});
     if (own_supports_) list.push_back({"supports", supports_.bytes()});
     if (mixed) list.push_back({"displacements", displacement_.bytes()});
-    if (load_.size()) list.push_back({"loads", load_.bytes()});
+    if (load_.size()) list.push_back({"loads", load_.bytes() + following_.bytes()});
     if (external_.size()) list.push_back({"external forces", external_.bytes()});
     if (pull_.size()) list.push_back({"hourglass control", pull_.bytes()});
     if (history_.bytes()) list.push_back({"history", history_.bytes()});
@@ -452,8 +457,8 @@ class DeviceModel {
   AllFields fields_{};
   DeviceLists lists_{}, second_lists_{};
   DeviceArray<std::byte> points_, stresses_, closing_stresses_;
-  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, external_, pull_,
-      closing_;
+  DeviceArray<Real> moment_constants_, force_constants_, supports_, load_, following_, external_,
+      pull_, closing_;
   DeviceHistory<Real> history_;
   DeviceArray<StateReal> velocity_, displacement_;
   DeviceArray<BodyConstants> tiles_;

@@ -108,6 +108,7 @@ __global__ void diagnose_tiles(const __grid_constant__ Fields<Real, StateReal> f
       p.internal = column(force);
       p.external = column(f.external);
       p.load = column(f.load) - p.external;
+      p.following = column(f.following);
       p.gravity = to<double>(f.gravity);
       for (int e = 0; e < 9; ++e) p.grad_u(e / 3, e % 3) = gradient[e * f.places + place];
       p.hourglass = m.hourglass;

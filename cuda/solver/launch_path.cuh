@@ -36,7 +36,7 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
   if (wanted == CudaPath::launches) {
     launches = "as asked";
   } else if (boundary.changes()) {
-    launches = "motions and growing loads change from step to step";
+    launches = "motions, and loads that grow or follow the surface, change from step to step";
   } else if (model.size() > most_recorded) {
     launches = "a step of " + model.subject() + " takes longer than its launches";
   } else if (halo && !halo->is_direct()) {

@@ -220,7 +220,8 @@ Load traction_load(const BodyRequest& request, std::size_t number, const LoadedF
   Load load{.ramp = request.tractions[number].ramp,
             .body = request.name,
             .set = entry_name("traction", number),
-            .on_surface = true};
+            .on_surface = true,
+            .follows = request.tractions[number].follower};
   double sizes = 0;
   Vec3d moment;
   const Vec3d origin = loaded.facets.front().centroid;

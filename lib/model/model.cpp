@@ -416,6 +416,10 @@ bool Model::has_inclusions() const {
   return !parts.empty() && parts.back().body + 1 < static_cast<Index>(parts.size());
 }
 
+bool Model::has_following_loads() const {
+  return std::any_of(loads.begin(), loads.end(), [](const Load& load) { return load.follows; });
+}
+
 std::span<const Part> Model::parts_of_body(const Part& part) const {
   auto first = parts.begin() + (&part - parts.data()), last = first + 1;
   while (first != parts.begin() && (first - 1)->body == part.body) --first;

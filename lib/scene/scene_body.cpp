@@ -260,6 +260,8 @@ TractionRequest read_traction(const SceneTable& table) {
   table.expect_one_of({"traction", "pressure"});
   table.read("traction", traction.traction);
   table.read("pressure", traction.pressure);
+  if (table.has("follower")) table.expect_together("follower", "pressure");
+  table.read("follower", traction.follower);
   if (table.has("angle")) table.expect_together("angle", "normal");
   table.read("normal", traction.normal);
   if (table.has("normal") && traction.normal == Vec3d{}) {

@@ -369,7 +369,10 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "body.traction", .name = "traction", .type = KeyType::vector, .unit = "Pa",
        .fallback = "[0, 0, 0]", .range = within(stiffest), .meaning = "Force per area at rest."},
       {.section = "body.traction", .name = "pressure", .unit = "Pa", .fallback = "0", .range = within(stiffest),
-       .meaning = "Force per area against the outward normal at rest; negative: along it."},
+       .meaning = "Force per area against the outward normal; negative: along it."},
+      {.section = "body.traction", .name = "follower", .type = KeyType::boolean, .fallback = "false",
+       .meaning = "Whether the pressure acts on the deformed surface, against its normals, as that of a gas or a liquid; "
+           "else its force stays as it is at rest."},
       {.section = "body.traction", .name = "normal", .type = KeyType::vector, .otherwise = "everywhere",
        .range = within(longest),
        .meaning = "Only where the outward normal at rest has nearly this direction."},

@@ -160,6 +160,7 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
   each(body.tractions, "traction", [](const TractionRequest& traction, auto&& inner) {
     inner("body.traction", "traction", traction.traction);
     inner("body.traction", "pressure", traction.pressure);
+    inner("body.traction", "follower", traction.follower);
     inner("body.traction", "normal", traction.normal);
     inner("body.traction", "angle", traction.angle);
     inner("body.traction", "ramp", traction.ramp);

@@ -66,7 +66,7 @@ std::vector<SceneSection> make_sections() {
        "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
        "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
        "`all`. The force keeps its size and "
-       "direction as the body deforms. Phyxels get their shares such that total, centroid and torque are "
+       "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
        "those on the triangles."},
       {"probe", "[[probe]]", "selection",
        "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "

@@ -1,17 +1,25 @@
 /// Loads and prescribed motions of a model, shared by all solvers.
 #pragma once
 
+#include <cmath>
 #include <utility>
 #include <vector>
 
+#include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/physics/follower.hpp"
 
 namespace phyxel {
 
-/// Calls add(phyxel, force) for the force [N] of every load on every phyxel at `time` [s].
+/// The time at which every load has its full size [s].
+inline constexpr double full_loads = HUGE_VAL;
+
+/// Calls add(phyxel, force) for the force at rest [N] of every load on every phyxel, either of the
+/// loads that follow the surface or of the others. @param time [s]
 template <class Add>
-void for_each_load(const Model& model, double time, Add&& add) {
+void for_each_load(const Model& model, bool following, double time, Add&& add) {
   for (const Load& load : model.loads) {
+    if (load.follows != following) continue;
     const double scale = load.scale_at(time);
     for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
       add(load.phyxels[k], scale * load.force[k]);
@@ -19,16 +27,31 @@ void for_each_load(const Model& model, double time, Add&& add) {
   }
 }
 
-/// Adds the loads at `time` [s] to forces [N], shape [n].
-inline void add_loads(const Model& model, double time, std::vector<Vec3d>& force) {
-  for_each_load(model, time, [&](Index i, Vec3d load) { force[i] += load; });
+/// Adds the loads that do not follow the surface to forces [N], shape [n]. @param time [s]
+inline void add_constant_loads(const Model& model, double time, std::vector<Vec3d>& force) {
+  for_each_load(model, false, time, [&](Index i, Vec3d load) { force[i] += load; });
 }
-
-/// Adds the loads at full size to forces [N], shape [n].
-inline void add_full_loads(const Model& model, std::vector<Vec3d>& force) {
-  for (const Load& load : model.loads) {
-    for (std::size_t k = 0; k < load.phyxels.size(); ++k) force[load.phyxels[k]] += load.force[k];
-  }
+/// Adds all loads of a body at rest to forces [N], shape [n]. @param time [s]
+inline void add_loads_at_rest(const Model& model, double time, std::vector<Vec3d>& force) {
+  add_constant_loads(model, time, force);
+  for_each_load(model, true, time, [&](Index i, Vec3d load) { force[i] += load; });
+}
+/// Adds the loads that follow the surface, at the present displacements of a backend, to forces
+/// [N], shape [n]. Without such loads it costs nothing. @param time [s]
+inline void add_following_loads(const Model& model, Backend& backend, double time,
+                                std::vector<Vec3d>& force) {
+  if (!model.has_following_loads()) return;
+  std::vector<Mat3d> gradient;
+  backend.displacement_gradients(gradient);
+  for_each_load(model, true, time,
+                [&](Index i, Vec3d load) { force[i] += following_force(gradient[i], load); });
+}
+/// Adds all loads at the present displacements of a backend to forces [N], shape [n].
+/// @param time [s]
+inline void add_loads(const Model& model, Backend& backend, double time,
+                      std::vector<Vec3d>& force) {
+  add_constant_loads(model, time, force);
+  add_following_loads(model, backend, time, force);
 }
 
 /// Returns 1 for the free axes of each phyxel and 0 for prescribed ones, shape [n]. Empty for a

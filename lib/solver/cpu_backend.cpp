@@ -186,6 +186,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::boundary_runs_;
   using Passes::closing_;
   using Passes::displacement_;
+  using Passes::following_;
   using Passes::history_interval_;
   using Passes::interior_runs_;
   using Passes::layout_;
@@ -216,24 +217,32 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     this->clear_padding();
   }
   /// Sums the forces that are applied at `time` [s]. Repeated calls sum again only while a load
-  /// still grows.
+  /// still grows or follows the surface.
   void apply_loads(double time) {
     if (applied_.empty()) return;
     double scales = 0;
     for (const Load& load : model_.loads) scales += load.scale_at(time);
     const bool same = load_time_ && scales == load_scales_;
     load_time_ = time;
-    if (same) return;
+    if (same && following_.empty()) return;
     load_scales_ = scales;
     std::fill(applied_.begin(), applied_.end(), Real(0));
-    const auto add = [&](Index i, Vec3d force) {
-      const Index slot = layout_.slot(i);
-      this->set3(applied_, slot, this->get3(applied_, slot) + force);
+    const auto add_to = [&](AlignedVector<Real>& array) {
+      return [&](Index i, Vec3d force) {
+        const Index slot = layout_.slot(i);
+        this->set3(array, slot, this->get3(array, slot) + force);
+      };
     };
     for (Index i = 0; i < static_cast<Index>(external_force_.size()); ++i) {
-      add(i, external_force_[i]);
+      add_to(applied_)(i, external_force_[i]);
     }
-    for_each_load(model_, time, add);
+    for_each_load(model_, false, time, add_to(applied_));
+    if (following_.empty()) return;
+    if (!same) {
+      std::fill(following_.begin(), following_.end(), Real(0));
+      for_each_load(model_, true, time, add_to(following_));
+    }
+    this->add_following();
   }
 
   std::vector<Vec3d> external_force_;

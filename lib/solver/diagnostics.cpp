@@ -42,7 +42,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   Totals all;
   const std::span<const Vec3d> external = backend.external_forces();
   std::vector<Vec3d> loads(model.loads.empty() ? 0 : force.size());
-  if (!loads.empty()) add_loads(model, now.time, loads);
+  std::vector<Vec3d> following(model.has_following_loads() ? force.size() : 0);
+  add_constant_loads(model, now.time, loads);
+  for_each_load(model, true, now.time, [&](Index i, Vec3d load) { following[i] += load; });
   const std::vector<Vec3d> free = free_axes(model);
   const std::vector<std::string> columns = history_columns(model);
 
@@ -84,6 +86,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
                            .free = free.empty() ? Vec3d{1, 1, 1} : free[i],
                            .internal = force[i],
                            .load = loads.empty() ? none : loads[i],
+                           .following = following.empty() ? none : following[i],
                            .external = external.empty() ? none : external[i],
                            .gravity = model.gravity,
                            .grad_u = gradient[i],

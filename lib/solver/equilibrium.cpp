@@ -30,10 +30,7 @@ Balance whole_balance(const Model& model, const Newton& newton) {
           "equilibrium are fixed phyxels and motions by a displacement");
     }
   }
-  balance.applied = vectors.make();
-  vectors.for_each([&](Index i) { balance.applied[i] = model.mass[i] * model.gravity; });
-  add_full_loads(model, balance.applied);
-  newton.add_external_forces(balance.applied);
+  newton.set_applied(full_loads, balance);
   return balance;
 }
 

@@ -25,7 +25,6 @@ ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
   const OwnedVectors& vectors = newton_.vectors();
   balance_.target = vectors.make();
   balance_.centre = vectors.make();
-  balance_.applied = vectors.make();
   balance_.weight.resize(balance_.target.size());
   balance_.free = free_axes(model);
   balance_.free.resize(balance_.target.size(), {1, 1, 1});
@@ -38,19 +37,12 @@ ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
   }
 }
 
-void ImplicitStep::find_applied(double time) {
-  newton_.vectors().for_each(
-      [&](Index i) { balance_.applied[i] = model_.mass[i] * model_.gravity; });
-  add_loads(model_, time, balance_.applied);
-  newton_.add_external_forces(balance_.applied);
-}
-
 /// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): substituting v' in the first equation
 /// leaves a balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
 ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u,
                                               Vector& v) {
   const OwnedVectors& vectors = newton_.vectors();
-  find_applied(time);
+  newton_.set_applied(time, balance_);
   prescribe_displacements(model_, time, balance_.target);
   const auto slowed = [&](Index i) { return damping_.empty() ? 1.0 : 1 + damping_[i] * s; };
   vectors.for_each([&](Index i) {
@@ -82,9 +74,8 @@ ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vecto
   }
   // Velocities are updated from forces rather than displacements: internal forces sum to zero, so
   // momentum is conserved.
-  Vector force = newton_.inner_forces(u);
+  Vector force = newton_.acting_forces(balance_, u);
   vectors.for_each([&](Index i) {
-    force[i] += balance_.applied[i];
     const Vec3d acceleration = (1 / model_.mass[i]) * force[i];
     v[i] = by_components(balance_.free[i], (1 / slowed(i)) * (v[i] + s * acceleration));
   });
@@ -122,9 +113,8 @@ void ImplicitStep::take_both_stages(State& state) {
   Vector& v2 = state.velocity;
   Vector first_force;
   if (state.step == 0 && !support_work_.empty()) {
-    find_applied(begin);
-    first_force = newton_.inner_forces(u);
-    vectors.for_each([&](Index i) { first_force[i] += balance_.applied[i]; });
+    newton_.set_applied(begin, balance_);
+    first_force = newton_.acting_forces(balance_, u);
   }
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);

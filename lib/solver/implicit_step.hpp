@@ -34,7 +34,6 @@ class ImplicitStep {
 
  private:
   using Vector = Newton::Vector;
-  void find_applied(double time);
   /// Takes a stage of length s [s] that ends at `time` [s].
   /// @param from U of the stage [m]. @param u start of the search; receives u' [m]. @param v V of
   /// the stage; receives v' [m/s]

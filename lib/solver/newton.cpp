@@ -8,6 +8,8 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/follower.hpp"
+#include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
 namespace {
@@ -101,9 +103,12 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
       });
       force = forces(balance, next);
       const double now = potential(balance, next);
-      // Energy may rise while prescribed phyxels move; a rise by rounding does not count.
+      // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
+      // that follows the surface has an energy only nearly: there, smaller residuals do as well.
       const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
-      if (std::isfinite(now) && (to_move > 0 || rise <= rounding || attempt == most_cuts)) {
+      const bool falls = rise <= rounding || (!balance.following.empty() &&
+                                              residual(balance, next, force) < report.residual);
+      if (std::isfinite(now) && (to_move > 0 || falls || attempt == most_cuts)) {
         energy = now;
         break;
       }
@@ -128,15 +133,39 @@ Newton::Vector Newton::inner_forces(const Vector& u) {
   return force;
 }
 
-void Newton::add_external_forces(Vector& applied) const {
+void Newton::set_applied(double time, Balance& balance) const {
+  Vector& applied = balance.applied;
+  applied = vectors_.make();
+  vectors_.for_each([&](Index i) { applied[i] = model_.mass[i] * model_.gravity; });
+  add_constant_loads(model_, time, applied);
   const std::span<const Vec3d> external = backend_.external_forces();
   if (!external.empty()) vectors_.for_each([&](Index i) { applied[i] += external[i]; });
+  if (!model_.has_following_loads()) return;
+  balance.following = vectors_.make();
+  for_each_load(model_, true, time, [&](Index i, Vec3d load) { balance.following[i] += load; });
 }
 
-/// The sum of internal, applied and inertial forces [N] at u.
-Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
+Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
   Vector force = inner_forces(u);
   vectors_.for_each([&](Index i) { force[i] += balance.applied[i]; });
+  if (balance.following.empty()) return force;
+  const std::vector<Mat3d> gradient = gradients();
+  vectors_.for_each(
+      [&](Index i) { force[i] += following_force(gradient[i], balance.following[i]); });
+  return force;
+}
+
+/// The displacement gradients at the present displacements.
+std::vector<Mat3d> Newton::gradients() {
+  std::vector<Mat3d> gradient;
+  backend_.displacement_gradients(gradient);
+  ++evaluations_;
+  return gradient;
+}
+
+/// The sum of all forces at u, those of inertia included [N].
+Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
+  Vector force = acting_forces(balance, u);
   if (!balance.weight.empty()) {
     vectors_.for_each([&](Index i) {
       force[i] -= balance.weight[i] * by_components(balance.free[i], u[i] - balance.centre[i]);
@@ -164,7 +193,14 @@ double Newton::potential(const Balance& balance, const Vector& u) {
       return 0.5 * balance.weight[i] * dot(way, way);
     });
   }
-  return elastic - vectors_.product(balance.applied, u) + inert;
+  double pushed = 0;
+  if (!balance.following.empty()) {
+    const std::vector<Mat3d> gradient = gradients();
+    pushed = vectors_.sum([&](Index i) {
+      return dot(mean_following_force(gradient[i], balance.following[i]), u[i]);
+    });
+  }
+  return elastic - vectors_.product(balance.applied, u) - pushed + inert;
 }
 
 /// The residual force relative to applied, reaction and inertial forces, plus a fraction of the
@@ -175,7 +211,9 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
       [&](Index i) { return dot(by_components(balance.free[i], force[i]), force[i]); });
   const double reactions =
       vectors_.sum([&](Index i) { return dot(held_part(balance, i, force[i]), force[i]); });
+  const Vector& following = balance.following;
   const double scale = std::sqrt(vectors_.product(balance.applied, balance.applied)) +
+                       (following.empty() ? 0 : std::sqrt(vectors_.product(following, following))) +
                        std::sqrt(reactions) + balance.scale +
                        rounding_share * std::sqrt(vectors_.sum([&](Index i) {
                          return stiffness_[i] * stiffness_[i] * dot(u[i], u[i]);
@@ -186,9 +224,7 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
 /// The largest entry of ∇u of a displacement.
 double Newton::steepest(const Vector& step) {
   put(step);
-  std::vector<Mat3d> gradient;
-  backend_.displacement_gradients(gradient);
-  ++evaluations_;
+  const std::vector<Mat3d> gradient = gradients();
   const double most = vectors_.largest([&](Index i) {
     double entry = 0;
     for (int e = 0; e < 9; ++e) entry = std::max(entry, std::abs(gradient[i](e / 3, e % 3)));

@@ -20,13 +20,15 @@ namespace phyxel {
 void check_precision(const Backend& backend, Method method);
 
 /// A balance of forces: displacements u that satisfy, along every free axis of each phyxel,
-///   f(u) + applied - weight (u - centre) = 0,
-/// the derivative of minus the energy E(u) - applied · u + ½ Σ weight |u - centre|².
+///   f(u) + applied + following(u) - weight (u - centre) = 0.
+/// Without loads that follow the surface, that is the derivative of minus the energy
+/// E(u) - applied · u + ½ Σ weight |u - centre|².
 struct Balance {
   using Vector = OwnedVectors::Vector;
   Vector free;                 ///< 1 along free axes, 0 along prescribed ones.
   Vector target;               ///< Displacement along prescribed axes [m].
-  Vector applied;              ///< Gravity, loads and the caller's forces [N].
+  Vector applied;              ///< Gravity, constant loads and the caller's forces [N].
+  Vector following;            ///< At rest [N], of loads that follow the surface; empty: none.
   std::vector<double> weight;  ///< Inertia [kg/s²], shape [n]; empty without inertia.
   Vector centre;               ///< Displacement that inertia alone leads to [m]; empty likewise.
   double scale = 0;  ///< Force added to the applied forces as the reference of residuals [N].
@@ -66,13 +68,16 @@ class Newton {
 
   /// Returns the internal forces [N] at u.
   Vector inner_forces(const Vector& u);
+  /// Returns the sum of internal, applied and following forces [N] at u, without inertia.
+  Vector acting_forces(const Balance& balance, const Vector& u);
   const OwnedVectors& vectors() const { return vectors_; }
-  /// Adds the caller's forces [N], shape [n].
-  void add_external_forces(Vector& applied) const;
+  /// Sets the forces of gravity, loads and the caller. @param time of loads that grow [s]
+  void set_applied(double time, Balance& balance) const;
 
  private:
   Vector forces(const Balance& balance, const Vector& u);
   void put(const Vector& u);
+  std::vector<Mat3d> gradients();
   double potential(const Balance& balance, const Vector& u);
   double residual(const Balance& balance, const Vector& u, const Vector& force) const;
   double steepest(const Vector& step);

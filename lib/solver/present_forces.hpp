@@ -26,11 +26,7 @@ class PresentForces {
       return;
     }
     backend.internal_forces(force_);
-    if (dt_ > 0) {
-      add_loads(model, time_, force_);
-    } else {
-      add_full_loads(model, force_);
-    }
+    add_loads(model, backend, dt_ > 0 ? time_ : full_loads, force_);
     const std::span<const Vec3d> external = backend.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];
     for (std::size_t i = 0; i < force_.size(); ++i) force_[i] += model.mass[i] * model.gravity;

@@ -95,7 +95,8 @@ BodySums sums_of(const Model& model, const Balance& balance, std::span<const Par
   BodySums sums;
   for_each_phyxel(body, [&](Index i) {
     const Vec3d x = (1 / size) * (model.position[i] - body[0].centre);
-    const Vec3d force = balance.applied[i], torque = cross(x, force);
+    const Vec3d following = balance.following.empty() ? Vec3d{} : balance.following[i];
+    const Vec3d force = balance.applied[i] + following, torque = cross(x, force);
     const double along[] = {force.x, force.y, force.z, torque.x, torque.y, torque.z};
     for (int k = 0; k < 6; ++k) sums.force[k].add(along[k]);
     sums.force_size.add(norm(force));

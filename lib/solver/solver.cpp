@@ -34,7 +34,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   // Prescribed phyxels have not moved yet.
   if (scene.solver.method == Method::equilibrium) return state;
   std::vector<Vec3d> loaded(model.loads.empty() ? 0 : state.displacement.size());  // [N]
-  add_loads(model, 0, loaded);
+  add_loads_at_rest(model, 0, loaded);
   for (const Part& part : model.parts) {
     const BodyRequest& body = scene.bodies[static_cast<std::size_t>(part.body)];
 #pragma omp parallel for schedule(static)

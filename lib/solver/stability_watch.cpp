@@ -37,13 +37,16 @@ double largest_speed(const Model& model, const Motion& motion) {
   return speed;
 }
 
+/// Largest growth of an area on which a pressure that follows it is expected to act.
+constexpr double most_growth = 25;  // five times as long and as wide
+
 /// Largest acceleration of a single phyxel by a load [m/s²]. Of a share: collective.
 double largest_acceleration(const Model& model, const Load& load) {
   double largest = 0;
   for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
     largest = std::max(largest, norm(load.force[k]) / model.mass[load.phyxels[k]]);
   }
-  return largest_over_ranks(model, largest);
+  return (load.follows ? most_growth : 1) * largest_over_ranks(model, largest);
 }
 
 }  // namespace
@@ -53,7 +56,7 @@ bool is_conservative(const Model& model) {
     if (part.material.damping > 0) return false;
   }
   for (const Load& load : model.loads) {
-    if (load.ramp > 0) return false;
+    if (load.ramp > 0 || load.follows) return false;
   }
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) return false;

@@ -47,7 +47,7 @@ class Accelerations {
     backend_.internal_forces(all, use);
     const std::span<const Vec3d> external = backend_.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) all[i] += external[i];
-    add_loads(model_, time_, all);
+    add_loads(model_, backend_, time_, all);
     owned_.for_each(
         [&](Index i) { all[i] = free(i, (1 / model_.mass[i]) * all[i] + model_.gravity); });
     return all;

@@ -52,8 +52,8 @@ bool fits_shared_memory(const Combination& row, const Device& gpu) {
 /// The body of a row stays in residence on one rank if nothing changes from step to step and shared
 /// memory holds it; otherwise steps are launches over tiles.
 void expect_path(const Combination& row, const Device& gpu, const Backend& backend) {
-  const bool changes =
-      row.is(boundary, "rollers") || row.is(boundary, "moved") || row.is(boundary, "growing loads");
+  const bool changes = row.is(boundary, "rollers") || row.is(boundary, "moved") ||
+                       row.is(boundary, "growing loads") || row.is(boundary, "pressure");
   const bool is_resident = backend.name().find("resident") != std::string::npos;
   EXPECT_EQ(is_resident, world().size() == 1 && !changes && fits_shared_memory(row, gpu))
       << backend.name() << ": " << backend.path_reason();

@@ -102,10 +102,11 @@ struct Motion {
   }
 };
 
-/// Constant forces on some phyxels, grown over `ramp` seconds.
+/// Forces on some phyxels, grown over `ramp` seconds. They are constant, unless they follow the
+/// surface.
 struct Load {
   std::vector<Index> phyxels;
-  std::vector<Vec3d> force;  ///< [N], shape [phyxels]
+  std::vector<Vec3d> force;  ///< At rest [N], shape [phyxels].
   Vec3d total;               ///< Sum of the forces but for those by volume [N].
   Vec3d density;             ///< Force by volume [N/m³].
   double ramp = 0;           ///< [s]
@@ -113,6 +114,7 @@ struct Load {
   std::string set = {};      ///< Entry of that body in the scene, e.g. "load 1", "traction 2".
   Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
   bool on_surface = false;   ///< True of a traction, which follows the areas of phyxels.
+  bool follows = false;      ///< True of a pressure on the deformed surface (physics/follower.hpp).
   /// Which share of the force acts at a time [s].
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
 };
@@ -177,6 +179,8 @@ struct Model {
   Index global_id(Index i) const { return share ? share->global_id[i] : i; }
   /// Whether phyxel i is no ghost.
   bool owns(Index i) const { return !share || share->owned[i]; }
+  /// Whether a load follows the surface.
+  bool has_following_loads() const;
   /// Whether neighbour lists are here.
   bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
   /// This model, for whoever needs the lists. @throws InputError if they were left to a device.

@@ -102,15 +102,16 @@ struct LoadRequest {
 };
 
 /// A force on a part of a body's surface: either `traction`, along a direction, or `pressure`,
-/// against the outward normals at rest. It keeps its size and direction while the body deforms, and
-/// grows linearly from zero during `ramp` seconds.
+/// against the outward normals. It keeps its size and direction while the body deforms, unless it
+/// follows the surface, and grows linearly from zero during `ramp` seconds.
 struct TractionRequest {
-  Selection select;     ///< By box, ball or all: the triangles, or parts of them, that lie there.
-  Vec3d traction;       ///< [Pa]
-  double pressure = 0;  ///< [Pa]
-  Vec3d normal;         ///< If not zero, only where the outward normal is nearly along it.
-  double angle = 45;    ///< Largest angle between the two [degrees].
-  double ramp = 0;      ///< [s]
+  Selection select;       ///< By box, ball or all: the triangles, or parts of them, that lie there.
+  Vec3d traction;         ///< [Pa]
+  double pressure = 0;    ///< [Pa]
+  bool follower = false;  ///< True of a pressure on the deformed surface, against its normals.
+  Vec3d normal;           ///< If not zero, only where the outward normal is nearly along it.
+  double angle = 45;      ///< Largest angle between the two [degrees].
+  double ramp = 0;        ///< [s]
 };
 
 /// A place whose values a run logs at each frame: points of a body at rest, or phyxels of it over

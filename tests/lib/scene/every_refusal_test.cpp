@@ -132,6 +132,8 @@ std::vector<Late> refused_loads() {
       {with_bar("[[body.traction]]\nall = true\npressure = 1\ntraction = [1, 0, 0]\n"),
        {"found together with", "exactly one of: traction, pressure"}},
       {with_bar("[[body.traction]]\nall = true\npressure = nan\n"), {":15:", "pressure"}},
+      {with_bar("[[body.traction]]\nall = true\ntraction = [1, 0, 0]\nfollower = true\n"),
+       {":16:", "follower", "found without pressure"}},
       {with_bar("[[body.traction]]\nall = true\npressure = 1\nangle = 3\n"),
        {":16:", "angle", "found without normal"}},
       {with_bar("[[body.traction]]\nall = true\npressure = 1\nnormal = [0, 0, 0]\n"),

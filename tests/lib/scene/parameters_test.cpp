@@ -112,6 +112,7 @@ angle = 30 # body.traction.angle => angle = 40
 [[body.traction]]
 all = true
 pressure = 1 # body.traction.pressure => pressure = 2
+follower = true # body.traction.follower => follower = false
 ramp = 1 # body.traction.ramp => ramp = 2
 [[body]]
 name = 'second'

@@ -60,7 +60,7 @@ inline const std::vector<FactorEntry>& factors() {
         {"viscosity", {"", "viscosity"}},
         {"damping", {"", "damping"}},
         {"external", {"", "external forces"}},
-        {"boundary", {"free", "fixed", "rollers", "moved", "loaded", "growing loads"}},
+        {"boundary", {"free", "fixed", "rollers", "moved", "loaded", "growing loads", "pressure"}},
         {"supports", {"one support", "adaptive supports", "capped lists"}},
         {"cloud", {"lattice", "jittered lattice", "filled mesh"}},
         {"precision", {"float", "double", "mixed"}},

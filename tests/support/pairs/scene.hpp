@@ -87,6 +87,11 @@ inline void set_boundary(const Combination& row, Scene& scene) {
     return;
   }
   body.fixed.push_back({low});
+  if (row.is(boundary, "pressure")) {
+    body.tractions.push_back({.select = {.all = true}, .pressure = 500, .follower = true});
+    body.tractions.push_back(
+        {.select = {.all = true}, .pressure = -200, .follower = true, .ramp = 0.02});
+  }
   if (row.is(boundary, "moved")) {
     body.motions.push_back({.select = high,
                             .displacement = {0.03, 0.01, 0},

@@ -1,0 +1,288 @@
+/// Pressure that follows the surface, on the CPU and in programs built with PHYXEL_TEST_CUDA on a
+/// GPU.
+#include "phyxel/physics/follower.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/equilibrium.hpp"
+#include "phyxel/mesh.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/shapes.hpp"
+#include "phyxel/solver.hpp"
+#include "support/backend.hpp"
+#include "support/clouds.hpp"
+#include "support/surfaces.hpp"
+
+namespace phyxel {
+namespace {
+
+using namespace phyxel::testing;
+
+constexpr Precision all_precisions[] = {Precision::single, Precision::double_, Precision::mixed};
+
+TEST(Follower, IsNansonsFormulaAndItsMeanThatOfTheWay) {
+  std::mt19937_64 engine(3);
+  const Vec3d rest{1, -2, 0.5};
+  for (int attempt = 0; attempt < 20; ++attempt) {
+    Mat3d g;
+    Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
+    for (int e = 0; e < 9; ++e) {
+      g(e / 3, e % 3) = uniform(engine, -0.8, 0.8);
+      f(e / 3, e % 3) += g(e / 3, e % 3);
+    }
+    const Eigen::Vector3d expected =
+        f.determinant() * f.inverse().transpose() * Eigen::Vector3d(rest.x, rest.y, rest.z);
+    const Vec3d found = following_force(g, rest);
+    EXPECT_LE(norm(found - Vec3d{expected[0], expected[1], expected[2]}), 1e-13);
+    // Simpson's rule is exact: cof(1 + s G) is quadratic in s.
+    const Vec3d mean = (1.0 / 6) * (rest + 4.0 * following_force(0.5 * g, rest) + found);
+    EXPECT_LE(norm(mean_following_force(g, rest) - mean), 1e-14);
+  }
+}
+
+/// A ball under a pressure all around.
+Scene pressed_ball(double pressure, double ramp = 0) {
+  Material material = rubber();
+  material.law = "neo-hookean";
+  material.hourglass = 0.1;
+  Scene scene = one_body(material);
+  scene.bodies[0].closure = 1e-10;
+  scene.bodies[0].tractions.push_back(
+      {.select = {.all = true}, .pressure = pressure, .follower = true, .ramp = ramp});
+  return scene;
+}
+const Cloud& ball() {
+  static const Cloud cloud =
+      sample_surface(test::sphere({0, 0, 0}, 0.5, 3), {.phyxels = 700, .relaxations = 10});
+  return cloud;
+}
+Mat3d dilation(double by) {
+  Mat3d g;
+  for (int e = 0; e < 9; e += 4) g(e / 3, e % 3) = by;
+  return g;
+}
+std::vector<Vec3d> moved_by(const Model& model, const Mat3d& g) {
+  std::vector<Vec3d> u;
+  for (const Vec3d& x : model.position) u.push_back(g * x);
+  return u;
+}
+/// Cauchy's stress of the first phyxel's law under a dilation [Pa].
+double pressure_of(const Model& model, double by) {
+  const auto backend = make_cpu_backend(model, Precision::double_, 1);
+  // ½ d(energy)/d(volume) by differences, whatever the law.
+  const auto energy = [&](double at) {
+    backend->upload(state_of(moved_by(model, dilation(at))));
+    return diagnose(model, *backend, 0, 1).strain_energy;
+  };
+  const double h = 1e-5, volume = model.parts[0].volume, length = 1 + by;
+  return -(energy(by + h) - energy(by - h)) / (2 * h) / (3 * volume * length * length);
+}
+
+/// Compressed by a fifth, a ball is held so by the pressure that its law has there: the step of
+/// every device leaves it at rest.
+TEST(Follower, HoldsACompressedBall) {
+  const double by = -0.2;
+  const double p = pressure_of(build_model(pressed_ball(0), std::span(&ball(), 1)), by);
+  ASSERT_GT(p, 1e4);
+  for (const Precision precision : all_precisions) {
+    const auto largest_gain = [&](double pressure) {
+      const Scene scene = pressed_ball(pressure);
+      const Model model = build_model(scene, std::span(&ball(), 1));
+      const auto backend = make_test_backend(model, precision);
+      backend->upload(state_of(moved_by(model, dilation(by))));
+      const double dt = 1e-5;
+      backend->step(0, dt, 1);
+      State state;
+      backend->download(state);
+      double largest = 0;
+      for (const Vec3d& v : state.velocity) largest = std::max(largest, norm(v) / dt);
+      return largest;
+    };
+    // Rounding of strains in float; in double the sums are closed to 1e-10.
+    EXPECT_LT(largest_gain(p), (precision == Precision::double_ ? 1e-7 : 1e-4) * largest_gain(0));
+  }
+}
+
+/// A block that has turned is pressed as before it turned.
+TEST(Follower, TurnsWithTheSurface) {
+  Scene scene = one_body(rubber());
+  scene.bodies[0].source.shape = {.name = "beam",
+                                  .size = {0.5, 0.3, 0.4},
+                                  .spacing = 0.1,
+                                  .placement = ShapeRequest::Placement::nodes};
+  scene.bodies[0].closure = 0;
+  scene.bodies[0].tractions.push_back(
+      {.select = {.all = true}, .pressure = 700, .follower = true, .normal = {0, 0, 1}});
+  const Model model = build_model(scene);
+  const Eigen::Matrix3d r =
+      Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  Mat3d g;
+  for (int e = 0; e < 9; ++e) g(e / 3, e % 3) = r(e / 3, e % 3) - (e % 4 == 0 ? 1 : 0);
+  for (const Precision precision : all_precisions) {
+    const auto backend = make_test_backend(model, precision);
+    backend->upload(state_of(moved_by(model, g)));
+    const double dt = 1e-5;
+    backend->step(0, dt, 1);
+    State state;
+    backend->download(state);
+    Vec3d total;
+    double worst = 0, largest = 0;
+    std::vector<Vec3d> expected(model.position.size());
+    for (const Load& load : model.loads) {
+      for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
+        expected[load.phyxels[k]] += load.force[k] + g * load.force[k];
+      }
+    }
+    for (Index i = 0; i < model.size(); ++i) {
+      const Vec3d force = (model.mass[i] / dt) * state.velocity[i];
+      worst = std::max(worst, norm(force - expected[i]));
+      largest = std::max(largest, norm(expected[i]));
+      total += force;
+    }
+    // In float, strains of a turned block are rounded to 1e-7 of a stiffness 100 times the
+    // pressure.
+    EXPECT_LT(worst, (precision == Precision::double_ ? 1e-9 : 2e-3) * largest);
+    const Vec3d z{r(0, 2), r(1, 2), r(2, 2)};
+    EXPECT_LT(norm(total + 700 * 0.15 * z), 1e-3 * 700 * 0.15);
+  }
+}
+
+/// A ball that a sudden pressure sets in motion exchanges the work of the pressure for energy of
+/// its own.
+TEST(Follower, WorksAsMuchAsTheBodyGains) {
+  const Scene scene = pressed_ball(4e3);
+  const Model model = build_model(scene, std::span(&ball(), 1));
+  const auto backend = make_test_backend(model, Precision::double_);
+  const double dt = 2e-4;
+  Solver solver(*backend, initial_state(model, scene, dt));
+  double most_work = 0, drift = 0;
+  for (int k = 0; k < 40; ++k) {
+    solver.step(10);
+    const Diagnostics now = diagnose(model, *backend, solver.now());
+    most_work = std::max(most_work, -now.load_energy);
+    drift = std::max(drift, std::abs(now.total_energy()));
+  }
+  EXPECT_GT(most_work, 1);
+  EXPECT_LT(drift, 4e-3 * most_work);  // seen: 2e-3, at any step: the force has an energy nearly
+}
+
+/// The state of rest of a pressed ball is the dilation under which its law has that pressure.
+TEST(Follower, CompressesABallAsItsLawSays) {
+  const double by = -0.15;
+  const double p = pressure_of(build_model(pressed_ball(0), std::span(&ball(), 1)), by);
+  const Model model = build_model(pressed_ball(p), std::span(&ball(), 1));
+  const auto backend = make_test_backend(model, Precision::double_);
+  const Equilibrium found = find_equilibrium(model, *backend);
+  double worst = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    // Relative to the first phyxel: nothing holds the ball in place.
+    const Vec3d x = model.position[i] - model.position[0],
+                u = found.state.displacement[i] - found.state.displacement[0];
+    worst = std::max(worst, norm(u - by * x));
+  }
+  EXPECT_LT(worst, 1e-6);
+}
+
+/// A slender beam in its plane, from its free end: without shear and stretch, the balance of a
+/// piece under a pressure on the top is, with tension N, shear V, moment M and curvature κ = M/EI
+/// along the arc s from the free end,
+///   N' = κ V,  V' = q (1 + κ h/2) - κ N,  M' = V,  θ' = κ,
+/// where the top is longer than the axis by κ h/2, since the beam bends down.
+/// @returns the end's place relative to the clamp, along the axis there and across [m]
+Eigen::Vector2d end_of_beam(double length, double height, double q, double stiffness) {
+  using State = Eigen::Matrix<double, 6, 1>;  // N, V, M, θ, x, y
+  const auto rate = [&](const State& s) {
+    const double kappa = s[2] / stiffness;
+    State d;
+    d << kappa * s[1], q * (1 + 0.5 * kappa * height) - kappa * s[0], s[1], kappa, std::cos(s[3]),
+        std::sin(s[3]);
+    return d;
+  };
+  State s = State::Zero();
+  constexpr int steps = 1000;
+  const double ds = length / steps;
+  for (int k = 0; k < steps; ++k) {
+    const State a = rate(s), b = rate(s + 0.5 * ds * a), c = rate(s + 0.5 * ds * b),
+                d = rate(s + ds * c);
+    s += ds / 6 * (a + 2 * b + 2 * c + d);
+  }
+  // Seen from the clamp, whose axis points against the arc.
+  const double cosine = std::cos(s[3]), sine = std::sin(s[3]);
+  return {cosine * s[4] + sine * s[5], -sine * s[4] + cosine * s[5]};
+}
+
+/// Where the middle of a cantilever's end comes to rest under a pressure on its top, relative to
+/// the clamp [m].
+Eigen::Vector2d end_of_cantilever(double length, double height, double young, double pressure) {
+  Scene scene;
+  BodyRequest& beam = scene.bodies.emplace_back();
+  beam.name = "beam";
+  beam.where = "test";
+  beam.source.shape = {.name = "beam",
+                       .size = {length, height, height},
+                       .spacing = height / 4,
+                       .placement = ShapeRequest::Placement::nodes};
+  beam.material = {.young = young, .poisson = 0, .density = 1000};
+  beam.fixed.push_back({.select = {.region = "x-"}});
+  beam.tractions.push_back(
+      {.select = {.all = true}, .pressure = pressure, .follower = true, .normal = {0, 0, 1}});
+  const Model model = build_model(scene);
+  const auto backend = make_test_backend(model, Precision::double_);
+  const Equilibrium found = find_equilibrium(model, *backend);
+  Eigen::Vector2d end(0, 0);
+  double weight = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    if (model.position[i].x < length - 1e-9) continue;
+    const Vec3d x = model.position[i] + found.state.displacement[i];
+    end += model.volume[i] * Eigen::Vector2d(x.x, x.z);
+    weight += model.volume[i];
+  }
+  return end / weight;
+}
+
+/// A cantilever is bent by a quarter of a turn. Its stiffness is that of its phyxels, 4% below a
+/// beam's, which a small pressure shows.
+TEST(Follower, BendsABeamAsTheElasticaSays) {
+  const double length = 2, height = 0.2, young = 1e6;
+  const auto reference = [&](double pressure, double stiffness) {
+    return end_of_beam(length, height, pressure * height, stiffness);
+  };
+  double stiffness = young * std::pow(height, 4) / 12;
+  stiffness *= reference(1, stiffness)[1] / end_of_cantilever(length, height, young, 1)[1];
+  EXPECT_NEAR(stiffness, 0.95 * young * std::pow(height, 4) / 12, 2);
+  const Eigen::Vector2d found = end_of_cantilever(length, height, young, 300),
+                        expected = reference(300, stiffness);
+  EXPECT_LT(expected[1], -0.4 * length);
+  EXPECT_LT((found - expected).norm(), 0.005 * length);
+}
+
+/// Implicit steps and those of Verlet's method lead to the same place.
+TEST(Follower, IsTheSameToAllMethods) {
+  const Scene scene = pressed_ball(4e3, 0.01);
+  const Model model = build_model(scene, std::span(&ball(), 1));
+  const auto place_after = [&](Method method, double dt, int steps) {
+    Scene by = scene;
+    by.solver.method = method;
+    const auto backend = make_test_backend(model, Precision::double_);
+    Solver solver(model, *backend, initial_state(model, by, dt), method);
+    solver.step(steps);
+    return solver.state().displacement;
+  };
+  const std::vector<Vec3d> explicitly = place_after(Method::verlet, 1e-4, 200),
+                           implicitly = place_after(Method::implicit, 5e-4, 40);
+  double worst = 0, largest = 0;
+  for (std::size_t i = 0; i < explicitly.size(); ++i) {
+    worst = std::max(worst, norm(explicitly[i] - implicitly[i]));
+    largest = std::max(largest, norm(explicitly[i]));
+  }
+  EXPECT_GT(largest, 1e-3);
+  EXPECT_LT(worst, 0.02 * largest);  // both methods are of second order
+}
+
+}  // namespace
+}  // namespace phyxel
