@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "model/following.hpp"
 #include "parallel_sort.hpp"
 #include "tabulated.hpp"
 #include "timeline.hpp"
@@ -129,6 +130,7 @@ void connect(const MpiCommunicator& ranks, ModelShare& made) {
 
 Model model_of(ModelShare&& made) {
   made.model.share = std::make_shared<Share>(std::move(made.share));
+  find_following(made.model);
   return std::move(made.model);
 }
 

@@ -1,8 +1,6 @@
 /// Prescribed motions and loads on the GPU.
 #pragma once
 
-#include <optional>
-
 #include "exact_sum.hpp"
 #include "solver/following.cuh"
 #include "solver/support_work.hpp"
@@ -97,7 +95,7 @@ class Boundary {
 
   /// True if motions or loads that grow or follow the surface change from step to step.
   bool changes() const {
-    return !paths_.empty() || following_ ||
+    return !paths_.empty() || !following_.empty() ||
            std::any_of(loads_.begin(), loads_.end(), [](const auto& l) { return l.of->ramp > 0; });
   }
   /// Sets the caller's forces [N], shape [3, places]; an empty list clears them. They act from the
@@ -114,8 +112,7 @@ class Boundary {
     if (!m_.loads()) return;
     double scales = 0;
     for (const Loading& load : loads_) scales += load.of->scale_at(time);
-    const bool same = scales == load_scales_;
-    if (same && !following_) return;
+    if (scales == load_scales_ && following_.empty()) return;
     load_scales_ = scales;
     const std::size_t bytes = 3 * m_.places() * sizeof(Real);
     if (m_.fields().external) {
@@ -124,17 +121,15 @@ class Boundary {
     } else {
       PHYXEL_CUDA(cudaMemsetAsync(m_.loads(), 0, bytes, m_.stream()));
     }
-    add_loads(false, time, m_.loads());
-    if (same) return;
-    Real* const rest = m_.following();
-    if (rest) PHYXEL_CUDA(cudaMemsetAsync(rest, 0, bytes, m_.stream()));
-    add_loads(true, time, rest);
+    for (const Loading& load : loads_) {
+      m_.launch_each("add_load", add_load<Real>, static_cast<int>(load.places.size()), m_.loads(),
+                     m_.places(), load.places.data(), load.force.data(),
+                     static_cast<int>(load.places.size()),
+                     static_cast<Real>(load.of->scale_at(time)));
+    }
   }
-  /// Adds loads that follow the surface, at the present displacements, to the sum. Call after
-  /// `sum_loads`.
-  void add_following(const Passes<Real, StateReal>& passes) const {
-    if (following_) following_->add(passes);
-  }
+  /// The loads that follow the surface.
+  const DeviceFollowing<Real, StateReal>& following() const { return following_; }
   /// Moves phyxels to their prescribed positions after a step from `time` [s].
   void follow_paths(double time, double dt) {
     prepare_work(dt);
@@ -166,8 +161,6 @@ class Boundary {
     }
     return words_of(std::move(work));
   }
-  /// Bytes of the arrays for loads that follow the surface, beside their forces at rest.
-  std::size_t following_bytes() const { return following_ ? following_->bytes() : 0; }
   /// Bytes of the arrays for the work of supports.
   std::size_t work_bytes() const {
     std::size_t bytes = 0;
@@ -286,24 +279,12 @@ class Boundary {
   void make_loads() {
     if (m_.model().loads.empty()) return;
     m_.make_loads();
-    std::vector<Index> following;
     for (const Load& load : m_.model().loads) {
+      if (load.follows) continue;
       std::vector<Vec3<Real>> force;
       for (const Vec3d& f : load.force) force.push_back(to<Real>(f));
-      const std::vector<Index> places = places_of(load.phyxels);
-      if (load.follows) following.insert(following.end(), places.begin(), places.end());
-      loads_.push_back({&load, sent(places, "loaded phyxels"), sent(force, "loads")});
-    }
-    if (m_.following()) following_.emplace(m_, following);
-  }
-  /// Adds the forces at rest of the loads that follow the surface, or of the others.
-  void add_loads(bool following, double time, Real* to) const {
-    for (const Loading& load : loads_) {
-      if (load.of->follows != following) continue;
-      m_.launch_each("add_load", add_load<Real>, static_cast<int>(load.places.size()), to,
-                     m_.places(), load.places.data(), load.force.data(),
-                     static_cast<int>(load.places.size()),
-                     static_cast<Real>(load.of->scale_at(time)));
+      loads_.push_back(
+          {&load, sent(places_of(load.phyxels), "loaded phyxels"), sent(force, "loads")});
     }
   }
   void set(const DeviceArray<Index>& at, const Vec3<StateReal>* positions, Axes axes,
@@ -317,7 +298,7 @@ class Boundary {
   DeviceModel<Real, StateReal>& m_;
   std::vector<Moved> paths_;
   std::vector<Loading> loads_;
-  std::optional<FollowingLoads<Real, StateReal>> following_;
+  DeviceFollowing<Real, StateReal> following_{m_};
   double load_scales_ = -1, time_ = 0;  // scale and time [s] of the last sum
   double work_step_ = 0;                // step for which inertias were made [s]
   DeviceArray<Index> held_;

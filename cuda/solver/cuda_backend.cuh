@@ -128,6 +128,11 @@ class CudaBackend final : public Backend {
   std::optional<Diagnostics> diagnostics(const Instant& now) override {
     m_.use_device();
     boundary_.sum_loads(now.time);
+    if (Real* const following = m_.following()) {
+      passes_->receive_displacements();
+      PHYXEL_CUDA(cudaMemsetAsync(following, 0, 3 * m_.places() * sizeof(Real), m_.stream()));
+      boundary_.following().add(now.time, following);
+    }
     const DeviceArray<Real> forces = passes_->forces(HistoryUse::trial, history_interval_),
                             gradients = m_.fields().pull ? passes_->gradients_and_residuals()
                                                          : passes_->gradients();
@@ -248,8 +253,8 @@ class CudaBackend final : public Backend {
     if (path_.residence) {
       list.push_back({"what stays in shared memory", path_.residence->bytes()});
     }
-    if (boundary_.following_bytes() > 0) {
-      list.push_back({"loads that follow the surface", boundary_.following_bytes()});
+    if (boundary_.following().bytes() > 0) {
+      list.push_back({"loads that follow the surface", boundary_.following().bytes()});
     }
     if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
@@ -315,7 +320,10 @@ class CudaBackend final : public Backend {
   /// Launches one step of the present size from a time [s].
   void launch_step(double time, const Advection* surfels) {
     boundary_.sum_loads(time);
-    boundary_.add_following(*passes_);
+    if (!boundary_.following().empty()) {
+      passes_->receive_displacements();
+      boundary_.following().add(time, m_.loads());
+    }
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
     if (fresh_ || boundary_.changes()) {

@@ -146,7 +146,7 @@ class DeviceModel {
     if (load_.size()) return;
     load_ = {3 * places(), "loads of " + subject_};
     fields_.load = load_.data();
-    if (!model_.has_following_loads()) return;
+    if (model_.following.empty()) return;
     following_ = {3 * places(), "loads of " + subject_};
     fields_.following = following_.data();
   }
@@ -164,7 +164,7 @@ class DeviceModel {
     fields_.external = external_.data();
   }
   Real* loads() const { return load_.data(); }  ///< [3, places], or null.
-  /// Forces at rest of loads that follow the surface, [3, places], or null.
+  /// Room for the forces of loads that follow the surface, [3, places], or null.
   Real* following() const { return following_.data(); }
 
   /// Uploads a state. @throws InputError for a history of other laws

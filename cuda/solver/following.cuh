@@ -1,63 +1,173 @@
 /// Loads on the GPU that follow the surface.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "phyxel/physics/follower.hpp"
-#include "solver/passes.cuh"
+#include "solver/device_model.cuh"
+#include "solver/following_loads.hpp"
 
 namespace phyxel::cuda {
 
-/// Adds the present forces of loads that follow the surface. One block per tile of a list.
-/// @param rest their forces at rest [N], shape [3, places]
-/// @param gradient displacement gradients of the phyxels of the listed tiles, shape
-/// [9, tiles * tile_size]
+/// A load that follows the surface, as kernels see it.
 template <class Real>
-__global__ void add_following(Real* load, std::size_t places, const Real* rest,
-                              const Index* tile_of_block, const Real* gradient,
-                              std::size_t stride) {
-  const std::size_t place = place_of(tile_of_block[blockIdx.x]);
-  const Vec3<Real> f = column3(rest, places, place);
-  if (f.x == Real(0) && f.y == Real(0) && f.z == Real(0)) return;
-  const std::size_t at = place_of(static_cast<Index>(blockIdx.x));
-  Mat3<Real> grad_u;
-  for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient[e * stride + at];
-  set_column3(load, places, place, column3(load, places, place) + following_force(grad_u, f));
+struct FollowingView {
+  const Index* place;       ///< Tile slot of each phyxel.
+  const Vec3<Real>* force;  ///< At rest [N].
+  const Offset* row;        ///< Start of each phyxel's row, and the end of the last.
+  const Index* near;        ///< Tile slots of the phyxels that a gradient knows of.
+  const Vec3<Real>* slope;  ///< Their shares in it [1/m].
+  int count;                ///< Number of phyxels.
+
+  /// The displacement gradient at the k-th phyxel.
+  template <class Points>
+  __device__ Mat3<Real> gradient(const Points& points, int k) const {
+    const Vec3<Real> own = points.get(place[k]).u;
+    Mat3<Real> sum;
+    for (Offset e = row[k]; e < row[k + 1]; ++e) {
+      add_gradient_term(sum, points.get(near[e]).u - own, slope[e]);
+    }
+    return sum;
+  }
+};
+
+/// Adds the present forces of a load, times a factor, to columns of forces [N]. One thread per
+/// phyxel.
+template <class Real, class StateReal>
+__global__ void add_following(const __grid_constant__ Fields<Real, StateReal> f,
+                              FollowingView<Real> load, Real factor, Real* force) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= load.count) return;
+  const Index place = load.place[k];
+  const Vec3<Real> now = following_force(load.gradient(f.points, k), factor * load.force[k]);
+  set_column3(force, f.places, place, column3(force, f.places, place) + now);
 }
 
-/// The tiles of a model whose loads follow the surface, and room for the gradients there.
+/// Words of `CavitySums` on the device. Phyxels are dealt out among accumulators so that few
+/// threads add to the same word at once.
+struct CavityWords {
+  static constexpr int sums = 8;
+  static constexpr unsigned accumulators = 64;
+  static constexpr std::size_t size = std::size_t{sums} * ExactSum::words * accumulators;
+
+  unsigned long long* words;  ///< Shape [sums, words, accumulators].
+
+  __device__ void add(int sum, int k, double value) const {
+    const unsigned own = static_cast<unsigned>(k) % accumulators;
+    ExactSum::split(value, [&](int word, std::int64_t number) {
+      if (number == 0) return;
+      atomicAdd(words + static_cast<unsigned>(sum * ExactSum::words + word) * accumulators + own,
+                static_cast<unsigned long long>(number));
+    });
+  }
+  /// The sums of all accumulators.
+  static CavitySums on_host(const std::vector<unsigned long long>& words) {
+    CavitySums all;
+    std::size_t at = 0;
+    for (ExactSum* sum : all.all()) {
+      for (std::int64_t& word : sum->ready()) {
+        for (unsigned a = 0; a < accumulators; ++a) {
+          word += static_cast<std::int64_t>(words[at++]);
+        }
+      }
+    }
+    return all;
+  }
+};
+
+/// Adds the terms of `CavitySums`, in the order of its sums. One thread per phyxel.
+/// @param pressure of the gas at rest [Pa]
 template <class Real, class StateReal>
-class FollowingLoads {
+__global__ void sum_cavity(const __grid_constant__ Fields<Real, StateReal> f,
+                           FollowingView<Real> load, double pressure, CavityWords words) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= load.count) return;
+  const auto point = f.points.get(load.place[k]);
+  const Vec3<double> x = to<double>(point.x) + to<double>(point.u);
+  const Mat3<Real> gradient = load.gradient(f.points, k);
+  Mat3<double> grad_u;
+  for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient(e / 3, e % 3);
+  const Vec3<double> a = following_force(grad_u, (-1 / pressure) * to<double>(load.force[k]));
+  const double terms[CavityWords::sums] = {dot(x, a), a.x, a.y, a.z, x.x, x.y, x.z, 1};
+  for (int s = 0; s < CavityWords::sums; ++s) words.add(s, k, terms[s]);
+}
+
+/// The loads of a model that follow the surface, on the device.
+template <class Real, class StateReal>
+class DeviceFollowing {
  public:
-  /// @param places tile slots of the phyxels on which such loads act
-  FollowingLoads(DeviceModel<Real, StateReal>& model, const std::vector<Index>& places)
-      : m_(model) {
-    std::vector<Index> tiles;
-    for (const Index place : places) tiles.push_back(place / tile_size);
-    std::sort(tiles.begin(), tiles.end());
-    tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
-    tiles_ = sent(tiles, "tiles of loads that follow the surface");
-    gradients_ = {9 * stride(), "gradients for loads that follow the surface"};
+  explicit DeviceFollowing(const DeviceModel<Real, StateReal>& model)
+      : m_(model), host_(model.model()) {
+    const std::string what = "loads that follow the surface";
+    for (const Following& f : m_.model().following) {
+      const phyxel::Load& load = m_.model().loads[f.load];
+      std::vector<Index> place, near;
+      std::vector<Vec3<Real>> force, slope;
+      for (const std::size_t k : f.entry) {
+        place.push_back(m_.tiling().place[load.phyxels[k]]);
+        force.push_back(to<Real>(load.force[k]));
+      }
+      for (const Index j : f.near.indices) near.push_back(m_.tiling().place[j]);
+      for (const Vec3d& s : f.slope) slope.push_back(to<Real>(s));
+      loads_.push_back({sent(place, what), sent(near, what), sent(f.near.offsets, what),
+                        sent(force, what), sent(slope, what)});
+    }
+    if (host_.has_gas()) words_ = {CavityWords::size, what};
   }
 
-  /// Adds their forces at the present displacements to the loads.
-  void add(const Passes<Real, StateReal>& passes) const {
-    const auto tiles = static_cast<Index>(tiles_.size());
-    if (tiles == 0) return;
-    passes.put_gradients({gradients_.data(), stride(), tiles_.data()}, tiles);
-    m_.launch_blocks("add_following", add_following<Real>, static_cast<unsigned>(tiles), 0, false,
-                     m_.loads(), m_.places(), static_cast<const Real*>(m_.fields().following),
-                     static_cast<const Index*>(tiles_.data()),
-                     static_cast<const Real*>(gradients_.data()), stride());
+  bool empty() const { return loads_.empty(); }
+  /// Adds the present forces to columns of forces [N], shape [3, places]. Collective if there is a
+  /// gas. Displacements of ghosts must be here. @param time [s]
+  void add(double time, Real* force) const {
+    const std::vector<double> factor = host_.factors(time, gases());
+    for (std::size_t l = 0; l < loads_.size(); ++l) {
+      const FollowingView<Real> load = loads_[l].view();
+      m_.launch_each("add_following", add_following<Real, StateReal>, load.count, m_.fields(), load,
+                     static_cast<Real>(factor[l]), force);
+    }
   }
-  std::size_t bytes() const { return tiles_.bytes() + gradients_.bytes(); }
+  std::size_t bytes() const {
+    std::size_t bytes = words_.bytes();
+    for (const Load& load : loads_) bytes += load.bytes();
+    return bytes;
+  }
 
  private:
-  std::size_t stride() const { return tiles_.size() * static_cast<std::size_t>(tile_size); }
+  struct Load {
+    DeviceArray<Index> place, near;
+    DeviceArray<Offset> row;
+    DeviceArray<Vec3<Real>> force, slope;
 
-  DeviceModel<Real, StateReal>& m_;
-  DeviceArray<Index> tiles_;
-  DeviceArray<Real> gradients_;
+    FollowingView<Real> view() const {
+      return {place.data(), force.data(), row.data(),
+              near.data(),  slope.data(), static_cast<int>(place.size())};
+    }
+    std::size_t bytes() const {
+      return place.bytes() + near.bytes() + row.bytes() + force.bytes() + slope.bytes();
+    }
+  };
+
+  std::vector<FollowingLoads::Gas> gases() const {
+    if (!host_.has_gas()) return {};
+    std::vector<CavitySums> sums;
+    for (std::size_t l = 0; l < loads_.size(); ++l) {
+      const phyxel::Load& of = m_.model().loads[m_.model().following[l].load];
+      if (!of.gas) continue;
+      const FollowingView<Real> load = loads_[l].view();
+      PHYXEL_CUDA(cudaMemsetAsync(words_.data(), 0, words_.bytes(), m_.stream()));
+      m_.launch_each("sum_cavity", sum_cavity<Real, StateReal>, load.count, m_.fields(), load,
+                     of.pressure, CavityWords{words_.data()});
+      m_.wait();
+      sums.push_back(CavityWords::on_host(fetched(words_)));
+    }
+    return host_.gases_of(sums);
+  }
+
+  const DeviceModel<Real, StateReal>& m_;
+  FollowingLoads host_;
+  std::vector<Load> loads_;
+  DeviceArray<unsigned long long> words_;
 };
 
 }  // namespace phyxel::cuda

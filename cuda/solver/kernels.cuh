@@ -53,7 +53,7 @@ struct Fields {
   Vec3<StateReal> gravity;
   std::size_t places;
   const Real* external;    ///< The caller's part of `load`, [3, places], or null.
-  const Real* following;   ///< At rest, of loads that follow the surface, [3, places], or null.
+  const Real* following;   ///< Of loads that follow the surface, for energies, or null.
   Real* history;           ///< Histories, [history_numbers, places], or null.
   int history_numbers;     ///< Largest number of history values of a phyxel.
   HistoryUse history_use;  ///< How stresses treat the history,

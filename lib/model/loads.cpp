@@ -11,6 +11,7 @@
 #include "model/neighbour_search.hpp"
 #include "model/selection.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "rank_sums.hpp"
 #include "tabulated.hpp"
@@ -175,6 +176,29 @@ std::vector<Triangle> chosen_triangles(const BodyRequest& request, const Tractio
                    [&](std::size_t k) { return surface.triangle[found->second[k]]; });
 }
 
+/// Checks that triangles are the whole surface of a cavity, or of several.
+/// @throws InputError
+void check_cavity(const BodyRequest& request, const TractionRequest& traction,
+                  const BodySurface& surface, const std::vector<Triangle>& triangles) {
+  if (triangles.empty()) return;  // refused as a traction on nothing
+  Surface around{.position = {surface.position.begin(), surface.position.end()}};
+  for (const Triangle& t : triangles) {
+    around.triangle.push_back({t[0] - surface.first, t[1] - surface.first, t[2] - surface.first});
+  }
+  const double volume =
+      enclosed_by(facets_of(around.position, around.triangle, 0, HUGE_VAL)).volume;
+  const SurfaceDefects defects = inspect_surface(around);
+  const bool closed =
+      defects.open_edges == 0 && defects.crowded_edges == 0 && defects.flipped_edges == 0;
+  if (closed && volume < 0) return;
+  throw InputError(fmt::format(
+      "{}: key body.traction.gas: the {} selected triangles of the surface of body \"{}\" {}; "
+      "allowed: those of the whole surface of a cavity in the body",
+      traction.select.where, triangles.size(), request.name,
+      closed ? "are not around a cavity: their normals point out of the space inside"
+             : "are not closed"));
+}
+
 }  // namespace
 
 LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& traction,
@@ -193,7 +217,16 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
         direction == Vec3d{} || dot(area, direction) >= (least - digits) * norm(area);
     if (is_facing) facing.push_back(t);
   }
-  if (region) {
+  if (traction.gas) {
+    if (region) {
+      std::erase_if(facing, [&](const Triangle& t) {
+        return !std::all_of(t.begin(), t.end(),
+                            [&](Index vertex) { return region->contains(corner(vertex)); });
+      });
+    }
+    check_cavity(request, traction, surface, facing);
+  }
+  if (region && !traction.gas) {
     const double tolerance = digits * box_around(surface.position).extent();
     for (const Triangle& t : facing) {
       add_facets_in(*region, {corner(t[0]), corner(t[1]), corner(t[2])}, longest, tolerance,
@@ -221,7 +254,9 @@ Load traction_load(const BodyRequest& request, std::size_t number, const LoadedF
             .body = request.name,
             .set = entry_name("traction", number),
             .on_surface = true,
-            .follows = request.tractions[number].follower};
+            .follows = request.tractions[number].follower,
+            .pressure = request.tractions[number].pressure,
+            .gas = request.tractions[number].gas};
   double sizes = 0;
   Vec3d moment;
   const Vec3d origin = loaded.facets.front().centroid;

@@ -11,6 +11,7 @@
 #include "model/box.hpp"
 #include "model/closing_areas.hpp"
 #include "model/closure.hpp"
+#include "model/following.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
 #include "phyxel/error.hpp"
@@ -360,6 +361,7 @@ void finish(Model& model, const Scene& scene) {
   add_tractions(model, scene);
   find_moments(model);
   close_gradients(model);
+  find_following(model);
   add_warnings(model, model.surfels.position.size());
 }
 
@@ -414,10 +416,6 @@ const Model& Model::with_lists() const {
 
 bool Model::has_inclusions() const {
   return !parts.empty() && parts.back().body + 1 < static_cast<Index>(parts.size());
-}
-
-bool Model::has_following_loads() const {
-  return std::any_of(loads.begin(), loads.end(), [](const Load& load) { return load.follows; });
 }
 
 std::span<const Part> Model::parts_of_body(const Part& part) const {

@@ -107,7 +107,7 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
   for (const Load& load : model.loads) {
     add(state.get(), std::vector<Vec3d>{load.total, load.density});
     add(state.get(), std::vector<double>{load.ramp});
-    if (load.follows) add(state.get(), std::vector<char>{1});
+    if (load.follows) add(state.get(), std::vector<double>{1, load.gas.value_or(-1)});
   }
   return XXH3_64bits_digest(state.get());
 }

@@ -260,8 +260,23 @@ TractionRequest read_traction(const SceneTable& table) {
   table.expect_one_of({"traction", "pressure"});
   table.read("traction", traction.traction);
   table.read("pressure", traction.pressure);
-  if (table.has("follower")) table.expect_together("follower", "pressure");
+  for (const char* key : {"follower", "gas"}) {
+    if (table.has(key)) table.expect_together(key, "pressure");
+  }
   table.read("follower", traction.follower);
+  if (table.has("gas")) {
+    if (table.has("follower") && !traction.follower) {
+      table.refuse("gas",
+                   "found with follower = false; allowed: true, as the pressure of a gas follows "
+                   "the surface");
+    }
+    if (!(traction.pressure > 0)) {
+      table.refuse("gas", fmt::format("found with pressure = {:g}; allowed: a pressure > 0",
+                                      traction.pressure));
+    }
+    traction.follower = true;
+    table.read("gas", traction.gas.emplace());
+  }
   if (table.has("angle")) table.expect_together("angle", "normal");
   table.read("normal", traction.normal);
   if (table.has("normal") && traction.normal == Vec3d{}) {

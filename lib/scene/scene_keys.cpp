@@ -373,6 +373,9 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "body.traction", .name = "follower", .type = KeyType::boolean, .fallback = "false",
        .meaning = "Whether the pressure acts on the deformed surface, against its normals, as that of a gas or a liquid; "
            "else its force stays as it is at rest."},
+      {.section = "body.traction", .name = "gas", .otherwise = "none", .range = between(0, 100),
+       .meaning = "Exponent g of a gas in a cavity of the body, whose whole surface is selected: its pressure is `pressure` "
+           "times (volume at rest / volume)^g, on the deformed surface. 1: at constant temperature; 1.4: air that changes fast."},
       {.section = "body.traction", .name = "normal", .type = KeyType::vector, .otherwise = "everywhere",
        .range = within(longest),
        .meaning = "Only where the outward normal at rest has nearly this direction."},
@@ -381,6 +384,11 @@ std::vector<SceneKey> boundary_keys() {
       {.section = "body.traction", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
 
+  };
+}
+
+std::vector<SceneKey> place_keys() {
+  return {
       {.section = "probe", .name = "name", .type = KeyType::text, .otherwise = "\"probe 1\", \"probe 2\", ...",
        .meaning = "The probe's name in `probes.csv`."},
       {.section = "probe", .name = "body", .type = KeyType::text, .otherwise = "the only body",
@@ -423,7 +431,7 @@ std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {
     std::vector<SceneKey> keys;
     for (const auto& part : {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
-                             law_keys("body.inclusion"), boundary_keys()}) {
+                             law_keys("body.inclusion"), boundary_keys(), place_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

@@ -161,6 +161,7 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.traction", "traction", traction.traction);
     inner("body.traction", "pressure", traction.pressure);
     inner("body.traction", "follower", traction.follower);
+    if (traction.gas) inner("body.traction", "gas", *traction.gas);
     inner("body.traction", "normal", traction.normal);
     inner("body.traction", "angle", traction.angle);
     inner("body.traction", "ramp", traction.ramp);

@@ -5,9 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
-#include "phyxel/physics/follower.hpp"
 
 namespace phyxel {
 
@@ -36,24 +34,6 @@ inline void add_loads_at_rest(const Model& model, double time, std::vector<Vec3d
   add_constant_loads(model, time, force);
   for_each_load(model, true, time, [&](Index i, Vec3d load) { force[i] += load; });
 }
-/// Adds the loads that follow the surface, at the present displacements of a backend, to forces
-/// [N], shape [n]. Without such loads it costs nothing. @param time [s]
-inline void add_following_loads(const Model& model, Backend& backend, double time,
-                                std::vector<Vec3d>& force) {
-  if (!model.has_following_loads()) return;
-  std::vector<Mat3d> gradient;
-  backend.displacement_gradients(gradient);
-  for_each_load(model, true, time,
-                [&](Index i, Vec3d load) { force[i] += following_force(gradient[i], load); });
-}
-/// Adds all loads at the present displacements of a backend to forces [N], shape [n].
-/// @param time [s]
-inline void add_loads(const Model& model, Backend& backend, double time,
-                      std::vector<Vec3d>& force) {
-  add_constant_loads(model, time, force);
-  add_following_loads(model, backend, time, force);
-}
-
 /// Returns 1 for the free axes of each phyxel and 0 for prescribed ones, shape [n]. Empty for a
 /// model without prescribed motions.
 inline std::vector<Vec3d> free_axes(const Model& model) {

@@ -54,7 +54,6 @@ class CpuArrays {
     displacement_.assign(slots * 3, StateReal(0));
     velocity_.assign(slots * 3, StateReal(0));
     if (!model.loads.empty()) applied_.assign(slots * 3, Real(0));
-    if (model.has_following_loads()) following_.assign(slots * 3, Real(0));
     if (has_hourglass_control(model)) pull_.assign(slots * 3, Real(0));
     if (!model.closing.empty()) closing_.assign(slots * 3, Real(0));
     for (std::size_t p = 0; p < model.parts.size(); ++p) pack_part(p);
@@ -105,6 +104,11 @@ class CpuArrays {
   template <class T>
   static T& component(AlignedVector<T>& array, Index slot, int c, int count) {
     return array[(static_cast<std::size_t>(slot / W) * count + c) * W + slot % W];
+  }
+  /// The displacement of a slot as the passes see it [m]; of a ghost, its owner's.
+  Vec3d point_displacement(Index slot) const {
+    const Real* u = point_record(slot) + PointRecord::displacement;
+    return {u[0], u[1], u[2]};
   }
   template <class T>
   static Vec3d get3(const AlignedVector<T>& array, Index slot) {
@@ -307,9 +311,6 @@ class CpuArrays {
                  {"neighbour lists", lists_.bytes()}});
     if (!inverse_.start.empty()) list.push_back({"inverse neighbour lists", inverse_.bytes()});
     if (!applied_.empty()) list.push_back({"loads", applied_.size() * sizeof(Real)});
-    if (!following_.empty()) {
-      list.push_back({"loads that follow the surface", following_.size() * sizeof(Real)});
-    }
     if (!pull_.empty()) list.push_back({"hourglass control", pull_.size() * sizeof(Real)});
     if (!closing_.empty()) list.push_back({"closing vectors", closing_.size() * sizeof(Real)});
     if (!history_.empty()) {
@@ -336,10 +337,9 @@ class CpuArrays {
   AlignedVector<Real> points_, stresses_;  // records, by slot
   AlignedVector<Real> inverse_moment_, moment_offset_, volume_, inverse_mass_;
   AlignedVector<StateReal> displacement_, velocity_;
-  AlignedVector<Real> applied_;    // forces of loads and of the caller; empty if there are none
-  AlignedVector<Real> following_;  // at rest, of loads that follow the surface; empty: none
-  AlignedVector<Real> pull_;       // forces of hourglass control; likewise
-  AlignedVector<Real> closing_;    // b, ĉ and t of closed gradients; likewise
+  AlignedVector<Real> applied_;  // forces of loads and of the caller; empty if there are none
+  AlignedVector<Real> pull_;     // forces of hourglass control; likewise
+  AlignedVector<Real> closing_;  // b, ĉ and t of closed gradients; likewise
   std::vector<std::string> history_columns_;
   std::vector<std::vector<std::size_t>> columns_of_part_;  // history columns of each part's law
   std::vector<std::size_t> history_start_;  // [packs + 1]; empty if no law has a history

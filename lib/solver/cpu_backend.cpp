@@ -2,12 +2,15 @@
 #include <fmt/format.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
 #include "solver/cpu_passes.hpp"
 #include "solver/cpu_surfels.hpp"
+#include "solver/following_loads.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -175,6 +178,9 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     if (!external_force_.empty()) {
       list.push_back({"external forces", external_force_.size() * sizeof(Vec3d)});
     }
+    if (!following_.empty()) {
+      list.push_back({"loads that follow the surface", followed_force_.size() * sizeof(Vec3d)});
+    }
     if (support_work_.bytes() > 0) list.push_back({"work of supports", support_work_.bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
@@ -186,7 +192,6 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   using Passes::boundary_runs_;
   using Passes::closing_;
   using Passes::displacement_;
-  using Passes::following_;
   using Passes::history_interval_;
   using Passes::interior_runs_;
   using Passes::layout_;
@@ -227,25 +232,27 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     if (same && following_.empty()) return;
     load_scales_ = scales;
     std::fill(applied_.begin(), applied_.end(), Real(0));
-    const auto add_to = [&](AlignedVector<Real>& array) {
-      return [&](Index i, Vec3d force) {
-        const Index slot = layout_.slot(i);
-        this->set3(array, slot, this->get3(array, slot) + force);
-      };
+    const auto add = [&](Index i, Vec3d force) {
+      const Index slot = layout_.slot(i);
+      this->set3(applied_, slot, this->get3(applied_, slot) + force);
     };
     for (Index i = 0; i < static_cast<Index>(external_force_.size()); ++i) {
-      add_to(applied_)(i, external_force_[i]);
+      add(i, external_force_[i]);
     }
-    for_each_load(model_, false, time, add_to(applied_));
+    for_each_load(model_, false, time, add);
     if (following_.empty()) return;
-    if (!same) {
-      std::fill(following_.begin(), following_.end(), Real(0));
-      for_each_load(model_, true, time, add_to(following_));
-    }
-    this->add_following();
+    std::fill(followed_force_.begin(), followed_force_.end(), Vec3d{});
+    following_.add(
+        time, [&](Index i) { return this->point_displacement(layout_.slot(i)); }, followed_force_);
+    for_each_load(model_, true, time,
+                  [&](Index i, Vec3d) { add(i, std::exchange(followed_force_[i], Vec3d{})); });
   }
 
   std::vector<Vec3d> external_force_;
+  FollowingLoads following_{model_};
+  // Forces of loads that follow the surface [N], shape [n]; empty without such loads.
+  std::vector<Vec3d> followed_force_ =
+      std::vector<Vec3d>(following_.empty() ? 0 : model_.position.size());
   std::optional<double> load_time_;  // time of `applied_`; none before the first sum
   double load_scales_ = 0;
   std::optional<CpuSurfels<StateReal>> surfels_;  // created on the first `update_surfels`

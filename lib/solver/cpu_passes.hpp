@@ -85,7 +85,6 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   using Arrays::applied_;
   using Arrays::closing_;
   using Arrays::displacement_;
-  using Arrays::following_;
   using Arrays::history_;
   using Arrays::history_interval_;
   using Arrays::history_start_;
@@ -391,23 +390,6 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     std::memcpy(static_cast<void*>(values), &state, sizeof(values));
     for (int k = 0; k < count; ++k) store(numbers + k * W, values[k]);
     return stress;
-  }
-
-  // --- loads ------------------------------------------------------------------------------------
-
-  /// Adds the loads that follow the surface at the present displacements to the applied forces.
-  void add_following() {
-#pragma omp parallel for schedule(dynamic, 64) num_threads(threads_)
-    for (Index p = 0; p < layout_.packs(); ++p) {
-      const Vec3<P> rest = this->template vec3_of<P>(following_, p);
-      bool none = true;
-      for (int l = 0; l < W; ++l) {
-        none = none && rest.x[l] == 0 && rest.y[l] == 0 && rest.z[l] == 0;
-      }
-      if (none) continue;
-      const Vec3<P> constant = this->template vec3_of<P>(applied_, p);
-      this->store3(applied_, p, constant + following_force(whole_gradient_of(p), rest));
-    }
   }
 
   // --- pass 2 -----------------------------------------------------------------------------------

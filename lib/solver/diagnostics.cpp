@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/physics/hourglass.hpp"
@@ -14,6 +15,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/first_error.hpp"
+#include "solver/following_loads.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
 #include "solver/totals.hpp"
@@ -23,13 +25,19 @@ double pressure_wave_speed(const Material& m) {
   return std::sqrt(wave_stiffness_at_rest(m) / m.density);
 }
 
-Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
-  check_fits(model, backend);
-  if (auto summed = backend.diagnostics(now)) {
-    summed->step = now.step;
-    summed->time = now.time;
-    return *summed;
-  }
+namespace {
+
+/// The energy of the loads that follow the surface [J]. Collective if there are any.
+double energy_of_following(const Model& model, Backend& backend, double time) {
+  if (model.following.empty()) return 0;
+  State state;
+  backend.download(state);
+  if (model.share) refresh_ghosts(*model.share, state.displacement);
+  return FollowingLoads(model).energy(time, [&](Index i) { return state.displacement[i]; });
+}
+
+/// Sums over the phyxels of this rank, as of `Backend::diagnostics`, on the host.
+Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) {
   State state;
   backend.download(state);
   std::vector<Vec3d> force;
@@ -40,11 +48,16 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   if (has_hourglass_control(model)) backend.fit_residuals(residual);
 
   Totals all;
+  if (model.share && !model.following.empty()) refresh_ghosts(*model.share, state.displacement);
   const std::span<const Vec3d> external = backend.external_forces();
   std::vector<Vec3d> loads(model.loads.empty() ? 0 : force.size());
-  std::vector<Vec3d> following(model.has_following_loads() ? force.size() : 0);
+  std::vector<Vec3d> following(model.following.empty() ? 0 : force.size());
   add_constant_loads(model, now.time, loads);
-  for_each_load(model, true, now.time, [&](Index i, Vec3d load) { following[i] += load; });
+  FollowingLoads(model).add(
+      now.time, [&](Index i) { return state.displacement[i]; }, following);
+  const auto value_of = [](std::span<const Vec3d> forces, Index i) {
+    return forces.empty() ? Vec3d{} : forces[i];
+  };
   const std::vector<Vec3d> free = free_axes(model);
   const std::vector<std::string> columns = history_columns(model);
 
@@ -73,7 +86,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
       const DampedFlow half = damped_flow(m.damping, now.lag);
 #pragma omp for schedule(static) nowait
       for (Index i = part.begin; i < part.owned_end(); ++i) {
-        const Vec3d u = state.displacement[i], none{};
+        const Vec3d u = state.displacement[i];
         const PointResponse<double> response = error.caught([&] {
           return law.after_step(gradient[i], history.of(i, numbers), state.history_interval);
         });
@@ -85,9 +98,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
                            .flow = half,
                            .free = free.empty() ? Vec3d{1, 1, 1} : free[i],
                            .internal = force[i],
-                           .load = loads.empty() ? none : loads[i],
-                           .following = following.empty() ? none : following[i],
-                           .external = external.empty() ? none : external[i],
+                           .load = value_of(loads, i),
+                           .following = value_of(following, i),
+                           .external = value_of(external, i),
                            .gravity = model.gravity,
                            .grad_u = gradient[i],
                            .hourglass = kappa,
@@ -100,11 +113,23 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     all.add(own);
   }
   error.rethrow();
-  if (model.share) all.add_ranks(*model.share->communicator);
-  Diagnostics d = all.values();
-  d.step = now.step;
-  d.time = now.time;
-  return d;
+  return all;
+}
+
+}  // namespace
+
+Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
+  check_fits(model, backend);
+  std::optional<Diagnostics> d = backend.diagnostics(now);
+  if (!d) {
+    Totals all = totals_on_host(model, backend, now);
+    if (model.share) all.add_ranks(*model.share->communicator);
+    d = all.values();
+  }
+  d->load_energy += energy_of_following(model, backend, now.time);
+  d->step = now.step;
+  d->time = now.time;
+  return *d;
 }
 
 std::string describe_phyxel(const Model& model, Index global_id) {

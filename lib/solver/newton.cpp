@@ -8,7 +8,6 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/physics/follower.hpp"
 #include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
@@ -42,6 +41,7 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       backend_(backend),
       most_steps_(most_steps),
       vectors_(model, std::max(1, backend.threads())),
+      following_(model),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
 NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
@@ -106,8 +106,8 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
       // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
       // that follows the surface has an energy only nearly: there, smaller residuals do as well.
       const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
-      const bool falls = rise <= rounding || (!balance.following.empty() &&
-                                              residual(balance, next, force) < report.residual);
+      const bool falls = rise <= rounding ||
+                         (!following_.empty() && residual(balance, next, force) < report.residual);
       if (std::isfinite(now) && (to_move > 0 || falls || attempt == most_cuts)) {
         energy = now;
         break;
@@ -140,27 +140,19 @@ void Newton::set_applied(double time, Balance& balance) const {
   add_constant_loads(model_, time, applied);
   const std::span<const Vec3d> external = backend_.external_forces();
   if (!external.empty()) vectors_.for_each([&](Index i) { applied[i] += external[i]; });
-  if (!model_.has_following_loads()) return;
-  balance.following = vectors_.make();
-  for_each_load(model_, true, time, [&](Index i, Vec3d load) { balance.following[i] += load; });
+  balance.time = time;
+  if (following_.empty()) return;
+  Vector rest = vectors_.make();
+  for_each_load(model_, true, time, [&](Index i, Vec3d load) { rest[i] += load; });
+  balance.scale = std::sqrt(vectors_.product(rest, rest));
 }
 
 Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
   Vector force = inner_forces(u);
   vectors_.for_each([&](Index i) { force[i] += balance.applied[i]; });
-  if (balance.following.empty()) return force;
-  const std::vector<Mat3d> gradient = gradients();
-  vectors_.for_each(
-      [&](Index i) { force[i] += following_force(gradient[i], balance.following[i]); });
+  following_.add(
+      balance.time, [&](Index i) { return placed_[i]; }, force);
   return force;
-}
-
-/// The displacement gradients at the present displacements.
-std::vector<Mat3d> Newton::gradients() {
-  std::vector<Mat3d> gradient;
-  backend_.displacement_gradients(gradient);
-  ++evaluations_;
-  return gradient;
 }
 
 /// The sum of all forces at u, those of inertia included [N].
@@ -193,14 +185,8 @@ double Newton::potential(const Balance& balance, const Vector& u) {
       return 0.5 * balance.weight[i] * dot(way, way);
     });
   }
-  double pushed = 0;
-  if (!balance.following.empty()) {
-    const std::vector<Mat3d> gradient = gradients();
-    pushed = vectors_.sum([&](Index i) {
-      return dot(mean_following_force(gradient[i], balance.following[i]), u[i]);
-    });
-  }
-  return elastic - vectors_.product(balance.applied, u) - pushed + inert;
+  const double following = following_.energy(balance.time, [&](Index i) { return placed_[i]; });
+  return elastic - vectors_.product(balance.applied, u) + following + inert;
 }
 
 /// The residual force relative to applied, reaction and inertial forces, plus a fraction of the
@@ -211,9 +197,7 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
       [&](Index i) { return dot(by_components(balance.free[i], force[i]), force[i]); });
   const double reactions =
       vectors_.sum([&](Index i) { return dot(held_part(balance, i, force[i]), force[i]); });
-  const Vector& following = balance.following;
   const double scale = std::sqrt(vectors_.product(balance.applied, balance.applied)) +
-                       (following.empty() ? 0 : std::sqrt(vectors_.product(following, following))) +
                        std::sqrt(reactions) + balance.scale +
                        rounding_share * std::sqrt(vectors_.sum([&](Index i) {
                          return stiffness_[i] * stiffness_[i] * dot(u[i], u[i]);
@@ -224,7 +208,9 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
 /// The largest entry of ∇u of a displacement.
 double Newton::steepest(const Vector& step) {
   put(step);
-  const std::vector<Mat3d> gradient = gradients();
+  std::vector<Mat3d> gradient;
+  backend_.displacement_gradients(gradient);
+  ++evaluations_;
   const double most = vectors_.largest([&](Index i) {
     double entry = 0;
     for (int e = 0; e < 9; ++e) entry = std::max(entry, std::abs(gradient[i](e / 3, e % 3)));

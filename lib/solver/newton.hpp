@@ -10,6 +10,7 @@
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
+#include "solver/following_loads.hpp"
 
 namespace phyxel {
 
@@ -28,9 +29,9 @@ struct Balance {
   Vector free;                 ///< 1 along free axes, 0 along prescribed ones.
   Vector target;               ///< Displacement along prescribed axes [m].
   Vector applied;              ///< Gravity, constant loads and the caller's forces [N].
-  Vector following;            ///< At rest [N], of loads that follow the surface; empty: none.
   std::vector<double> weight;  ///< Inertia [kg/s²], shape [n]; empty without inertia.
   Vector centre;               ///< Displacement that inertia alone leads to [m]; empty likewise.
+  double time = 0;             ///< Time of loads that follow the surface and grow [s].
   double scale = 0;  ///< Force added to the applied forces as the reference of residuals [N].
 };
 
@@ -77,7 +78,6 @@ class Newton {
  private:
   Vector forces(const Balance& balance, const Vector& u);
   void put(const Vector& u);
-  std::vector<Mat3d> gradients();
   double potential(const Balance& balance, const Vector& u);
   double residual(const Balance& balance, const Vector& u, const Vector& force) const;
   double steepest(const Vector& step);
@@ -96,6 +96,7 @@ class Newton {
   Backend& backend_;
   int most_steps_;
   OwnedVectors vectors_;
+  FollowingLoads following_;
   double difference_;              ///< Largest displacement in differences of forces [m].
   std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;

@@ -3,7 +3,6 @@
 
 #include <cmath>
 
-#include "phyxel/physics/follower.hpp"
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/laws.hpp"
 #include "phyxel/physics/verlet.hpp"
@@ -40,7 +39,7 @@ struct PhyxelState {
   DampedFlow flow;              ///< From the time of the velocity to that of the displacement.
   Vec3<double> free;            ///< 1 along free axes, 0 along prescribed ones.
   Vec3<double> internal, load;  ///< Internal forces and those of constant loads [N].
-  Vec3<double> following;       ///< At rest [N], of loads that follow the surface.
+  Vec3<double> following;       ///< Of loads that follow the surface [N], counted elsewhere.
   Vec3<double> external;        ///< The caller's forces [N], whose energy is the caller's to count.
   Vec3<double> gravity;         ///< [m/s²]
   Mat3<double> grad_u;          ///< ∇u
@@ -73,7 +72,7 @@ PHYXEL_HD PhyxelTotals totals_of(const PhyxelState& p, const PointResponse<doubl
   t.finite = all - all == 0;
   t.inverted = volume_change(p.grad_u) <= -1;
 
-  const Vec3<double> loads = p.load + following_force(p.grad_u, p.following);
+  const Vec3<double> loads = p.load + p.following;
   const Vec3<double> acceleration = (1 / p.mass) * (p.internal + (loads + p.external)) + p.gravity;
   const Vec3<double> change = p.flow.gain * acceleration - (1 - p.flow.keep) * p.velocity;
   const Vec3<double> velocity =
@@ -88,8 +87,7 @@ PHYXEL_HD PhyxelTotals totals_of(const PhyxelState& p, const PointResponse<doubl
   t.sum[Sums::viscous_work] = p.volume * response.viscous_work;
   if (p.hourglass > 0) t.sum[Sums::hourglass_energy] = hourglass_energy(p.hourglass, p.residual);
   t.sum[Sums::gravity_energy] = -p.mass * dot(p.gravity, p.displacement);
-  t.sum[Sums::load_energy] =
-      -dot(p.load + mean_following_force(p.grad_u, p.following), p.displacement);
+  t.sum[Sums::load_energy] = -dot(p.load, p.displacement);
   detail::put(t.sum + Sums::internal_force, p.internal);
   detail::put(t.sum + Sums::internal_torque, cross(p.position, p.internal));
   using std::sqrt;

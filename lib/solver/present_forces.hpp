@@ -3,10 +3,12 @@
 
 #include <vector>
 
+#include "model/owned_vectors.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/following_loads.hpp"
 #include "solver/support_work.hpp"
 
 namespace phyxel {
@@ -26,7 +28,10 @@ class PresentForces {
       return;
     }
     backend.internal_forces(force_);
-    add_loads(model, backend, dt_ > 0 ? time_ : full_loads, force_);
+    if (model.share && !model.following.empty()) {
+      refresh_ghosts(*model.share, state_.displacement);
+    }
+    add_loads(FollowingLoads(model), dt_ > 0 ? time_ : full_loads, state_.displacement, force_);
     const std::span<const Vec3d> external = backend.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];
     for (std::size_t i = 0; i < force_.size(); ++i) force_[i] += model.mass[i] * model.gravity;

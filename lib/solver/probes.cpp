@@ -8,12 +8,12 @@
 #include <type_traits>
 #include <utility>
 
+#include "model/point_fit.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/point_fields.hpp"
 #include "phyxel/share.hpp"
 #include "rank_sums.hpp"
 #include "solver/first_error.hpp"
-#include "solver/point_fit.hpp"
 #include "solver/tensors.hpp"
 
 namespace phyxel {

@@ -8,6 +8,7 @@
 
 #include "exact_sum.hpp"
 #include "phyxel/error.hpp"
+#include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
 namespace {
@@ -90,13 +91,13 @@ std::vector<double> sizes_of(const Model& model) {
   return sizes;
 }
 
-BodySums sums_of(const Model& model, const Balance& balance, std::span<const Part> body,
-                 double size) {
+/// @param applied all forces but those of supports, on the body at rest [N]
+BodySums sums_of(const Model& model, const Balance& balance, const Balance::Vector& applied,
+                 std::span<const Part> body, double size) {
   BodySums sums;
   for_each_phyxel(body, [&](Index i) {
     const Vec3d x = (1 / size) * (model.position[i] - body[0].centre);
-    const Vec3d following = balance.following.empty() ? Vec3d{} : balance.following[i];
-    const Vec3d force = balance.applied[i] + following, torque = cross(x, force);
+    const Vec3d force = applied[i], torque = cross(x, force);
     const double along[] = {force.x, force.y, force.z, torque.x, torque.y, torque.z};
     for (int k = 0; k < 6; ++k) sums.force[k].add(along[k]);
     sums.force_size.add(norm(force));
@@ -164,9 +165,11 @@ void check(const Model& model, const Part& body, double size, BodySums& sums) {
 
 void refuse_unsupported_bodies(const Model& model, const Balance& balance) {
   const std::vector<double> sizes = sizes_of(model);
+  Balance::Vector applied = balance.applied;
+  for_each_load(model, true, full_loads, [&](Index i, Vec3d load) { applied[i] += load; });
   std::vector<BodySums> bodies;
   for_each_body(model, [&](std::span<const Part> body) {
-    bodies.push_back(sums_of(model, balance, body, sizes[bodies.size()]));
+    bodies.push_back(sums_of(model, balance, applied, body, sizes[bodies.size()]));
   });
   add_ranks(model, bodies);
   std::size_t b = 0;

@@ -11,6 +11,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/following_loads.hpp"
 #include "solver/present_forces.hpp"
 
 namespace phyxel {
@@ -31,6 +32,7 @@ class Accelerations {
         backend_(backend),
         time_(time),
         owned_(model, std::max(1, backend.threads())),
+        following_(model),
         free_(free_axes(model)) {}
 
   /// Returns a vector of phyxel i with its prescribed components set to zero.
@@ -47,7 +49,7 @@ class Accelerations {
     backend_.internal_forces(all, use);
     const std::span<const Vec3d> external = backend_.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) all[i] += external[i];
-    add_loads(model_, backend_, time_, all);
+    add_loads(following_, time_, state.displacement, all);
     owned_.for_each(
         [&](Index i) { all[i] = free(i, (1 / model_.mass[i]) * all[i] + model_.gravity); });
     return all;
@@ -76,6 +78,7 @@ class Accelerations {
   Backend& backend_;
   double time_;
   OwnedVectors owned_;
+  FollowingLoads following_;
   Vectors free_;  // 0 along prescribed axes, else 1; empty if none are prescribed
 };
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -115,8 +116,20 @@ struct Load {
   Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
   bool on_surface = false;   ///< True of a traction, which follows the areas of phyxels.
   bool follows = false;      ///< True of a pressure on the deformed surface (physics/follower.hpp).
+  double pressure = 0;       ///< Of a pressure at rest [Pa].
+  std::optional<double> gas = {};  ///< γ of a gas in a cavity, whose pressure grows as V^-γ.
   /// Which share of the force acts at a time [s].
   double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
+};
+
+/// Where a load that follows the surface acts on phyxels of this rank. The gradient of displacement
+/// there, by which the surface has turned and grown, is that of a quadratic polynomial, which is
+/// accurate to second order on a surface, too.
+struct Following {
+  std::size_t load = 0;            ///< Number of the load among the model's.
+  std::vector<std::size_t> entry;  ///< Numbers of the phyxels among the load's.
+  Csr near;                        ///< Row k: the phyxels of which the gradient at entry k knows.
+  std::vector<Vec3d> slope;        ///< Their shares in the gradient [1/m], shape [entries of near].
 };
 
 /// A place in a body whose values are logged: points at rest, or the phyxels of a region.
@@ -158,6 +171,7 @@ struct Model {
   Surfels surfels;
   std::vector<Motion> motions;  ///< Fixed and prescribed phyxels.
   std::vector<Load> loads;
+  std::vector<Following> following;  ///< Of loads that follow the surface, in their order.
   std::vector<Probe> probes;
   std::vector<Walls> walls;  ///< Of each body.
   Vec3d gravity;             ///< [m/s^2]
@@ -179,8 +193,6 @@ struct Model {
   Index global_id(Index i) const { return share ? share->global_id[i] : i; }
   /// Whether phyxel i is no ghost.
   bool owns(Index i) const { return !share || share->owned[i]; }
-  /// Whether a load follows the surface.
-  bool has_following_loads() const;
   /// Whether neighbour lists are here.
   bool has_lists() const { return neighbourhood.neighbours.rows() == size(); }
   /// This model, for whoever needs the lists. @throws InputError if they were left to a device.

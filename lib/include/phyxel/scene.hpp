@@ -109,9 +109,12 @@ struct TractionRequest {
   Vec3d traction;         ///< [Pa]
   double pressure = 0;    ///< [Pa]
   bool follower = false;  ///< True of a pressure on the deformed surface, against its normals.
-  Vec3d normal;           ///< If not zero, only where the outward normal is nearly along it.
-  double angle = 45;      ///< Largest angle between the two [degrees].
-  double ramp = 0;        ///< [s]
+  /// Set for the gas in a cavity, around which the selected surface is: γ of its pressure,
+  /// pressure (V₀/V)^γ.
+  std::optional<double> gas;
+  Vec3d normal;       ///< If not zero, only where the outward normal is nearly along it.
+  double angle = 45;  ///< Largest angle between the two [degrees].
+  double ramp = 0;    ///< [s]
 };
 
 /// A place whose values a run logs at each frame: points of a body at rest, or phyxels of it over

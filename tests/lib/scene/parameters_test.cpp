@@ -114,6 +114,10 @@ all = true
 pressure = 1 # body.traction.pressure => pressure = 2
 follower = true # body.traction.follower => follower = false
 ramp = 1 # body.traction.ramp => ramp = 2
+[[body.traction]]
+all = true
+pressure = 1
+gas = 1.4 # body.traction.gas => gas = 1
 [[body]]
 name = 'second'
 mesh = 'a.obj' # body.mesh => mesh = 'b.obj'

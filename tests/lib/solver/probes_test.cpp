@@ -6,10 +6,10 @@
 
 #include <cmath>
 
+#include "model/point_fit.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/point_fields.hpp"
-#include "solver/point_fit.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/refusal.hpp"

@@ -234,27 +234,31 @@ class Physics {
   std::vector<Vec3d> applied_at(double time, const State& state) const {
     std::vector<Vec3d> force = external_;
     force.resize(whole_.position.size());
-    std::vector<Mat3d> gradient;
-    reference_->upload(state);
-    reference_->displacement_gradients(gradient);
     for (Index i = 0; i < whole_.size(); ++i) force[i] += whole_.mass[i] * whole_.gravity;
     for (const Load& load : whole_.loads) {
       const double share = load.ramp > time ? time / load.ramp : 1;
       for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-        const Index i = load.phyxels[k];
-        Vec3d now = load.force[k];
-        if (load.follows) {  // Nanson's formula, J F⁻ᵀ of the force at rest
-          Eigen::Matrix3d f = Eigen::Matrix3d::Identity();
-          for (int e = 0; e < 9; ++e) f(e / 3, e % 3) += gradient[i](e / 3, e % 3);
-          const Eigen::Vector3d turned =
-              f.determinant() * f.inverse().transpose() * Eigen::Vector3d(now.x, now.y, now.z);
-          now = {turned[0], turned[1], turned[2]};
+        if (!load.follows) force[load.phyxels[k]] += share * load.force[k];
+      }
+    }
+    for (const Following& f : whole_.following) {
+      const Load& load = whole_.loads[f.load];
+      const double share = load.ramp > time ? time / load.ramp : 1;
+      for (std::size_t k = 0; k < f.entry.size(); ++k) {
+        Eigen::Matrix3d deformation = Eigen::Matrix3d::Identity();
+        for (Offset e = f.near.offsets[k]; e < f.near.offsets[k + 1]; ++e) {
+          deformation +=
+              vector_of(state.displacement[f.near.indices[e]]) * vector_of(f.slope[e]).transpose();
         }
-        force[i] += share * now;
+        // Nanson's formula, J F⁻ᵀ of the force at rest.
+        const Eigen::Vector3d now = deformation.determinant() * deformation.inverse().transpose() *
+                                    vector_of(share * load.force[f.entry[k]]);
+        force[load.phyxels[f.entry[k]]] += Vec3d{now[0], now[1], now[2]};
       }
     }
     return force;
   }
+  static Eigen::Vector3d vector_of(Vec3d v) { return {v.x, v.y, v.z}; }
   /// Damping of each phyxel [1/s].
   std::vector<double> damping_rates() const {
     std::vector<double> rates(whole_.position.size());

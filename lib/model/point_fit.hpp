@@ -17,4 +17,8 @@ namespace phyxel {
 ///   alike
 std::vector<double> shares_at(Vec3d point, std::span<const Vec3d> near, double reach);
 
+/// The share of each phyxel in the gradient at a point [1/m], shape [n], of the same polynomials.
+/// Along directions that the phyxels do not span it is zero.
+std::vector<Vec3d> slopes_at(Vec3d point, std::span<const Vec3d> near, double reach);
+
 }  // namespace phyxel
