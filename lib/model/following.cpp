@@ -51,9 +51,13 @@ Csr phyxels_around(const Model& model, const std::vector<Index>& phyxels) {
   const auto begin = static_cast<std::size_t>(parts.front().begin),
              count = static_cast<std::size_t>(parts.back().end) - begin;
   std::vector<Vec3d> places;
-  for (const Index i : phyxels) places.push_back(model.position[i]);
+  double reach = 0;
+  for (const Index i : phyxels) {
+    places.push_back(model.position[i]);
+    reach = std::max(reach, model.neighbourhood.support[i]);
+  }
   const Csr rows = phyxels_reaching(places, std::span(model.position).subspan(begin, count),
-                                    std::span(model.neighbourhood.support).subspan(begin, count));
+                                    std::vector<double>(count, reach));
   for (std::size_t k = 0; k < phyxels.size(); ++k) {
     add(phyxels[k], rows.row(static_cast<Index>(k)), parts.front().begin);
   }
