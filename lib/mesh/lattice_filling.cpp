@@ -253,6 +253,19 @@ class Skin {
       const std::size_t room = room_of(p, 0);
       return in_room[room].empty() ? 0 : room;
     };
+    // False if no point of a ball lies in a room. Sites of the room may be far from such a ball,
+    // and a search for the nearest would visit them all.
+    const auto may_lie_in = [&](std::size_t room, Vec3d middle, double radius) {
+      for (std::size_t k = 0; k < cuts.list.size(); ++k) {
+        const double distance = cuts.list[k].wall.distance(middle);
+        if (k + 1 == room) return distance <= radius;
+        // Room 0 has the space of regions without phyxels.
+        if (room == 0 && in_room[k + 1].empty() && distance <= radius) return true;
+        // A little less, since sample points are rounded to float.
+        if (distance < -(1 + 1e-5) * radius) return false;
+      }
+      return true;
+    };
     const Depth depth(request_, spacing_);
     std::vector<double> volume(point_.size());
     for (std::size_t room = 0; room < in_room.size(); ++room) {
@@ -261,7 +274,7 @@ class Skin {
       for (const std::size_t k : in_room[room]) site.push_back(point_[k]);
       const auto wanted = [&](Vec3d middle, double half) {
         const double radius = std::numbers::sqrt3 * half;
-        if (room > 0 && cuts.list[room - 1].wall.distance(middle) > radius) return false;
+        if (!may_lie_in(room, middle, radius)) return false;
         // Smaller cells are parts of one that is wanted; larger ones would need a long search.
         if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
         // Cells of a Voronoi diagram reach one spacing from their phyxels.
