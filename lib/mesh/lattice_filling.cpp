@@ -239,18 +239,22 @@ class Skin {
   /// the space in its region, unless no other phyxel is there.
   std::vector<double> sampled_volumes(Stage& stage) const {
     const SupportCuts& cuts = request_.sites.cuts;
-    // Room 0 is outside all regions.
-    const auto room_of = [&](Vec3d p, double depth) {
+    // The number of the first region with contains(region), from 1; room 0 is outside all regions.
+    const auto first_room = [&](const auto& contains) {
       std::size_t k = 0;
-      while (k < cuts.list.size() && !cuts.list[k].wall.shrunk(depth).contains(p)) ++k;
+      while (k < cuts.list.size() && !contains(cuts.list[k].wall)) ++k;
       return k < cuts.list.size() ? k + 1 : 0;
     };
     std::vector<std::vector<std::size_t>> in_room(cuts.list.size() + 1);
     for (std::size_t k = 0; k < point_.size(); ++k) {
-      in_room[room_of(point_[k], 4 * cuts.depth)].push_back(k);
+      const auto deep_inside = [&](const SpaceRegion& wall) {
+        return wall.shrunk(4 * cuts.depth).contains(point_[k]);
+      };
+      in_room[first_room(deep_inside)].push_back(k);
     }
     const auto settled_room_of = [&](Vec3d p) {
-      const std::size_t room = room_of(p, 0);
+      const std::size_t room =
+          first_room([&](const SpaceRegion& wall) { return wall.contains(p); });
       return in_room[room].empty() ? 0 : room;
     };
     // False if no point of a ball lies in a room. Sites of the room may be far from such a ball,
