@@ -50,9 +50,9 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
                                               m.neighbourhood.support.begin() + body.end},
                                              rule);
       separate(hood, position, whole.bodies[b].walls);
-      append_lists(m.neighbourhood, hood, body.begin);
       std::copy(hood.support.begin(), hood.support.end(),
                 m.neighbourhood.support.begin() + body.begin);
+      append_lists(m.neighbourhood, std::move(hood), body.begin);
     }
   });
   return local;

@@ -6,6 +6,7 @@
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -48,13 +49,11 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
   return a + (vb / all) * ab + (vc / all) * ac;
 }
 
-void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
+void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
                     Stage& stage) {
-  std::vector<Vec3d> place(sample.size());
-  std::transform(sample.begin(), sample.end(), place.begin(),
-                 [](const PointOn& s) { return s.point; });
-  const SpatialHash samples(place, 0.4 * spacing);
+  const SpatialHash samples(in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; }),
+                            0.4 * spacing);
   const auto corners_at = [&](Vec3d p) {
     const Index nearest = samples.nearest(p).index;
     const Triangle& t = surface.triangle[sample[static_cast<std::size_t>(nearest)].piece];

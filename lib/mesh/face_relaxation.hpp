@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "phyxel/cloud.hpp"
@@ -27,7 +28,7 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 /// @param sample points spread over the whole surface, with their triangles
 /// @param spacing typical distance between the points [m]
 /// @param stage is told the share of sweeps that is done
-void relax_on_faces(const Surface& surface, const std::vector<PointOn>& sample,
+void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
                     Stage& stage);
 

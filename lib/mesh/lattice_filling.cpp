@@ -239,19 +239,36 @@ class Skin {
   /// the space in its region, unless no other phyxel is there.
   std::vector<double> sampled_volumes(Stage& stage) const {
     const SupportCuts& cuts = request_.sites.cuts;
-    // Room 0 is outside all regions.
-    const auto room_of = [&](Vec3d p, double depth) {
+    // The number of the first region with contains(region), from 1; room 0 is outside all regions.
+    const auto first_room = [&](const auto& contains) {
       std::size_t k = 0;
-      while (k < cuts.list.size() && !cuts.list[k].wall.shrunk(depth).contains(p)) ++k;
+      while (k < cuts.list.size() && !contains(cuts.list[k].wall)) ++k;
       return k < cuts.list.size() ? k + 1 : 0;
     };
     std::vector<std::vector<std::size_t>> in_room(cuts.list.size() + 1);
     for (std::size_t k = 0; k < point_.size(); ++k) {
-      in_room[room_of(point_[k], 4 * cuts.depth)].push_back(k);
+      const auto deep_inside = [&](const SpaceRegion& wall) {
+        return wall.shrunk(4 * cuts.depth).contains(point_[k]);
+      };
+      in_room[first_room(deep_inside)].push_back(k);
     }
     const auto settled_room_of = [&](Vec3d p) {
-      const std::size_t room = room_of(p, 0);
+      const std::size_t room =
+          first_room([&](const SpaceRegion& wall) { return wall.contains(p); });
       return in_room[room].empty() ? 0 : room;
+    };
+    // False if no point of a ball lies in a room. Sites of the room may be far from such a ball,
+    // and a search for the nearest would visit them all.
+    const auto may_lie_in = [&](std::size_t room, Vec3d middle, double radius) {
+      for (std::size_t k = 0; k < cuts.list.size(); ++k) {
+        const double distance = cuts.list[k].wall.distance(middle);
+        if (k + 1 == room) return distance <= radius;
+        // Room 0 has the space of regions without phyxels.
+        if (room == 0 && in_room[k + 1].empty() && distance <= radius) return true;
+        // A little less, since sample points are rounded to float.
+        if (distance < -(1 + 1e-5) * radius) return false;
+      }
+      return true;
     };
     const Depth depth(request_, spacing_);
     std::vector<double> volume(point_.size());
@@ -261,7 +278,7 @@ class Skin {
       for (const std::size_t k : in_room[room]) site.push_back(point_[k]);
       const auto wanted = [&](Vec3d middle, double half) {
         const double radius = std::numbers::sqrt3 * half;
-        if (room > 0 && cuts.list[room - 1].wall.distance(middle) > radius) return false;
+        if (!may_lie_in(room, middle, radius)) return false;
         // Smaller cells are parts of one that is wanted; larger ones would need a long search.
         if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
         // Cells of a Voronoi diagram reach one spacing from their phyxels.

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
 #include "mesh/nearest_points.hpp"
 #include "mesh/random_bits.hpp"
+#include "parallel_sort.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -33,23 +34,37 @@ class GrowingHash {
   /// Square of the distance to the nearest point [m^2], or `limit` if none is nearer. Exact for
   /// limits up to the square of the cell size.
   double nearest2(Vec3d p, double limit) const {
+    visit_near(p, [&](double distance2) {
+      limit = std::min(limit, distance2);
+      return true;
+    });
+    return limit;
+  }
+  /// True if the square of the distance to a point is below `limit` [m^2], for such limits.
+  bool has_within(Vec3d p, double limit) const {
+    return !visit_near(p, [&](double distance2) { return !(distance2 < limit); });
+  }
+
+  const std::vector<Vec3d>& points() const { return point_; }
+
+ private:
+  /// Calls visit(squared distance) for the points in the cells around a place until it is false.
+  /// @returns false if it was
+  template <class Visit>
+  bool visit_near(Vec3d p, Visit&& visit) const {
     const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
     for (std::int64_t k = z - 1; k <= z + 1; ++k) {
       for (std::int64_t j = y - 1; j <= y + 1; ++j) {
         for (std::int64_t i = x - 1; i <= x + 1; ++i) {
           for (Index q = head_[bucket(i, j, k)]; q >= 0; q = next_[q]) {
             const Vec3d d = point_[q] - p;
-            limit = std::min(limit, dot(d, d));
+            if (!visit(dot(d, d))) return false;
           }
         }
       }
     }
-    return limit;
+    return true;
   }
-
-  const std::vector<Vec3d>& points() const { return point_; }
-
- private:
   std::int64_t cell(double v) const { return static_cast<std::int64_t>(std::floor(v * inverse_)); }
   std::size_t bucket(std::int64_t x, std::int64_t y, std::int64_t z) const {
     const auto u = [](std::int64_t v) { return static_cast<std::uint64_t>(v); };
@@ -82,8 +97,7 @@ class Darts {
         dart_.push_back({mix_bits(bits), block.position(k) - origin_, HUGE_VAL});
       }
     }
-    std::sort(dart_.begin(), dart_.end(),
-              [](const Dart& a, const Dart& b) { return a.rank < b.rank; });
+    parallel_sort(dart_, [](const Dart& a, const Dart& b) { return a.rank < b.rank; });
     for (const Vec3d& p : before) taken_.add(p - origin_);
   }
 
@@ -146,12 +160,60 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
   return darts.points();
 }
 
+namespace {
+
+/// A sample point that may be accepted.
+struct Candidate {
+  std::uint64_t rank;  ///< Ranks are random, and no two are the same.
+  Vec3d place;         ///< [m]
+};
+
+/// All sample points in random order, relative to `origin`.
+Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks, Vec3d origin,
+                                    std::uint64_t seed) {
+  std::vector<std::size_t> first{0};
+  for (const SampleBlock& block : blocks) first.push_back(first.back() + block.offset.size());
+  Bulk<Candidate> all(first.back());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    for (std::size_t k = 0; k < blocks[b].offset.size(); ++k) {
+      const std::size_t sample = first[b] + k;
+      all[sample] = {mix_bits(mix_bits(seed ^ mix_bits(sample))), blocks[b].position(k) - origin};
+    }
+  }
+  parallel_sort(all, [](const Candidate& a, const Candidate& b) { return a.rank < b.rank; });
+  return all;
+}
+
+}  // namespace
+
 std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, double gap,
                                    std::uint64_t seed, std::span<const Vec3d> before) {
   if (blocks.empty()) return {};
-  Darts darts(blocks, 1, seed, gap, before, samples_in(blocks) / 16);
-  darts.take(gap, std::numeric_limits<std::size_t>::max());
-  return darts.points();
+  const Vec3d origin = blocks.front().centre;
+  const Bulk<Candidate> all = all_in_random_order(blocks, origin, seed);
+  const double limit = gap * gap;
+  GrowingHash taken(gap, before.size() + all.size() / 16);
+  for (const Vec3d& p : before) taken.add(p - origin);
+  // Most candidates have a point nearby that was accepted long before: all threads sort these out,
+  // batch by batch, and one goes through the rest in order. Batches grow, since ever fewer are
+  // left.
+  std::vector<char> is_free;
+  for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
+    end = std::min(all.size(), begin + std::max<std::size_t>(1024, begin / 4));
+    is_free.resize(end - begin);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t k = begin; k < end; ++k) {
+      is_free[k - begin] = !taken.has_within(all[k].place, limit);
+    }
+    for (std::size_t k = begin; k < end; ++k) {
+      if (is_free[k - begin] && !taken.has_within(all[k].place, limit)) taken.add(all[k].place);
+    }
+  }
+  std::vector<Vec3d> site(taken.points().begin() + static_cast<std::ptrdiff_t>(before.size()),
+                          taken.points().end());
+  for (Vec3d& p : site) p += origin;
+  return site;
 }
 
 namespace {

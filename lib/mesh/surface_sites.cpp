@@ -15,7 +15,9 @@
 #include "mesh/repulsion.hpp"
 #include "model/box.hpp"
 #include "model/host_memory.hpp"
+#include "parallel_sort.hpp"
 #include "phyxel/error.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -87,27 +89,33 @@ Features features_of(const Surface& surface, const SurfaceTopology& topology) {
 
 /// Groups neighbouring points of a piece into blocks. Points of a plane perpendicular to an axis
 /// stay exactly on it.
-std::vector<SampleBlock> blocks_of(const std::vector<PointOn>& points, double side) {
+std::vector<SampleBlock> blocks_of(std::span<const PointOn> points, double side) {
   struct Placed {
-    std::array<std::int64_t, 4> cell;
-    Vec3d point;
-  };
-  std::vector<Placed> placed;
-  placed.reserve(points.size());
-  const auto cell = [&](double v) { return static_cast<std::int64_t>(std::floor(v / side)); };
-  for (const auto& [piece, p] : points) {
-    placed.push_back({{cell(p.x), cell(p.y), cell(p.z), static_cast<std::int64_t>(piece)}, p});
-  }
-  std::stable_sort(placed.begin(), placed.end(),
-                   [](const Placed& a, const Placed& b) { return a.cell < b.cell; });
-  std::vector<SampleBlock> blocks;
-  for (std::size_t k = 0; k < placed.size(); ++k) {
-    if (k == 0 || placed[k].cell != placed[k - 1].cell) {
-      blocks.push_back({.centre = placed[k].point, .offset = {}});
+    std::array<std::int64_t, 4> cell;  // with the piece
+    std::size_t number;                // of the point
+    bool operator<(const Placed& other) const {
+      return cell == other.cell ? number < other.number : cell < other.cell;
     }
-    const Vec3d d = placed[k].point - blocks.back().centre;
-    blocks.back().offset.push_back(
-        {static_cast<float>(d.x), static_cast<float>(d.y), static_cast<float>(d.z)});
+  };
+  const auto cell = [&](double v) { return static_cast<std::int64_t>(std::floor(v / side)); };
+  auto placed = in_bulk(points.size(), [&](std::size_t k) {
+    const auto& [piece, p] = points[k];
+    return Placed{{cell(p.x), cell(p.y), cell(p.z), static_cast<std::int64_t>(piece)}, k};
+  });
+  parallel_sort(placed);
+  std::vector<std::size_t> first;  // of each block
+  for (std::size_t k = 0; k < placed.size(); ++k) {
+    if (k == 0 || placed[k].cell != placed[k - 1].cell) first.push_back(k);
+  }
+  std::vector<SampleBlock> blocks(first.size());
+  first.push_back(placed.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    blocks[b].centre = points[placed[first[b]].number].point;
+    blocks[b].offset.reserve(first[b + 1] - first[b]);
+    for (std::size_t k = first[b]; k < first[b + 1]; ++k) {
+      blocks[b].offset.push_back(to<float>(points[placed[k].number].point - blocks[b].centre));
+    }
   }
   return blocks;
 }
@@ -142,24 +150,35 @@ std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, doubl
   return blocks_of(points, spacing);
 }
 
-/// Calls visit(triangle, point) for points evenly spread over the triangles.
-template <class Visit>
-void visit_points_over(const Surface& surface, double area, std::uint64_t seed, Visit&& visit) {
+/// Points evenly spread over the triangles, one on each `area` [m²], in the triangles' order.
+/// @param made made(triangle, point) returns what a point is stored as
+template <class Points, class Made>
+Points spread_over(const Surface& surface, double area, std::uint64_t seed, Made&& made) {
   constexpr double step_1 = 0.7548776662466927, step_2 = 0.5698402909980532;
+  const std::size_t triangles = surface.triangle.size();
+  std::vector<std::size_t> first(triangles + 1, 0);  // point of each triangle
   Shares shares(area);
-  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+  for (std::size_t t = 0; t < triangles; ++t) {
+    const std::int64_t n = shares.next(norm(area_of(surface, static_cast<Index>(t))));
+    first[t + 1] = first[t] + static_cast<std::size_t>(n);
+  }
+  Points points(first.back());
+  // A cube has twelve triangles, a scan ten million.
+  const std::size_t at_once = triangles / 4096 + 1;
+#pragma omp parallel for schedule(dynamic, at_once)
+  for (std::size_t t = 0; t < triangles; ++t) {
     const Triangle& corner = surface.triangle[t];
     const Vec3d a = surface.position[corner[0]];
     const Vec3d ab = surface.position[corner[1]] - a, ac = surface.position[corner[2]] - a;
-    const std::int64_t n = shares.next(norm(area_of(surface, static_cast<Index>(t))));
     const std::uint64_t bits = mix_bits(seed ^ mix_bits(t));
     double u = unit_fraction(bits), v = unit_fraction(bits >> 21);
-    for (std::int64_t k = 0; k < n; ++k) {
+    for (std::size_t k = first[t]; k < first[t + 1]; ++k) {
       u += step_1, v += step_2;
       u -= std::floor(u), v -= std::floor(v);
-      visit(t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac);
+      points[k] = made(t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac);
     }
   }
+  return points;
 }
 
 /// Adds sites at random sample points of edges and relaxes them; the sites of the argument stay.
@@ -181,11 +200,10 @@ void add_along_edges(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, 
 void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spacing,
                   std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
-  std::vector<PointOn> sample;
-  visit_points_over(surface, spacing * spacing / samples_on_faces, seed,
-                    [&](std::size_t triangle, Vec3d p) {
-                      sample.push_back({triangle, p});
-                    });
+  const auto sample = spread_over<Bulk<PointOn>>(surface, spacing * spacing / samples_on_faces,
+                                                 seed, [](std::size_t triangle, Vec3d p) {
+                                                   return PointOn{triangle, p};
+                                                 });
   const std::vector<Vec3d> more =
       fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());
@@ -282,9 +300,8 @@ double spacing_for(double volume, double area, Index phyxels) {
 }  // namespace
 
 std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed) {
-  std::vector<Vec3d> points;
-  visit_points_over(surface, area, seed, [&](std::size_t, Vec3d p) { points.push_back(p); });
-  return points;
+  return spread_over<std::vector<Vec3d>>(surface, area, seed,
+                                         [](std::size_t, Vec3d p) { return p; });
 }
 
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,

@@ -166,20 +166,35 @@ std::string in_words(const NeighbourhoodRule& rule) {
   return words;
 }
 
-void append_rows(Csr& to, const Csr& rows, Index shift) {
+void append_rows(Csr& to, Csr&& rows, Index shift) {
+  if (shift == 0 && to.rows() == 0) {
+    to = std::move(rows);
+    return;
+  }
+  const std::size_t rows_before = to.offsets.size(), entries_before = to.indices.size();
   const Offset base = to.entries();
-  for (std::size_t r = 1; r < rows.offsets.size(); ++r)
-    to.offsets.push_back(base + rows.offsets[r]);
-  for (const Index j : rows.indices) to.indices.push_back(j + shift);
+  to.offsets.resize(rows_before + rows.offsets.size() - 1);
+  to.indices.resize(entries_before + rows.indices.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t r = 1; r < rows.offsets.size(); ++r) {
+    to.offsets[rows_before + r - 1] = base + rows.offsets[r];
+  }
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < rows.indices.size(); ++k) {
+    to.indices[entries_before + k] = rows.indices[k] + shift;
+  }
 }
 
-void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift) {
+void append_lists(Neighbourhood& all, Neighbourhood&& hood, Index shift) {
   if (all.symmetric && !hood.symmetric) {
     all.inverse_lists = all.neighbours;
     all.symmetric = false;
   }
-  append_rows(all.neighbours, hood.neighbours, shift);
-  if (!all.symmetric) append_rows(all.inverse_lists, hood.inverse(), shift);
+  if (!all.symmetric) {
+    append_rows(all.inverse_lists,
+                hood.symmetric ? Csr(hood.neighbours) : std::move(hood.inverse_lists), shift);
+  }
+  append_rows(all.neighbours, std::move(hood.neighbours), shift);
 }
 
 void append(Degenerate& to, const Degenerate& found, Index shift) {

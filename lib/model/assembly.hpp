@@ -71,10 +71,12 @@ void give_density(Masses& masses, Index begin, Index end, double density, double
 /// "uniform support, 1.8 x the mean distance to the 10 nearest"
 std::string in_words(const NeighbourhoodRule& rule);
 
+/// Appends rows; moves them if there are none before.
 /// @param shift what the indices of the rows are counted from
-void append_rows(Csr& to, const Csr& rows, Index shift);
-/// A body's lists. Inverse ones are stored for all bodies as soon as one needs them.
-void append_lists(Neighbourhood& all, const Neighbourhood& hood, Index shift);
+void append_rows(Csr& to, Csr&& rows, Index shift);
+/// Appends a body's lists, which are moved if it is the first body. Inverse ones are stored for all
+/// bodies as soon as one needs them.
+void append_lists(Neighbourhood& all, Neighbourhood&& hood, Index shift);
 
 /// @param shift what the indices found are counted from
 void append(Degenerate& to, const Degenerate& found, Index shift);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "exact_sum.hpp"
+#include "model/closing_gathers.hpp"
 #include "model/owned_vectors.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -161,8 +162,7 @@ class Sums {
         areas_(std::move(areas)),
         tilt_(areas_.size()),
         weight_(areas_.size()),
-        placed_sum_(areas_.size()),
-        term_(areas_.size()),
+        gathers_(areas_.size()),
         supported_(supported_phyxels(model)) {
     for (Body* body : bodies) {
       double volume = 0;
@@ -192,75 +192,73 @@ class Sums {
     bodies.sum(&Body::areas, [&](const Body&, Index i) { return dot(areas_[i], areas_[i]); });
   }
 
-  /// The sums without closing, as they are to be 0.
-  std::vector<Vec3d> open(const Bodies& bodies) {
-    std::vector<Vec3d> sums(areas_.size());
-    const std::vector<Unknown> ones(areas_.size(), {{}, 1 / ease_area, 1 / ease_volume});
+  /// Calls take(i, sum) for the sum of each phyxel without closing, as it is to be 0, on many
+  /// threads.
+  template <class Take>
+  void open(const Bodies& bodies, Take&& take) {
     for (Body* body : bodies) body->mean = 0;
-    apply_local(bodies, ones, sums);
-    return sums;
+    const Unknown ones{{}, 1 / ease_area, 1 / ease_volume};
+    set_terms(bodies, [&](Index) { return ones; });
+    bodies.for_each([&](const Body&, Index j) { take(j, sum_at(j, ones)); });
   }
+  /// Sets a member of each body to Σ take(i, sum), which is given the sum of each phyxel of the
+  /// body, on many threads. Collective.
   /// @param x its ghosts receive their owners' values
-  void apply(const Bodies& bodies, std::vector<Unknown>& x, std::vector<Vec3d>& sums) {
+  template <class Take>
+  void apply(const Bodies& bodies, std::vector<Unknown>& x, double Body::*into, Take&& take) {
     bodies.refresh_ghosts(x);
     find_means(bodies, x);
-    apply_local(bodies, x, sums);
+    set_terms(bodies, [&](Index k) { return x[k]; });
+    bodies.sum(into, [&](const Body&, Index j) { return take(j, sum_at(j, x[j])); });
   }
   /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
   void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
     bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
     for (Body* body : bodies) body->mean /= body->volume;
   }
+  /// Sets x to the transpose of `apply` times `sums`, and a member of each body to the square of x.
+  /// Collective.
   /// @param sums their ghosts receive their owners' values
-  void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums, std::vector<Unknown>& x) {
+  void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums, std::vector<Unknown>& x,
+                       double Body::*square) {
     bodies.refresh_ghosts(sums);
-    bodies.for_each_with_ghosts([&](const Body&, Index i) {
-      placed_sum_[i] = {model_.position[i], sums[i]};
-    });
-    bodies.for_each([&](const Body& body, Index i) {
-      Vec3d total;   // Σ w (R_k - R_i)
-      Mat3d moment;  // Σ w (R_k - R_i) x_ikᵀ
-      const PlacedSum own = placed_sum_[i];
-      const double inverse = inverse_support_squared(i);
-      for (const Index k : model_.neighbourhood.neighbours.row(i)) {
-        const PlacedSum& other = placed_sum_[k];
-        const Vec3d apart = other.position - own.position;
-        const Vec3d weighted = weight_shape(dot(apart, apart), inverse) * (other.sum - own.sum);
-        total += weighted;
-        moment = fused_outer(weighted, apart, moment);
-      }
+    bodies.for_each_with_ghosts(
+        [&](const Body&, Index i) { gathers_.set_value(i, model_.position[i], sums[i]); });
+    bodies.sum(&Body::sum, [&](const Body& body, Index i) {
+      const auto [total, moment] = gathers_.differences(i, model_.neighbourhood.neighbours.row(i),
+                                                        inverse_support_squared(i));
       x[i] = {.closing = total - moment * tilt_[i],
-              .area = -ease_area * dot(areas_[i], own.sum),
+              .area = -ease_area * dot(areas_[i], sums[i]),
               .volume = ease_volume * (model_.volume[i] / body.unit) *
                         contract(symmetric_part(moment), model_.inverse_moment[i])};
+      return x[i].volume;
     });
-    bodies.sum(&Body::sum, [&](const Body&, Index i) { return x[i].volume; });
-    bodies.for_each([&](const Body& body, Index i) {
+    bodies.sum(square, [&](const Body& body, Index i) {
       x[i].volume -= model_.volume[i] / body.volume * body.sum;
+      return dot(x[i], x[i]);
     });
   }
 
  private:
-  void apply_local(const Bodies& bodies, const std::vector<Unknown>& x, std::vector<Vec3d>& sums) {
+  /// Sets the terms that phyxels give to the sums of their neighbours. @param x x(k): unknowns
+  template <class X>
+  void set_terms(const Bodies& bodies, X&& x) {
     bodies.for_each_with_ghosts([&](const Body& body, Index k) {
-      const double change = ease_volume * (x[k].volume - body.mean) * model_.volume[k] / body.unit;
-      term_[k] = {model_.position[k], x[k].closing,
-                  outer(x[k].closing, tilt_[k]) - change * full(model_.inverse_moment[k])};
+      const Unknown of_k = x(k);
+      const double change = ease_volume * (of_k.volume - body.mean) * model_.volume[k] / body.unit;
+      gathers_.set_term(k, model_.position[k], of_k.closing,
+                        outer(of_k.closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
     });
-    bodies.for_each([&](const Body&, Index j) {
-      const Term& own = term_[j];
-      // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
-      Vec3d sum = own.linear * model_.moment_offset[j] -
-                  (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * x[j].closing -
-                  ease_area * x[j].area * areas_[j];
-      const double inverse = inverse_support_squared(j);
-      for (const Index k : model_.neighbourhood.neighbours.row(j)) {
-        const Term& other = term_[k];
-        const Vec3d x_jk = other.position - own.position;
-        sum += weight_shape(dot(x_jk, x_jk), inverse) * (other.constant + other.linear * x_jk);
-      }
-      sums[j] = supported_[j] ? Vec3d{} : sum;
-    });
+  }
+  /// The sum R_j, once terms are set. @param x unknowns of j
+  Vec3d sum_at(Index j, const Unknown& x) const {
+    if (supported_[j]) return {};
+    // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
+    const Vec3d own = gathers_.linear(j) * model_.moment_offset[j] -
+                      (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * x.closing -
+                      ease_area * x.area * areas_[j];
+    return gathers_.terms(j, model_.neighbourhood.neighbours.row(j), inverse_support_squared(j),
+                          own);
   }
   double inverse_support_squared(Index i) const {
     const double h = model_.neighbourhood.support[i];
@@ -268,19 +266,10 @@ class Sums {
   }
 
   const Model& model_;
-  std::vector<Vec3d> areas_;    ///< S / s²
-  std::vector<Vec3d> tilt_;     ///< a
-  std::vector<double> weight_;  ///< Σ_k w_jk (1 - a_j x_jk)
-  /// What a phyxel gives to the sums of its neighbours, each in one piece of memory.
-  struct PlacedSum {
-    Vec3d position, sum;
-  };
-  struct Term {
-    Vec3d position, constant;
-    Mat3d linear;
-  };
-  std::vector<PlacedSum> placed_sum_;
-  std::vector<Term> term_;
+  std::vector<Vec3d> areas_;     ///< S / s²
+  std::vector<Vec3d> tilt_;      ///< a
+  std::vector<double> weight_;   ///< Σ_k w_jk (1 - a_j x_jk)
+  Gathers gathers_;              ///< What phyxels give to the sums of their neighbours.
   std::vector<char> supported_;  ///< `supported_phyxels`.
 };
 

@@ -56,18 +56,15 @@ double way_of(const Body& body) {
 /// algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns, which take
 /// the most of them, matter the least: a few iterations do most of what can be done. What is left
 /// of each body's sums is summed anew at the end.
-std::vector<Unknown> close(Sums& sums, const Bodies& all) {
+/// @param n number of phyxels of the model
+std::vector<Unknown> close(Sums& sums, const Bodies& all, std::size_t n) {
   Stage stage("closed gradients");
-  const std::vector<Vec3d> open = sums.open(all);
-  const std::size_t n = open.size();
   std::vector<Unknown> x(n), gradient(n), direction(n);
-  std::vector<Vec3d> residual(n), image(n);
+  std::vector<Vec3d> residual(n);
   const auto residual_squares = [&](const Body&, Index i) { return dot(residual[i], residual[i]); };
-  const auto gradient_squares = [&](const Body&, Index i) { return dot(gradient[i], gradient[i]); };
-  all.for_each([&](const Body&, Index i) { residual[i] = -open[i]; });
+  sums.open(all, [&](Index i, Vec3d sum) { residual[i] = -sum; });
   all.sum(&Body::residual_squared, residual_squares);
-  sums.apply_transpose(all, residual, gradient);
-  all.sum(&Body::gradient_squared, gradient_squares);
+  sums.apply_transpose(all, residual, gradient, &Body::gradient_squared);
   all.for_each([&](const Body&, Index i) { direction[i] = gradient[i]; });
   Bodies active = all;
   for (;;) {
@@ -76,17 +73,19 @@ std::vector<Unknown> close(Sums& sums, const Bodies& all) {
     double way = 1;
     for (const Body* body : active) way = std::min(way, way_of(*body));
     stage.reach(way);
-    sums.apply(active, direction, image);
-    active.sum(&Body::image_squared, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+    // The gradient is used up, and its memory takes the image of the direction.
+    sums.apply(active, direction, &Body::image_squared, [&](Index i, Vec3d image) {
+      gradient[i].closing = image;
+      return dot(image, image);
+    });
     active.erase_if([](const Body& body) { return !(body.image_squared > 0); });
-    active.for_each([&](const Body& body, Index i) {
+    active.sum(&Body::residual_squared, [&](const Body& body, Index i) {
       const double step = body.gradient_squared / body.image_squared;
       add(x[i], step, direction[i]);
-      residual[i] -= step * image[i];
+      residual[i] -= step * gradient[i].closing;
+      return dot(residual[i], residual[i]);
     });
-    active.sum(&Body::residual_squared, residual_squares);
-    sums.apply_transpose(active, residual, gradient);
-    active.sum(&Body::next_gradient_squared, gradient_squares);
+    sums.apply_transpose(active, residual, gradient, &Body::next_gradient_squared);
     active.for_each([&](const Body& body, Index i) {
       Unknown turned = gradient[i];
       add(turned, body.next_gradient_squared / body.gradient_squared, direction[i]);
@@ -97,9 +96,12 @@ std::vector<Unknown> close(Sums& sums, const Bodies& all) {
       ++body->iterations;
     }
   }
-  sums.apply(all, x, image);
-  all.for_each([&](const Body&, Index i) { image[i] += open[i]; });
-  all.sum(&Body::residual_squared, [&](const Body&, Index i) { return dot(image[i], image[i]); });
+  sums.apply(all, x, &Body::image_squared, [&](Index i, Vec3d image) {
+    residual[i] = image;
+    return 0.0;
+  });
+  sums.open(all, [&](Index i, Vec3d sum) { residual[i] += sum; });
+  all.sum(&Body::residual_squared, residual_squares);
   for (Body* body : all) body->left = left_of(*body);
   stage.finish();
   return x;
@@ -217,7 +219,7 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   }
   Bodies bodies(model, list);
   Sums sums(model, bodies, std::move(areas));
-  const std::vector<Unknown> found = close(sums, bodies);
+  const std::vector<Unknown> found = close(sums, bodies, model.volume.size());
   sums.find_means(bodies, found);
   const auto change = [&](const Body& body, Index i) {
     return ease_volume * (found[i].volume - body.mean);

@@ -5,6 +5,8 @@
 
 #include "model/box.hpp"
 #include "model/cloud_check.hpp"
+#include "parallel_sort.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -23,9 +25,7 @@ std::uint64_t spread_bits(std::uint64_t v) {
 template <class T>
 void permute(std::vector<T>& values, const std::vector<Index>& order) {
   if (values.empty()) return;
-  std::vector<T> moved(values.size());
-  for (std::size_t k = 0; k < order.size(); ++k) moved[k] = values[order[k]];
-  values.swap(moved);
+  values = tabulated(order.size(), [&](std::size_t k) { return values[order[k]]; });
 }
 
 }  // namespace
@@ -60,23 +60,23 @@ void order_along_curve(Cloud& cloud) {
   const Box box = box_around(cloud.position);
   const double extent = box.extent();
   const double scale = extent > 0 ? 2097151.0 / extent : 0;
-  std::vector<std::pair<std::uint64_t, Index>> key(n);
-  for (std::size_t i = 0; i < n; ++i) {
+  auto key = in_bulk(n, [&](std::size_t i) {
     const Vec3d cell = scale * (cloud.position[i] - box.low);
-    key[i] = {spread_bits(static_cast<std::uint64_t>(cell.x)) |
-                  spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
-                  spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,
-              static_cast<Index>(i)};
-  }
-  std::sort(key.begin(), key.end());
-  std::vector<Index> order(n);
-  for (std::size_t k = 0; k < n; ++k) order[k] = key[k].second;
+    return std::pair{spread_bits(static_cast<std::uint64_t>(cell.x)) |
+                         spread_bits(static_cast<std::uint64_t>(cell.y)) << 1 |
+                         spread_bits(static_cast<std::uint64_t>(cell.z)) << 2,
+                     static_cast<Index>(i)};
+  });
+  parallel_sort(key);
+  const std::vector<Index> order = tabulated(n, [&](std::size_t k) { return key[k].second; });
+  release(key);
   reorder(cloud, order);
 }
 
 void reorder(Cloud& cloud, const std::vector<Index>& order) {
   check_order(cloud, order);
   std::vector<Index> place(order.size());
+#pragma omp parallel for schedule(static)
   for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Index>(k);
   permute(cloud.position, order);
   permute(cloud.volume, order);

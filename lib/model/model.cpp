@@ -120,7 +120,7 @@ Survey add_neighbours(Model& model, const BodyRequest& request, const Cloud& clo
   }
   Neighbourhood hood;
   Survey survey = survey_with_lists(cloud, request, kernel_volumes, hood);
-  append_lists(model.neighbourhood, hood, shift);
+  append_lists(model.neighbourhood, std::move(hood), shift);
   return survey;
 }
 

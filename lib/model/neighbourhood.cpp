@@ -212,14 +212,66 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
   return result;
 }
 
+namespace {
+
+/// `phyxels_reaching` for few points: each phyxel finds the points within its support, so that only
+/// the points need a table.
+Csr phyxels_reaching_few(std::span<const Vec3d> point, std::span<const Vec3d> position,
+                         std::span<const double> support, Stage& stage) {
+  const auto n = static_cast<Index>(position.size());
+  std::vector<double> sample;
+  constexpr std::size_t enough = 1000;
+  for (std::size_t k = 0; k < enough; ++k) sample.push_back(support[k * support.size() / enough]);
+  // A ball cuts eight cells of this size at most.
+  const SpatialHash hash(point, 2 * median_of(sample));
+  const Index blocks = (n + block_size - 1) / block_size;
+  struct Pair {
+    Index point, phyxel;
+  };
+  std::vector<std::vector<Pair>> found(static_cast<std::size_t>(blocks));
+  stage.expect(static_cast<std::size_t>(blocks));
+#pragma omp parallel for schedule(dynamic)
+  for (Index b = 0; b < blocks; ++b) {
+    for (Index i = b * block_size; i < std::min(n, (b + 1) * block_size); ++i) {
+      const double h = support[i];
+      hash.visit_ball(position[i], h, [&](const SpatialHash::Entry& e) {
+        const Vec3d apart = position[i] - e.position;
+        if (dot(apart, apart) < h * h) found[b].push_back({e.index, i});
+      });
+    }
+    stage.count();
+  }
+  Csr csr;
+  csr.offsets.assign(point.size() + 1, 0);
+  for (const std::vector<Pair>& pairs : found) {
+    for (const Pair& pair : pairs) ++csr.offsets[pair.point + 1];
+  }
+  std::partial_sum(csr.offsets.begin(), csr.offsets.end(), csr.offsets.begin());
+  csr.indices.resize(static_cast<std::size_t>(csr.entries()));
+  std::vector<Offset> next(csr.offsets.begin(), csr.offsets.end() - 1);
+  // Phyxels come in ascending order, and so do those of each row.
+  for (const std::vector<Pair>& pairs : found) {
+    for (const Pair& pair : pairs) csr.indices[next[pair.point]++] = pair.phyxel;
+  }
+  return csr;
+}
+
+}  // namespace
+
 Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> position,
                      std::span<const double> support) {
   Csr csr;
-  if (position.empty()) {
+  if (position.empty() || point.empty()) {
     csr.offsets.assign(point.size() + 1, 0);
     return csr;
   }
   Stage stage("phyxels near the surface");
+  constexpr std::size_t many = 16;  // phyxels a point, above which a table of all costs more
+  if (position.size() / many > point.size()) {
+    csr = phyxels_reaching_few(point, position, support, stage);
+    stage.finish();
+    return csr;
+  }
   const double largest = *std::max_element(support.begin(), support.end());
   const SpatialHash hash(position, median_of(support));
   const int rings = rings_within(largest, hash.cell_size());

@@ -1,6 +1,8 @@
 #include "model/space_filling_curve.hpp"
 
 #include "model/box.hpp"
+#include "parallel_sort.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 
@@ -8,14 +10,12 @@ std::vector<Index> curve_order(std::span<const Vec3d> position, Index begin, Ind
   const auto count = static_cast<std::size_t>(end - begin);
   const Box box = box_around(position.subspan(static_cast<std::size_t>(begin), count));
   const HilbertFrame frame = HilbertFrame::around(box.low, box.high);
-  std::vector<std::pair<std::uint64_t, Index>> keys(count);
-#pragma omp parallel for schedule(static)
-  for (Index i = begin; i < end; ++i) keys[i - begin] = {frame.key_of(position[i]), i};
-  std::sort(keys.begin(), keys.end());
-  std::vector<Index> order;
-  order.reserve(keys.size());
-  for (const auto& key : keys) order.push_back(key.second);
-  return order;
+  auto keys = in_bulk(count, [&](std::size_t k) {
+    const Index i = begin + static_cast<Index>(k);
+    return std::pair{frame.key_of(position[i]), i};
+  });
+  parallel_sort(keys);
+  return tabulated(count, [&](std::size_t k) { return keys[k].second; });
 }
 
 }  // namespace phyxel
