@@ -182,8 +182,8 @@ TEST(Follower, CompressesABallAsItsLawSays) {
   // Nothing holds the ball, which may have turned: distances from the middle tell.
   Vec3d middle, now;
   for (Index i = 0; i < model.size(); ++i) {
-    middle += model.position[i] / model.size();
-    now += (model.position[i] + found.state.displacement[i]) / model.size();
+    middle += (1.0 / model.size()) * model.position[i];
+    now += (1.0 / model.size()) * (model.position[i] + found.state.displacement[i]);
   }
   double worst = 0;
   for (Index i = 0; i < model.size(); ++i) {
