@@ -107,8 +107,10 @@ RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& 
                                     const MigratingPhyxels& own, double supports) {
   std::vector<double> reach;
   for (const WholeBody& body : whole.bodies) {
-    // Beside walls, lists depend on phyxels up to two spacings away.
-    const double beside = body.walls.regions.empty() ? 0 : 2 * body.walls.spacing;
+    // Beside walls, a list depends on the rooms of neighbours' neighbours, and a room on phyxels up
+    // to two spacings away.
+    const double beside =
+        body.walls.regions.empty() ? 0 : margin * body.reach + 2 * body.walls.spacing;
     reach.push_back(supports * margin * body.reach + beside);
   }
   return remote_phyxels_around(setup.ranks, own, reach, whole.boxes);

@@ -225,11 +225,12 @@ class CudaBackend final : public Backend {
   std::unique_ptr<Vibration> vibration() override {
     m_.use_device();
     passes_->receive_displacements();
-    return std::make_unique<CudaVibration<Real, StateReal>>(m_, *passes_);
+    return std::make_unique<CudaVibration<Real, StateReal>>(m_, *passes_, boundary_.moved());
   }
   std::unique_ptr<Vibration> vibration_at_present(double distance) override {
     m_.use_device();
-    return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, *passes_, distance);
+    return std::make_unique<CudaDeformedVibration<Real, StateReal>>(m_, *passes_, boundary_.moved(),
+                                                                    distance);
   }
 
   void update_surfels() override {

@@ -11,11 +11,27 @@
 
 namespace phyxel::cuda {
 
+/// The axes along which phyxels are held or moved, on a device.
 template <class Real>
-__global__ void start_vector(Real* vector, std::size_t places, const Index* number_at) {
+struct PrescribedAxes {
+  const Real* force_constants;  ///< Negative inverse masses mark phyxels that are fixed.
+  std::size_t places;
+  const char* moved;  ///< `Boundary::moved`.
+  bool none;          ///< True if components along all axes count.
+  __device__ int operator[](std::size_t place) const {
+    if (none) return 0;
+    if (force_constants[3 * places + place] < Real(0)) return 7;
+    return moved ? moved[place] : 0;
+  }
+};
+
+template <class Real>
+__global__ void start_vector(Real* vector, PrescribedAxes<Real> prescribed,
+                             const Index* number_at) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
   const Index i = number_at[place];
-  set_column3(vector, places, place, i >= 0 ? to<Real>(start_component(i)) : Vec3<Real>{});
+  const Vec3<Real> random = i >= 0 ? to<Real>(start_component(i)) : Vec3<Real>{};
+  set_column3(vector, prescribed.places, place, free_components(random, prescribed[place]));
 }
 
 template <class Real>
@@ -79,14 +95,15 @@ __global__ void find_farthest(Fields<Real, StateReal> f, const Real* x, unsigned
   if (threadIdx.x == 0) atomicMax(largest, __float_as_uint(shared[0]));
 }
 
-/// Computes y = -M^-1/2 f / a - beta x.
+/// Computes y = -M^-1/2 f / a - beta x, with forces along free axes.
 template <class Real, class StateReal>
-__global__ void stiffness_times(Fields<Real, StateReal> f, const Real* force, const Real* x,
-                                Real beta, Real amplitude, Real* y) {
+__global__ void stiffness_times(Fields<Real, StateReal> f, PrescribedAxes<Real> prescribed,
+                                const Real* force, const Real* x, Real beta, Real amplitude,
+                                Real* y) {
   const std::size_t place = static_cast<std::size_t>(blockIdx.x) * tile_size + threadIdx.x;
   const Real scale = -root_of_inverse_mass(f.force_constants, f.places, place) / amplitude;
-  set_column3(y, f.places, place,
-              scale * column3(force, f.places, place) - beta * column3(x, f.places, place));
+  const Vec3<Real> free = free_components(column3(force, f.places, place), prescribed[place]);
+  set_column3(y, f.places, place, scale * free - beta * column3(x, f.places, place));
 }
 
 /// Computes y -= alpha x.
@@ -126,9 +143,13 @@ __global__ void multiply_tiles(const Real* a, const Real* b, std::size_t places,
 template <class Real, class StateReal>
 class CudaLanczosVectors : public Vibration {
  public:
+  /// @param moved `Boundary::moved`
   CudaLanczosVectors(const DeviceModel<Real, StateReal>& model,
-                     const Passes<Real, StateReal>& passes)
-      : m_(model), passes_(passes), product_(ExactSum::words, "sums") {
+                     const Passes<Real, StateReal>& passes, const char* moved)
+      : m_(model),
+        passes_(passes),
+        prescribed_{model.fields().force_constants, model.places(), moved, false},
+        product_(ExactSum::words, "sums") {
     const std::string what = "vectors of " + m_.subject();
     const std::size_t count = 3 * m_.places();
     previous_ = {count, what};
@@ -136,9 +157,12 @@ class CudaLanczosVectors : public Vibration {
     next_ = {count, what};
     force_ = {count, what};
     previous_.clear();
-    m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), m_.places(),
-                    m_.number_at());
-    scale(current_, 1 / std::sqrt(product(current_, current_)));
+    double length = start();
+    if (!(length > 0)) {  // no component is free
+      prescribed_.none = true;
+      length = start();
+    }
+    scale(current_, 1 / length);
   }
   double subtract(double alpha) override {
     m_.use_device();
@@ -160,12 +184,19 @@ class CudaLanczosVectors : public Vibration {
   const DeviceArray<Real>& force() const { return force_; }
   /// Computes next = -M^-1/2 force / a - beta previous. @returns next · current
   double times_stiffness(Real amplitude, double beta) {
-    m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), force_.data(),
-                    previous_.data(), static_cast<Real>(beta), amplitude, next_.data());
+    m_.launch_tiles("stiffness_times", stiffness_times<Real, StateReal>, m_.fields(), prescribed_,
+                    force_.data(), previous_.data(), static_cast<Real>(beta), amplitude,
+                    next_.data());
     return product(next_, current_);
   }
 
  private:
+  /// Fills `current` with the free components of random numbers. @returns |current|
+  double start() {
+    m_.launch_tiles("start_vector", start_vector<Real>, current_.data(), prescribed_,
+                    m_.number_at());
+    return std::sqrt(product(current_, current_));
+  }
   double product(const DeviceArray<Real>& a, const DeviceArray<Real>& b) const {
     product_.clear(m_.stream());
     m_.launch_tiles("multiply_tiles", multiply_tiles<Real>, a.data(), b.data(), m_.places(),
@@ -182,6 +213,7 @@ class CudaLanczosVectors : public Vibration {
 
   const DeviceModel<Real, StateReal>& m_;
   const Passes<Real, StateReal>& passes_;
+  PrescribedAxes<Real> prescribed_;
   DeviceArray<unsigned long long> product_;
   DeviceArray<Real> previous_, current_, next_, force_;
 };
@@ -192,8 +224,9 @@ class CudaVibration final : public CudaLanczosVectors<Real, StateReal> {
   using Base = CudaLanczosVectors<Real, StateReal>;
 
  public:
-  CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes)
-      : Base(model, passes),
+  CudaVibration(const DeviceModel<Real, StateReal>& model, const Passes<Real, StateReal>& passes,
+                const char* moved)
+      : Base(model, passes, moved),
         amplitude_(amplitude_at_rest(model.model())),
         tiles_(model.rest_constants()) {}
   double apply(double beta) override {
@@ -244,8 +277,8 @@ class CudaDeformedVibration final : public CudaLanczosVectors<Real, StateReal> {
  public:
   /// @param distance size of the displacement in differences [m]
   CudaDeformedVibration(const DeviceModel<Real, StateReal>& model,
-                        const Passes<Real, StateReal>& passes, double distance)
-      : Base(model, passes),
+                        const Passes<Real, StateReal>& passes, const char* moved, double distance)
+      : Base(model, passes, moved),
         distance_(distance),
         present_(3 * model.places(), "displacements of " + model.subject()),
         forces_there_(3 * model.places(), "forces of " + model.subject()),

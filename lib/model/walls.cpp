@@ -1,5 +1,6 @@
 #include "model/walls.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,6 +8,8 @@
 #include "model/assembly.hpp"
 #include "model/selection.hpp"
 #include "model/spatial_hash.hpp"
+#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/weight.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -74,6 +77,50 @@ std::vector<std::size_t> rooms_of(std::span<const Vec3d> position, const Walls& 
   return room;
 }
 
+bool may_be_neighbours(std::size_t a, std::size_t b) {
+  return a == b || a == open_room || b == open_room;
+}
+
+/// The smallest eigenvalue of the moment matrix of phyxel i and those of its neighbours for which
+/// counts(j) is true, as a fraction of the largest.
+template <class Counts>
+double thickness(const Neighbourhood& hood, std::span<const Vec3d> position, Index i,
+                 Counts&& counts) {
+  const double inverse_h_squared = 1 / (hood.support[i] * hood.support[i]);
+  Sym3d moment;
+  for (const Index j : hood.neighbours.row(i)) {
+    if (!counts(j)) continue;
+    const Vec3d x = position[j] - position[i];
+    moment += moment_term(x, weight_shape(dot(x, x), inverse_h_squared));
+  }
+  const Mat3d entries = full(moment);
+  Eigen::Matrix3d matrix;
+  for (int k = 0; k < 9; ++k) matrix(k / 3, k % 3) = entries(k / 3, k % 3);
+  const Eigen::Vector3d ascending =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
+  return ascending[2] > 0 ? ascending[0] / ascending[2] : 0;
+}
+
+/// Opens the rooms of phyxels that no region contains, and whose neighbours in the same room lie
+/// nearly in a plane while all their neighbours do not: those of an acute wedge between a wall and
+/// the surface. Their fits would be far stiffer than any other in the body. Phyxels inside regions
+/// keep theirs, as all of their neighbours are held or moved, too.
+void open_thin_rooms(std::vector<std::size_t>& room, const Neighbourhood& hood,
+                     std::span<const Vec3d> position, std::size_t outside) {
+  constexpr double thin = 0.05;  // beside a flat wall, or a surface: 0.4 to 1
+  std::vector<Index> opened;
+  for (Index i = 0; i < hood.neighbours.rows(); ++i) {
+    if (room[i] != outside) continue;
+    const auto is_kept = [&](Index j) { return may_be_neighbours(room[i], room[j]); };
+    const auto row = hood.neighbours.row(i);
+    if (!std::ranges::all_of(row, is_kept) && thickness(hood, position, i, is_kept) < thin &&
+        thickness(hood, position, i, [](Index) { return true; }) >= thin) {
+      opened.push_back(i);
+    }
+  }
+  for (const Index i : opened) room[i] = open_room;
+}
+
 }  // namespace
 
 std::size_t Walls::room_of(Vec3d point) const {
@@ -98,16 +145,15 @@ Walls walls_of(const BodyRequest& request, const Cloud& cloud) {
 
 void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls) {
   if (walls.regions.empty()) return;
-  const std::vector<std::size_t> room = rooms_of(position, walls);
+  std::vector<std::size_t> room = rooms_of(position, walls);
+  open_thin_rooms(room, hood, position, walls.regions.size());
   Csr& lists = hood.neighbours;
   Offset kept = 0, from = 0;
   for (Index i = 0; i < lists.rows(); ++i) {
     const Offset end = lists.offsets[i + 1];
     for (; from < end; ++from) {
       const Index j = lists.indices[from];
-      if (room[i] == room[j] || room[i] == open_room || room[j] == open_room) {
-        lists.indices[kept++] = j;
-      }
+      if (may_be_neighbours(room[i], room[j])) lists.indices[kept++] = j;
     }
     lists.offsets[i + 1] = kept;
   }

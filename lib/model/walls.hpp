@@ -15,8 +15,9 @@ namespace phyxel {
 Walls walls_of(const BodyRequest& request, const Cloud& cloud);
 
 /// Removes the pairs of phyxels that are not in the same room of a body. A phyxel beside a wall
-/// keeps them if no phyxel lies on the wall near it: as in a layer outside the wall that is too
-/// thin for others.
+/// keeps them if no phyxel lies on the wall near it, as in a layer outside the wall that is too
+/// thin for others. A phyxel on or outside a wall also keeps them if its other neighbours lie
+/// nearly in a plane, as in an acute wedge between the wall and the surface.
 void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls);
 
 /// The regions of space in which a body is held or moved, in place and without repetitions.

@@ -20,4 +20,10 @@ PHYXEL_HD Vec3d start_component(Index phyxel) {
   return {values[0], values[1], values[2]};
 }
 
+/// A vector without its components along prescribed axes. @param axes `Axes::bits`
+template <class Real>
+PHYXEL_HD Vec3<Real> free_components(Vec3<Real> v, int axes) {
+  return {axes & 1 ? Real(0) : v.x, axes & 2 ? Real(0) : v.y, axes & 4 ? Real(0) : v.z};
+}
+
 }  // namespace phyxel

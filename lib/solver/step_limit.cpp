@@ -28,14 +28,18 @@ class HostVibration final : public Vibration {
         vectors_(model, std::max(1, backend.threads())),
         present_(present),
         moved_(present),
+        prescribed_(prescribed_axes(model)),
         previous_(vectors_.make()),
         current_(vectors_.make()),
         next_(vectors_.make()),
         distance_(distance) {
     backend_.put_displacements(present_.displacement);
     backend_.internal_forces(there_, HistoryUse::frozen);
-    vectors_.for_each([&](Index i) { current_[i] = start_component(model.global_id(i)); });
-    const double length = std::sqrt(vectors_.product(current_, current_));
+    double length = start();
+    if (!(length > 0)) {  // no component is free
+      std::ranges::fill(prescribed_, char{0});
+      length = start();
+    }
     vectors_.for_each([&](Index i) { current_[i] = current_[i] / length; });
   }
   HostVibration(const Model&, Backend&, State&&, double) = delete;  // kept by reference
@@ -54,8 +58,9 @@ class HostVibration final : public Vibration {
     backend_.put_displacements(moved_.displacement);
     backend_.internal_forces(force_, HistoryUse::frozen);
     vectors_.for_each([&](Index i) {
-      next_[i] = (-1 / (amplitude * std::sqrt(model_.mass[i]))) * (force_[i] - there_[i]) -
-                 beta * previous_[i];
+      const Vec3d product =
+          (-1 / (amplitude * std::sqrt(model_.mass[i]))) * (force_[i] - there_[i]);
+      next_[i] = free_components(product, prescribed_[i]) - beta * previous_[i];
     });
     return vectors_.product(next_, current_);
   }
@@ -71,11 +76,20 @@ class HostVibration final : public Vibration {
   }
 
  private:
+  /// Fills `current` with the free components of random numbers. @returns |current|
+  double start() {
+    vectors_.for_each([&](Index i) {
+      current_[i] = free_components(start_component(model_.global_id(i)), prescribed_[i]);
+    });
+    return std::sqrt(vectors_.product(current_, current_));
+  }
+
   const Model& model_;
   Backend& backend_;
   OwnedVectors vectors_;
   const State& present_;
   State moved_;
+  std::vector<char> prescribed_;  ///< `prescribed_axes`.
   OwnedVectors::Vector previous_, current_, next_;
   std::vector<Vec3d> there_, force_;
   double distance_;  // [m]

@@ -28,7 +28,9 @@ struct Exchanges {
 
 /// A model, at rest or deformed, as Lanczos' iteration sees it: three vectors of three numbers a
 /// phyxel, on one device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared
-/// eigenfrequencies. `current` starts as a unit vector, `previous` as zero.
+/// eigenfrequencies. K and M are those of the free components: supports prescribe the others, whose
+/// entries are zero in all vectors. If no component is free, all count. `current` starts as a unit
+/// vector, `previous` as zero.
 class Vibration {
  public:
   virtual ~Vibration() = default;

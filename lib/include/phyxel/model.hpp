@@ -210,6 +210,9 @@ void check_model(const Model& model);
 /// Whether each phyxel is held in place along all axes by a motion that stands still, shape [n].
 std::vector<char> held_phyxels(const Model& model);
 
+/// The axes along which motions hold or move each phyxel (`Axes::bits`), shape [n].
+std::vector<char> prescribed_axes(const Model& model);
+
 /// True for each phyxel that motions hold or move along all axes, shape [n].
 std::vector<char> supported_phyxels(const Model& model);
 

@@ -20,6 +20,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/physics/laws.hpp"
 #include "phyxel/point_fields.hpp"
+#include "phyxel/solver.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/mesh_content.hpp"
@@ -268,6 +269,32 @@ TEST(Cuts, EndWithTheBodyWhereFacesAreTheSame) {
   EXPECT_EQ(exact.model.motions[0].phyxels, larger.model.motions[0].phyxels);
   EXPECT_EQ(exact.model.neighbourhood.neighbours.indices,
             larger.model.neighbourhood.neighbours.indices);
+}
+
+/// Boxes whose faces cut a ball at any height, and so at any angle to its surface, leave steps as
+/// long as those without a support: phyxels in the wedges beside the cut are either held, or have
+/// neighbours that are not nearly in a plane.
+TEST(Cuts, LeaveStepsAsLongAsWithoutSupports) {
+  const Surface surface = test::sphere({0, 0, 0}, 1, 3);
+  const auto step_held_to = [&](std::optional<double> height) {
+    Scene scene = one_body();
+    BodyRequest& body = scene.bodies[0];
+    body.source.mesh = "ball.obj";
+    if (height) {
+      Selection held;
+      held.box = Selection::Box{{-9, -9, -9}, {9, *height, 9}};
+      body.fixed = {{.select = held}};
+    }
+    Cloud cloud = sample_surface(surface, {.phyxels = 600, .cuts = source_of(body).cuts});
+    place(cloud, body);
+    body.source = {};
+    return step_limit(build_model(scene, std::span(&cloud, 1)), 1).largest_step;
+  };
+  const double without = step_held_to(std::nullopt);
+  for (int k = 1; k < 20; ++k) {
+    const double height = -1 + 0.1 * k;
+    EXPECT_GT(step_held_to(height), 0.5 * without) << height;
+  }
 }
 
 /// A box thinner than a spacing holds one layer, in its middle.

@@ -16,32 +16,90 @@ namespace {
 
 using namespace phyxel::testing;
 
-TEST(StepLimit, EqualsTheLargestEigenvalueOfTheDenseStiffness) {
-  Material material = rubber();
-  material.volume_stiffness = 2e5;
-  const Model model = model_of(one_body(material), lattice(4, 4, 3, 0.1, 0.2));
+/// The largest frequency of a model, from the dense stiffness matrix of the components that no
+/// support prescribes.
+double dense_frequency(const Model& model) {
   const auto backend = make_test_backend(model, Precision::double_);
-  const Eigen::Index size = 3 * model.size();
+  std::vector<int> free;
+  const std::vector<char> axes = prescribed_axes(model);
+  for (int k = 0; k < 3 * model.size(); ++k) {
+    if (!(axes[k / 3] >> k % 3 & 1)) free.push_back(k);
+  }
+  const auto size = static_cast<Eigen::Index>(free.size());
   Eigen::MatrixXd stiffness(size, size);
   const double step = 1e-9;
   std::vector<Vec3d> force;
-  for (Eigen::Index column = 0; column < size; ++column) {
+  for (Eigen::Index c = 0; c < size; ++c) {
+    const int column = free[c];
     std::vector<Vec3d> u(model.position.size());
     (&u[column / 3].x)[column % 3] = step;
-    backend->upload(state_of(u));
+    backend->put_displacements(u);
     backend->internal_forces(force);
-    for (Eigen::Index row = 0; row < size; ++row) {
-      stiffness(row, column) = -(&force[row / 3].x)[row % 3] / step /
-                               std::sqrt(model.mass[row / 3] * model.mass[column / 3]);
+    for (Eigen::Index r = 0; r < size; ++r) {
+      const int row = free[r];
+      stiffness(r, c) = -(&force[row / 3].x)[row % 3] / step /
+                        std::sqrt(model.mass[row / 3] * model.mass[column / 3]);
     }
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
       0.5 * (stiffness + stiffness.transpose()).eval());
-  const double omega = std::sqrt(solver.eigenvalues()[size - 1]);
+  return std::sqrt(solver.eigenvalues()[size - 1]);
+}
+
+TEST(StepLimit, EqualsTheLargestEigenvalueOfTheDenseStiffness) {
+  Material material = rubber();
+  material.volume_stiffness = 2e5;
+  const Model model = model_of(one_body(material), lattice(4, 4, 3, 0.1, 0.2));
+  const double omega = dense_frequency(model);
   const StepLimit limit = step_limit(model);
   // Lanczos stops at a residual of 0.2% of the eigenvalue and adds it: 0.1% of the frequency.
   EXPECT_GE(limit.omega_max, omega * (1 - 1e-6));
   EXPECT_LE(limit.omega_max, omega * 1.0015);
+}
+
+/// A lattice of which one layer is fixed and two others are moved along one and two axes.
+Scene supported_scene() {
+  Scene scene = one_body();
+  BodyRequest& body = scene.bodies[0];
+  const auto layer = [](double low, double high) {
+    Selection made;
+    made.box = Selection::Box{{-9, -9, low}, {9, 9, high}};
+    return made;
+  };
+  body.fixed = {{.select = layer(-9, 0.05)},
+                {.select = layer(0.25, 0.35), .axes = {true, false, true}}};
+  MotionRequest motion;
+  motion.select = layer(0.35, 9);
+  motion.velocity = {0, 0.1, 0};
+  motion.axes = {false, true, false};
+  body.motions = {motion};
+  return scene;
+}
+
+/// Components that supports prescribe do not vibrate, however stiff their phyxels are.
+TEST(StepLimit, IsThatOfFreeComponents) {
+  const Model model = model_of(supported_scene(), lattice(4, 4, 5, 0.1, 0.2));
+  const double omega = dense_frequency(model);
+  Model loose = model;
+  loose.motions.clear();
+  EXPECT_LT(omega, 0.97 * dense_frequency(loose));
+  const double found = step_limit(model).omega_max;
+  EXPECT_GE(found, omega * (1 - 1e-6));
+  EXPECT_LE(found, omega * 1.0015);
+  const auto backend = make_test_backend(model, Precision::double_);
+  EXPECT_NEAR(present_step_limit(model, *backend).omega_max, omega, 0.02 * omega);
+}
+
+/// A body all of which is prescribed has the limit that it would have without supports.
+TEST(StepLimit, OfAWhollyHeldBodyIsThatOfAFreeOne) {
+  Scene scene = one_body();
+  Selection all;
+  all.all = true;
+  scene.bodies[0].fixed = {{.select = all}};
+  const Model model = model_of(scene, lattice(4, 4, 3, 0.1, 0.2));
+  Model loose = model;
+  loose.motions.clear();
+  EXPECT_EQ(step_limit(model).omega_max, step_limit(loose).omega_max);
 }
 
 double energy_after(const Model& model, const Scene& scene, double dt, int steps) {

@@ -192,16 +192,17 @@ TEST(StepControl, RemembersHowFastABodyStiffened) {
   EXPECT_EQ(interval(), control.most());
 }
 
-/// A bar of rubber with a weight at its end, let go: it stretches by a third and comes back, again
+/// A bar of rubber with a weight at its end, let go: it stretches by half and comes back, again
 /// and again.
 Scene bouncing_scene(Precision precision = Precision::double_) {
   Material material = rubber();
   material.law = "st-venant-kirchhoff";
   material.young = 2e4;
+  material.poisson = 0;  // else a stretched bar is narrower, and softer across
   material.hourglass = 0.1;
   Scene scene = one_body(material);
   scene.solver.precision = precision;
-  scene.gravity = {0, 0, -0.03};
+  scene.gravity = {0, 0, -0.06};
   material.density *= 1600;
   scene.bodies[0].inclusions.push_back(
       {.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.08}}}, .material = material});
@@ -255,7 +256,7 @@ TEST(StepControl, LengthensTheStepOfABodyThatComesBack) {
   EXPECT_EQ(halved.halvings, 1);
   EXPECT_EQ(halved.doublings, 0);
   EXPECT_EQ(adaptive.halvings, 5);
-  EXPECT_EQ(adaptive.doublings, 4);
+  EXPECT_EQ(adaptive.doublings, 5);
   const auto saved = static_cast<double>(fixed.steps - adaptive.steps);
   EXPECT_GT(saved, 0.4 * static_cast<double>(fixed.steps) / 2);  // seen 0.53
   // Of the order of the longer steps: four times what those of half their size are off by.
@@ -295,7 +296,7 @@ TEST(StepControl, LooksAtEachStepOfAShock) {
   material.young = 3e4;
   material.hourglass = 0.1;
   Scene scene = one_body(material);
-  scene.bodies[0].velocity = {0, 0, -4};
+  scene.bodies[0].velocity = {0, 0, -5};
   scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {1, 1, 0.03}}}});
   const Model model = model_of(scene, lattice(9, 9, 9, 0.05));
   const auto backend = make_test_backend(model, Precision::double_, 2);
@@ -378,7 +379,7 @@ TEST(StepControl, GoesOnToTheBitAfterARestartAmongStepsThatChange) {
   for (const Precision precision : {Precision::double_, Precision::single}) {
     StepPlan plan = plan_of(model);
     plan.lengthens = true;
-    plan.steps = 1500;
+    plan.steps = 1000;
     expect_same_after_restarts(model, bouncing_scene(precision), plan, 1);
   }
 }
