@@ -53,7 +53,8 @@ TEST_P(CudaResidence, EqualsLaunchesToTheLastBit) {
   }
   scene.bodies.resize(GetParam().clouds.size(), scene.bodies[0]);
   const Model model = build_model(scene, GetParam().clouds);
-  const double dt = 0.5 * step_limit(model).largest_step;
+  // Half the limit at rest is too long for the plastic bodies, which have no hourglass control.
+  const double dt = 0.3 * step_limit(model).largest_step;
   for (const Precision precision : {Precision::single, Precision::mixed, Precision::double_}) {
     const auto resident = make_cuda_backend(model, precision),
                launched = make_cuda_backend(model, precision, 0, CudaPath::launches);
