@@ -2,7 +2,7 @@
 All measured numbers come from these tables; the targets are constants here."""
 import math
 
-from pages import cantilever
+from pages import cantilever, large_meshes
 from pages.charts import LineChart
 from pages.page import Page, measured_by
 from pages.tables import markdown_table, read_if_there
@@ -232,5 +232,6 @@ def make(results, link):
         table = read_if_there(results / f"{name}.csv")
         if table:
             section(page, table, results)
+    large_meshes.add(page, results)
     page.add(TRIED)
     return page
