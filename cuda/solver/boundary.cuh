@@ -105,8 +105,9 @@ class Boundary {
     load_scales_ = -1;
     sum_loads(time_);
   }
-  /// Sums the applied forces at a time [s], but for those that follow the surface. Repeated calls
-  /// sum again only while a load still grows, or if others were added to the sum.
+  /// Sums the applied forces at a time [s] without loads that follow the surface, which may be
+  /// added to the sum (`DeviceFollowing::add`). Repeated calls sum again only while a load still
+  /// grows or follows the surface.
   void sum_loads(double time) {
     time_ = time;
     if (!m_.loads()) return;

@@ -17,7 +17,7 @@ struct FollowingView {
   const Vec3<Real>* force;  ///< At rest [N].
   const Offset* row;        ///< Start of each phyxel's row, and the end of the last.
   const Index* near;        ///< Tile slots of the phyxels that a gradient knows of.
-  const Vec3<Real>* slope;  ///< Their shares in it [1/m].
+  const Vec3<Real>* slope;  ///< Share of each of these phyxels in the gradient [1/m].
   int count;                ///< Number of phyxels.
 
   /// The displacement gradient at the k-th phyxel.

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "model/neighbour_search.hpp"
+#include "model/parts.hpp"
 #include "model/point_fit.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
@@ -11,28 +12,21 @@
 namespace phyxel {
 namespace {
 
-/// The part of a phyxel.
-const Part& part_of(const Model& model, Index i) {
-  return *std::upper_bound(model.parts.begin(), model.parts.end(), i,
-                           [](Index at, const Part& part) { return at < part.end; });
-}
-
 /// The phyxels around each of some phyxels of one body, within its support.
 Csr phyxels_around(const Model& model, const std::vector<Index>& phyxels) {
   Csr around;
   if (phyxels.empty()) return around;
   const auto add = [&](Index i, auto&& candidates, Index first) {
     // The gradient jumps where the material does.
-    const Part& part = part_of(model, i);
+    const double h = model.neighbourhood.support[i];
     std::vector<Index> row{i}, of_part{i};
     Sym3d moment;
     for (const Index of_body : candidates) {
       const Index j = first + of_body;
-      const double h = model.neighbourhood.support[i];
       const Vec3d x = model.position[j] - model.position[i];
       if (j == i || !(dot(x, x) < h * h)) continue;
       row.push_back(j);
-      if (j < part.begin || j >= part.end) continue;
+      if (!are_of_one_part(model, i, j)) continue;
       of_part.push_back(j);
       moment += moment_term(x, weight_shape(dot(x, x), 1 / (h * h)));
     }

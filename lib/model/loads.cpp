@@ -185,12 +185,10 @@ void check_cavity(const BodyRequest& request, const TractionRequest& traction,
   for (const Triangle& t : triangles) {
     around.triangle.push_back({t[0] - surface.first, t[1] - surface.first, t[2] - surface.first});
   }
-  const double volume =
-      enclosed_by(facets_of(around.position, around.triangle, 0, HUGE_VAL)).volume;
   const SurfaceDefects defects = inspect_surface(around);
   const bool closed =
       defects.open_edges == 0 && defects.crowded_edges == 0 && defects.flipped_edges == 0;
-  if (closed && volume < 0) return;
+  if (closed && defects.inside_out) return;
   throw InputError(fmt::format(
       "{}: key body.traction.gas: the {} selected triangles of the surface of body \"{}\" {}; "
       "allowed: those of the whole surface of a cavity in the body",

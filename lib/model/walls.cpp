@@ -1,6 +1,5 @@
 #include "model/walls.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -81,11 +80,12 @@ bool may_be_neighbours(std::size_t a, std::size_t b) {
   return a == b || a == open_room || b == open_room;
 }
 
-/// The smallest eigenvalue of the moment matrix of phyxel i and those of its neighbours for which
-/// counts(j) is true, as a fraction of the largest.
+/// True if those neighbours of phyxel i for which counts(j) is true span space: if the smallest
+/// eigenvalue of their moment matrix is above a twentieth of the largest. Beside a flat wall, or a
+/// surface, it is 0.4 to 1 of it.
 template <class Counts>
-double thickness(const Neighbourhood& hood, std::span<const Vec3d> position, Index i,
-                 Counts&& counts) {
+bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, Index i,
+                Counts&& counts) {
   const double inverse_h_squared = 1 / (hood.support[i] * hood.support[i]);
   Sym3d moment;
   for (const Index j : hood.neighbours.row(i)) {
@@ -93,12 +93,7 @@ double thickness(const Neighbourhood& hood, std::span<const Vec3d> position, Ind
     const Vec3d x = position[j] - position[i];
     moment += moment_term(x, weight_shape(dot(x, x), inverse_h_squared));
   }
-  const Mat3d entries = full(moment);
-  Eigen::Matrix3d matrix;
-  for (int k = 0; k < 9; ++k) matrix(k / 3, k % 3) = entries(k / 3, k % 3);
-  const Eigen::Vector3d ascending =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix, Eigen::EigenvaluesOnly).eigenvalues();
-  return ascending[2] > 0 ? ascending[0] / ascending[2] : 0;
+  return pseudo_inverse(moment, 0.05).rank == 3;
 }
 
 /// Opens the rooms of phyxels that no region contains, and whose neighbours in the same room lie
@@ -107,14 +102,13 @@ double thickness(const Neighbourhood& hood, std::span<const Vec3d> position, Ind
 /// keep theirs, as all of their neighbours are held or moved, too.
 void open_thin_rooms(std::vector<std::size_t>& room, const Neighbourhood& hood,
                      std::span<const Vec3d> position, std::size_t outside) {
-  constexpr double thin = 0.05;  // beside a flat wall, or a surface: 0.4 to 1
   std::vector<Index> opened;
   for (Index i = 0; i < hood.neighbours.rows(); ++i) {
     if (room[i] != outside) continue;
     const auto is_kept = [&](Index j) { return may_be_neighbours(room[i], room[j]); };
     const auto row = hood.neighbours.row(i);
-    if (!std::ranges::all_of(row, is_kept) && thickness(hood, position, i, is_kept) < thin &&
-        thickness(hood, position, i, [](Index) { return true; }) >= thin) {
+    if (!std::ranges::all_of(row, is_kept) && !span_space(hood, position, i, is_kept) &&
+        span_space(hood, position, i, [](Index) { return true; })) {
       opened.push_back(i);
     }
   }

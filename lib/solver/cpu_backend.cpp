@@ -241,7 +241,6 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     }
     for_each_load(model_, false, time, add);
     if (following_.empty()) return;
-    std::fill(followed_force_.begin(), followed_force_.end(), Vec3d{});
     following_.add(
         time, [&](Index i) { return this->point_displacement(layout_.slot(i)); }, followed_force_);
     for_each_load(model_, true, time,
@@ -250,7 +249,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
 
   std::vector<Vec3d> external_force_;
   FollowingLoads following_{model_};
-  // Forces of loads that follow the surface [N], shape [n]; empty without such loads.
+  // Forces of loads that follow the surface [N], shape [n], zero but while they are summed; empty
+  // without such loads.
   std::vector<Vec3d> followed_force_ =
       std::vector<Vec3d>(following_.empty() ? 0 : model_.position.size());
   std::optional<double> load_time_;  // time of `applied_`; none before the first sum

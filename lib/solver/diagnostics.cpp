@@ -7,7 +7,6 @@
 #include <cmath>
 #include <limits>
 
-#include "model/owned_vectors.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/physics/hourglass.hpp"
@@ -32,7 +31,7 @@ double energy_of_following(const Model& model, Backend& backend, double time) {
   if (model.following.empty()) return 0;
   State state;
   backend.download(state);
-  if (model.share) refresh_ghosts(*model.share, state.displacement);
+  refresh_for_following(model, state.displacement);
   return FollowingLoads(model).energy(time, [&](Index i) { return state.displacement[i]; });
 }
 
@@ -48,7 +47,7 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
   if (has_hourglass_control(model)) backend.fit_residuals(residual);
 
   Totals all;
-  if (model.share && !model.following.empty()) refresh_ghosts(*model.share, state.displacement);
+  refresh_for_following(model, state.displacement);
   const std::span<const Vec3d> external = backend.external_forces();
   std::vector<Vec3d> loads(model.loads.empty() ? 0 : force.size());
   std::vector<Vec3d> following(model.following.empty() ? 0 : force.size());

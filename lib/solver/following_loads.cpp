@@ -1,5 +1,6 @@
 #include "solver/following_loads.hpp"
 
+#include "model/owned_vectors.hpp"
 #include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
@@ -55,6 +56,10 @@ double FollowingLoads::energy_of(double time, const std::vector<Gas>& gases) con
     energy -= load.scale_at(time) * load.pressure * gas.volume_at_rest * work;
   }
   return energy;
+}
+
+void refresh_for_following(const Model& model, std::vector<Vec3d>& displacement) {
+  if (model.share && !model.following.empty()) refresh_ghosts(*model.share, displacement);
 }
 
 void add_loads(const FollowingLoads& following, double time, std::span<const Vec3d> displacement,

@@ -134,6 +134,10 @@ class FollowingLoads {
   std::vector<double> volume_at_rest_;  // of gases [m³]
 };
 
+/// Copies displacements of owners to ghosts, if a load follows the surface, whose gradients need
+/// them. Collective on a share. @param displacement [m], shape [n]
+void refresh_for_following(const Model& model, std::vector<Vec3d>& displacement);
+
 /// Adds all loads to forces [N], shape [n]. Collective if there is a gas. @param time [s]
 /// @param displacement [m], shape [n], with those of ghosts
 void add_loads(const FollowingLoads& following, double time, std::span<const Vec3d> displacement,

@@ -3,7 +3,6 @@
 
 #include <vector>
 
-#include "model/owned_vectors.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/solver.hpp"
@@ -28,9 +27,7 @@ class PresentForces {
       return;
     }
     backend.internal_forces(force_);
-    if (model.share && !model.following.empty()) {
-      refresh_ghosts(*model.share, state_.displacement);
-    }
+    refresh_for_following(model, state_.displacement);
     add_loads(FollowingLoads(model), dt_ > 0 ? time_ : full_loads, state_.displacement, force_);
     const std::span<const Vec3d> external = backend.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];

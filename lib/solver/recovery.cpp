@@ -5,6 +5,7 @@
 
 #include "model/neighbour_search.hpp"
 #include "model/owned_vectors.hpp"
+#include "model/parts.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "phyxel/physics/weight.hpp"
 
@@ -14,13 +15,6 @@ namespace {
 constexpr int sweeps = 4;
 /// Shift, in supports, from which on a phyxel counts as one on the surface, where it is 0.2.
 constexpr double least_shift = 0.1;
-
-/// Whether two phyxels of a body are of the same part.
-bool is_of_part(const Model& model, Index i, Index j) {
-  const auto after = std::upper_bound(model.parts.begin(), model.parts.end(), i,
-                                      [](Index at, const Part& part) { return at < part.end; });
-  return after != model.parts.end() && j >= after->begin && j < after->end;
-}
 
 /// The neighbours of the phyxels of one body, counted from its first.
 Csr lists_of_body(const Model& model, Index begin, Index end) {
@@ -67,7 +61,7 @@ Recovery::Recovery(const Model& model)
       const Vec3d x = model.position[j] - model.position[i];
       const double w = weight_shape(dot(x, x), 1 / (h * h));
       moment += moment_term(x, w);
-      if (!is_of_part(model, i, j)) return;
+      if (!are_of_one_part(model, i, j)) return;
       of_part += moment_term(x, w);
       third += w * dot(x, x) * x;
     });
@@ -112,7 +106,7 @@ std::vector<Mat3d> Recovery::gradients(std::vector<Vec3d> displacement) const {
   const auto for_each_neighbour = [&](Index i, auto&& use) {
     const double h = model_.neighbourhood.support[i], inverse = 1 / (h * h);
     for (const Index j : rows_.row(i)) {
-      if (several && !is_of_part(model_, i, j)) continue;
+      if (several && !are_of_one_part(model_, i, j)) continue;
       const Vec3d x = model_.position[j] - model_.position[i];
       use(j, x, weight_shape(dot(x, x), inverse) * x);
     }

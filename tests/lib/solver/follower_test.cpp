@@ -153,23 +153,33 @@ TEST(Follower, TurnsWithTheSurface) {
   }
 }
 
+/// The most work that loads have done [J], and the largest change of the total energy [J].
+struct Exchange {
+  double work = 0, drift = 0;
+};
+/// Lets a body at rest go, and looks at its energies every few steps. @param dt [s]
+Exchange exchange_of(const Scene& scene, const Model& model, double dt, int looks, int steps) {
+  const auto backend = make_test_backend(model, Precision::double_);
+  Solver solver(*backend, initial_state(model, scene, dt));
+  Exchange seen;
+  for (int k = 0; k < looks; ++k) {
+    solver.step(steps);
+    const Diagnostics now = diagnose(model, *backend, solver.now());
+    seen.work = std::max(seen.work, -now.load_energy);
+    seen.drift = std::max(seen.drift, std::abs(now.total_energy()));
+  }
+  return seen;
+}
+
 /// A ball that a sudden pressure sets in motion exchanges the work of the pressure for energy of
 /// its own.
 TEST(Follower, WorksAsMuchAsTheBodyGains) {
   const Scene scene = pressed_ball(4e3);
   const Model model = build_model(scene, std::span(&ball(), 1));
-  const auto backend = make_test_backend(model, Precision::double_);
-  const double dt = 2e-4;
-  Solver solver(*backend, initial_state(model, scene, dt));
-  double most_work = 0, drift = 0;
-  for (int k = 0; k < 40; ++k) {
-    solver.step(10);
-    const Diagnostics now = diagnose(model, *backend, solver.now());
-    most_work = std::max(most_work, -now.load_energy);
-    drift = std::max(drift, std::abs(now.total_energy()));
-  }
-  EXPECT_GT(most_work, 1);
-  EXPECT_LT(drift, 4e-3 * most_work);  // seen: 2e-3, at any step: the force has an energy nearly
+  const Exchange seen = exchange_of(scene, model, 2e-4, 40, 10);
+  EXPECT_GT(seen.work, 1);
+  EXPECT_LT(seen.drift,
+            4e-3 * seen.work);  // seen: 2e-3, at any step: the force has an energy nearly
 }
 
 /// The state of rest of a pressed ball is the dilation under which its law has that pressure.
@@ -351,17 +361,9 @@ TEST(Follower, KeepsTheEnergyOfAGas) {
   for (const double gamma : {1.0, 1.4}) {
     const Scene scene = hollow_ball(4e3, gamma);
     const Model model = build_model(scene, std::span(&shell(), 1));
-    const auto backend = make_test_backend(model, Precision::double_);
-    Solver solver(*backend, initial_state(model, scene, 3e-4));
-    double most_work = 0, drift = 0;
-    for (int k = 0; k < 30; ++k) {
-      solver.step(20);
-      const Diagnostics now = diagnose(model, *backend, solver.now());
-      most_work = std::max(most_work, -now.load_energy);
-      drift = std::max(drift, std::abs(now.total_energy()));
-    }
-    EXPECT_GT(most_work, 1);
-    EXPECT_LT(drift, 0.05 * most_work);  // likewise, seen: 3.2%, 1.3% for 6000
+    const Exchange seen = exchange_of(scene, model, 3e-4, 30, 20);
+    EXPECT_GT(seen.work, 1);
+    EXPECT_LT(seen.drift, 0.05 * seen.work);  // likewise, seen: 3.2%, 1.3% for 6000
   }
 }
 
