@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
@@ -15,16 +16,16 @@ namespace {
 /// @param move move(place, step) returns the place of a point after a step [m]
 /// @param done done(sweeps) is told the number of sweeps done
 template <class Move, class Done>
-void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
-                Move&& move, Done&& done) {
+void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
+                int sweeps, Move&& move, Done&& done) {
   std::vector<Vec3d> moved = site;
   const auto n = static_cast<std::ptrdiff_t>(site.size());
   for (int sweep = 0; sweep < sweeps; ++sweep) {
-    const SpatialHash hash = hash_for_repulsion(site, spacing);
+    const Repulsion repulsion(site, spacing);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
       const Vec3d step =
-          repulsion_step(hash, site[i], static_cast<Index>(i), spacing, [](Index) { return 1.0; });
+          repulsion.step(site[i], static_cast<Index>(i), [](Index) { return 1.0; });
       moved[i] = move(site[i], step);
     }
     site.swap(moved);
@@ -49,14 +50,44 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
   return a + (vb / all) * ab + (vc / all) * ac;
 }
 
+namespace {
+
+/// The pieces that sample points lie on, by the nearest of the points.
+class NearestPiece {
+ public:
+  NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing)
+      : sample_(sample), spacing_(spacing) {
+    const auto place = in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; });
+    if (spacing.is_uniform()) {
+      uniform_.emplace(place, 0.4 * spacing.coarsest());
+    } else {
+      graded_.emplace(place, tabulated(sample.size(), [&](std::size_t k) {
+                        return 0.4 * spacing.at(sample[k].point);
+                      }));
+    }
+  }
+  std::size_t at(Vec3d p) const {
+    if (uniform_) return sample_[uniform_->nearest(p).index].piece;
+    auto found = graded_->nearest(p, spacing_.at(p));
+    if (found.index < 0) found = graded_->nearest(p);
+    return sample_[found.index].piece;
+  }
+
+ private:
+  std::span<const PointOn> sample_;
+  const SpacingField& spacing_;
+  std::optional<SpatialHash> uniform_;
+  std::optional<GradedHash> graded_;
+};
+
+}  // namespace
+
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
-                    std::vector<Vec3d>& site, std::size_t fixed, double spacing, int sweeps,
-                    Stage& stage) {
-  const SpatialHash samples(in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; }),
-                            0.4 * spacing);
+                    std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
+                    int sweeps, Stage& stage) {
+  const NearestPiece nearest(sample, spacing);
   const auto corners_at = [&](Vec3d p) {
-    const Index nearest = samples.nearest(p).index;
-    const Triangle& t = surface.triangle[sample[static_cast<std::size_t>(nearest)].piece];
+    const Triangle& t = surface.triangle[nearest.at(p)];
     return std::array{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
   };
   const auto move = [&](Vec3d before, Vec3d step) {
@@ -73,10 +104,26 @@ void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
 }
 
 void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::vector<Vec3d>& site,
-                  std::size_t fixed, double spacing, int sweeps) {
+                  std::size_t fixed, const SpacingField& spacing, int sweeps) {
   const auto move = [&](Vec3d before, Vec3d step) {
     const Vec3d after = region.nearest_on_boundary(before + step);
     return sampler.inside(after) ? after : before;
+  };
+  sweep_over(site, fixed, spacing, sweeps, move, [](int) {});
+}
+
+void relax_on_edges(std::span<const Crease> piece, std::span<const PointOn> sample,
+                    std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
+                    int sweeps) {
+  const NearestPiece nearest(sample, spacing);
+  const auto move = [&](Vec3d before, Vec3d step) {
+    const auto on_piece = [&](Vec3d p) {
+      const auto& [from, to] = piece[nearest.at(p)];
+      const Vec3d along = to - from;
+      const double size2 = dot(along, along);
+      return size2 > 0 ? from + std::clamp(dot(p - from, along) / size2, 0.0, 1.0) * along : from;
+    };
+    return on_piece(before + step);
   };
   sweep_over(site, fixed, spacing, sweeps, move, [](int) {});
 }

@@ -7,6 +7,8 @@
 
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
+#include "mesh/rooms.hpp"
+#include "mesh/surface_points.hpp"
 #include "mesh/surface_sites.hpp"
 #include "stage.hpp"
 
@@ -35,19 +37,6 @@ constexpr double sample_factor = 1.2;
 /// Sample points for a volume along a lattice constant.
 constexpr double samples_along = 6;
 
-/// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
-/// that of a face that people draw, so that no layer of nodes has one clearance for all.
-Mat3d turn_of_lattice() {
-  constexpr double w = 30, x = 8, y = 6, z = -9, all = w * w + x * x + y * y + z * z;
-  Mat3d turn;
-  const double rows[3][3] = {
-      {w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
-      {2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
-      {2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
-  for (int e = 0; e < 9; ++e) turn(e / 3, e % 3) = rows[e / 3][e % 3] / all;
-  return turn;
-}
-
 /// Phyxels on the surface, then those on cuts [m].
 std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
   std::vector<Vec3d> all = sites.position;
@@ -60,7 +49,7 @@ class Depth {
  public:
   Depth(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
-        farthest_(request.sites.spacing),
+        farthest_(request.sites.spacing.coarsest()),
         site_(all_sites(request.sites), largest_clearance * spacing) {}
 
   /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
@@ -97,8 +86,11 @@ class Clearance {
 
  private:
   static std::vector<Vec3d> samples(const LatticeRequest& request, double spacing) {
-    std::vector<Vec3d> points =
-        points_over(request.surface, spacing * spacing / surface_samples, request.seed + 1);
+    std::vector<Vec3d> points;
+    for (const PointOn& p : points_over(request.surface, SpacingField(spacing), surface_samples,
+                                        request.seed + 1)) {
+      points.push_back(p.point);
+    }
     const std::vector<Vec3d>& on_cuts = request.sites.cut_points;
     points.insert(points.end(), on_cuts.begin(), on_cuts.end());
     return points;
@@ -194,13 +186,13 @@ class Skin {
 
   /// Moves each node by the sum of the forces at the places before the sweep.
   void sweep() {
-    const SpatialHash hash = hash_for_repulsion(point_, spacing_);
+    const Repulsion repulsion(point_, SpacingField(spacing_));
     std::vector<Vec3d> moved(near_.size());
     const auto n = static_cast<std::ptrdiff_t>(near_.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const Vec3d before = point_[sites() + k];
-      moved[k] = clearance_of(k) < moving_clearance ? moved_from(before, k, hash) : before;
+      moved[k] = clearance_of(k) < moving_clearance ? moved_from(before, k, repulsion) : before;
     }
     std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
   }
@@ -238,65 +230,35 @@ class Skin {
   /// Shares of the inside by sample points [m^3]. Cells end at cuts: a phyxel on a cut has none of
   /// the space in its region, unless no other phyxel is there.
   std::vector<double> sampled_volumes(Stage& stage) const {
-    const SupportCuts& cuts = request_.sites.cuts;
-    // The number of the first region with contains(region), from 1; room 0 is outside all regions.
-    const auto first_room = [&](const auto& contains) {
-      std::size_t k = 0;
-      while (k < cuts.list.size() && !contains(cuts.list[k].wall)) ++k;
-      return k < cuts.list.size() ? k + 1 : 0;
-    };
-    std::vector<std::vector<std::size_t>> in_room(cuts.list.size() + 1);
-    for (std::size_t k = 0; k < point_.size(); ++k) {
-      const auto deep_inside = [&](const SpaceRegion& wall) {
-        return wall.shrunk(4 * cuts.depth).contains(point_[k]);
-      };
-      in_room[first_room(deep_inside)].push_back(k);
-    }
-    const auto settled_room_of = [&](Vec3d p) {
-      const std::size_t room =
-          first_room([&](const SpaceRegion& wall) { return wall.contains(p); });
-      return in_room[room].empty() ? 0 : room;
-    };
-    // False if no point of a ball lies in a room. Sites of the room may be far from such a ball,
-    // and a search for the nearest would visit them all.
-    const auto may_lie_in = [&](std::size_t room, Vec3d middle, double radius) {
-      for (std::size_t k = 0; k < cuts.list.size(); ++k) {
-        const double distance = cuts.list[k].wall.distance(middle);
-        if (k + 1 == room) return distance <= radius;
-        // Room 0 has the space of regions without phyxels.
-        if (room == 0 && in_room[k + 1].empty() && distance <= radius) return true;
-        // A little less, since sample points are rounded to float.
-        if (distance < -(1 + 1e-5) * radius) return false;
-      }
-      return true;
-    };
+    const Rooms rooms(request_.sites.cuts, point_);
     const Depth depth(request_, spacing_);
     std::vector<double> volume(point_.size());
-    for (std::size_t room = 0; room < in_room.size(); ++room) {
-      if (in_room[room].empty()) continue;
+    for (std::size_t room = 0; room < rooms.size(); ++room) {
+      const std::vector<std::size_t>& here = rooms.points_in(room);
+      if (here.empty()) continue;
       std::vector<Vec3d> site;
-      for (const std::size_t k : in_room[room]) site.push_back(point_[k]);
+      for (const std::size_t k : here) site.push_back(point_[k]);
       const auto wanted = [&](Vec3d middle, double half) {
         const double radius = std::numbers::sqrt3 * half;
-        if (!may_lie_in(room, middle, radius)) return false;
+        if (!rooms.may_reach(room, middle, radius)) return false;
         // Smaller cells are parts of one that is wanted; larger ones would need a long search.
         if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
         // Cells of a Voronoi diagram reach one spacing from their phyxels.
         return !depth.is_deep(middle, radius, regular_clearance + 1);
       };
       std::function<bool(Vec3d)> counts;
-      if (!cuts.list.empty()) counts = [&](Vec3d p) { return settled_room_of(p) == room; };
+      if (rooms.size() > 1) counts = [&](Vec3d p) { return rooms.room_of(p) == room; };
       const std::vector<double> shares =
           NearestSite(site, spacing_)
               .volumes(
                   request_.sampler,
                   {.voxel = spacing_ / samples_along, .seed = request_.seed + 2, .wanted = wanted},
                   stage, counts);
-      for (std::size_t k = 0; k < site.size(); ++k) volume[in_room[room][k]] = shares[k];
+      for (std::size_t k = 0; k < site.size(); ++k) volume[here[k]] = shares[k];
     }
     return volume;
   }
-  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const SpatialHash& hash) const {
+  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const Repulsion& repulsion) const {
     const auto first_inside = static_cast<Index>(on_surface());
     bool beside_surface = false;
     const auto strength = [&](Index other) {
@@ -304,7 +266,7 @@ class Skin {
       return other < first_inside ? surface_strength : 1;
     };
     const auto self = static_cast<Index>(static_cast<std::ptrdiff_t>(sites()) + k);
-    const Vec3d after = before + repulsion_step(hash, before, self, spacing_, strength);
+    const Vec3d after = before + repulsion.step(before, self, strength);
     // Only nodes beside phyxels on the surface can leave it.
     return !beside_surface || request_.sampler.inside(after) ? after : before;
   }
@@ -317,6 +279,17 @@ class Skin {
 };
 
 }  // namespace
+
+Mat3d turn_of_lattice() {
+  constexpr double w = 30, x = 8, y = 6, z = -9, all = w * w + x * x + y * y + z * z;
+  Mat3d turn;
+  const double rows[3][3] = {
+      {w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+      {2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
+      {2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
+  for (int e = 0; e < 9; ++e) turn(e / 3, e % 3) = rows[e / 3][e % 3] / all;
+  return turn;
+}
 
 LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   Stage placing("placing phyxels");

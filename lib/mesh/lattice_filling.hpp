@@ -31,6 +31,10 @@ struct LatticeFilling {
   double spacing = 0;  ///< Lattice constant [m].
 };
 
+/// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
+/// that of a face that people draw, so that no layer of nodes has one clearance for all.
+Mat3d turn_of_lattice();
+
 /// Fills a closed surface with a cubic lattice turned against the axes: exactly the requested
 /// number of its nodes, those farthest from the surface and the phyxels on it. Nodes within two
 /// spacings of the surface are then evened out: they and the phyxels on the surface repel each

@@ -187,13 +187,69 @@ Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks, Vec3
 
 }  // namespace
 
-std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, double gap,
-                                   std::uint64_t seed, std::span<const Vec3d> before) {
+namespace {
+
+/// Points that have been accepted, with the distance that others have to keep from them: in one
+/// table, or in one for each octave of that distance.
+class Accepted {
+ public:
+  /// @param origin places are relative to it. @param expected number of points
+  Accepted(const SpacingField& spacing, double gap, Vec3d origin, std::size_t expected)
+      : spacing_(spacing), gap_(gap), origin_(origin) {
+    if (spacing.is_uniform()) {
+      tables_.emplace_back(gap * spacing.coarsest(), expected);
+      return;
+    }
+    const int octaves = octave_of(gap * spacing.coarsest()) + 1;
+    for (int k = 0; k < octaves; ++k) {
+      // Twice as large as needed, since the asking point may belong to the octave above.
+      tables_.emplace_back(gap * spacing.finest() * std::ldexp(4.0, k), expected / octaves);
+    }
+  }
+
+  void add(Vec3d place) {
+    tables_[spacing_.is_uniform() ? 0 : octave_of(gap_at(place))].add(place);
+    added_.push_back(place);
+  }
+  /// True if a point that has been accepted is nearer to a place than it may be.
+  bool is_near(Vec3d place) const {
+    if (spacing_.is_uniform()) {
+      const double gap = gap_ * spacing_.coarsest();
+      return tables_.front().has_within(place, gap * gap);
+    }
+    const double gap = gap_at(place);
+    const int octave = octave_of(gap);
+    // The gap changes by less than a factor of two over its own length.
+    for (int k = std::max(octave - 1, 0);
+         k <= std::min(octave + 1, static_cast<int>(tables_.size()) - 1); ++k) {
+      if (tables_[k].has_within(place, gap * gap)) return true;
+    }
+    return false;
+  }
+  const std::vector<Vec3d>& points() const { return added_; }
+
+ private:
+  double gap_at(Vec3d place) const { return gap_ * spacing_.at(place + origin_); }
+  int octave_of(double gap) const {
+    return std::max(0, std::ilogb(gap / (gap_ * spacing_.finest())));
+  }
+
+  const SpacingField& spacing_;
+  double gap_;
+  Vec3d origin_;
+  std::vector<GrowingHash> tables_;
+  std::vector<Vec3d> added_;
+};
+
+}  // namespace
+
+std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
+                                   const SpacingField& spacing, double gap, std::uint64_t seed,
+                                   std::span<const Vec3d> before) {
   if (blocks.empty()) return {};
   const Vec3d origin = blocks.front().centre;
   const Bulk<Candidate> all = all_in_random_order(blocks, origin, seed);
-  const double limit = gap * gap;
-  GrowingHash taken(gap, before.size() + all.size() / 16);
+  Accepted taken(spacing, gap, origin, before.size() + all.size() / 16);
   for (const Vec3d& p : before) taken.add(p - origin);
   // Most candidates have a point nearby that was accepted long before: all threads sort these out,
   // batch by batch, and one goes through the rest in order. Batches grow, since ever fewer are
@@ -203,11 +259,9 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, doubl
     end = std::min(all.size(), begin + std::max<std::size_t>(1024, begin / 4));
     is_free.resize(end - begin);
 #pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t k = begin; k < end; ++k) is_free[k - begin] = !taken.is_near(all[k].place);
     for (std::size_t k = begin; k < end; ++k) {
-      is_free[k - begin] = !taken.has_within(all[k].place, limit);
-    }
-    for (std::size_t k = begin; k < end; ++k) {
-      if (is_free[k - begin] && !taken.has_within(all[k].place, limit)) taken.add(all[k].place);
+      if (is_free[k - begin] && !taken.is_near(all[k].place)) taken.add(all[k].place);
     }
   }
   std::vector<Vec3d> site(taken.points().begin() + static_cast<std::ptrdiff_t>(before.size()),
@@ -282,9 +336,9 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
 }
 
-std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
-                                         Stage& stage,
-                                         const std::function<bool(Vec3d)>& counts) const {
+std::vector<std::uint32_t> NearestSite::samples_of_sites(const InsideSampler& sampler,
+                                               const SampleSweep& sweep, Stage& stage,
+                                               const std::function<bool(Vec3d)>& counts) const {
   std::vector<std::uint32_t> count(sites_, 0);
   sampler.visit(
       sweep,
@@ -298,6 +352,13 @@ std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const Sam
         }
       },
       &stage);
+  return count;
+}
+
+std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
+                                         Stage& stage,
+                                         const std::function<bool(Vec3d)>& counts) const {
+  const std::vector<std::uint32_t> count = samples_of_sites(sampler, sweep, stage, counts);
   std::vector<double> volume(sites_);
   for (std::size_t i = 0; i < sites_; ++i) {
     volume[i] = std::max(0.5, double(count[i])) * std::pow(sweep.voxel, 3);

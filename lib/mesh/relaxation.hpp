@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mesh/inside_samples.hpp"
+#include "mesh/spacing_field.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
@@ -19,9 +20,11 @@ namespace phyxel {
 std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
                                std::uint64_t seed, std::span<const Vec3d> before = {});
 
-/// A maximal set of sample points at least `gap` [m] from each other and from those in `before`.
-std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks, double gap,
-                                   std::uint64_t seed, std::span<const Vec3d> before);
+/// A maximal set of sample points at least `gap` spacings from each other and from those in
+/// `before`.
+std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
+                                   const SpacingField& spacing, double gap, std::uint64_t seed,
+                                   std::span<const Vec3d> before);
 
 /// Search for the nearest of a set of sites for each point of a block.
 class NearestSite {
@@ -46,6 +49,10 @@ class NearestSite {
   /// @param counts tells whether a sample point counts, on many threads; null: all do
   std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
                               const std::function<bool(Vec3d)>& counts = nullptr) const;
+  /// The number of sample points that each site gets, likewise.
+  std::vector<std::uint32_t> samples_of_sites(const InsideSampler& sampler,
+                                              const SampleSweep& sweep, Stage& stage,
+                                    const std::function<bool(Vec3d)>& counts = nullptr) const;
 
  private:
   SpatialHash hash_;

@@ -6,6 +6,8 @@
 #include <numeric>
 
 #include "mesh/face_relaxation.hpp"
+#include "mesh/graded_filling.hpp"
+#include "mesh/grading.hpp"
 #include "mesh/inside_filling.hpp"
 #include "mesh/lattice_filling.hpp"
 #include "mesh/repulsion.hpp"
@@ -19,6 +21,7 @@
 #include "phyxel/mesh.hpp"
 #include "sort_unique.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -67,6 +70,24 @@ double check_extent(const Surface& surface) {
   return extent;
 }
 
+void check_grading(const SampleRequest& request) {
+  const Grading& grading = *request.grading;
+  const auto check = [](const char* name, double value, double least, double most) {
+    if (value >= least && value <= most) return;
+    throw InputError(
+        fmt::format("grading: {} is {:g}; allowed: {:g} to {:g}", name, value, least, most));
+  };
+  check("ratio", grading.ratio, 1, 10);
+  check("growth", grading.growth, 0.05, 0.5);
+  check("per_radius", grading.per_radius, 0, 1000);
+  check("across", grading.across, 0, 1000);
+  for (const Grading::Finer& finer : grading.finer) check("by", finer.by, 1, grading.ratio);
+  if (request.on_surface == false) {
+    throw InputError(
+        "a graded body has phyxels on its surface; allowed: on_surface = true, or no grading");
+  }
+}
+
 void check_request(const Surface& surface, const SampleRequest& request) {
   if (request.phyxels < 1) {
     throw InputError(fmt::format("{} phyxels asked for; at least 1 is needed", request.phyxels));
@@ -75,6 +96,7 @@ void check_request(const Surface& surface, const SampleRequest& request) {
     throw InputError(
         fmt::format("{} relaxations asked for; 0 or more are allowed", request.relaxations));
   }
+  if (request.grading) check_grading(request);
   check_memory(request.phyxels, bytes_on_lattice);
   if (surface.triangle.empty()) throw InputError("the surface has no triangles");
   check_surface(surface);
@@ -115,14 +137,21 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
 }
 
 /// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
-void measure_gaps(const std::vector<Vec3d>& site, double spacing, SampleReport& report) {
+void measure_gaps(const std::vector<Vec3d>& site, const SpacingField& spacing,
+                  SampleReport& report) {
   const auto n = static_cast<std::ptrdiff_t>(site.size());
   if (n < 2) return;
-  const SpatialHash hash(site, spacing);
   std::vector<double> gap(site.size());
+  const auto measure = [&](const auto& hash) {
 #pragma omp parallel for schedule(static)
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    gap[i] = std::sqrt(hash.nearest(site[i], HUGE_VAL, static_cast<Index>(i)).distance2);
+    for (std::ptrdiff_t i = 0; i < n; ++i) {
+      gap[i] = std::sqrt(hash.nearest(site[i], HUGE_VAL, static_cast<Index>(i)).distance2);
+    }
+  };
+  if (spacing.is_uniform()) {
+    measure(SpatialHash(site, spacing.coarsest()));
+  } else {
+    measure(GradedHash(site, tabulated(site.size(), [&](auto k) { return spacing.at(site[k]); })));
   }
   report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
@@ -170,22 +199,45 @@ PreparedSurface prepare(const Surface& surface, SampleReport& found) {
   return made;
 }
 
+/// The wanted distances between phyxels. @param filling of the inside
+SpacingField wanted_spacing(const PreparedSurface& prepared, const InsideSampler& sampler,
+                            const InsideFilling& filling, double volume,
+                            const SampleRequest& request) {
+  if (!request.grading) {
+    return SpacingField(spacing_for(volume, sampler.area(), request.phyxels));
+  }
+  Grading scaled = *request.grading;
+  for (Grading::Finer& finer : scaled.finer) {
+    finer.region = finer.region.scaled(std::ldexp(1.0, prepared.exponent));
+  }
+  return graded_spacing({.surface = prepared.surface,
+                         .topology = prepared.topology,
+                         .inside = filling.blocks,
+                         .voxel = filling.voxel,
+                         .phyxels = request.phyxels},
+                        scaled);
+}
+
 /// Phyxels on the surface; none if the request or the surface does not allow them.
 SurfaceSites place_on_surface(const PreparedSurface& prepared, const InsideSampler& sampler,
-                              const SampleTally& tally, double volume, const SampleRequest& request,
-                              SampleReport& found) {
+                              const InsideFilling& filling, double volume,
+                              const SampleRequest& request, SampleReport& found) {
   Stage stage("phyxels on the surface");
   SurfaceSites sites;
   try {
-    refuse_surface_phyxels(tally, prepared.topology.closed, prepared.defects);
+    refuse_surface_phyxels(filling.tally, prepared.topology.closed, prepared.defects);
     std::vector<SpaceRegion> cuts;
     for (const SpaceRegion& cut : request.cuts) {
       cuts.push_back(cut.scaled(std::ldexp(1.0, prepared.exponent)));
     }
-    sites = sites_on(prepared.surface, prepared.topology, volume, sampler, cuts, request.phyxels,
-                     request.seed + 3, request.relaxations, stage);
+    sites = sites_on(prepared.surface, prepared.topology, volume,
+                     wanted_spacing(prepared, sampler, filling, volume, request), sampler, cuts,
+                     request.phyxels, request.seed + 3, request.relaxations, stage);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
+    if (request.grading) {
+      throw InputError(fmt::format("a graded body has phyxels on its surface: {}", error.what()));
+    }
     found.warnings.push_back(fmt::format("all phyxels lie inside: {}", error.what()));
   }
   stage.finish();
@@ -229,25 +281,31 @@ void report_tally(const PreparedSurface& prepared, const SampleTally& tally, Sam
 }
 
 /// Fills the inside of a surface that has phyxels on it.
-/// @returns the lattice constant
-double fill_with_lattice(const PreparedSurface& prepared, const InsideSampler& sampler,
-                         const SampleRequest& request, const SurfaceSites& sites, double volume,
-                         bool exact_volume, Cloud& cloud) {
+/// @returns the distances between phyxels
+SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& sampler,
+                          const SampleRequest& request, const SurfaceSites& sites, double volume,
+                          bool exact_volume, Cloud& cloud) {
   const auto placed = static_cast<Index>(sites.position.size() + sites.on_cuts.size());
-  LatticeFilling inside = fill_by_lattice({.surface = prepared.surface,
-                                           .sampler = sampler,
-                                           .sites = sites,
-                                           .volume = volume,
-                                           .exact_volume = exact_volume,
-                                           .phyxels = request.phyxels - placed,
-                                           .seed = request.seed,
-                                           .sweeps = repulsion_sweeps(request.relaxations)});
+  const LatticeRequest lattice{.surface = prepared.surface,
+                               .sampler = sampler,
+                               .sites = sites,
+                               .volume = volume,
+                               .exact_volume = exact_volume,
+                               .phyxels = request.phyxels - placed,
+                               .seed = request.seed,
+                               .sweeps = repulsion_sweeps(request.relaxations)};
+  SpacingField spacing = sites.spacing;
+  LatticeFilling inside =
+      spacing.is_uniform() ? fill_by_lattice(lattice) : fill_graded(lattice, spacing);
   cloud.position = sites.position;
   cloud.position.insert(cloud.position.end(), sites.on_cuts.begin(), sites.on_cuts.end());
   cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
   cloud.volume = std::move(inside.volume);
   cloud.cuts = sites.cuts;
-  return inside.spacing;
+  if (spacing.is_uniform()) return SpacingField(inside.spacing);
+  cloud.spacing = tabulated(cloud.position.size(),
+                            [&](std::size_t k) { return spacing.at(cloud.position[k]); });
+  return spacing;
 }
 
 /// The phyxels on the triangles of each named group, or, if all phyxels lie inside, those within a
@@ -298,20 +356,24 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
                    : static_cast<double>(tally.samples) * std::pow(filling.voxel, 3);
   };
   if (request.on_surface.value_or(true)) {
-    measure(filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, 2e4, 1e6)));
-    sites = place_on_surface(prepared, sampler, tally, volume, request, found);
+    // Small finer regions need more samples for the number of their phyxels to be foretold.
+    const double least = request.grading ? 2e5 : 2e4;
+    const InsideFilling filling =
+        filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, least, 1e6));
+    measure(filling);
+    sites = place_on_surface(prepared, sampler, filling, volume, request, found);
   }
   Cloud cloud;
-  double spacing = 0;
+  SpacingField spacing(0);
   if (sites.position.empty()) {
     const double samples = samples_per_phyxel(request.phyxels);
     check_memory(request.phyxels, bytes_scattered(samples));
     InsideFilling filling = filled(prepared, sampler, request, request.phyxels * samples);
     measure(filling);
-    spacing = std::cbrt(volume / request.phyxels);
-    fill_scattered(sampler, filling, request, spacing, cloud);
+    spacing = SpacingField(std::cbrt(volume / request.phyxels));
+    fill_scattered(sampler, filling, request, spacing.coarsest(), cloud);
   } else {
-    spacing = fill_with_lattice(prepared, sampler, request, sites, volume, exact, cloud);
+    spacing = fill_between(prepared, sampler, request, sites, volume, exact, cloud);
   }
   found.on_surface = static_cast<Index>(sites.position.size());
   report_tally(prepared, tally, found);
@@ -321,7 +383,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   for (double& v : cloud.volume) v *= found.volume / total;
 
   measure_gaps(cloud.position, spacing, found);
-  add_regions(cloud, prepared.surface, sites.position.size(), spacing);
+  add_regions(cloud, prepared.surface, sites.position.size(), spacing.finest());
   cloud.surface = std::move(prepared.surface);
   order_along_curve(cloud);
 
@@ -329,6 +391,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   scale(cloud.surface.position, -exponent);
   scale(cloud.position, -exponent);
   for (double& v : cloud.volume) v = std::ldexp(v, -3 * exponent);
+  for (double& s : cloud.spacing) s = std::ldexp(s, -exponent);
   for (SupportCut& cut : cloud.cuts.list) {
     cut = {cut.support.scaled(std::ldexp(1.0, -exponent)),
            cut.wall.scaled(std::ldexp(1.0, -exponent))};

@@ -6,13 +6,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "mesh/cuts.hpp"
 #include "mesh/face_relaxation.hpp"
-#include "mesh/random_bits.hpp"
+#include "mesh/grading.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
+#include "mesh/surface_points.hpp"
 #include "model/box.hpp"
 #include "model/host_memory.hpp"
 #include "parallel_sort.hpp"
@@ -22,9 +22,6 @@
 namespace phyxel {
 namespace {
 
-/// Cosine of the smallest angle between the normals of two faces that makes their edge sharp, and
-/// of the smallest turn of a sharp edge that makes a corner.
-const double sharp = std::cos(40 * std::numbers::pi / 180);
 /// Area, in squares of the longest side, below which a triangle's normal is rounding error.
 constexpr double no_area = 1e-12;
 /// Number of sample points for each site along an edge and on a face.
@@ -39,12 +36,6 @@ struct Features {
   std::vector<PointOn> corners;  ///< Corners, with the indices of their vertices.
   std::vector<Crease> creases;
 };
-
-Vec3d area_of(const Surface& surface, Index triangle) {
-  const Triangle& t = surface.triangle[triangle];
-  const Vec3d a = surface.position[t[0]];
-  return 0.5 * cross(surface.position[t[1]] - a, surface.position[t[2]] - a);
-}
 
 Features features_of(const Surface& surface, const SurfaceTopology& topology) {
   Features features;
@@ -120,92 +111,64 @@ std::vector<SampleBlock> blocks_of(std::span<const PointOn> points, double side)
   return blocks;
 }
 
-/// Number of samples of each piece in turn, rounded so that any run of pieces gets its share.
-class Shares {
- public:
-  explicit Shares(double size_of_one) : one_(size_of_one) {}
-  std::int64_t next(double size) {
-    size_ += size;
-    const auto before = given_;
-    given_ = static_cast<std::int64_t>(size_ / one_ + 0.5);
-    return given_ - before;
-  }
-
- private:
-  double one_, size_ = 0;
-  std::int64_t given_ = 0;
-};
-
-std::vector<SampleBlock> samples_along(const std::vector<Crease>& creases, double spacing) {
+/// Points evenly spread along pieces of edges, `samples_along_edges` on each spacing.
+std::vector<PointOn> points_along(const std::vector<Crease>& creases, const SpacingField& spacing) {
   std::vector<PointOn> points;
-  Shares shares(spacing / samples_along_edges);
-  for (std::size_t e = 0; e < creases.size(); ++e) {
-    const Vec3d from = creases[e].from, along = creases[e].to - from;
-    const std::int64_t n = shares.next(norm(along));
+  const double one = spacing.is_uniform() ? spacing.coarsest() : 1;
+  Shares shares(one / samples_along_edges);
+  const auto add = [&](std::size_t e, Vec3d from, Vec3d along, double size) {
+    const std::int64_t n = shares.next(size);
     for (std::int64_t k = 0; k < n; ++k) {
       points.push_back(
           {e, from + ((static_cast<double>(k) + 0.5) / static_cast<double>(n)) * along});
     }
-  }
-  return blocks_of(points, spacing);
-}
-
-/// Points evenly spread over the triangles, one on each `area` [m²], in the triangles' order.
-/// @param made made(triangle, point) returns what a point is stored as
-template <class Points, class Made>
-Points spread_over(const Surface& surface, double area, std::uint64_t seed, Made&& made) {
-  constexpr double step_1 = 0.7548776662466927, step_2 = 0.5698402909980532;
-  const std::size_t triangles = surface.triangle.size();
-  std::vector<std::size_t> first(triangles + 1, 0);  // point of each triangle
-  Shares shares(area);
-  for (std::size_t t = 0; t < triangles; ++t) {
-    const std::int64_t n = shares.next(norm(area_of(surface, static_cast<Index>(t))));
-    first[t + 1] = first[t] + static_cast<std::size_t>(n);
-  }
-  Points points(first.back());
-  // A cube has twelve triangles, a scan ten million.
-  const std::size_t at_once = triangles / 4096 + 1;
-#pragma omp parallel for schedule(dynamic, at_once)
-  for (std::size_t t = 0; t < triangles; ++t) {
-    const Triangle& corner = surface.triangle[t];
-    const Vec3d a = surface.position[corner[0]];
-    const Vec3d ab = surface.position[corner[1]] - a, ac = surface.position[corner[2]] - a;
-    const std::uint64_t bits = mix_bits(seed ^ mix_bits(t));
-    double u = unit_fraction(bits), v = unit_fraction(bits >> 21);
-    for (std::size_t k = first[t]; k < first[t + 1]; ++k) {
-      u += step_1, v += step_2;
-      u -= std::floor(u), v -= std::floor(v);
-      points[k] = made(t, u + v < 1 ? a + u * ab + v * ac : a + (1 - u) * ab + (1 - v) * ac);
+  };
+  for (std::size_t e = 0; e < creases.size(); ++e) {
+    const Vec3d from = creases[e].from, along = creases[e].to - from;
+    const double length = norm(along);
+    if (spacing.is_uniform()) {
+      add(e, from, along, length);
+      continue;
+    }
+    // Stretches on which the spacing is nearly one.
+    for (double at = 0; at < length;) {
+      const double here = spacing.at(from + (at / length) * along),
+                   end = std::min(length, at + 0.25 * here);
+      add(e, from + (at / length) * along, ((end - at) / length) * along, (end - at) / here);
+      at = end;
     }
   }
   return points;
 }
 
-/// Adds sites at random sample points of edges and relaxes them; the sites of the argument stay.
-void add_along_edges(std::vector<Vec3d>& site, std::vector<SampleBlock> blocks, double gap,
-                     double spacing, std::uint64_t seed, int relaxations) {
+/// Adds sites at random points of edges and relaxes them; the sites of the argument stay.
+void add_along_edges(std::vector<Vec3d>& site, const std::vector<Crease>& creases,
+                     const SpacingField& spacing, std::uint64_t seed, int relaxations) {
   const std::size_t fixed = site.size();
-  const std::vector<Vec3d> more = fill_with_darts(blocks, gap, seed, site);
+  const std::vector<PointOn> points = points_along(creases, spacing);
+  std::vector<SampleBlock> blocks = blocks_of(points, spacing.coarsest());
+  const std::vector<Vec3d> more = fill_with_darts(blocks, spacing, gap_along_edges, seed, site);
   if (more.empty()) return;
   site.insert(site.end(), more.begin(), more.end());
+  if (!spacing.is_uniform()) {
+    relax_on_edges(creases, points, site, fixed, spacing, repulsion_sweeps(relaxations));
+    return;
+  }
   SampledVoronoi voronoi(std::move(blocks));
-  voronoi.relax(site, spacing, relaxations, fixed);
+  voronoi.relax(site, spacing.coarsest(), relaxations, fixed);
   // The centroids of cells of curved edges and faces lie off the surface.
   std::vector<std::uint8_t> which(site.size(), 1);
   std::fill_n(which.begin(), fixed, 0);
-  voronoi.snap(site, spacing, which, fixed);
+  voronoi.snap(site, spacing.coarsest(), which, fixed);
 }
 
 /// Adds sites at random points of faces and relaxes them; the sites of the argument stay.
-void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, double spacing,
+void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const SpacingField& spacing,
                   std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
-  const auto sample = spread_over<Bulk<PointOn>>(surface, spacing * spacing / samples_on_faces,
-                                                 seed, [](std::size_t triangle, Vec3d p) {
-                                                   return PointOn{triangle, p};
-                                                 });
-  const std::vector<Vec3d> more =
-      fill_with_darts(blocks_of(sample, spacing), gap_on_faces * spacing, seed + 1, site);
+  const Bulk<PointOn> sample = points_over(surface, spacing, samples_on_faces, seed);
+  const std::vector<Vec3d> more = fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing,
+                                                  gap_on_faces, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());
   relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
 }
@@ -223,17 +186,28 @@ void settle_on_cuts(std::vector<Vec3d>& site, std::size_t first, std::span<const
   }
 }
 
+/// The finest spacing on the part of a region's boundary that lies in a body [m].
+double finest_on(const SpacingField& spacing, const InsideSampler& sampler,
+                 const SpaceRegion& region) {
+  if (spacing.is_uniform()) return spacing.coarsest();
+  double finest = spacing.coarsest();
+  for (const Vec3d p : points_on_cut(sampler, region, sampler.extent() / 64, 1)) {
+    finest = std::min(finest, spacing.at(p));
+  }
+  return finest;
+}
+
 /// Adds sites where sharp edges cross the boundaries of regions.
 void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std::uint64_t seed) {
-  const double spacing = sites.spacing;
+  const SpacingField& spacing = sites.spacing;
   std::vector<PointOn> points;
-  for (const Vec3d p : crossings(creases, sites.boundaries, 0.5 * spacing))
+  for (const Vec3d p : crossings(creases, sites.boundaries, 0.5 * spacing.finest()))
     points.push_back({0, p});
   if (points.empty()) return;
   std::vector<Vec3d>& site = sites.position;
   const std::size_t first = site.size();
   const std::vector<Vec3d> more =
-      fill_with_darts(blocks_of(points, spacing), gap_at_corners * spacing, seed, site);
+      fill_with_darts(blocks_of(points, spacing.coarsest()), spacing, gap_at_corners, seed, site);
   site.insert(site.end(), more.begin(), more.end());
   settle_on_cuts(site, first, sites.boundaries, sites.cuts.depth);
 }
@@ -241,19 +215,20 @@ void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std:
 /// Adds sites along the curves on a surface in which the boundaries of regions cut it.
 void add_along_cuts(const Surface& surface, SurfaceSites& sites, std::uint64_t seed,
                     int relaxations) {
-  const double spacing = sites.spacing;
-  const std::vector<Crease> curves = cutting_curves(surface, sites.boundaries, 0.5 * spacing);
+  const SpacingField& spacing = sites.spacing;
+  const std::vector<Crease> curves =
+      cutting_curves(surface, sites.boundaries, 0.5 * spacing.finest());
   if (curves.empty()) return;
   const std::size_t first = sites.position.size();
-  add_along_edges(sites.position, samples_along(curves, spacing), gap_along_edges * spacing,
-                  spacing, seed, relaxations);
+  add_along_edges(sites.position, curves, spacing, seed, relaxations);
   settle_on_cuts(sites.position, first, sites.boundaries, sites.cuts.depth);
 }
 
 /// Adds sites on the boundary of a region inside a surface, at most `most` with those there are.
 void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSites& sites,
                 double most, std::uint64_t seed, int relaxations) {
-  const double spacing = sites.spacing, gap = spacing / std::sqrt(samples_on_faces);
+  const SpacingField& spacing = sites.spacing;
+  const double gap = finest_on(spacing, sampler, cut) / std::sqrt(samples_on_faces);
   const std::vector<Vec3d> points = points_on_cut(sampler, cut, gap, seed);
   if (points.empty()) return;
   std::vector<PointOn> samples;
@@ -262,7 +237,7 @@ void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSit
   all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
   const std::size_t first = all.size();
   const std::vector<Vec3d> more =
-      fill_with_darts(blocks_of(samples, spacing), gap_on_faces * spacing, seed + 1, all);
+      fill_with_darts(blocks_of(samples, spacing.coarsest()), spacing, gap_on_faces, seed + 1, all);
   // A boundary that two regions share has its sites already.
   if (more.empty() || static_cast<double>(sites.on_cuts.size() + more.size()) > 0.75 * most) return;
   all.insert(all.end(), more.begin(), more.end());
@@ -275,38 +250,23 @@ void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSit
 }
 
 /// A subset of the corners that are not too near to each other [m].
-std::vector<Vec3d> corners_of(const Features& features, double spacing, std::uint64_t seed) {
-  const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing);
-  std::vector<Vec3d> site = fill_with_darts(blocks, gap_at_corners * spacing, seed, {});
+std::vector<Vec3d> corners_of(const Features& features, const SpacingField& spacing,
+                              std::uint64_t seed) {
+  const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing.coarsest());
+  std::vector<Vec3d> site = fill_with_darts(blocks, spacing, gap_at_corners, seed, {});
   if (site.empty()) return site;
   // Sample offsets are rounded to float; this restores the exact corners.
-  SampledVoronoi(blocks).snap(site, spacing, std::vector<std::uint8_t>(site.size(), 1), 0);
+  SampledVoronoi(blocks).snap(site, spacing.coarsest(),
+                              std::vector<std::uint8_t>(site.size(), 1), 0);
   return site;
-}
-
-/// The spacing s [m] that solves phyxels = V/s³ + A/(2 s²): a phyxel on a face takes half the
-/// volume of an interior one.
-double spacing_for(double volume, double area, Index phyxels) {
-  double low = std::cbrt(volume / phyxels), high = low;
-  const auto needed = [&](double s) { return volume / (s * s * s) + area / (2 * s * s); };
-  while (needed(high) > phyxels) high *= 2;
-  for (int k = 0; k < 60; ++k) {
-    const double middle = 0.5 * (low + high);
-    (needed(middle) > phyxels ? low : high) = middle;
-  }
-  return high;
 }
 
 }  // namespace
 
-std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed) {
-  return spread_over<std::vector<Vec3d>>(surface, area, seed,
-                                         [](std::size_t, Vec3d p) { return p; });
-}
-
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
-                      const InsideSampler& sampler, std::span<const SpaceRegion> regions,
-                      Index phyxels, std::uint64_t seed, int relaxations, Stage& stage) {
+                      const SpacingField& wanted, const InsideSampler& sampler,
+                      std::span<const SpaceRegion> regions, Index phyxels, std::uint64_t seed,
+                      int relaxations, Stage& stage) {
   double area = 0;
   for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
     area += norm(area_of(surface, static_cast<Index>(t)));
@@ -315,34 +275,41 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
   const double rounding =
       16 * std::numeric_limits<double>::epsilon() * box_around(surface.position).farthest();
   SurfaceSites found;
-  found.spacing = spacing_for(volume, area, phyxels);
+  found.spacing = wanted;
   for (int attempt = 0; attempt < 8; ++attempt) {
-    const double s = found.spacing;
-    if (s > 2 * volume / area) break;
-    const double samples = samples_on_faces * area / (s * s);
-    require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
-    found.cuts = {.list = {}, .depth = 1e-7 * s + rounding, .spacing = s, .shift = 0};
+    const SpacingField s = found.spacing;
+    if (s.finest() > 2 * volume / area) break;
+    if (s.is_uniform()) {
+      const double samples = samples_on_faces * area / (s.coarsest() * s.coarsest());
+      require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
+    }
+    found.cuts = {.list = {},
+                  .depth = 1e-7 * s.finest() + rounding,
+                  .spacing = s.coarsest(),
+                  .shift = 0};
     found.boundaries.clear();
     for (const SpaceRegion& region : regions) {
-      const PlannedCut planned = plan_cut(sampler, surface, region, s);
+      const PlannedCut planned =
+          plan_cut(sampler, surface, region, finest_on(s, sampler, region));
       if (planned.is_cut) found.boundaries.push_back(planned.boundary);
       if (planned.has_inside) found.cuts.list.push_back({region, planned.boundary});
     }
     found.position = corners_of(features, s, seed);
     add_crossings(found, features.creases, seed);
-    add_along_edges(found.position, samples_along(features.creases, s), gap_along_edges * s, s,
-                    seed, relaxations);
+    add_along_edges(found.position, features.creases, s, seed, relaxations);
     add_along_cuts(surface, found, seed + 2, relaxations);
     add_on_faces(surface, found.position, s, seed + 1, relaxations, stage);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
-    if (inside > 0.25 * volume / (s * s * s)) {
+    const double least_inside = s.is_uniform() ? 0.25 * volume / std::pow(s.coarsest(), 3)
+                                               : 0.1 * static_cast<double>(phyxels);
+    if (inside > least_inside) {
       for (const SpaceRegion& cut : found.boundaries) {
         add_on_cut(sampler, cut, found, inside, seed + 3, relaxations);
       }
       return found;
     }
-    found.spacing *= 1.1;
+    found.spacing = s.with_coarsest(1.1 * s.coarsest());
   }
   const double thickness = 2 * volume / area;
   throw InputError(fmt::format(

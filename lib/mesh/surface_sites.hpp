@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "mesh/spacing_field.hpp"
 #include "mesh/surface_topology.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/space_region.hpp"
@@ -26,25 +27,23 @@ struct SurfaceSites {
   /// wall.
   std::vector<SpaceRegion> boundaries;
   SupportCuts cuts;  ///< Regions that have space inside.
-  /// Cube root of the volume of an interior phyxel [m]; one on a face has about half that volume.
-  double spacing = 0;
+  /// Cube root of the volume of an interior phyxel; one on a face has about half that volume.
+  SpacingField spacing{0};
 };
-
-/// Points evenly spread over the triangles of a surface, one on each `area` [m²].
-/// Source of the sequence: Roberts 2018 (R2), folded from a square into the triangle.
-std::vector<Vec3d> points_over(const Surface& surface, double area, std::uint64_t seed);
 
 /// Distributes sites over a surface and over cuts through its inside: the boundaries of regions
 /// that reach into it. Sites on cuts lie inside the regions by a little more than rounding errors.
 /// @param surface must be closed and must not overlap itself
 /// @param sampler sampler of the surface's inside
 /// @param volume enclosed volume [m³]
+/// @param spacing the wanted one; the one found may be coarser
 /// @param phyxels total number of phyxels, some of which are left for the inside
 /// @param stage is told the progress
 /// @throws InputError if there are so few phyxels that those on opposite sides would be nearer to
 ///   each other than those side by side
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
-                      const InsideSampler& sampler, std::span<const SpaceRegion> cuts,
-                      Index phyxels, std::uint64_t seed, int relaxations, Stage& stage);
+                      const SpacingField& spacing, const InsideSampler& sampler,
+                      std::span<const SpaceRegion> cuts, Index phyxels, std::uint64_t seed,
+                      int relaxations, Stage& stage);
 
 }  // namespace phyxel

@@ -21,6 +21,8 @@ Cloud rest_cloud(const CutSource& from) {
   }
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
+    std::optional<Grading> grading = source.grading;
+    if (grading) grading->finer = from.finer;
     try {
       SampleReport report;
       Cloud cloud = sample_surface(surface,
@@ -28,7 +30,8 @@ Cloud rest_cloud(const CutSource& from) {
                                     .seed = source.seed,
                                     .relaxations = source.relaxations,
                                     .on_surface = source.on_surface,
-                                    .cuts = from.cuts},
+                                    .cuts = from.cuts,
+                                    .grading = grading},
                                    &report);
       cloud.cuts.shift = from.shift;
       for (const std::string& warning : report.warnings) {

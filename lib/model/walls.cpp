@@ -164,22 +164,30 @@ std::vector<SpaceRegion> support_regions(const BodyRequest& request) {
 }
 
 CutSource source_of(const BodyRequest& request) {
-  CutSource made{request.source, {}, 0};
+  CutSource made{request.source, {}, {}, 0};
   if (request.source.mesh.empty()) return made;
   const Mat3d rotation = rotation_of(request);
   for (const SpaceRegion& region : support_regions(request)) {
     made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
+  }
+  for (const FinerRequest& finer : request.finer) {
+    made.finer.push_back({region_of(finer.select)->before_placement(request.scale, rotation,
+                                                                    request.translation),
+                          finer.by});
   }
   made.shift = norm(request.translation) / request.scale;
   return made;
 }
 
 bool is_same(const CutSource& a, const CutSource& b) {
-  return a.source == b.source &&
-         std::equal(a.cuts.begin(), a.cuts.end(), b.cuts.begin(), b.cuts.end(),
-                    [&](const SpaceRegion& one, const SpaceRegion& other) {
-                      return nearly_equal(one, other, a.shift + b.shift);
-                    });
+  const auto equal = [&](const SpaceRegion& one, const SpaceRegion& other) {
+    return nearly_equal(one, other, a.shift + b.shift);
+  };
+  const auto equal_finer = [&](const Grading::Finer& one, const Grading::Finer& other) {
+    return one.by == other.by && equal(one.region, other.region);
+  };
+  return a.source == b.source && std::ranges::equal(a.cuts, b.cuts, equal) &&
+         std::ranges::equal(a.finer, b.finer, equal_finer);
 }
 
 void place_cuts(Cloud& cloud, const BodyRequest& request) {

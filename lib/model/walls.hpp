@@ -28,6 +28,7 @@ std::vector<SpaceRegion> support_regions(const BodyRequest& request);
 struct CutSource {
   BodySource source;
   std::vector<SpaceRegion> cuts;
+  std::vector<Grading::Finer> finer;  ///< Regions in which phyxels are nearer to each other.
   double shift = 0;  ///< Length of the translation, whose digits the cuts' coordinates lack [m].
 };
 CutSource source_of(const BodyRequest& request);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "model/selection.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
 #include "phyxel/shapes.hpp"
@@ -24,7 +25,7 @@ SourceKeys lattice_keys(std::vector<const char*> needed) {
 }
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
-  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations", "on_surface"}};
+  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations", "on_surface", "grading"}};
   if (std::string(kind) == "file" || std::string(kind) == "cloud") return {};
   if (is_paper_shape(shape)) return {{}, {"surfels"}};
   if (shape == "cylinder") return lattice_keys({"radius", "length"});
@@ -39,7 +40,7 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
   std::vector<std::string> used(keys.needed.begin(), keys.needed.end());
   used.insert(used.end(), keys.optional.begin(), keys.optional.end());
   for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "lattice", "jitter",
-                           "seed", "relaxations", "on_surface", "surfels"}) {
+                           "seed", "relaxations", "on_surface", "grading", "surfels"}) {
     if (!body.has(name) || std::find(used.begin(), used.end(), name) != used.end()) continue;
     body.refuse(name,
                 fmt::format("found, but {} does not use it; allowed with {}: {}", source, source,
@@ -71,6 +72,33 @@ void check_file_exists(const SceneTable& body, const char* kind,
                                   "to the scene file's folder",
                                   file.string()));
   }
+}
+
+Grading read_grading(const SceneTable& table) {
+  Grading grading;
+  table.read("ratio", grading.ratio);
+  table.read("growth", grading.growth);
+  table.read("per_radius", grading.per_radius);
+  table.read("across", grading.across);
+  return grading;
+}
+
+std::vector<FinerRequest> read_finer(const SceneTable& table, double ratio) {
+  std::vector<FinerRequest> all;
+  for (const SceneTable& finer : table.tables("finer")) {
+    FinerRequest request{read_selection(finer), ratio};
+    if (!region_of(request.select)) {
+      throw InputError(fmt::format("{}: finer has no box and no ball; allowed: one of the two",
+                                   request.select.where));
+    }
+    finer.read("by", request.by);
+    if (request.by > ratio) {
+      finer.refuse("by", fmt::format("{:g} found; allowed: 1 to the ratio of the grading, {:g}",
+                                     request.by, ratio));
+    }
+    all.push_back(request);
+  }
+  return all;
 }
 
 BodySource read_source(const SceneTable& body) {
@@ -106,6 +134,13 @@ BodySource read_source(const SceneTable& body) {
   body.read("seed", source.seed);
   body.read("relaxations", source.relaxations);
   body.read("on_surface", source.on_surface);
+  if (body.has("grading")) {
+    source.grading = read_grading(body.table("grading"));
+    if (source.on_surface == false) {
+      body.refuse("on_surface", "false found, but a graded body has phyxels on its surface; allowed: "
+                                "true, or no grading");
+    }
+  }
   shape.seed = source.seed;
   return source;
 }
@@ -313,6 +348,9 @@ BodyRequest read_body_request(const SceneTable& table) {
   for (const SceneTable& inclusion : table.tables("inclusion")) {
     body.inclusions.push_back(read_inclusion(inclusion, body.material));
   }
+  if (body.source.grading) {
+    body.finer = read_finer(table.table("grading"), body.source.grading->ratio);
+  }
   for (const SceneTable& fixed : table.tables("fixed")) {
     body.fixed.push_back({read_selection(fixed), read_axes(fixed)});
   }
@@ -336,6 +374,7 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
   copy.name = fmt::format("{} {}", body.name, number);
   copy.translation += by;
   for (InclusionRequest& inclusion : copy.inclusions) move(inclusion.select, by);
+  for (FinerRequest& finer : copy.finer) move(finer.select, by);
   for (FixRequest& fix : copy.fixed) move(fix.select, by);
   for (MotionRequest& motion : copy.motions) {
     move(motion.select, by);

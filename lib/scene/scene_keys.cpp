@@ -219,6 +219,8 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Whether phyxels of a mesh lie on its surface, too, on its corners and along its "
            "sharp edges: far more accurate in bending, with `closure` above all. Needs a closed "
            "mesh that does not overlap itself, and enough phyxels."},
+      {.section = "body", .name = "grading", .type = KeyType::table, .otherwise = "one distance between phyxels everywhere",
+       .meaning = "Where the phyxels of a mesh are nearer to each other than elsewhere."},
       {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Whether a built-in shape gets its surfels."},
       {.section = "body", .name = "scale", .fallback = "1", .range = length(),
@@ -332,6 +334,24 @@ std::vector<SceneKey> body_keys() {
   };
 }
 
+std::vector<SceneKey> grading_keys() {
+  return {
+      {.section = "body.grading", .name = "ratio", .fallback = "4", .range = between(1, 10),
+       .meaning = "Largest over smallest distance between neighbours."},
+      {.section = "body.grading", .name = "growth", .fallback = "0.25", .range = between(0.05, 0.5),
+       .meaning = "How fast the distance between neighbours grows along a path, by the path's length, at most."},
+      {.section = "body.grading", .name = "per_radius", .fallback = "4", .range = between(0, 1000),
+       .meaning = "Phyxels over a radius of curvature of the surface; 0: however it curves. Edges "
+           "sharper than 40 degrees are no curvature."},
+      {.section = "body.grading", .name = "across", .fallback = "5", .range = between(0, 1000),
+       .meaning = "Phyxels through thin places; 0: however thin they are."},
+      {.section = "body.grading", .name = "finer", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Regions in which phyxels are nearer to each other."},
+      {.section = "body.grading.finer", .name = "by", .otherwise = "`ratio`", .range = between(1, 10),
+       .meaning = "Largest distance between neighbours over the one in the region; at most `ratio`."},
+  };
+}
+
 std::vector<SceneKey> boundary_keys() {
   const std::vector<std::string> axes = {"x", "y", "z", "xy", "xz", "yz", "xyz"};
   return {
@@ -431,7 +451,7 @@ std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {
     std::vector<SceneKey> keys;
     for (const auto& part : {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
-                             law_keys("body.inclusion"), boundary_keys(), place_keys()}) {
+                             law_keys("body.inclusion"), grading_keys(), boundary_keys(), place_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

@@ -75,6 +75,12 @@ void visit_source(const BodySource& source, Visit&& visit) {
   visit("body", "seed", source.seed);
   visit("body", "relaxations", source.relaxations);
   if (source.on_surface) visit("body", "on_surface", *source.on_surface);
+  if (source.grading) {
+    visit("body.grading", "ratio", source.grading->ratio);
+    visit("body.grading", "growth", source.grading->growth);
+    visit("body.grading", "per_radius", source.grading->per_radius);
+    visit("body.grading", "across", source.grading->across);
+  }
   visit("body", "surfels", shape.surface);
 }
 
@@ -146,6 +152,9 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
   };
   each(body.inclusions, "inclusion", [&](const InclusionRequest& inclusion, auto&& inner) {
     visit_material("body.inclusion", body, inclusion.material, inner);
+  });
+  each(body.finer, "grading.finer", [](const FinerRequest& finer, auto&& inner) {
+    inner("body.grading.finer", "by", finer.by);
   });
   each(body.fixed, "fixed", [](const FixRequest& fix, auto&& inner) {
     inner("body.fixed", "axes", axes_in_words(fix.axes));

@@ -23,7 +23,7 @@ std::vector<SceneSection> make_sections() {
        "origin, the cylinder along z.\n"
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
        "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
-       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`. Named groups of its triangles "
+       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations`, `on_surface` and `grading`. Named groups of its triangles "
        "are regions: an OBJ file's groups, objects and materials, the solids of an STL file, and colours: "
        "`\"#ff0000\"` of the faces of a PLY file, `\"attribute 31\"` of the triangles of a binary STL file. A region has "
        "the phyxels on its triangles; if all phyxels lie inside, those within a spacing of them.\n"
@@ -36,6 +36,12 @@ std::vector<SceneSection> make_sections() {
        "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
        "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
        "phyxels of a body with inclusions are numbered material by material."},
+      {"body.grading", "[body.grading]", "",
+       "Distances between the phyxels of a mesh that differ from place to place: smaller where the surface "
+       "curves, where the body is thin, and in finer regions, and growing from there. How many phyxels there are "
+       "is still said by `phyxels`. The smallest distance sets the time step. Needs a mesh that phyxels can lie on."},
+      {"body.grading.finer", "[[body.grading.finer]]", "selection",
+       "A `box` or a `ball` in which phyxels are nearer to each other."},
       {"body.neighbours", "[body.neighbours]", "",
        "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
        "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},

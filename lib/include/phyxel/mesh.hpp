@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "phyxel/cloud.hpp"
+#include "phyxel/grading.hpp"
 #include "phyxel/space_region.hpp"
 
 namespace phyxel {
@@ -49,6 +50,8 @@ struct SampleRequest {
   /// Regions at whose boundaries supports of the body end: if there are phyxels on the surface,
   /// there are also some on these boundaries, and the cloud has the regions as its `cuts`.
   std::vector<SpaceRegion> cuts;
+  /// Unset for the same distance everywhere. A graded body has phyxels on its surface.
+  std::optional<Grading> grading;
 };
 
 /// Statistics of a sampled surface.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "phyxel/grading.hpp"
 #include "phyxel/material.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/shapes.hpp"
@@ -138,7 +139,16 @@ struct BodySource {
   int relaxations = 30;
   /// Mesh: true puts phyxels on the surface, too; unset: wherever the surface allows it.
   std::optional<bool> on_surface;
+  /// Mesh: unset for the same distance between phyxels everywhere. Its finer regions are those of
+  /// the body (`BodyRequest::finer`), before it is placed.
+  std::optional<Grading> grading;
   bool operator==(const BodySource&) const = default;
+};
+
+/// A box or a ball in which the phyxels of a graded body are nearer to each other.
+struct FinerRequest {
+  Selection select;
+  double by = 1;  ///< The coarsest distance between neighbours over the one here.
 };
 
 /// Tolerance of closed gradients of a body that does not ask for one. Displacements are then within
@@ -165,6 +175,7 @@ struct BodyRequest {
   /// Inclusions; where several contain a phyxel, the last one counts. The strength of hourglass
   /// control is the body's.
   std::vector<InclusionRequest> inclusions;
+  std::vector<FinerRequest> finer;
   std::vector<FixRequest> fixed;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;

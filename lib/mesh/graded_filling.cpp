@@ -1,0 +1,298 @@
+#include "mesh/graded_filling.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mesh/relaxation.hpp"
+#include "mesh/repulsion.hpp"
+#include "mesh/rooms.hpp"
+#include "mesh/surface_points.hpp"
+#include "stage.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+/// Clearance from the surface and from phyxels on it that a node has at the start, in spacings, and
+/// the least to which it is reduced where there is no room for all.
+constexpr double usual_clearance = 0.62, least_clearance = 0.45;
+/// Strength of the repulsion by a phyxel on the surface, as beside a lattice.
+constexpr double surface_strength = 0.85;
+constexpr double surface_samples = 12;
+/// Sample points for a volume along a spacing.
+constexpr double samples_along = 5;
+/// Levels of an octave, each with a lattice and a size of samples of its own.
+constexpr int levels_of_octave = 3;
+
+/// Ranges of spacings, from fine to coarse.
+class Levels {
+ public:
+  explicit Levels(const SpacingField& spacing)
+      : spacing_(spacing),
+        count_(1 + static_cast<int>(levels_of_octave *
+                                    std::log2(spacing.coarsest() / spacing.finest()) * (1 + 1e-9))) {
+  }
+  int count() const { return count_; }
+  /// The smallest spacing of a level [m].
+  double smallest(int level) const {
+    return spacing_.finest() * std::exp2(static_cast<double>(level) / levels_of_octave);
+  }
+  int level_of(double spacing) const {
+    const double octaves = std::log2(spacing / spacing_.finest());
+    return std::clamp(static_cast<int>(std::floor(levels_of_octave * octaves)), 0, count_ - 1);
+  }
+  int level_at(Vec3d place) const { return level_of(spacing_.at(place)); }
+  /// False if no place of a ball has a spacing of the level.
+  bool may_reach(int level, Vec3d middle, double radius) const {
+    const double here = spacing_.at(middle), change = spacing_.growth() * radius;
+    return level_of(std::max(here - change, spacing_.finest())) <= level &&
+           level_of(here + change) >= level;
+  }
+
+ private:
+  const SpacingField& spacing_;
+  int count_;
+};
+
+/// Tests places for their distance from the surface, from cuts and from the phyxels on them.
+class Clear {
+ public:
+  Clear(const LatticeRequest& request, const SpacingField& spacing) : spacing_(spacing) {
+    std::vector<Vec3d> place = request.sites.position;
+    place.insert(place.end(), request.sites.on_cuts.begin(), request.sites.on_cuts.end());
+    // A distance to a point between phyxels counts for more than one to a phyxel.
+    sites_ = place.size();
+    for (const PointOn& p :
+         points_over(request.surface, spacing, surface_samples, request.seed + 1)) {
+      place.push_back(p.point);
+    }
+    place.insert(place.end(), request.sites.cut_points.begin(), request.sites.cut_points.end());
+    hash_.emplace(place, tabulated(place.size(),
+                                   [&](std::size_t k) { return 0.5 * spacing.at(place[k]); }));
+  }
+
+  /// The clearance of a place, in spacings; 1 for all that is farther.
+  double at(Vec3d place) const {
+    constexpr double sample_factor = 1.2;
+    const double spacing = spacing_.at(place);
+    double clearance = spacing;
+    hash_->visit_ball(
+        place, [&](double) { return spacing; },
+        [&](const GradedHash::Entry& e) {
+          const double factor = static_cast<std::size_t>(e.index) < sites_ ? 1 : sample_factor;
+          clearance = std::min(clearance, factor * norm(e.position - place));
+        });
+    return clearance / spacing;
+  }
+
+ private:
+  const SpacingField& spacing_;
+  std::size_t sites_ = 0;
+  std::optional<GradedHash> hash_;
+};
+
+struct Node {
+  Vec3d position;
+  float clearance;  ///< In spacings.
+  float weight;     ///< Phyxels for this node: less than one where the lattice is too fine.
+};
+
+/// All nodes inside, level by level and task by task.
+std::vector<Node> nodes_inside(const LatticeRequest& request, const SpacingField& spacing) {
+  const Levels levels(spacing);
+  const Clear clear(request, spacing);
+  std::vector<Node> all;
+  for (int level = 0; level < levels.count(); ++level) {
+    // A little finer, since at most one phyxel is made of a node.
+    const double constant = 0.97 * levels.smallest(level);
+    std::vector<std::vector<Node>> by_task(InsideSampler::most_tasks);
+    const auto wanted = [&](Vec3d middle, double half) {
+      return levels.may_reach(level, middle, std::numbers::sqrt3 * half);
+    };
+    request.sampler.visit({.voxel = constant,
+                           .seed = request.seed + static_cast<std::uint64_t>(level),
+                           .at_random = false,
+                           .turn = turn_of_lattice(),
+                           .wanted = wanted},
+                          [&](std::size_t task, const SampleBlock& block) {
+                            for (std::size_t k = 0; k < block.offset.size(); ++k) {
+                              const Vec3d p = block.position(k);
+                              const double s = spacing.at(p);
+                              if (levels.level_of(s) != level) continue;
+                              const double clearance = clear.at(p);
+                              if (clearance < least_clearance) continue;
+                              by_task[task].push_back({p, static_cast<float>(clearance),
+                                                       static_cast<float>(std::pow(constant / s, 3))});
+                            }
+                          });
+    for (std::vector<Node>& nodes : by_task) {
+      all.insert(all.end(), nodes.begin(), nodes.end());
+      nodes = {};
+    }
+  }
+  return all;
+}
+
+double weight_of(const std::vector<Node>& nodes, double clearance) {
+  double sum = 0;
+  for (const Node& node : nodes) sum += node.clearance >= clearance ? node.weight : 0;
+  return sum;
+}
+
+/// Leaves nodes out such that each run of nodes keeps about the sum of its weights, and n are kept.
+std::vector<Vec3d> thinned_out(const std::vector<Node>& nodes, double clearance, std::size_t n) {
+  double weight = weight_of(nodes, clearance), left = static_cast<double>(n);
+  std::size_t candidates = 0;
+  for (const Node& node : nodes) candidates += node.clearance >= clearance;
+  std::vector<Vec3d> kept;
+  double owed = 0.5;
+  for (const Node& node : nodes) {
+    if (node.clearance < clearance) continue;
+    owed += node.weight * (left / weight);
+    // The last nodes are all kept if they are needed.
+    const bool needed = n - kept.size() >= candidates--;
+    if (kept.size() < n && (owed >= 1 || needed)) {
+      kept.push_back(node.position);
+      owed -= 1;
+    }
+  }
+  return kept;
+}
+
+/// The phyxels on the surface and on cuts, and those inside.
+class GradedSkin {
+ public:
+  GradedSkin(const LatticeRequest& request, const SpacingField& spacing,
+             const std::vector<Vec3d>& inside)
+      : request_(request), spacing_(spacing), point_(request.sites.position) {
+    point_.insert(point_.end(), request.sites.on_cuts.begin(), request.sites.on_cuts.end());
+    first_inside_ = point_.size();
+    point_.insert(point_.end(), inside.begin(), inside.end());
+  }
+
+  /// Moves each phyxel inside by the sum of the forces at the places before the sweep.
+  void sweep() {
+    const Repulsion repulsion(point_, spacing_);
+    std::vector<Vec3d> moved = point_;
+    const auto on_surface = static_cast<Index>(request_.sites.position.size());
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t k = first_inside_; k < point_.size(); ++k) {
+      bool beside_surface = false;
+      const auto strength = [&](Index other) {
+        beside_surface |= other < on_surface;
+        return other < on_surface ? surface_strength : 1;
+      };
+      const Vec3d after =
+          point_[k] + repulsion.step(point_[k], static_cast<Index>(k), strength);
+      if (!beside_surface || request_.sampler.inside(after)) moved[k] = after;
+    }
+    point_.swap(moved);
+  }
+
+  std::vector<Vec3d> inside() const {
+    return {point_.begin() + static_cast<std::ptrdiff_t>(first_inside_), point_.end()};
+  }
+
+  /// Shares of the inside by sample points, level by level of their spacing: the nearest phyxel to
+  /// a sample has a spacing near that of the sample [m³]. Cells end at cuts.
+  std::vector<double> volumes(Stage& stage) const {
+    const Levels levels(spacing_);
+    const Rooms rooms(request_.sites.cuts, point_);
+    const auto size =
+        tabulated(point_.size(), [&](std::size_t k) { return spacing_.at(point_[k]); });
+    std::vector<double> volume(point_.size(), 0);
+    for (std::size_t room = 0; room < rooms.size(); ++room) {
+      for (int level = 0; level < levels.count(); ++level) {
+        const double smallest = levels.smallest(level);
+        std::vector<std::size_t> near;
+        std::vector<Vec3d> site;
+        for (const std::size_t k : rooms.points_in(room)) {
+          if (size[k] < 0.5 * smallest || size[k] > 2.5 * smallest) continue;
+          near.push_back(k);
+          site.push_back(point_[k]);
+        }
+        if (site.empty()) continue;
+        const auto wanted = [&](Vec3d middle, double half) {
+          const double radius = std::numbers::sqrt3 * half;
+          return rooms.may_reach(room, middle, radius) && levels.may_reach(level, middle, radius);
+        };
+        const auto counts = [&](Vec3d p) {
+          return levels.level_at(p) == level && (rooms.size() == 1 || rooms.room_of(p) == room);
+        };
+        const double voxel = smallest / samples_along;
+        const std::vector<std::uint32_t> count =
+            NearestSite(site, smallest)
+                .samples_of_sites(request_.sampler,
+                                  {.voxel = voxel, .seed = request_.seed + 2, .wanted = wanted},
+                                  stage, counts);
+        for (std::size_t k = 0; k < near.size(); ++k) {
+          volume[near[k]] += count[k] * std::pow(voxel, 3);
+        }
+      }
+    }
+    for (std::size_t k = 0; k < point_.size(); ++k) {
+      volume[k] = std::max(volume[k], 0.5 * std::pow(size[k] / samples_along, 3));
+    }
+    if (!request_.exact_volume) return volume;
+    double sum = 0;
+    for (const double v : volume) sum += v;
+    for (double& v : volume) v *= request_.volume / sum;
+    return volume;
+  }
+
+ private:
+  const LatticeRequest& request_;
+  const SpacingField& spacing_;
+  std::vector<Vec3d> point_;
+  std::size_t first_inside_ = 0;
+};
+
+}  // namespace
+
+LatticeFilling fill_graded(const LatticeRequest& request, SpacingField& spacing) {
+  Stage placing("placing phyxels");
+  const auto n = static_cast<std::size_t>(request.phyxels);
+  spacing = request.sites.spacing;
+  std::vector<Node> nodes;
+  double clearance = usual_clearance;
+  constexpr int most_attempts = 12;
+  for (int attempt = 0;; ++attempt) {
+    nodes = nodes_inside(request, spacing);
+    const double ratio = weight_of(nodes, usual_clearance) / static_cast<double>(n);
+    const auto enough = static_cast<std::size_t>(
+        std::count_if(nodes.begin(), nodes.end(),
+                      [](const Node& node) { return node.clearance >= usual_clearance; }));
+    if (enough >= n && std::abs(ratio - 1) < 0.02) break;
+    if (attempt == most_attempts && nodes.size() >= n) {
+      clearance = enough >= n ? usual_clearance : least_clearance;
+      break;
+    }
+    // Where a thin body has no room for more, finer distances make it.
+    const double finer = ratio > 0 ? std::clamp(std::cbrt(ratio), 0.8, 1.25) : 0.8;
+    spacing = spacing.with_coarsest(finer * (enough < n ? 0.99 : 1) * spacing.coarsest());
+  }
+  std::vector<Vec3d> inside = thinned_out(nodes, clearance, n);
+  nodes = {};
+  placing.finish();
+
+  Stage relaxing("evening out distances");
+  GradedSkin skin(request, spacing, inside);
+  // Twice as many sweeps as beside a lattice: thinned out lattices are farther from even.
+  const int sweeps = 2 * request.sweeps;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    skin.sweep();
+    relaxing.reach((sweep + 1.0) / sweeps);
+  }
+  relaxing.finish();
+
+  LatticeFilling filling;
+  filling.spacing = spacing.finest();
+  Stage measuring("volumes of phyxels");
+  filling.volume = skin.volumes(measuring);
+  measuring.finish();
+  filling.position = skin.inside();
+  return filling;
+}
+
+}  // namespace phyxel

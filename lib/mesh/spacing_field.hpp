@@ -1,0 +1,83 @@
+/// The distance between phyxels that is wanted at each place of a body.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "phyxel/space_region.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// A place at which a distance between phyxels is wanted.
+struct SpacingSource {
+  Vec3d place;     ///< [m]
+  double spacing;  ///< [m]
+};
+/// A region in which phyxels are to be nearer to each other than elsewhere.
+struct FinerRegion {
+  SpaceRegion region;
+  double ratio = 1;  ///< The coarsest spacing of the body over the one in the region.
+};
+
+/// The smallest of s + growth * |p - x| over sources at x with spacings s, by a tree of cubes: each
+/// leaf has a list of the sources that may be the smallest somewhere in it.
+class SpacingCone {
+ public:
+  /// @param most spacings beyond this are not wanted [m]
+  /// @param least distances below this may be resolved no further [m]
+  SpacingCone(std::span<const SpacingSource> sources, double growth, double least, double most);
+
+  /// The spacing wanted at a place [m]; `most` where no source asks for less.
+  double at(Vec3d place) const;
+
+ private:
+  /// A cube: either a leaf, or one with eight children in a row.
+  struct Node {
+    std::int32_t first_child = -1;  ///< -1 for a leaf.
+    std::uint32_t begin = 0, end = 0;  ///< Its sources, in `listed_`.
+  };
+  void divide(std::size_t node, Vec3d middle, double half, std::vector<std::uint32_t> sources,
+              int depth);
+
+  std::vector<SpacingSource> sources_;
+  double growth_, least_, most_;
+  Vec3d middle_;
+  double half_ = 0;  ///< Half the side of the tree's cube; beyond it no source counts [m].
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> listed_;
+};
+
+/// The distance between phyxels that is wanted at each place: one throughout, or one between a
+/// finest and a coarsest that grows with the distance from sources and finer regions by at most
+/// `growth` times that distance.
+class SpacingField {
+ public:
+  /// One spacing for all places [m].
+  explicit SpacingField(double everywhere) : coarsest_(everywhere) {}
+  /// @param cone may be null
+  /// @param ratio the coarsest spacing over the finest
+  SpacingField(std::shared_ptr<const SpacingCone> cone, std::vector<FinerRegion> regions,
+               double growth, double ratio, double coarsest)
+      : cone_(std::move(cone)),
+        regions_(std::move(regions)),
+        growth_(growth),
+        ratio_(ratio),
+        coarsest_(coarsest) {}
+
+  double at(Vec3d place) const;
+  bool is_uniform() const { return ratio_ == 1; }
+  double coarsest() const { return coarsest_; }          ///< [m]
+  double finest() const { return coarsest_ / ratio_; }   ///< [m]
+  double growth() const { return growth_; }
+  /// The same wishes with another coarsest spacing [m].
+  SpacingField with_coarsest(double coarsest) const;
+
+ private:
+  std::shared_ptr<const SpacingCone> cone_;
+  std::vector<FinerRegion> regions_;
+  double growth_ = 0, ratio_ = 1, coarsest_;
+};
+
+}  // namespace phyxel
