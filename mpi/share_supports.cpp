@@ -81,7 +81,7 @@ void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels
   const auto stretches = ranges_of_bodies(own);
   for (const auto& [first, last] : stretches) {
     const auto b = static_cast<std::size_t>(own[first].body);
-    if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
+    if (rule(b).radius || rule(b).differs()) continue;
     spacings[b] = spacings_of(first, last);
   }
   const std::vector<double> medians = medians_of(setup.ranks, spacings);

@@ -40,6 +40,7 @@ void place(Cloud& cloud, const BodyRequest& request) {
     cloud.position[i] = placed(cloud.position[i]);
   }
   for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
+  for (double& s : cloud.spacing) s *= request.scale;
   place_cuts(cloud, request);
   for (Vec3d& p : cloud.surface.position) p = placed(p);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
@@ -60,12 +61,18 @@ void check_terms(const BodyRequest& request) {
   };
   check_law(request.material);
   for (const InclusionRequest& inclusion : request.inclusions) check_law(inclusion.material);
+  const NeighbourhoodRule& rule = request.neighbourhood;
+  if (rule.support == NeighbourhoodRule::Support::pairwise && (rule.max_neighbours || rule.radius)) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has neighbours.support = \"pairwise\" and {}; allowed: only one",
+        request.where, request.name, rule.radius ? "a radius" : "max_neighbours"));
+  }
   if (!request.neighbourhood.one_sided()) return;
   const auto refuse_if = [&](double value, const char* term, const char* key) {
     if (!(value > 0)) return;
     throw InputError(fmt::format(
-        "{}: body \"{}\" has {} ({:g}), which needs one support for the body: allowed are "
-        "neighbours.support = \"uniform\" without max_neighbours, or {} = 0",
+        "{}: body \"{}\" has {} ({:g}), which needs symmetric lists: allowed are "
+        "neighbours.support = \"uniform\" or \"pairwise\" without max_neighbours, or {} = 0",
         request.where, request.name, term, value, key));
   };
   refuse_if(hourglass_of(request), "hourglass control", "hourglass");
@@ -157,10 +164,11 @@ std::string in_words(const NeighbourhoodRule& rule) {
       words += fmt::format(", {} nearest", rule.nearest);
     }
   } else {
-    words =
-        fmt::format("{} support, {:g} x the mean distance to the {} nearest",
-                    rule.support == NeighbourhoodRule::Support::uniform ? "uniform" : "adaptive",
-                    rule.factor, rule.nearest);
+    words = fmt::format("{} support, {:g} x the mean distance to the {} nearest",
+                        rule.pairwise()  ? "pairwise"
+                        : rule.differs() ? "adaptive"
+                                         : "uniform",
+                        rule.factor, rule.nearest);
   }
   if (rule.max_neighbours) words += fmt::format(", at most {} neighbours", *rule.max_neighbours);
   return words;

@@ -80,6 +80,7 @@ void reorder(Cloud& cloud, const std::vector<Index>& order) {
   for (std::size_t k = 0; k < order.size(); ++k) place[order[k]] = static_cast<Index>(k);
   permute(cloud.position, order);
   permute(cloud.volume, order);
+  permute(cloud.spacing, order);
   for (auto& [name, members] : cloud.regions) {
     for (Index& i : members) i = place[i];
     std::sort(members.begin(), members.end());

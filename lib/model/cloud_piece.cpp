@@ -19,6 +19,7 @@ CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
                   static_cast<Index>(first),
                   static_cast<Index>(whole)};
   made.cloud.lattice = cloud.lattice;
+  made.cloud.spacing = cut(cloud.spacing);
   made.cloud.cuts = cloud.cuts;
   for (const auto& [name, members] : cloud.regions) {
     std::vector<Index>& here = made.cloud.regions[name];
@@ -36,6 +37,7 @@ std::uint64_t cloud_digest(const Cloud& cloud) {
   };
   add(cloud.position);
   add(cloud.volume);
+  if (!cloud.spacing.empty()) add(cloud.spacing);
   add(cloud.surface.position);
   add(cloud.surface.triangle);
   add(std::array{static_cast<double>(cloud.cuts.list.size()), cloud.cuts.depth});

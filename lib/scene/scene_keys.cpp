@@ -308,9 +308,11 @@ std::vector<SceneKey> body_keys() {
        .range = between(0, 1e9), .meaning = "As in `[body.material]`."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
-       .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},
+       .fallback = "\"automatic\"", .words = {"automatic", "uniform", "adaptive", "pairwise"},
        .meaning = "\"uniform\": one radius for the body; \"adaptive\": each phyxel its own, for "
-           "bodies with thin parts or uneven clouds."},
+           "bodies with thin parts or uneven clouds, without hourglass control and closed "
+           "gradients; \"pairwise\": each phyxel its own, and each pair the mean of two, for graded "
+           "clouds; \"automatic\": pairwise for clouds with spacings of their own, else uniform."},
       {.section = "body.neighbours", .name = "nearest", .type = KeyType::integer, .fallback = "10",
        .range = between(1, 1000),
        .meaning = "How many nearest phyxels the mean distance is taken over."},

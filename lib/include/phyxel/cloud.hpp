@@ -51,6 +51,9 @@ struct Cloud {
   std::map<std::string, std::vector<Index>> regions;
   /// True for a regular lattice, whose gradients are not closed unless a scene asks for it.
   bool lattice = false;
+  /// Distance between neighbouring phyxels that each was placed for [m], shape [n_phyxels]. Graded
+  /// clouds have it, and their supports follow from it; empty if unknown.
+  std::vector<double> spacing;
   SupportCuts cuts;                   ///< Where supports end inside the body.
   std::vector<std::string> warnings;  ///< Warnings of the generator or sampler, for the summary.
 };
