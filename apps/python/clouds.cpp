@@ -149,7 +149,8 @@ void add_clouds(py::module_& module) {
   py::class_<Cloud, std::shared_ptr<Cloud>>(
       module, "Cloud",
       "Rest points of one body.\n\n"
-      "Cloud(position, volume=None, surface=None, regions={}, spacing=None): `position` (n, 3) [m];\n"
+      "Cloud(position, volume=None, surface=None, regions={}, spacing=None): `position` (n, 3) "
+      "[m];\n"
       "`volume` (n,) [m^3], without which masses follow from the kernel; `surface`, a pair of\n"
       "surfels (m, 3) [m] and triangles (t, 3); `regions`, names for phyxels that scenes select;\n"
       "`spacing` (n,) [m] of a graded cloud, from which the supports of its phyxels follow.")

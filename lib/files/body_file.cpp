@@ -113,6 +113,14 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
   write_sealed(file, kind, out.content(), Durable::yes);
 }
 
+bool has_spacing(const std::filesystem::path& file) {
+  try {
+    return Hdf5Reader(file).has("/spacing");
+  } catch (const InputError&) {
+    return false;  // `read_body` says why
+  }
+}
+
 Cloud read_body(const std::filesystem::path& file) {
   check_seal(file, kind);
   const Hdf5Reader in(file);

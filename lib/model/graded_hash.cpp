@@ -25,8 +25,8 @@ GradedHash::GradedHash(std::span<const Vec3d> position, std::span<const double> 
     largest = std::max(largest, size[i]);
   }
   for (auto& [power, octave] : found) {
-    const std::vector<Vec3d> here = tabulated(
-        octave.member.size(), [&](std::size_t k) { return position[octave.member[k]]; });
+    const std::vector<Vec3d> here =
+        tabulated(octave.member.size(), [&](std::size_t k) { return position[octave.member[k]]; });
     // From level to level cells are four times as large. One more level could be of use only to
     // balls larger than every size.
     for (double cell = octave.largest;; cell *= 4) {

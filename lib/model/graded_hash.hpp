@@ -88,7 +88,8 @@ void search_nearest(NearestDistances& found, const GradedHash& hash, Vec3d place
   for (double radius = std::max(0.75 * size, 1e-9 * farthest);; radius *= 1.5) {
     const double reach = std::min(radius, farthest);
     found.clear();
-    hash.visit_ball(place, [&](double) { return reach; }, offer);
+    hash.visit_ball(
+        place, [&](double) { return reach; }, offer);
     if (reach == farthest || (found.full() && found.largest() <= reach * reach)) return;
   }
 }

@@ -245,7 +245,8 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
     const double h = result.support[i];
     const auto visit_near = [&](auto&& visit) {
       if (graded) {
-        graded->visit_ball(here, [&](double other) { return reach(h, other); }, visit);
+        graded->visit_ball(
+            here, [&](double other) { return reach(h, other); }, visit);
       } else {
         even->visit_near(here, rings_within(reach(h, largest), even->cell_size()), visit);
       }

@@ -68,8 +68,8 @@ struct NeighbourhoodRule {
 inline double pair_support(double h_i, double h_j) { return 0.5 * (h_i + h_j); }
 
 /// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i (h_ij for the supports
-/// of pairs), except pairs across the boundary of a support (`Cloud::cuts`). The lists are empty if the device finds them;
-/// `support` is always set.
+/// of pairs), except pairs across the boundary of a support (`Cloud::cuts`). The lists are empty if
+/// the device finds them; `support` is always set.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
@@ -84,8 +84,8 @@ struct Neighbourhood {
 /// @throws InputError for a position that is not finite, or `nearest` < 1
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 
-/// The distances between phyxels from which supports follow [m]: the cloud's own, times the median of
-/// their ratios to the mean ones; the mean ones if it has none of its own.
+/// The distances between phyxels from which supports follow [m]: the cloud's own, times the median
+/// of their ratios to the mean ones; the mean ones if it has none of its own.
 /// @param mean result of `mean_spacing`. @param own `Cloud::spacing`
 std::vector<double> graded_spacing(std::span<const double> mean, std::span<const double> own);
 
