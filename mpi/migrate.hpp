@@ -20,7 +20,7 @@ struct MigratingPhyxel {
   Vec3d position;      ///< [m]
   double volume = 0;   ///< [m³], if the cloud has volumes.
   double spacing = 0;  ///< r̄ [m], if needed.
-  double support = 0;  ///< h [m]
+  double support = 0;  ///< h [m]; until it is found, the cloud's own spacing (`Cloud::spacing`).
   Index body = 0;
   Index number = 0;              ///< Index in its body.
   Index along = 0;               ///< Index in its part along Hilbert's curve.

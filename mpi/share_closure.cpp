@@ -93,7 +93,7 @@ void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel
       LoadedFacets loaded;
       setup.ranks.collectively([&] {
         naming(request, [&] {
-          const double longest = longest_edge(whole.bodies[b].reach, surface.position,
+          const double longest = longest_edge(facet_support(whole.bodies[b]), surface.position,
                                               surface.triangle, 0, whole.bodies[b].size);
           loaded = loaded_facets(request, request.tractions[t],
                                  {surface.position, surface.triangle, 0, surface.groups}, longest);
@@ -122,8 +122,8 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
     const Surface& surface = whole.surfaces[b];
     const std::vector<Facet> facets =
         facets_of(surface.position, surface.triangle, 0,
-                  longest_edge(whole.bodies[b].reach, surface.position, surface.triangle, 0,
-                               whole.bodies[b].size));
+                  longest_edge(facet_support(whole.bodies[b]), surface.position, surface.triangle,
+                               0, whole.bodies[b].size));
     check_alike(setup.ranks, facets.size());
     whole.bodies[b].enclosed = enclosed_by(facets).volume;
     const NearFacets here = facets_near(setup, whole, local, b, facets);

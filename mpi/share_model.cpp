@@ -39,7 +39,7 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
       Range& body = local.bodies[b];
       if (body.begin == body.end) body.begin = body.end = before;  // nobody is here
       before = body.end;
-      const NeighbourhoodRule& rule = setup.scene.bodies[b].neighbourhood;
+      const NeighbourhoodRule& rule = whole.bodies[b].rule;
       if (setup.options.surveyor) {
         if (rule.one_sided()) m.neighbourhood.symmetric = false;
         continue;
@@ -49,7 +49,7 @@ LocalModel surroundings_of(const ShareSetup& setup, const WholeBodies& whole,
                                              {m.neighbourhood.support.begin() + body.begin,
                                               m.neighbourhood.support.begin() + body.end},
                                              rule);
-      separate(hood, position, whole.bodies[b].walls);
+      separate(hood, position, whole.bodies[b].walls, whole.bodies[b].pair_length);
       std::copy(hood.support.begin(), hood.support.end(),
                 m.neighbourhood.support.begin() + body.begin);
       append_lists(m.neighbourhood, std::move(hood), body.begin);
@@ -93,14 +93,15 @@ void collect_ghost_neighbours(const ShareSetup& setup, const WholeBodies& whole,
   if (setup.options.surveyor) {
     Around& around = local.around.emplace_back(setup.options.surveyor->around(
         of_range(m.position, body), of_range(m.neighbourhood.support, body), spacing, own,
-        setup.scene.bodies[b].neighbourhood.one_sided()));
+        whole.bodies[b].rule.one_sided()));
     append(m.degenerate, around.degenerate, body.begin);
     return;
   }
   const Neighbourhood& hood = m.neighbourhood;
   Around& around = local.around.emplace_back(around_by_lists(hood, body.begin, own));
   if (whole.bodies[b].kernel_volumes) {
-    around.kernel_sum = kernel_sums(m.position, hood, spacing, body.begin);
+    around.kernel_sum =
+        kernel_sums(m.position, hood, spacing, whole.bodies[b].rule.pairwise(), body.begin);
   }
 }
 
@@ -176,13 +177,14 @@ void begin_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
     part.material = known.material.material;
     part.material.law = law_of(request, known.material.material);
     part.material.hourglass = hourglass_of(request);
-    part.neighbourhood = in_words(request.neighbourhood);
+    part.neighbourhood = in_words(body.rule);
     part.kernel_volumes = body.kernel_volumes;
     part.size = known.size();
     part.surfels =
         q == body.first_part ? static_cast<Index>(whole.surfaces[known.body].position.size()) : 0;
     part.origin = body.origin;
     part.farthest = whole.boxes[known.body].farthest();
+    part.pair_length = body.pair_length;
   }
 }
 
@@ -209,6 +211,7 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   Model& m = local.model;
   std::vector<BodySums> sums(m.parts.size());
   std::vector<ListLengths> lists(m.parts.size());
+  std::vector<ExactSum> cubes(m.parts.size());  // of supports, with weights of pairs
   std::vector<ExactSum*> all;
   for (std::size_t q = 0; q < m.parts.size(); ++q) {
     const Part& part = m.parts[q];
@@ -217,9 +220,15 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
         sum.add(m.mass[i], m.volume[i], m.position[i]);
       }
     });
+    if (part.pair_length > 0) {
+      cubes[q] = added_up<ExactSum>(part.begin, part.end, [&](ExactSum& sum, Index i) {
+        const double h = m.neighbourhood.support[i];
+        if (owns(local, static_cast<std::size_t>(i))) sum.add(h * h * h);
+      });
+    }
     lists[q] = own_lengths(whole, local, part);
     BodySums& s = sums[q];
-    all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z});
+    all.insert(all.end(), {&s.mass, &s.volume, &s.moment.x, &s.moment.y, &s.moment.z, &cubes[q]});
   }
   add_over_ranks(setup.ranks, all);
   const std::vector<ListLengths> of_ranks = setup.ranks.gathered(std::span(std::as_const(lists)));
@@ -230,6 +239,7 @@ void add_up_parts(const ShareSetup& setup, const WholeBodies& whole, LocalModel&
   for (std::size_t q = 0; q < m.parts.size(); ++q) {
     Part& part = m.parts[q];
     sums[q].tell(part);
+    part.support_cubes = cubes[q].value();
     Part body;
     of_bodies[static_cast<std::size_t>(part.body)].tell(body);
     part.centre = body.centre;

@@ -187,7 +187,8 @@ void check_alike(const MpiCommunicator& ranks, std::uint64_t digest) {
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole) {
   MigratingPhyxels own;
   whole.surfaces.resize(whole.bodies.size());
-  std::vector<std::int64_t> with_volumes(whole.bodies.size()), lattices(whole.bodies.size());
+  std::vector<std::int64_t> with_volumes(whole.bodies.size()), lattices(whole.bodies.size()),
+      with_spacings(whole.bodies.size());
   std::vector<PieceMaterials> materials;
   std::uint64_t digest = 0;  // of what each rank has made or read for itself
   setup.ranks.collectively([&] {
@@ -201,6 +202,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       WholeBody& body = whole.bodies[b];
       body.size = made.whole;
       with_volumes[b] = !cloud.volume.empty();
+      with_spacings[b] = !cloud.spacing.empty();
       lattices[b] = cloud.lattice;
       const BodyRequest& request = setup.scene.bodies[b];
       body.walls = walls_of(request, cloud);
@@ -219,6 +221,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       for (std::size_t i = 0; i < more; ++i) {
         own[before + i] = {.position = cloud.position[i],
                            .volume = cloud.volume.empty() ? 0 : cloud.volume[i],
+                           .support = cloud.spacing.empty() ? 0 : cloud.spacing[i],
                            .body = static_cast<Index>(b),
                            .number = made.first + static_cast<Index>(i),
                            .region_set = sets.empty() ? RegionSets::none : sets[i]};
@@ -229,6 +232,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   });
   check_alike(setup.ranks, digest);
   setup.ranks.add(with_volumes);
+  setup.ranks.add(with_spacings);
   setup.ranks.add(lattices);
   whole.boxes = boxes_of(setup.ranks, own, whole.bodies.size(),
                          [](const MigratingPhyxel& p) { return static_cast<std::size_t>(p.body); });
@@ -239,6 +243,9 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       check_terms(setup.scene.bodies[b]);
       whole.bodies[b].lattice = lattices[b] > 0;
+      whole.bodies[b].has_spacing = with_spacings[b] > 0;
+      whole.bodies[b].rule =
+          setup.scene.bodies[b].neighbourhood.resolved(whole.bodies[b].has_spacing);
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));

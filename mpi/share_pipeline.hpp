@@ -43,9 +43,17 @@ struct WholeBody {
   /// For bodies with inclusions: the region of each boundary entry, or -1 for an entry that selects
   /// by position. Empty for bodies of one material.
   std::vector<int> region_of_entry;
-  double reach = 0;     ///< Largest support [m].
-  double enclosed = 0;  ///< Volume inside its surface, if its gradients are closed [m³].
+  NeighbourhoodRule rule;    ///< The scene's, resolved for the cloud.
+  bool has_spacing = false;  ///< True if the cloud has spacings of its own.
+  double reach = 0;          ///< Largest support [m].
+  double finest = 0;         ///< Smallest support [m].
+  double pair_length = 0;    ///< `Part::pair_length`.
+  double enclosed = 0;       ///< Volume inside its surface, if its gradients are closed [m³].
 };
+/// The support that facets of a body's surface have to resolve (`facet_support`) [m].
+inline double facet_support(const WholeBody& body) {
+  return body.pair_length > 0 ? body.finest : body.reach;
+}
 /// Properties of a part, which has one material, that all ranks know.
 struct WholePart {
   std::size_t body = 0;
@@ -125,7 +133,7 @@ void count_bodies(const ShareSetup& setup, WholeBodies& whole);
 
 /// Finds the spacing of own phyxels, from phyxels of other ranks within a growing distance.
 void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingPhyxels& own);
-/// Finds the support of own phyxels, and the largest of each body.
+/// Finds the support of own phyxels, and the largest and smallest of each body.
 void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own);
 
 /// Partitions the groups of phyxels. @param own phyxels in the order of the curve

@@ -70,37 +70,76 @@ void find_spacings(const ShareSetup& setup, const WholeBodies& whole, MigratingP
   }
 }
 
-void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own) {
-  std::vector<Bulk<double>> spacings(whole.bodies.size());
-  const auto rule = [&](std::size_t b) -> const NeighbourhoodRule& {
-    return setup.scene.bodies[b].neighbourhood;
-  };
-  const auto spacings_of = [&](std::size_t first, std::size_t last) {
-    return in_bulk(last - first, [&](std::size_t k) { return own[first + k].spacing; });
-  };
-  const auto stretches = ranges_of_bodies(own);
-  for (const auto& [first, last] : stretches) {
-    const auto b = static_cast<std::size_t>(own[first].body);
-    if (rule(b).radius || rule(b).support != NeighbourhoodRule::Support::uniform) continue;
-    spacings[b] = spacings_of(first, last);
+namespace {
+
+/// Returns the medians of a value of the phyxels of each body for which wants(body); 0 for others.
+/// Collective. @param value value(phyxel)
+template <class Wants, class Value>
+std::vector<double> medians(const ShareSetup& setup, const WholeBodies& whole,
+                            const MigratingPhyxels& own, Wants&& wants, Value&& value) {
+  if (std::none_of(whole.bodies.begin(), whole.bodies.end(), wants)) {
+    return std::vector<double>(whole.bodies.size(), 0);
   }
-  const std::vector<double> medians = medians_of(setup.ranks, spacings);
-  std::vector<double> reach(whole.bodies.size(), 0);
-  for (const auto& [first, last] : stretches) {
+  std::vector<Bulk<double>> values(whole.bodies.size());
+  for (const auto& [first, last] : ranges_of_bodies(own)) {
     const auto b = static_cast<std::size_t>(own[first].body);
-    const std::vector<double> support =
-        support_radii(spacings_of(first, last), rule(b), medians[b]);
+    if (!wants(whole.bodies[b])) continue;
+    values[b] =
+        in_bulk(last - first, [&, from = first](std::size_t k) { return value(own[from + k]); });
+  }
+  return medians_of(setup.ranks, values);
+}
+
+/// Replaces the spacings of own phyxels of graded clouds by those that supports follow from, as
+/// `graded_spacing` does. Kernel volumes need the former.
+void find_graded_spacings(const ShareSetup& setup, const WholeBodies& whole,
+                          MigratingPhyxels& own) {
+  const auto is_graded = [](const WholeBody& body) {
+    return body.rule.pairwise() && body.has_spacing;
+  };
+  const std::vector<double> ratio = medians(
+      setup, whole, own, is_graded, [](const MigratingPhyxel& p) { return p.spacing / p.support; });
+  for (MigratingPhyxel& p : own) {
+    const auto b = static_cast<std::size_t>(p.body);
+    p.support = is_graded(whole.bodies[b]) ? ratio[b] * p.support : p.spacing;
+  }
+}
+
+}  // namespace
+
+void find_supports(const ShareSetup& setup, WholeBodies& whole, MigratingPhyxels& own) {
+  find_graded_spacings(setup, whole, own);  // `support` has spacings until the end
+  const std::vector<double> middle = medians(
+      setup, whole, own,
+      [](const WholeBody& body) { return !body.rule.radius && !body.rule.differs(); },
+      [](const MigratingPhyxel& p) { return p.support; });
+  std::vector<double> reach(whole.bodies.size(), 0), finest(whole.bodies.size(), -HUGE_VAL);
+  for (const auto& [first, last] : ranges_of_bodies(own)) {
+    const auto b = static_cast<std::size_t>(own[first].body);
     const std::size_t begin = first;  // for clang, whose OpenMP takes no bindings
-    double most = 0;
-#pragma omp parallel for schedule(static) reduction(max : most)
+    const std::vector<double> support =
+        support_radii(in_bulk(last - first, [&](std::size_t k) { return own[begin + k].support; }),
+                      whole.bodies[b].rule, middle[b]);
+    double most = 0, least = HUGE_VAL;
+#pragma omp parallel for schedule(static) reduction(max : most) reduction(min : least)
     for (std::size_t k = 0; k < support.size(); ++k) {
       own[begin + k].support = support[k];
       most = std::max(most, support[k]);
+      least = std::min(least, support[k]);
     }
     reach[b] = most;
+    finest[b] = -least;
   }
   reach = largest_of(setup.ranks, reach);
-  for (std::size_t b = 0; b < whole.bodies.size(); ++b) whole.bodies[b].reach = reach[b];
+  finest = largest_of(setup.ranks, finest);
+  const std::vector<double> length = medians(
+      setup, whole, own, [](const WholeBody& body) { return body.rule.pairwise(); },
+      [](const MigratingPhyxel& p) { return p.support; });
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+    whole.bodies[b].reach = reach[b];
+    whole.bodies[b].finest = -finest[b];
+    whole.bodies[b].pair_length = length[b];
+  }
 }
 
 RemotePhyxels remote_phyxels_within(const ShareSetup& setup, const WholeBodies& whole,

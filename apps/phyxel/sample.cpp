@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,8 +25,31 @@ struct SampleOptions {
   std::filesystem::path mesh, out;
   std::int64_t phyxels = 0, relaxations = SampleRequest{}.relaxations, seed = SampleRequest{}.seed;
   std::optional<bool> on_surface;
+  std::optional<double> ratio;  ///< Set for a graded body.
+  Grading grading;              ///< But for its ratio and its finer regions.
+  std::vector<double> balls;    ///< Centres and radii of finer regions, four numbers each [m].
   bool force = false, json = false;
 };
+
+/// The grading that the options ask for, if any.
+std::optional<Grading> grading_of(const SampleOptions& options) {
+  if (!options.ratio) return {};
+  Grading grading = options.grading;
+  grading.ratio = *options.ratio;
+  for (std::size_t k = 0; k + 3 < options.balls.size(); k += 4) {
+    const double* const b = &options.balls[k];
+    if (!(b[3] > 0)) {
+      throw InputError(fmt::format("--finer {:g} {:g} {:g} {:g}: the radius is {:g} m; allowed: > 0",
+                                   b[0], b[1], b[2], b[3], b[3]));
+    }
+    SpaceRegion ball;
+    ball.is_ball = true;
+    ball.centre = {b[0], b[1], b[2]};
+    ball.radius = b[3];
+    grading.finer.push_back({ball, grading.ratio});
+  }
+  return grading;
+}
 
 SampleRequest request_of(const SampleOptions& options) {
   constexpr std::int64_t most = std::numeric_limits<Index>::max(), most_relaxations = 10000;
@@ -44,7 +68,9 @@ SampleRequest request_of(const SampleOptions& options) {
   return {.phyxels = static_cast<Index>(options.phyxels),
           .seed = static_cast<std::uint64_t>(options.seed),
           .relaxations = static_cast<int>(options.relaxations),
-          .on_surface = options.on_surface};
+          .on_surface = options.on_surface,
+          .cuts = {},
+          .grading = grading_of(options)};
 }
 
 /// Checks in advance that the output can be written. @throws InputError
@@ -102,6 +128,10 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
         "  spacing     {:.4g} m to the nearest on average, {:.4g} m at the least ({:.2f} of it)\n",
         report.spacing, report.smallest_gap, report.smallest_gap / report.spacing);
   }
+  if (!cloud.spacing.empty()) {
+    const auto [finest, coarsest] = std::ranges::minmax(cloud.spacing);
+    fmt::print("  graded      for distances of {:.4g} to {:.4g} m\n", finest, coarsest);
+  }
   fmt::print("  surfels     {}, in {} triangles\n", cloud.surface.position.size(),
              cloud.surface.triangle.size());
   fmt::print("  surface     {}\n", report.defects.describe());
@@ -156,13 +186,39 @@ void add_sample(CLI::App& program) {
       ->add_flag_callback(
           "--inside", [options] { options->on_surface = false; }, "Place all phyxels inside")
       ->excludes(on_surface);
+  CLI::Option* const ratio = command->add_option(
+      "--ratio", options->ratio,
+      "Grades the body: largest over smallest distance between neighbours, 1 to 10; nearer where "
+      "the surface curves and where the body is thin");
+  command
+      ->add_option("--growth", options->grading.growth,
+                   "Growth of that distance along a path, by the path's length, 0.05 to 0.5")
+      ->capture_default_str()
+      ->needs(ratio);
+  command
+      ->add_option("--per-radius", options->grading.per_radius,
+                   "Phyxels over a radius of curvature; 0: however the surface curves")
+      ->capture_default_str()
+      ->needs(ratio);
+  command
+      ->add_option("--across", options->grading.across,
+                   "Phyxels through thin places; 0: however thin they are")
+      ->capture_default_str()
+      ->needs(ratio);
+  command
+      ->add_option("--finer", options->balls,
+                   "Centre x y z and radius of a ball with the smallest distances [m]; repeatable")
+      ->type_size(4)
+      ->expected(-1)
+      ->needs(ratio);
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
   command->footer(
       "Examples:\n"
       "  phyxel sample bunny.obj --phyxels 5000 --out bunny.h5\n"
       "  phyxel sample scan.ply --phyxels 200000 --out scan.h5 --seed 7 --force\n"
-      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --relaxations 100 --on-surface");
+      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --relaxations 100 --on-surface\n"
+      "  phyxel sample gear.stl --phyxels 20000 --out gear.h5 --ratio 5 --finer 0.02 0 0.01 0.005");
   command->callback([options] { sample(*options); });
 }
 

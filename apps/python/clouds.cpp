@@ -53,20 +53,27 @@ Surface surface_from(const py::handle& pair, const char* what) {
   return surface_from(py::object(two[0]), py::object(two[1]));
 }
 
+/// One positive number for each of n phyxels.
+std::vector<double> positive_from(const py::object& object, const char* what, const char* unit,
+                                  py::ssize_t n) {
+  std::vector<double> values = numbers_from(object, what, n);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double v = values[i];
+    if (v > 0 && std::isfinite(v)) continue;
+    throw InputError(fmt::format("{}: {} found in row {}; allowed: > 0 {}", what, v, i, unit));
+  }
+  return values;
+}
+
 Cloud cloud_from(const py::object& position, const py::object& volume, const py::object& surface,
-                 const std::map<std::string, std::vector<Index>>& regions) {
+                 const std::map<std::string, std::vector<Index>>& regions,
+                 const py::object& spacing) {
   Cloud cloud;
   cloud.position = vectors_from(position, "position");
   const auto n = static_cast<py::ssize_t>(cloud.position.size());
   if (n == 0) throw InputError("position: no phyxel; allowed: at least one");
-  if (!volume.is_none()) {
-    cloud.volume = numbers_from(volume, "volume", n);
-    for (std::size_t i = 0; i < cloud.volume.size(); ++i) {
-      const double v = cloud.volume[i];
-      if (v > 0 && std::isfinite(v)) continue;
-      throw InputError(fmt::format("volume: {} found in row {}; allowed: > 0 m^3", v, i));
-    }
-  }
+  if (!volume.is_none()) cloud.volume = positive_from(volume, "volume", "m^3", n);
+  if (!spacing.is_none()) cloud.spacing = positive_from(spacing, "spacing", "m", n);
   if (!surface.is_none()) {
     cloud.surface = surface_from(surface, "surface");
   }
@@ -142,19 +149,22 @@ void add_clouds(py::module_& module) {
   py::class_<Cloud, std::shared_ptr<Cloud>>(
       module, "Cloud",
       "Rest points of one body.\n\n"
-      "Cloud(position, volume=None, surface=None, regions={}): `position` (n, 3) [m]; `volume` "
-      "(n,)\n"
-      "[m^3], without which masses follow from the kernel; `surface`, a pair of surfels (m, 3) "
-      "[m]\n"
-      "and triangles (t, 3); `regions`, names for phyxels that scenes select.")
+      "Cloud(position, volume=None, surface=None, regions={}, spacing=None): `position` (n, 3) "
+      "[m];\n"
+      "`volume` (n,) [m^3], without which masses follow from the kernel; `surface`, a pair of\n"
+      "surfels (m, 3) [m] and triangles (t, 3); `regions`, names for phyxels that scenes select;\n"
+      "`spacing` (n,) [m] of a graded cloud, from which the supports of its phyxels follow.")
       .def(py::init(&cloud_from), "position"_a, "volume"_a = py::none(), "surface"_a = py::none(),
-           "regions"_a = std::map<std::string, std::vector<Index>>{})
+           "regions"_a = std::map<std::string, std::vector<Index>>{}, "spacing"_a = py::none())
       .def_property_readonly(
           "position", [](py::object self) { return view(self.cast<Cloud&>().position, self); },
           "Phyxels at rest [m], (n, 3).")
       .def_property_readonly(
           "volume", [](py::object self) { return view(self.cast<Cloud&>().volume, self); },
           "Volumes [m^3], (n,); empty if unknown.")
+      .def_property_readonly(
+          "spacing", [](py::object self) { return view(self.cast<Cloud&>().spacing, self); },
+          "Distances between phyxels of a graded cloud [m], (n,); empty if unknown.")
       .def_property_readonly(
           "surfels",
           [](py::object self) { return view(self.cast<Cloud&>().surface.position, self); },

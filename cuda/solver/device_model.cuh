@@ -50,8 +50,11 @@ class DeviceModel {
         history_(model, tiling_) {
     PHYXEL_CUDA(cudaDeviceGetAttribute(&most_shared_memory_,
                                        cudaDevAttrMaxSharedMemoryPerBlockOptin, device_.index));
-    own_supports_ = !one_support_each();
-    closed_ = !model.closing.empty();
+    pairwise_ = std::any_of(model.parts.begin(), model.parts.end(),
+                            [](const Part& part) { return part.pair_length > 0; });
+    own_supports_ = pairwise_ || !one_support_each();
+    // Kernels with closed gradients alone have weights of pairs; closing vectors are then zero.
+    closed_ = pairwise_ || !model.closing.empty();
     if (share()) {
       own_supports_ = share()->communicator->largest(own_supports_) > 0;
       closed_ = share()->communicator->largest(closed_) > 0;
@@ -79,7 +82,8 @@ class DeviceModel {
   bool own_supports() const { return own_supports_; }
   /// True if a law of any rank has a history.
   bool has_history() const { return history_.columns() > 0; }
-  bool closed() const { return closed_; }  ///< True with closed gradients on any rank.
+  /// True with closed gradients, or with weights of pairs, on any rank.
+  bool closed() const { return closed_; }
   int most_shared_memory() const { return most_shared_memory_; }  ///< Limit for one block [bytes].
 
   const AllFields& fields() const { return fields_; }
@@ -257,6 +261,10 @@ class DeviceModel {
                                      most_shared_memory_));
     allowed_.push_back(kernel);
   }
+  /// Shared memory [bytes] of a block of pass 1.
+  int pass_1_bytes(int slots) const {
+    return (Points<Real>::bytes + (pairwise_ ? static_cast<int>(sizeof(Real)) : 0)) * slots;
+  }
   /// Shared memory [bytes] of a block of pass 2, which needs more than pass 1.
   int pass_2_bytes(int slots) const {
     return (Stresses<Real>::bytes + (own_supports_ ? static_cast<int>(sizeof(Real)) : 0) +
@@ -393,6 +401,21 @@ class DeviceModel {
     return values;
   }
 
+  /// `Fields::inverse_h_squared` of a model with weights of pairs.
+  std::vector<Real> supports_by_place() const {
+    std::vector<Real> values(places());
+    for (const Part& part : model_.parts) {
+      for (Index i = part.begin; i < part.end; ++i) {
+        const double h = model_.neighbourhood.support[i];
+        values[static_cast<std::size_t>(tiling_.place[i])] =
+            static_cast<Real>(part.pair_length > 0 ? relative_half_support(h, part.pair_length)
+                              : h > 0              ? 1 / (h * h)
+                                                   : 0);
+      }
+    }
+    return values;
+  }
+
   void put_all_constants() {
     const DeviceArray<Vec3d> position = sent(model_.position, "rest positions");
     const DeviceArray<double> volume = sent(model_.volume, "volumes"),
@@ -415,6 +438,7 @@ class DeviceModel {
     launch_places("put_constants", put_constants<Real, StateReal>, fields_, constants,
                   moment_constants_.data(), force_constants_.data(), supports_.data());
     wait();
+    if (pairwise_) supports_.upload(supports_by_place().data());
     tiling_.inverse_moment = {};
     tiling_.moment_offset = {};
   }
@@ -422,7 +446,9 @@ class DeviceModel {
   BodyConstants constants_of(const Part& part, double dt) const {
     const Material& m = part.material;
     const DampedFlow flow = damped_flow(m.damping, dt);
-    const double h = part.begin < part.end ? model_.neighbourhood.support[part.begin] : 0;
+    const double h = part.pair_length > 0    ? part.pair_length
+                     : part.begin < part.end ? model_.neighbourhood.support[part.begin]
+                                             : 0;
     const ChosenLaw law = chosen_law(m);
     BodyConstants tile{};
     for (int k = 0; k < law_numbers; ++k) tile.law[k] = static_cast<Real>(law.constants[k]);
@@ -431,6 +457,7 @@ class DeviceModel {
     tile.keep = static_cast<StateReal>(flow.keep);
     tile.gain = static_cast<StateReal>(flow.gain);
     tile.damped = m.damping > 0;
+    tile.pairwise = part.pair_length > 0;
     tile.law_index = law.index;
     return tile;
   }
@@ -448,7 +475,7 @@ class DeviceModel {
   DeviceTiling tiling_;
   Stream stream_;
   int most_shared_memory_ = 0;
-  bool own_supports_ = false, closed_ = false;
+  bool own_supports_ = false, closed_ = false, pairwise_ = false;
   std::string subject_;
   double dt_ = -1;
   mutable Launch last_launch_;

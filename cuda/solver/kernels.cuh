@@ -21,10 +21,11 @@ template <class Real, class StateReal>
 struct TileConstants {
   Real law[law_numbers];   ///< As in `ChosenLaw::constants`.
   Real hourglass;          ///< κ [N/m]; 0 without hourglass control.
-  Real inverse_h_squared;  ///< [1/m²], if the body has one support.
+  Real inverse_h_squared;  ///< [1/m²], if the body has one support; 1/H² with weights of pairs.
   StateReal keep, gain;    ///< Factors of `damped_flow`; gain is the step without damping.
   bool damped;             ///< For kernels that serve damped and undamped bodies.
-  int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
+  bool pairwise;  ///< True with weights of pairs (`pair_weight`); kernels that send know them.
+  int law_index;  ///< Index in `Laws`, for kernels that serve bodies of any law.
 };
 
 /// `TileLists` in device memory.
@@ -40,12 +41,14 @@ template <class Real, class StateReal>
 struct Fields {
   Points<Real> points;
   Stresses<Real> stresses;
-  const Real* inverse_h_squared;  ///< [places], or null if each body has one support.
-  const Real* moment_constants;   ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
-  const Real* force_constants;    ///< b and 1/m, shape [4, places]; -1/m if fixed, 0 if empty.
-  const Real* load;               ///< Applied forces, [3, places], or null.
-  Real* pull;                     ///< Force of hourglass control, [3, places], or null.
-  const Real* closing;            ///< ĉ of closed gradients [1/m]: [3, places], or null.
+  /// 1/h² [1/m²], or `relative_half_support` in bodies with weights of pairs, [places]; null if
+  /// each body has one support.
+  const Real* inverse_h_squared;
+  const Real* moment_constants;  ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
+  const Real* force_constants;   ///< b and 1/m, shape [4, places]; -1/m if fixed, 0 if empty.
+  const Real* load;              ///< Applied forces, [3, places], or null.
+  Real* pull;                    ///< Force of hourglass control, [3, places], or null.
+  const Real* closing;           ///< ĉ of closed gradients [1/m]: [3, places], or null.
   ClosingStresses<Real> closing_stresses;
   StateReal* velocity;      ///< [3, places]
   StateReal* displacement;  ///< [3, places] if StateReal is not Real, else null.
@@ -181,6 +184,31 @@ constexpr int pass_2_blocks = sizeof(Real) == 4 ? 5 : 2;
 template <class Real>
 constexpr int pass_2_blocks_sent = sizeof(Real) == 4 ? 4 : 2;
 
+/// Copies the supports of a tile and its halo (`Fields::inverse_h_squared`) into shared memory, by
+/// slot.
+template <class Real, class StateReal>
+__device__ __forceinline__ void fetch_supports(const Fields<Real, StateReal>& f,
+                                               const DeviceLists& lists, Index tile,
+                                               Real* supports) {
+  supports[threadIdx.x] = f.inverse_h_squared[place_of(tile)];
+  if (threadIdx.x < far_slots) supports[tile_size + threadIdx.x] = Real(1);
+  const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride;
+  for (int h = static_cast<int>(threadIdx.x); h < lists.halo_stride; h += tile_size) {
+    if (halo[h] >= 0) supports[tile_size + far_slots + h] = f.inverse_h_squared[halo[h]];
+  }
+}
+
+/// Calls use(weight_of) with the weights of pairs of this lane's phyxel: weight_of(x_ij, offset).
+/// @param supports result of `fetch_supports`
+template <class Real, class Use>
+__device__ __forceinline__ void with_pair_weights(const Real* supports, Real inverse_length_squared,
+                                                  Use&& use) {
+  const Real own = supports[threadIdx.x];
+  use([&](Vec3<Real> x, unsigned offset) {
+    return pair_weight(dot(x, x), own, supports[offset / 16], inverse_length_squared);
+  });
+}
+
 /// Output of the gradient-only variant of pass 1: entry e of thread t of block b is stored in
 /// values[e * stride + b * tile_size + t].
 template <class Real>
@@ -214,16 +242,31 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
   const TileConstants<Real, StateReal> body = f.tiles[tile];
   const Real inverse_h_squared =
       f.inverse_h_squared ? f.inverse_h_squared[place] : body.inverse_h_squared;
+  Real* supports = reinterpret_cast<Real*>(image + Points<Real>::bytes * lists.slots);
+  if constexpr (Terms::sends) {
+    if (body.pairwise) fetch_supports(f, lists, tile, supports);
+  }
   wait_for_copies();
   __syncthreads();
 
   const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
+  // Calls use(weight_of): a tile is of one body, so that its warps do not diverge.
+  const auto weighted = [&](auto&& use) {
+    if constexpr (Terms::sends) {
+      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+    }
+    use([&](Vec3<Real> x, unsigned) {
+      return weight_shape_anywhere(dot(x, x), inverse_h_squared);
+    });
+  };
   NeighbourSums<Real> sums;
-  walk(lists, row, first, [&](unsigned offset) {
-    const auto p = Points<Real>::at(image, lists.slots, offset);
-    const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
-    const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
-    sums.template add<Terms::pulls>(x, u, w);
+  weighted([&](auto&& weight_of) {
+    walk(lists, row, first, [&](unsigned offset) {
+      const auto p = Points<Real>::at(image, lists.slots, offset);
+      const Vec3<Real> x = p.x - own.x, u = p.u - own.u;
+      const Real w = weight_of(x, offset);
+      sums.template add<Terms::pulls>(x, u, w);
+    });
   });
 
   const Real* c = f.moment_constants + place;
@@ -241,12 +284,14 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
     if (!gradients.residuals) return;
     Real residual{};
-    walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
-      const auto p = Points<Real>::at(image, lists.slots, offset);
-      const Vec3<Real> x = p.x - own.x;
-      const Real w = weight_shape_anywhere(dot(x, x), inverse_h_squared);
-      // Null slots are skipped: the squares of their distances leave the range of float.
-      if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
+    weighted([&](auto&& weight_of) {
+      walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
+        const auto p = Points<Real>::at(image, lists.slots, offset);
+        const Vec3<Real> x = p.x - own.x;
+        const Real w = weight_of(x, offset);
+        // Null slots are skipped: the squares of their distances leave the range of float.
+        if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
+      });
     });
     gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
@@ -291,14 +336,7 @@ __global__ void __launch_bounds__(tile_size,
   if constexpr (Terms::sends) fetch_tile(f.closing_stresses, lists, tile, sent);
   Real* supports = reinterpret_cast<Real*>(
       sent + (Terms::sends ? ClosingStresses<Real>::bytes : 0) * lists.slots);
-  if constexpr (own_supports) {
-    supports[threadIdx.x] = f.inverse_h_squared[place];
-    if (threadIdx.x < far_slots) supports[tile_size + threadIdx.x] = Real(1);
-    const Index* halo = lists.halo + static_cast<std::size_t>(tile) * lists.halo_stride;
-    for (int h = static_cast<int>(threadIdx.x); h < lists.halo_stride; h += tile_size) {
-      if (halo[h] >= 0) supports[tile_size + far_slots + h] = f.inverse_h_squared[halo[h]];
-    }
-  }
+  if constexpr (own_supports) fetch_supports(f, lists, tile, supports);
   prefetch_rows(f.force_constants + warp_place_of(tile), f.places, 4);
   if constexpr (!only_force) prefetch_rows(f.velocity + warp_place_of(tile), f.places, 3);
   const uint4 first = first_entries(lists, row);
@@ -307,23 +345,31 @@ __global__ void __launch_bounds__(tile_size,
   __syncthreads();
 
   const Vec3<Real> x_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).x;
-  const auto weight_of = [&](Vec3<Real> x, unsigned offset) {
-    const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
-    return weight_shape_anywhere(dot(x, x), inverse_h_squared);
+  // Calls use(weight_of), as in pass 1.
+  const auto weighted = [&](auto&& use) {
+    if constexpr (own_supports && Terms::sends) {
+      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+    }
+    use([&](Vec3<Real> x, unsigned offset) {
+      const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
+      return weight_shape_anywhere(dot(x, x), inverse_h_squared);
+    });
   };
   Vec3<Real> sent_i;
   if constexpr (Terms::sends) {
     sent_i = ClosingStresses<Real>::at(sent, lists.slots, 16 * threadIdx.x);
   }
   Vec3<Real> sum;
-  walk(lists, row, first, [&](unsigned offset) {
-    const auto p = Stresses<Real>::at(image, lists.slots, offset);
-    const Vec3<Real> x = p.x - x_i;
-    const Real w = weight_of(x, offset);
-    add_neighbour_force(sum, p.q, x, w);
-    if constexpr (Terms::sends) {
-      Terms::add_forces(sum, sent_i, ClosingStresses<Real>::at(sent, lists.slots, offset), w);
-    }
+  weighted([&](auto&& weight_of) {
+    walk(lists, row, first, [&](unsigned offset) {
+      const auto p = Stresses<Real>::at(image, lists.slots, offset);
+      const Vec3<Real> x = p.x - x_i;
+      const Real w = weight_of(x, offset);
+      add_neighbour_force(sum, p.q, x, w);
+      if constexpr (Terms::sends) {
+        Terms::add_forces(sum, sent_i, ClosingStresses<Real>::at(sent, lists.slots, offset), w);
+      }
+    });
   });
   const Mat3<Real> q_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).q;
   sum += own_force(q_i, column3(f.force_constants, f.places, place));

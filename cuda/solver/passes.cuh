@@ -261,8 +261,8 @@ class Passes {
   void launch_pass_1(const AllFields& fields, const Run<Pass1<Halo>>& run,
                      Gradients<Real> gradients, const Halo& exchange) const {
     m_.launch_blocks("pass_1", run.kernel, static_cast<unsigned>(run.tiles),
-                     Points<Real>::bytes * m_.lists().slots, false, fields, m_.lists(),
-                     run.first_tile, gradients, exchange);
+                     m_.pass_1_bytes(m_.lists().slots), false, fields, m_.lists(), run.first_tile,
+                     gradients, exchange);
   }
   template <class Halo>
   void launch_pass_2(const Run<Pass2<Halo>>& run, StateReal dt, Real* force,

@@ -31,7 +31,7 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
                             const Index* place, const std::uint16_t* entries, int passes,
                             Pair<Real>* pairs, Real* weights) {
   const Slice& slice = slices[blockIdx.x];
-  const Real body_support = f.tiles[slice.first_place / tile_size].inverse_h_squared;
+  const TileConstants<Real, StateReal>& body = f.tiles[slice.first_place / tile_size];
   for (int pass = 0; pass < passes; ++pass) {
     const Slice::Rows& rows = slice.rows[pass];
     for (int k = static_cast<int>(threadIdx.x); k < rows.longest * slice_size;
@@ -44,9 +44,15 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
         const auto own = static_cast<std::size_t>(slice.first_place) + p;
         const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
         const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
-        const Real inverse_h_squared =
-            f.inverse_h_squared ? f.inverse_h_squared[pass == 0 ? own : other] : body_support;
-        weight = weight_shape_anywhere(dot(x, x), inverse_h_squared);
+        if (body.pairwise) {
+          weight = pair_weight(dot(x, x), f.inverse_h_squared[own], f.inverse_h_squared[other],
+                               body.inverse_h_squared);
+        } else {
+          const Real inverse_h_squared = f.inverse_h_squared
+                                             ? f.inverse_h_squared[pass == 0 ? own : other]
+                                             : body.inverse_h_squared;
+          weight = weight_shape_anywhere(dot(x, x), inverse_h_squared);
+        }
         pair = {weight * x, entry};
       }
       pairs[rows.first_entry + k] = pair;

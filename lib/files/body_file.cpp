@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "files/atomic_file.hpp"
@@ -68,6 +69,21 @@ Surface read_surface(const Hdf5Reader& in) {
   return surface;
 }
 
+/// Reads one positive value for each phyxel; none if the file lacks the array. @throws InputError
+std::vector<double> read_positive(const Hdf5Reader& in, const char* path, const char* unit,
+                                  std::size_t phyxels) {
+  if (!in.has(path)) return {};
+  std::vector<double> values = in.array<double>(path);
+  if (values.size() != phyxels) {
+    in.refuse(fmt::format("{} has {} rows, /position {}", path, values.size(), phyxels));
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i] > 0 && std::isfinite(values[i])) continue;
+    in.refuse(fmt::format("{} is {} in row {}; allowed > 0 {}", path, values[i], i, unit));
+  }
+  return values;
+}
+
 }  // namespace
 
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite) {
@@ -82,6 +98,7 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
   if (cloud.lattice) out.attribute("/phyxel", "lattice", std::int64_t{1});
   out.vectors("/position", cloud.position, false);
   if (!cloud.volume.empty()) out.array<double>("/volume", cloud.volume);
+  if (!cloud.spacing.empty()) out.array<double>("/spacing", cloud.spacing);
   const Surface& surface = cloud.surface;
   if (!surface.position.empty()) {
     out.vectors("/surface/position", surface.position, false);
@@ -96,6 +113,14 @@ void write_body(const std::filesystem::path& file, const Cloud& cloud, bool over
   write_sealed(file, kind, out.content(), Durable::yes);
 }
 
+bool has_spacing(const std::filesystem::path& file) {
+  try {
+    return Hdf5Reader(file).has("/spacing");
+  } catch (const InputError&) {
+    return false;  // `read_body` says why
+  }
+}
+
 Cloud read_body(const std::filesystem::path& file) {
   check_seal(file, kind);
   const Hdf5Reader in(file);
@@ -106,18 +131,8 @@ Cloud read_body(const std::filesystem::path& file) {
   cloud.position = in.vectors("/position");
   if (cloud.position.empty()) in.refuse("has no phyxels");
   check_points(in, "/position", cloud.position);
-  if (in.has("/volume")) {
-    cloud.volume = in.array<double>("/volume");
-    if (cloud.volume.size() != cloud.position.size()) {
-      in.refuse(fmt::format("/volume has {} rows, /position {}", cloud.volume.size(),
-                            cloud.position.size()));
-    }
-    for (std::size_t i = 0; i < cloud.volume.size(); ++i) {
-      if (!(cloud.volume[i] > 0) || !std::isfinite(cloud.volume[i])) {
-        in.refuse(fmt::format("/volume is {} in row {}; allowed > 0 m^3", cloud.volume[i], i));
-      }
-    }
-  }
+  cloud.volume = read_positive(in, "/volume", "m^3", cloud.position.size());
+  cloud.spacing = read_positive(in, "/spacing", "m", cloud.position.size());
   if (in.has("/surface")) cloud.surface = read_surface(in);
   cloud.lattice =
       in.has_attribute("/phyxel", "lattice") && in.integer_attribute("/phyxel", "lattice") != 0;

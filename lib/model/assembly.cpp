@@ -6,11 +6,13 @@
 #include <numbers>
 
 #include "model/closing_areas.hpp"
+#include "model/parts.hpp"
+#include "model/row_weights.hpp"
 #include "model/selection.hpp"
+#include "phyxel/body_file.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
-#include "phyxel/physics/weight.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
 
@@ -40,6 +42,7 @@ void place(Cloud& cloud, const BodyRequest& request) {
     cloud.position[i] = placed(cloud.position[i]);
   }
   for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
+  for (double& s : cloud.spacing) s *= request.scale;
   place_cuts(cloud, request);
   for (Vec3d& p : cloud.surface.position) p = placed(p);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
@@ -47,7 +50,12 @@ void place(Cloud& cloud, const BodyRequest& request) {
 
 bool needs_lists_on_host(const BodyRequest& request) {
   const bool may_be_cut = !request.source.mesh.empty() && !support_regions(request).empty();
-  return may_close(request) || !request.inclusions.empty() || may_be_cut;
+  const NeighbourhoodRule& rule = request.neighbourhood;
+  // A cloud of the caller's is not known here.
+  const bool may_have_spacing = !request.source.cloud.empty() ||
+                                (!request.source.file.empty() && has_spacing(request.source.file));
+  const bool pairwise = rule.resolved(may_have_spacing).pairwise();
+  return may_close(request) || !request.inclusions.empty() || may_be_cut || pairwise;
 }
 
 double hourglass_of(const BodyRequest& request) {
@@ -60,12 +68,19 @@ void check_terms(const BodyRequest& request) {
   };
   check_law(request.material);
   for (const InclusionRequest& inclusion : request.inclusions) check_law(inclusion.material);
+  const NeighbourhoodRule& rule = request.neighbourhood;
+  if (rule.support == NeighbourhoodRule::Support::pairwise &&
+      (rule.max_neighbours || rule.radius)) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has neighbours.support = \"pairwise\" and {}; allowed: only one",
+        request.where, request.name, rule.radius ? "a radius" : "max_neighbours"));
+  }
   if (!request.neighbourhood.one_sided()) return;
   const auto refuse_if = [&](double value, const char* term, const char* key) {
     if (!(value > 0)) return;
     throw InputError(fmt::format(
-        "{}: body \"{}\" has {} ({:g}), which needs one support for the body: allowed are "
-        "neighbours.support = \"uniform\" without max_neighbours, or {} = 0",
+        "{}: body \"{}\" has {} ({:g}), which needs symmetric lists: allowed are "
+        "neighbours.support = \"uniform\" or \"pairwise\" without max_neighbours, or {} = 0",
         request.where, request.name, term, value, key));
   };
   refuse_if(hourglass_of(request), "hourglass control", "hourglass");
@@ -90,7 +105,7 @@ bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::siz
 }
 
 std::vector<double> kernel_sums(std::span<const Vec3d> position, const Neighbourhood& hood,
-                                const std::vector<double>& spacing, Index begin) {
+                                const std::vector<double>& spacing, bool pairwise, Index begin) {
   const auto cube = [&](Index i) {
     const double r = spacing[i - begin];
     return r * r * r;
@@ -103,7 +118,8 @@ std::vector<double> kernel_sums(std::span<const Vec3d> position, const Neighbour
     double& sum = sums[i - begin];
     sum = h > 0 ? cube(i) * weight(0, h) : 0;
     for (const Index j : hood.neighbours.row(i)) {
-      sum += cube(j) * weight(norm(position[j] - position[i]), h);
+      const double of_pair = pairwise ? pair_support(h, hood.support[j]) : h;
+      sum += cube(j) * weight(norm(position[j] - position[i]), of_pair);
     }
   }
   return sums;
@@ -157,10 +173,11 @@ std::string in_words(const NeighbourhoodRule& rule) {
       words += fmt::format(", {} nearest", rule.nearest);
     }
   } else {
-    words =
-        fmt::format("{} support, {:g} x the mean distance to the {} nearest",
-                    rule.support == NeighbourhoodRule::Support::uniform ? "uniform" : "adaptive",
-                    rule.factor, rule.nearest);
+    words = fmt::format("{} support, {:g} x the mean distance to the {} nearest",
+                        rule.pairwise()  ? "pairwise"
+                        : rule.differs() ? "adaptive"
+                                         : "uniform",
+                        rule.factor, rule.nearest);
   }
   if (rule.max_neighbours) words += fmt::format(", at most {} neighbours", *rule.max_neighbours);
   return words;
@@ -222,10 +239,10 @@ void find_moments(Model& model) {
     Sym3d moment;
     Vec3d offset;
     const double h = model.neighbourhood.support[i];
-    const double inverse_h_squared = 1 / (h * h);
+    const RowWeights weights(model.neighbourhood.support.data(), i, part_of(model, i).pair_length);
     for (const Index j : model.neighbourhood.neighbours.row(i)) {
       const Vec3d x = model.position[j] - model.position[i];
-      const double w = weight_shape(dot(x, x), inverse_h_squared);
+      const double w = weights(j, dot(x, x));
       moment += moment_term(x, w);
       offset += w * x;
       if (dot(x, x) <= 1e-20 * h * h) coincident[i] = 1;
@@ -265,6 +282,12 @@ void add_warnings(Model& model, std::size_t surfels) {
                     "phyxel; more phyxels or a larger neighbours.factor reach them",
                     model.surfels.unreached, surfels));
   }
+}
+
+ExactSum sum_of_cubes(std::span<const double> support) {
+  ExactSum sum;
+  for (const double h : support) sum.add(h * h * h);
+  return sum;
 }
 
 void BodySums::tell(Part& part) const {

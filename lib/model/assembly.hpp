@@ -45,8 +45,9 @@ void check_terms(const BodyRequest& request);
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels);
 
 /// r̄_i³ w_ii + Σ_j r̄_j³ w_ij of each phyxel [begin, begin + spacing.size()) of a neighbourhood.
+/// @param pairwise true if the weight of a pair has the mean of its supports
 std::vector<double> kernel_sums(std::span<const Vec3d> position, const Neighbourhood& hood,
-                                const std::vector<double>& spacing, Index begin = 0);
+                                const std::vector<double>& spacing, bool pairwise, Index begin = 0);
 
 struct Masses {
   std::vector<double> mass, volume;
@@ -88,6 +89,9 @@ void find_moments(Model& model);
 
 /// What the summary shall warn of, once all bodies are in. @param surfels of the whole model
 void add_warnings(Model& model, std::size_t surfels);
+
+/// Σ h³ of some phyxels [m³]. @param support of each [m]
+ExactSum sum_of_cubes(std::span<const double> support);
 
 /// Mass, volume and centre of a body, in exact sums.
 struct BodySums {

@@ -33,6 +33,11 @@ constexpr double most_shares = 1.2;
 
 }  // namespace
 
+double facet_support(std::span<const double> support, double pair_length) {
+  const auto [least, most] = std::minmax_element(support.begin(), support.end());
+  return pair_length > 0 ? *least : *most;
+}
+
 double longest_edge(double support, std::span<const Vec3d> position,
                     std::span<const Triangle> triangles, Index first, Index size) {
   double area = 0;

@@ -21,6 +21,10 @@ struct Facet {
 std::vector<Facet> facets_of(std::span<const Vec3d> position, std::span<const Triangle> triangles,
                              Index first, double longest);
 
+/// The support of a body's phyxels that facets of its surface have to resolve [m]: the smallest if
+/// weights are those of pairs. @param pair_length `Part::pair_length`
+double facet_support(std::span<const double> support, double pair_length);
+
 /// The largest edge of a facet of a body whose phyxels have this support: short enough for the
 /// facet's area to go to the phyxels beside it [m].
 ///

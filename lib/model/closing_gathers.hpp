@@ -6,6 +6,7 @@
 #include <span>
 
 #include "bulk.hpp"
+#include "model/row_weights.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel::closing {
@@ -35,8 +36,9 @@ class Gathers {
     return m;
   }
   /// Returns start + Σ_k w_jk (constant_k + linear_k x_jk), added in the order of the neighbours.
-  /// @param inverse 1 / h² [1/m²]
-  Vec3d terms(Index j, std::span<const Index> neighbours, double inverse, Vec3d start) const;
+  /// @param weights of phyxel j
+  Vec3d terms(Index j, std::span<const Index> neighbours, const RowWeights& weights,
+              Vec3d start) const;
 
   /// Sets the record of phyxel k for `differences`, and destroys records for `terms`.
   void set_value(Index k, Vec3d position, Vec3d value) {
@@ -48,7 +50,8 @@ class Gathers {
     Vec3d total;   ///< Σ_k w_jk (value_k - value_j)
     Mat3d moment;  ///< Σ_k w_jk (value_k - value_j) x_jkᵀ
   };
-  Differences differences(Index j, std::span<const Index> neighbours, double inverse) const;
+  Differences differences(Index j, std::span<const Index> neighbours,
+                          const RowWeights& weights) const;
 
  private:
   /// Numbers in a line of the cache and in records.

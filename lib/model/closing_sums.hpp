@@ -13,7 +13,6 @@
 #include "model/closing_gathers.hpp"
 #include "model/owned_vectors.hpp"
 #include "phyxel/model.hpp"
-#include "phyxel/physics/weight.hpp"
 #include "rank_sums.hpp"
 
 namespace phyxel::closing {
@@ -22,8 +21,9 @@ namespace phyxel::closing {
 /// much as a closing vector 1/ease times as large.
 inline constexpr double ease_area = 0.3, ease_volume = 0.1;
 
-/// What is sought, of each phyxel: the closing vector times v / s², and the relative changes of its
-/// area and of its volume, over `ease_area` and `ease_volume`.
+/// What is sought, of each phyxel: the closing vector times v / (s² ρ), and the relative changes of
+/// its area and of its volume, over `ease_area` and `ease_volume`. ρ is the phyxel's support over
+/// that of its body, 1 unless supports differ: then numbers do not depend on the size of a phyxel.
 struct Unknown {
   Vec3d closing;
   double area = 0, volume = 0;
@@ -47,7 +47,7 @@ struct Body {
   std::span<Part> parts;
   double tolerance = 0;
   double unit = 1, volume = 1;  ///< s² [m²] and the volume of all phyxels [m³].
-  double areas = 0;             ///< Σ S², per s⁴.
+  double areas = 0;             ///< Σ S², per s⁴ ρ⁴.
   double residual_squared = 0, gradient_squared = 0, next_gradient_squared = 0, image_squared = 0;
   double sum = 0, mean = 0;  ///< Sum and mean of the changes of volumes.
   double left = 0;           ///< Root mean square of the sums over that of the areas.
@@ -147,7 +147,7 @@ class Bodies {
   std::vector<Body*> list_;
 };
 
-/// The sums of bodies, per s², as a linear function of the unknowns:
+/// The sums of bodies, per s² ρ², as a linear function of the unknowns:
 ///   R_j = Σ_k w_jk (c_k (1 + a_k x_jk) - M_k x_jk (1 + σ_k)) - c_j Σ_k w_jk (1 - a_j x_jk)
 ///         - M_j b_j (1 + σ_j) - S_j (1 + y_j),   M = v A⁻¹, a = A⁻¹ b.
 /// R_j is the force of a uniform stress on phyxel j, which does nothing where j is supported: there
@@ -162,6 +162,7 @@ class Sums {
         areas_(std::move(areas)),
         tilt_(areas_.size()),
         weight_(areas_.size()),
+        relative_size_(areas_.size(), 1),
         gathers_(areas_.size()),
         supported_(supported_phyxels(model)) {
     for (Body* body : bodies) {
@@ -176,16 +177,19 @@ class Sums {
 #pragma omp parallel for schedule(static)
       for (Index i = body->begin(); i < body->end(); ++i) {
         tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
+        const double length = body->parts.front().pair_length;
+        if (length > 0) relative_size_[i] = model_.neighbourhood.support[i] / length;
       }
     }
     bodies.sum(&Body::volume, [&](const Body&, Index i) { return model_.volume[i]; });
     bodies.for_each([&](const Body& body, Index i) {
-      areas_[i] = supported_[i] ? Vec3d{} : areas_[i] / body.unit;
+      const double size = relative_size_[i];
+      areas_[i] = supported_[i] ? Vec3d{} : areas_[i] / (body.unit * size * size);
       double sum = 0;
-      const double inverse = inverse_support_squared(i);
+      const RowWeights weights = weights_of(body, i);
       for (const Index k : model_.neighbourhood.neighbours.row(i)) {
         const Vec3d x = model_.position[k] - model_.position[i];
-        sum += weight_shape(dot(x, x), inverse);
+        sum += weights(k, dot(x, x));
       }
       weight_[i] = sum - dot(tilt_[i], model_.moment_offset[i]);
     });
@@ -199,7 +203,7 @@ class Sums {
     for (Body* body : bodies) body->mean = 0;
     const Unknown ones{{}, 1 / ease_area, 1 / ease_volume};
     set_terms(bodies, [&](Index) { return ones; });
-    bodies.for_each([&](const Body&, Index j) { take(j, sum_at(j, ones)); });
+    bodies.for_each([&](const Body& body, Index j) { take(j, sum_at(body, j, ones)); });
   }
   /// Sets a member of each body to Σ take(i, sum), which is given the sum of each phyxel of the
   /// body, on many threads. Collective.
@@ -209,12 +213,16 @@ class Sums {
     bodies.refresh_ghosts(x);
     find_means(bodies, x);
     set_terms(bodies, [&](Index k) { return x[k]; });
-    bodies.sum(into, [&](const Body&, Index j) { return take(j, sum_at(j, x[j])); });
+    bodies.sum(into, [&](const Body& body, Index j) { return take(j, sum_at(body, j, x[j])); });
   }
   /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
   void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
     bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
     for (Body* body : bodies) body->mean /= body->volume;
+  }
+  /// The closing vector ĉ that the unknowns of phyxel i mean [1/m].
+  Vec3d closing_vector(const Body& body, Index i, const Unknown& x) const {
+    return (body.unit / model_.volume[i] * relative_size_[i]) * x.closing;
   }
   /// Sets x to the transpose of `apply` times `sums`, and a member of each body to the square of x.
   /// Collective.
@@ -222,12 +230,13 @@ class Sums {
   void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums, std::vector<Unknown>& x,
                        double Body::*square) {
     bodies.refresh_ghosts(sums);
-    bodies.for_each_with_ghosts(
-        [&](const Body&, Index i) { gathers_.set_value(i, model_.position[i], sums[i]); });
+    bodies.for_each_with_ghosts([&](const Body&, Index i) {
+      gathers_.set_value(i, model_.position[i], per_size(i, sums[i]));
+    });
     bodies.sum(&Body::sum, [&](const Body& body, Index i) {
-      const auto [total, moment] = gathers_.differences(i, model_.neighbourhood.neighbours.row(i),
-                                                        inverse_support_squared(i));
-      x[i] = {.closing = total - moment * tilt_[i],
+      const auto [total, moment] =
+          gathers_.differences(i, model_.neighbourhood.neighbours.row(i), weights_of(body, i));
+      x[i] = {.closing = relative_size_[i] * (total - moment * tilt_[i]),
               .area = -ease_area * dot(areas_[i], sums[i]),
               .volume = ease_volume * (model_.volume[i] / body.unit) *
                         contract(symmetric_part(moment), model_.inverse_moment[i])};
@@ -246,31 +255,38 @@ class Sums {
     bodies.for_each_with_ghosts([&](const Body& body, Index k) {
       const Unknown of_k = x(k);
       const double change = ease_volume * (of_k.volume - body.mean) * model_.volume[k] / body.unit;
-      gathers_.set_term(k, model_.position[k], of_k.closing,
-                        outer(of_k.closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
+      const Vec3d closing = relative_size_[k] * of_k.closing;
+      gathers_.set_term(k, model_.position[k], closing,
+                        outer(closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
     });
   }
   /// The sum R_j, once terms are set. @param x unknowns of j
-  Vec3d sum_at(Index j, const Unknown& x) const {
+  Vec3d sum_at(const Body& body, Index j, const Unknown& x) const {
     if (supported_[j]) return {};
+    const double size = relative_size_[j];
     // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
     const Vec3d own = gathers_.linear(j) * model_.moment_offset[j] -
-                      (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * x.closing -
-                      ease_area * x.area * areas_[j];
-    return gathers_.terms(j, model_.neighbourhood.neighbours.row(j), inverse_support_squared(j),
-                          own);
+                      (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * (size * x.closing) -
+                      ease_area * x.area * (size * size * areas_[j]);
+    return per_size(
+        j, gathers_.terms(j, model_.neighbourhood.neighbours.row(j), weights_of(body, j), own));
   }
-  double inverse_support_squared(Index i) const {
-    const double h = model_.neighbourhood.support[i];
-    return 1 / (h * h);
+  /// A sum of phyxel j over ρ².
+  Vec3d per_size(Index j, Vec3d sum) const {
+    const double size = relative_size_[j];
+    return sum / (size * size);
+  }
+  RowWeights weights_of(const Body& body, Index i) const {
+    return {model_.neighbourhood.support.data(), i, body.parts.front().pair_length};
   }
 
   const Model& model_;
-  std::vector<Vec3d> areas_;     ///< S / s²
-  std::vector<Vec3d> tilt_;      ///< a
-  std::vector<double> weight_;   ///< Σ_k w_jk (1 - a_j x_jk)
-  Gathers gathers_;              ///< What phyxels give to the sums of their neighbours.
-  std::vector<char> supported_;  ///< `supported_phyxels`.
+  std::vector<Vec3d> areas_;           ///< S / (s² ρ²)
+  std::vector<Vec3d> tilt_;            ///< a
+  std::vector<double> weight_;         ///< Σ_k w_jk (1 - a_j x_jk)
+  std::vector<double> relative_size_;  ///< ρ
+  Gathers gathers_;                    ///< What phyxels give to the sums of their neighbours.
+  std::vector<char> supported_;        ///< `supported_phyxels`.
 };
 
 }  // namespace phyxel::closing

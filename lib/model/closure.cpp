@@ -198,8 +198,10 @@ std::vector<Facet> facets_of(const Model& model, const Part& part) {
   const std::span<const Triangle> triangles = model.surfels.triangles_of(part);
   Index size = 0;
   for (const Part& of_body : model.parts_of_body(part)) size += of_body.size;
+  const std::span<const double> support =
+      std::span(model.neighbourhood.support).subspan(part.begin, size);
   return facets_of(position, triangles, part.surfel_begin,
-                   longest_edge(model.neighbourhood.support[part.begin], position, triangles,
+                   longest_edge(facet_support(support, part.pair_length), position, triangles,
                                 part.surfel_begin, size));
 }
 
@@ -240,7 +242,7 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   model.closing.resize(model.volume.size());
   bodies.for_each([&](const Body& body, Index i) {
     model.volume[i] *= 1 + change(body, i);
-    model.closing[i] = (body.unit / model.volume[i]) * found[i].closing;
+    model.closing[i] = sums.closing_vector(body, i, found[i]);
   });
   bodies.refresh_ghosts(model.volume);
   bodies.refresh_ghosts(model.closing);

@@ -49,15 +49,27 @@ void check_volume_count(const CloudFault& fault, const Cloud& cloud) {
                            cloud.volume.size(), cloud.position.size()));
 }
 
+void check_spacing_count(const CloudFault& fault, const Cloud& cloud) {
+  if (cloud.spacing.empty() || cloud.spacing.size() == cloud.position.size()) return;
+  fault.refuse(fmt::format("has {} spacings for {} phyxels; allowed: as many, or none",
+                           cloud.spacing.size(), cloud.position.size()));
+}
+
 void check_phyxels(const CloudFault& fault, const Cloud& cloud) {
   if (cloud.position.empty()) fault.refuse("has no phyxel; allowed: at least one");
   check_volume_count(fault, cloud);
+  check_spacing_count(fault, cloud);
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {
     check_place(fault, "phyxel", i, cloud.position[i]);
     if (!cloud.volume.empty() && !(cloud.volume[i] > 0 && std::isfinite(cloud.volume[i]))) {
       fault.refuse("phyxel", i,
                    fmt::format("has a volume of {:g} m^3 (is the body flat?); allowed: > 0, finite",
                                cloud.volume[i]));
+    }
+    if (!cloud.spacing.empty() && !(cloud.spacing[i] > 0 && cloud.spacing[i] <= longest_length)) {
+      fault.refuse("phyxel", i,
+                   fmt::format("has a spacing of {:g} m; allowed: > 0, at most {:g} m",
+                               cloud.spacing[i], longest_length));
     }
   }
 }
@@ -156,6 +168,7 @@ void check_order(const Cloud& cloud, std::span<const Index> order) {
     seen[order[k]] = true;
   }
   check_volume_count(fault, cloud);
+  check_spacing_count(fault, cloud);
   check_regions(fault, cloud, false);
 }
 

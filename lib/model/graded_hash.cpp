@@ -1,10 +1,12 @@
 #include "model/graded_hash.hpp"
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
 
 #include "model/box.hpp"
+#include "model/space_filling_curve.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -23,8 +25,8 @@ GradedHash::GradedHash(std::span<const Vec3d> position, std::span<const double> 
     largest = std::max(largest, size[i]);
   }
   for (auto& [power, octave] : found) {
-    const std::vector<Vec3d> here = tabulated(
-        octave.member.size(), [&](std::size_t k) { return position[octave.member[k]]; });
+    const std::vector<Vec3d> here =
+        tabulated(octave.member.size(), [&](std::size_t k) { return position[octave.member[k]]; });
     // From level to level cells are four times as large. One more level could be of use only to
     // balls larger than every size.
     for (double cell = octave.largest;; cell *= 4) {
@@ -60,6 +62,27 @@ GradedHash::Nearest GradedHash::nearest(Vec3d place, double limit, Index except)
         });
     if (last || found.distance2 <= radius * radius) return found;
   }
+}
+
+std::vector<double> local_sizes(std::span<const Vec3d> position) {
+  constexpr std::size_t few = 8;
+  const Box box = box_around(position);
+  const HilbertFrame frame = HilbertFrame::around(box.low, box.high);
+  const std::vector<Index> order = curve_order(position, 0, static_cast<Index>(position.size()));
+  const std::vector<std::uint64_t> key =
+      tabulated(order.size(), [&](std::size_t k) { return frame.key_of(position[order[k]]); });
+  std::vector<double> size(order.size(), 0);
+  if (!(frame.scale > 0)) return size;
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    int bits = 3 * hilbert_bits;  // lowest ones, in which the keys of a cell differ
+    for (std::size_t first = k < few ? 0 : k - few; first <= k; first += few / 2) {
+      const std::size_t last = std::min(order.size() - 1, first + few);
+      bits = std::min(bits, static_cast<int>(std::bit_width(key[first] ^ key[last])));
+    }
+    size[order[k]] = std::ldexp(1 / frame.scale, (bits + 2) / 3);
+  }
+  return size;
 }
 
 }  // namespace phyxel

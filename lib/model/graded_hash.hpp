@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "model/nearest_distances.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
@@ -73,5 +74,24 @@ class GradedHash {
   Vec3d low_, high_;             // box around all points
   std::vector<Octave> octaves_;  // from small to large sizes
 };
+
+/// Sides of cubes that hold some ten points each around every point of a cloud [m]: of cells of an
+/// octree, of which the smallest counts that holds a few of the points next to it along the curve.
+std::vector<double> local_sizes(std::span<const Vec3d> position);
+
+/// Offers points in balls of growing radius, until no nearer one can come. @param size a distance
+/// within which there are some points [m]. @param offer offer(entry) offers to `found`
+template <class Offer>
+void search_nearest(NearestDistances& found, const GradedHash& hash, Vec3d place, double size,
+                    Offer&& offer) {
+  const double farthest = hash.farthest(place);
+  for (double radius = std::max(0.75 * size, 1e-9 * farthest);; radius *= 1.5) {
+    const double reach = std::min(radius, farthest);
+    found.clear();
+    hash.visit_ball(
+        place, [&](double) { return reach; }, offer);
+    if (reach == farthest || (found.full() && found.largest() <= reach * reach)) return;
+  }
+}
 
 }  // namespace phyxel

@@ -333,7 +333,7 @@ void add_tractions(Model& model, const Scene& scene) {
     const std::span<const Triangle> triangles = model.surfels.triangles_of(part);
     const double longest =
         triangles.empty() ? 1
-                          : longest_edge(*std::max_element(support.begin(), support.end()), surfel,
+                          : longest_edge(facet_support(support, part.pair_length), surfel,
                                          triangles, part.surfel_begin, static_cast<Index>(count));
     for (std::size_t t = 0; t < request.tractions.size(); ++t) {
       const LoadedFacets loaded =

@@ -14,6 +14,7 @@
 #include "model/following.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
+#include "model/neighbour_search.hpp"
 #include "phyxel/error.hpp"
 #include "scene/scene_error.hpp"
 #include "stage.hpp"
@@ -38,15 +39,23 @@ ListLengths lengths_of(const Csr& lists, Index begin, Index end) {
   return lengths;
 }
 
+/// `Part::pair_length` of a body. @param support of its phyxels [m]
+double pair_length_of(const NeighbourhoodRule& rule, std::span<const double> support) {
+  return rule.pairwise() && !support.empty() ? median_of(support) : 0;
+}
+
 /// What a survey tells, found here along with the lists.
 Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool kernel_volumes,
                          Neighbourhood& hood) {
   Survey survey;
-  survey.spacing = mean_spacing(cloud.position, request.neighbourhood.nearest);
-  hood = find_neighbours(cloud.position, survey.spacing, request.neighbourhood);
-  separate(hood, cloud.position, walls_of(request, cloud));
+  const NeighbourhoodRule& rule = request.neighbourhood;
+  survey.spacing = mean_spacing(cloud.position, rule.nearest);
+  hood = rule.pairwise()
+             ? find_neighbours(cloud.position, graded_spacing(survey.spacing, cloud.spacing), rule)
+             : find_neighbours(cloud.position, survey.spacing, rule);
+  separate(hood, cloud.position, walls_of(request, cloud), pair_length_of(rule, hood.support));
   if (kernel_volumes) {
-    survey.kernel_sum = kernel_sums(cloud.position, hood, survey.spacing);
+    survey.kernel_sum = kernel_sums(cloud.position, hood, survey.spacing, rule.pairwise());
   }
   survey.support = hood.support;
   survey.lists = lengths_of(hood.neighbours, 0, hood.neighbours.rows());
@@ -62,6 +71,13 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
         request.where, request.name,
         request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
+  }
+  if (request.neighbourhood.pairwise()) {
+    throw InputError(
+        fmt::format("{}: body \"{}\" has supports of pairs (neighbours.support = \"pairwise\"), "
+                    "whose lists are "
+                    "made on the host: allowed is a model built without a surveyor, or \"uniform\"",
+                    request.where, request.name));
   }
   if (!walls_of(request, cloud).regions.empty()) {
     throw InputError(fmt::format(
@@ -171,6 +187,7 @@ double add_parts(Model& model, const BodyRequest& request, std::span<const Mater
   Part body;  // of all materials
   whole.tell(body);
   const double farthest = box_around(std::span(model.position).subspan(shift)).farthest();
+  const double pair_length = pair_length_of(request.neighbourhood, survey.support);
   const Index number = model.parts.empty() ? 0 : model.parts.back().body + 1;
   const auto surfel_end = static_cast<Index>(model.surfels.position.size());
   for (const MaterialGroup& group : groups) {
@@ -198,6 +215,12 @@ double add_parts(Model& model, const BodyRequest& request, std::span<const Mater
     sums.tell(part);
     part.centre = body.centre;
     part.farthest = farthest;
+    part.pair_length = pair_length;
+    if (pair_length > 0) {
+      part.support_cubes =
+          sum_of_cubes(std::span(model.neighbourhood.support).subspan(part.begin, part.size))
+              .value();
+    }
   }
   return body.volume;
 }
@@ -217,10 +240,10 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
 }
 
 /// @param surveyor null: lists and moments are made here.
-void add_body(Model& model, const BodyRequest& request, const Cloud& given,
-              const Surveyor* surveyor) {
+void add_body(Model& model, BodyRequest request, const Cloud& given, const Surveyor* surveyor) {
   check_terms(request);
   check_cloud(request, given);
+  request.neighbourhood = request.neighbourhood.resolved(!given.spacing.empty());
   std::optional<SortedCloud> sorted;
   if (!request.inclusions.empty()) sorted = sort_by_material(request, given);
   const Cloud& cloud = sorted ? sorted->cloud : given;

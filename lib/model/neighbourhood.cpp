@@ -9,11 +9,13 @@
 #include <numeric>
 
 #include "model/box.hpp"
+#include "model/graded_hash.hpp"
 #include "model/nearest_distances.hpp"
 #include "model/neighbour_search.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -64,6 +66,24 @@ SpatialHash roomy_hash(std::span<const Vec3d> position) {
     if (hash.mean_occupancy() <= 8 || attempt == 4) return hash;
     cell *= std::cbrt(3 / hash.mean_occupancy());
   }
+}
+
+/// True if a good part of the points lie in cells that hold very many, as in a graded cloud.
+bool is_crowded(const SpatialHash& hash, std::span<const Vec3d> position) {
+  constexpr std::size_t most_samples = 1000;
+  const std::size_t samples = std::min(position.size(), most_samples);
+  std::size_t beside = 0;  // points in the cells of the samples
+  for (std::size_t k = 0; k < samples; ++k) {
+    hash.visit_ring(position[k * position.size() / samples], 0,
+                    [&](const SpatialHash::Entry&) { ++beside; });
+  }
+  return beside > 32 * samples;
+}
+
+/// True if some sizes are more than twice as large as others.
+bool are_graded(std::span<const double> size) {
+  const auto [least, most] = std::minmax_element(size.begin(), size.end());
+  return *most > 2 * *least;
 }
 
 /// @throws InputError if there is not one value for each phyxel, or with the first that is negative
@@ -117,9 +137,23 @@ Csr transpose(const Csr& csr, Index columns) {
   return result;
 }
 
+NeighbourhoodRule NeighbourhoodRule::resolved(bool has_spacing) const {
+  NeighbourhoodRule rule = *this;
+  if (support != Support::automatic) return rule;
+  rule.support = has_spacing && !radius && !max_neighbours ? Support::pairwise : Support::uniform;
+  return rule;
+}
+
+std::vector<double> graded_spacing(std::span<const double> mean, std::span<const double> own) {
+  if (own.empty()) return {mean.begin(), mean.end()};
+  const double ratio =
+      median_of(tabulated(own.size(), [&](std::size_t i) { return mean[i] / own[i]; }));
+  return tabulated(own.size(), [&](std::size_t i) { return ratio * own[i]; });
+}
+
 std::vector<double> support_radii(std::span<const double> spacing, const NeighbourhoodRule& rule,
                                   double median) {
-  if (!rule.radius && rule.support == NeighbourhoodRule::Support::adaptive) {
+  if (rule.differs()) {
     std::vector<double> support;
     support.reserve(spacing.size());
     for (const double r : spacing) support.push_back(rule.factor * r);
@@ -140,6 +174,12 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, d
   if (n < 2) return spacing;
   Stage stage("distances between phyxels");
   const SpatialHash hash = roomy_hash(position);
+  std::vector<double> size;
+  std::optional<GradedHash> graded;
+  if (is_crowded(hash, position)) {
+    size = local_sizes(position);
+    graded.emplace(position, size);
+  }
   stage.expect(static_cast<std::size_t>(n / block_size));
 #pragma omp parallel
   {
@@ -152,9 +192,13 @@ std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest, d
       const auto offer = [&](const SpatialHash::Entry& e) {
         if (e.index != i) found.offer(dot(e.position - here, e.position - here));
       };
-      search_nearest(
-          found, hash.farthest_ring(here), hash.cell_size(),
-          [&](int ring) { hash.visit_ring(here, ring, offer); }, [&] { hash.visit_all(offer); });
+      if (graded) {
+        search_nearest(found, *graded, here, size[i], offer);
+      } else {
+        search_nearest(
+            found, hash.farthest_ring(here), hash.cell_size(),
+            [&](int ring) { hash.visit_ring(here, ring, offer); }, [&] { hash.visit_all(offer); });
+      }
       spacing[i] = found.mean_distance();
       if (farthest) farthest[i] = std::sqrt(found.largest());
       if ((i + 1) % block_size == 0) stage.count();
@@ -180,25 +224,46 @@ Neighbourhood neighbours_within(std::span<const Vec3d> position, std::vector<dou
   result.symmetric = !rule.one_sided();
   if (n == 0) return result;
   Stage stage("neighbours");
-  const SpatialHash hash(position, median_of(result.support));
+  const bool pairwise = rule.pairwise();
+  const double largest = *std::max_element(result.support.begin(), result.support.end());
+  // A search visits phyxels by octaves of their supports where these vary.
+  std::optional<GradedHash> graded;
+  std::optional<SpatialHash> even;
+  if (are_graded(result.support)) {
+    graded.emplace(position, result.support);
+  } else {
+    even.emplace(position, median_of(result.support));
+  }
+  // The distance within which phyxels of support `other` are neighbours of one of support `h`.
+  const auto reach = [pairwise](double h, double other) {
+    return pairwise ? pair_support(h, other) : h;
+  };
 
   using Candidate = std::pair<double, Index>;
   result.neighbours = build_rows(n, stage, [&](Index i, std::vector<Index>& row) {
     const Vec3d here = position[i];
     const double h = result.support[i];
-    const int rings = rings_within(h, hash.cell_size());
+    const auto visit_near = [&](auto&& visit) {
+      if (graded) {
+        graded->visit_ball(
+            here, [&](double other) { return reach(h, other); }, visit);
+      } else {
+        even->visit_near(here, rings_within(reach(h, largest), even->cell_size()), visit);
+      }
+    };
     const auto within = [&](const SpatialHash::Entry& e) {
-      return e.index != i && dot(e.position - here, e.position - here) < h * h;
+      const double r = reach(h, result.support[e.index]);
+      return e.index != i && dot(e.position - here, e.position - here) < r * r;
     };
     if (!rule.max_neighbours) {
-      hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+      visit_near([&](const SpatialHash::Entry& e) {
         if (within(e)) row.push_back(e.index);
       });
       return;
     }
     // Nearest kept; ties go to the smaller index, so that the choice is one on every machine.
     std::vector<Candidate> candidates;
-    hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
+    visit_near([&](const SpatialHash::Entry& e) {
       if (within(e)) candidates.emplace_back(dot(e.position - here, e.position - here), e.index);
     });
     const std::size_t kept =
@@ -272,15 +337,27 @@ Csr phyxels_reaching(std::span<const Vec3d> point, std::span<const Vec3d> positi
     stage.finish();
     return csr;
   }
+  const auto add_reaching = [&](Vec3d here, const SpatialHash::Entry& e, std::vector<Index>& row) {
+    const double h = support[e.index];
+    if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
+  };
+  const auto points = static_cast<Index>(point.size());
+  if (are_graded(support)) {
+    const GradedHash hash(position, support);
+    csr = build_rows(points, stage, [&](Index s, std::vector<Index>& row) {
+      hash.visit_ball(
+          point[s], [](double largest) { return largest; },
+          [&](const SpatialHash::Entry& e) { add_reaching(point[s], e, row); });
+    });
+    stage.finish();
+    return csr;
+  }
   const double largest = *std::max_element(support.begin(), support.end());
   const SpatialHash hash(position, median_of(support));
   const int rings = rings_within(largest, hash.cell_size());
-  csr = build_rows(static_cast<Index>(point.size()), stage, [&](Index s, std::vector<Index>& row) {
-    const Vec3d here = point[s];
-    hash.visit_near(here, rings, [&](const SpatialHash::Entry& e) {
-      const double h = support[e.index];
-      if (dot(e.position - here, e.position - here) < h * h) row.push_back(e.index);
-    });
+  csr = build_rows(points, stage, [&](Index s, std::vector<Index>& row) {
+    hash.visit_near(point[s], rings,
+                    [&](const SpatialHash::Entry& e) { add_reaching(point[s], e, row); });
   });
   stage.finish();
   return csr;

@@ -5,10 +5,10 @@
 #include <limits>
 
 #include "model/assembly.hpp"
+#include "model/row_weights.hpp"
 #include "model/selection.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/physics/moment.hpp"
-#include "phyxel/physics/weight.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -84,14 +84,14 @@ bool may_be_neighbours(std::size_t a, std::size_t b) {
 /// eigenvalue of their moment matrix is above a twentieth of the largest. Beside a flat wall, or a
 /// surface, it is 0.4 to 1 of it.
 template <class Counts>
-bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, Index i,
-                Counts&& counts) {
-  const double inverse_h_squared = 1 / (hood.support[i] * hood.support[i]);
+bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, double pair_length,
+                Index i, Counts&& counts) {
+  const RowWeights weights(hood.support.data(), i, pair_length);
   Sym3d moment;
   for (const Index j : hood.neighbours.row(i)) {
     if (!counts(j)) continue;
     const Vec3d x = position[j] - position[i];
-    moment += moment_term(x, weight_shape(dot(x, x), inverse_h_squared));
+    moment += moment_term(x, weights(j, dot(x, x)));
   }
   return pseudo_inverse(moment, 0.05).rank == 3;
 }
@@ -101,14 +101,15 @@ bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, Inde
 /// the surface. Their fits would be far stiffer than any other in the body. Phyxels inside regions
 /// keep theirs, as all of their neighbours are held or moved, too.
 void open_thin_rooms(std::vector<std::size_t>& room, const Neighbourhood& hood,
-                     std::span<const Vec3d> position, std::size_t outside) {
+                     std::span<const Vec3d> position, double pair_length, std::size_t outside) {
   std::vector<Index> opened;
   for (Index i = 0; i < hood.neighbours.rows(); ++i) {
     if (room[i] != outside) continue;
     const auto is_kept = [&](Index j) { return may_be_neighbours(room[i], room[j]); };
     const auto row = hood.neighbours.row(i);
-    if (!std::ranges::all_of(row, is_kept) && !span_space(hood, position, i, is_kept) &&
-        span_space(hood, position, i, [](Index) { return true; })) {
+    if (!std::ranges::all_of(row, is_kept) &&
+        !span_space(hood, position, pair_length, i, is_kept) &&
+        span_space(hood, position, pair_length, i, [](Index) { return true; })) {
       opened.push_back(i);
     }
   }
@@ -137,10 +138,11 @@ Walls walls_of(const BodyRequest& request, const Cloud& cloud) {
   return walls;
 }
 
-void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls) {
+void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls,
+              double pair_length) {
   if (walls.regions.empty()) return;
   std::vector<std::size_t> room = rooms_of(position, walls);
-  open_thin_rooms(room, hood, position, walls.regions.size());
+  open_thin_rooms(room, hood, position, pair_length, walls.regions.size());
   Csr& lists = hood.neighbours;
   Offset kept = 0, from = 0;
   for (Index i = 0; i < lists.rows(); ++i) {

@@ -18,7 +18,9 @@ Walls walls_of(const BodyRequest& request, const Cloud& cloud);
 /// keeps them if no phyxel lies on the wall near it, as in a layer outside the wall that is too
 /// thin for others. A phyxel on or outside a wall also keeps them if its other neighbours lie
 /// nearly in a plane, as in an acute wedge between the wall and the surface.
-void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls);
+/// @param pair_length `Part::pair_length` of the body
+void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls,
+              double pair_length);
 
 /// The regions of space in which a body is held or moved, in place and without repetitions.
 std::vector<SpaceRegion> support_regions(const BodyRequest& request);

@@ -222,6 +222,11 @@ NeighbourhoodRule read_neighbours(const SceneTable& table) {
   table.read("factor", rule.factor);
   table.read("radius", rule.radius);
   table.read("max_neighbours", rule.max_neighbours);
+  if (rule.max_neighbours && rule.support == NeighbourhoodRule::Support::pairwise) {
+    table.refuse("support",
+                 "\"pairwise\" found together with max_neighbours, which makes lists one-sided; "
+                 "allowed: only one");
+  }
   return rule;
 }
 

@@ -246,8 +246,8 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Closes the sums of gradients over neighbourhoods to within this share of the "
            "surface's areas, so that a uniform stress leaves no forces inside, however irregular "
            "the phyxels are: without it, irregular bodies are some percent off, however many "
-           "phyxels they have. 1e-3 is plenty. 0: as they come. Needs a closed surface, and one "
-           "support for the body. \"auto\": 0.01 for bodies that have both; 0 for all other bodies, "
+           "phyxels they have. 1e-3 is plenty. 0: as they come. Needs a closed surface, and "
+           "symmetric lists. \"auto\": 0.01 for bodies that have both; 0 for all other bodies, "
            "for lattices without jitter, for the paper's bodies, and with the kernel's volumes."},
       {.section = "body", .name = "material", .type = KeyType::table, .required = true,
        .meaning = "What the body is made of."},
@@ -286,11 +286,11 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Kelvin-Voigt damping, in proportion to the stiffness: a relaxation time tau. A "
            "mode of angular frequency omega is damped by the share tau omega / 2 of critical "
            "damping; rigid motion is not damped. 0: none."},
-      {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and where supports vary", .range = between(0, 1e6),
+      {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and with one-sided lists", .range = between(0, 1e6),
        .meaning = "Strength of hourglass control, as a share of E (`young`, or what follows from "
            "the parameters of a law without it): energy of what does not "
            "follow the linear fit of its neighbourhood; 0.1 holds the modes that a phyxel does not "
-           "see; 0: none. Needs one support for the body. With inclusions, a share of the smallest "
+           "see; 0: none. Needs symmetric lists. With inclusions, a share of the smallest "
            "E."},
 
       {.section = "body.inclusion", .name = "young", .unit = "Pa", .otherwise = "the body's",
@@ -310,9 +310,11 @@ std::vector<SceneKey> body_keys() {
        .range = between(0, 1e9), .meaning = "As in `[body.material]`."},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
-       .fallback = "\"uniform\"", .words = {"uniform", "adaptive"},
+       .fallback = "\"automatic\"", .words = {"automatic", "uniform", "adaptive", "pairwise"},
        .meaning = "\"uniform\": one radius for the body; \"adaptive\": each phyxel its own, for "
-           "bodies with thin parts or uneven clouds."},
+           "bodies with thin parts or uneven clouds, without hourglass control and closed "
+           "gradients; \"pairwise\": each phyxel its own, and each pair the mean of two, for graded "
+           "clouds; \"automatic\": pairwise for clouds with spacings of their own, else uniform."},
       {.section = "body.neighbours", .name = "nearest", .type = KeyType::integer, .fallback = "10",
        .range = between(1, 1000),
        .meaning = "How many nearest phyxels the mean distance is taken over."},

@@ -11,6 +11,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/physics/point.hpp"
+#include "phyxel/physics/weight.hpp"
 #include "solver/cpu_layout.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/pack.hpp"
@@ -18,14 +19,15 @@
 namespace phyxel {
 
 /// Record of a phyxel that the first pass reads: its length, and the offset of each value.
+/// `support` is 1/h² [1/m²], or `relative_half_support` in bodies with weights of pairs.
 struct PointRecord {
   static constexpr int size = 8;
-  enum { position = 0, inverse_h_squared = 3, displacement = 4 };
+  enum { position = 0, support = 3, displacement = 4 };
 };
 /// Record of a phyxel that the second pass reads, likewise.
 struct StressRecord {
   static constexpr int size = 16;
-  enum { pair_stress = 0, closing_stress = 9, position = 12, inverse_h_squared = 15 };
+  enum { pair_stress = 0, closing_stress = 9, position = 12, support = 15 };
 };
 
 /// Arrays of one model. @tparam Real scalar of neighbour sums. @tparam StateReal scalar of
@@ -171,6 +173,10 @@ class CpuArrays {
     for (int l = 0; l < W; ++l) value.lanes[l] = point_record(p * W + l)[which];
     return value;
   }
+  /// 1/H² of the weights of pairs [1/m²]; 0 if weights of pack p follow from one support.
+  PHYXEL_HD Real pair_scale_of(Index p) const {
+    return pair_scale_.empty() ? Real(0) : pair_scale_[p];
+  }
   PHYXEL_HD Vec3<P> point_of(Index p, int first) const {
     return {own_point_value(p, first), own_point_value(p, first + 1),
             own_point_value(p, first + 2)};
@@ -224,8 +230,14 @@ class CpuArrays {
       Real *point = point_record(slot), *stress = stress_record(slot);
       set_values(point + PointRecord::position, x);
       set_values(stress + StressRecord::position, x);
-      point[PointRecord::inverse_h_squared] = stress[StressRecord::inverse_h_squared] =
-          h > 0 ? static_cast<Real>(1 / (h * h)) : Real(0);
+      point[PointRecord::support] = stress[StressRecord::support] =
+          part.pair_length > 0 ? static_cast<Real>(relative_half_support(h, part.pair_length))
+          : h > 0              ? static_cast<Real>(1 / (h * h))
+                               : Real(0);
+      if (part.pair_length > 0) {
+        pair_scale_.resize(static_cast<std::size_t>(layout_.packs()), Real(0));
+        pair_scale_[slot / W] = static_cast<Real>(1 / (part.pair_length * part.pair_length));
+      }
       const Sym3d& a = model_.inverse_moment[i];
       const double entries[] = {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
       for (int e = 0; e < 6; ++e) {
@@ -344,8 +356,9 @@ class CpuArrays {
   std::vector<std::vector<std::size_t>> columns_of_part_;  // history columns of each part's law
   std::vector<std::size_t> history_start_;  // [packs + 1]; empty if no law has a history
   AlignedVector<Real> history_;
-  double history_interval_ = 0;  // time from the history to the displacements [s]
-  std::vector<Index> padding_;   // slots without a phyxel
+  double history_interval_ = 0;   // time from the history to the displacements [s]
+  std::vector<Real> pair_scale_;  // 1/H² of packs with weights of pairs, 0 of others; empty if none
+  std::vector<Index> padding_;    // slots without a phyxel
 };
 
 }  // namespace phyxel

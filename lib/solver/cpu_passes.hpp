@@ -204,14 +204,24 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
   PHYXEL_HD void visit_neighbours(Index p, Visit&& visit) const {
     const Vec3<P> x_i = this->point_of(p, PointRecord::position),
                   u_i = this->point_of(p, PointRecord::displacement);
-    const P inverse_h_squared = this->own_point_value(p, PointRecord::inverse_h_squared);
+    const P support = this->own_point_value(p, PointRecord::support);
     const Index* end = lists_.indices.data() + lists_.start[p + 1];
-    for (const Index* j = lists_.indices.data() + lists_.start[p]; j != end; j += W) {
-      P point[PointRecord::size];
-      load_records<PointRecord::size>(points_.data(), j, point);
-      const Vec3<P> x_ij = this->vec3_at(point, PointRecord::position) - x_i;
-      const Vec3<P> u_ij = this->vec3_at(point, PointRecord::displacement) - u_i;
-      visit(x_ij, u_ij, weight_shape(dot(x_ij, x_ij), inverse_h_squared));
+    const auto walk = [&](auto&& weight_of) __attribute__((always_inline)) {
+      for (const Index* j = lists_.indices.data() + lists_.start[p]; j != end; j += W) {
+        P point[PointRecord::size];
+        load_records<PointRecord::size>(points_.data(), j, point);
+        const Vec3<P> x_ij = this->vec3_at(point, PointRecord::position) - x_i;
+        const Vec3<P> u_ij = this->vec3_at(point, PointRecord::displacement) - u_i;
+        visit(x_ij, u_ij, weight_of(dot(x_ij, x_ij), point[PointRecord::support]));
+      }
+    };
+    if (const Real scale = this->pair_scale_of(p); scale > 0) {
+      walk([&](P r_squared, P of_j) __attribute__((always_inline)) {
+        return pair_weight(r_squared, support, of_j, P(scale));
+      });
+    } else {
+      walk([&](P r_squared, P)
+               __attribute__((always_inline)) { return weight_shape(r_squared, support); });
     }
   }
 
@@ -256,13 +266,24 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
     const Vec3<P> x_i = this->vec3_at(record, StressRecord::position);
     Vec3<P> force = own_force(this->mat3_at(record), this->template vec3_of<P>(moment_offset_, p));
     const Vec3<P> sent_i = this->vec3_at(record, StressRecord::closing_stress);
+    const P support = record[StressRecord::support];
     const Index* end = lists.indices.data() + lists.start[p + 1];
-    for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
-      load_records<StressRecord::size>(stresses_.data(), j, record);
-      const Vec3<P> x_ij = this->vec3_at(record, StressRecord::position) - x_i;
-      const P w_ji = weight_shape(dot(x_ij, x_ij), record[StressRecord::inverse_h_squared]);
-      add_neighbour_force(force, this->mat3_at(record), x_ij, w_ji);
-      Terms::add_forces(force, sent_i, this->vec3_at(record, StressRecord::closing_stress), w_ji);
+    const auto walk = [&](auto&& weight_of) __attribute__((always_inline)) {
+      for (const Index* j = lists.indices.data() + lists.start[p]; j != end; j += W) {
+        load_records<StressRecord::size>(stresses_.data(), j, record);
+        const Vec3<P> x_ij = this->vec3_at(record, StressRecord::position) - x_i;
+        const P w_ji = weight_of(dot(x_ij, x_ij), record[StressRecord::support]);
+        add_neighbour_force(force, this->mat3_at(record), x_ij, w_ji);
+        Terms::add_forces(force, sent_i, this->vec3_at(record, StressRecord::closing_stress), w_ji);
+      }
+    };
+    if (const Real scale = this->pair_scale_of(p); scale > 0) {
+      walk([&](P r_squared, P of_j) __attribute__((always_inline)) {
+        return pair_weight(r_squared, support, of_j, P(scale));
+      });
+    } else {
+      walk([&](P r_squared, P of_j)
+               __attribute__((always_inline)) { return weight_shape(r_squared, of_j); });
     }
     return force;
   }

@@ -15,11 +15,17 @@ namespace phyxel {
 inline double hourglass_stiffness(const Model& model, const Part& part) {
   const double strength = part.material.hourglass.value_or(0);
   if (!(strength > 0) || part.begin == part.end) return 0;
-  double young = hourglass_modulus(part.material), volume = 0, size = 0;
+  double young = hourglass_modulus(part.material), volume = 0, size = 0, cubes = 0;
   for (const Part& other : model.parts_of_body(part)) {
     young = std::min(young, hourglass_modulus(other.material));
     volume += other.volume;
     size += other.size;
+    cubes += other.support_cubes;
+  }
+  if (const double length = part.pair_length; length > 0) {
+    // v/h³ is about the same everywhere: the volume of a phyxel whose support is H.
+    return hourglass_stiffness(strength, young, volume / cubes * (length * length * length),
+                               length);
   }
   return hourglass_stiffness(strength, young, volume / size,
                              model.neighbourhood.support[part.begin]);

@@ -6,8 +6,8 @@
 #include "model/neighbour_search.hpp"
 #include "model/owned_vectors.hpp"
 #include "model/parts.hpp"
+#include "model/row_weights.hpp"
 #include "phyxel/physics/moment.hpp"
-#include "phyxel/physics/weight.hpp"
 
 namespace phyxel {
 namespace {
@@ -55,11 +55,12 @@ Recovery::Recovery(const Model& model)
     std::sort(begin, end,
               [&](Index a, Index b) { return model.global_id(a) < model.global_id(b); });
     const double h = model.neighbourhood.support[i];
+    const RowWeights weights(model.neighbourhood.support.data(), i, part_of(model, i).pair_length);
     Sym3d moment, of_part;
     Vec3d third;  // Σ w x |x|²
     std::for_each(begin, end, [&](Index j) {
       const Vec3d x = model.position[j] - model.position[i];
-      const double w = weight_shape(dot(x, x), 1 / (h * h));
+      const double w = weights(j, dot(x, x));
       moment += moment_term(x, w);
       if (!are_of_one_part(model, i, j)) return;
       of_part += moment_term(x, w);
@@ -104,11 +105,12 @@ std::vector<Mat3d> Recovery::gradients(std::vector<Vec3d> displacement) const {
   const bool several = model_.has_inclusions();
   // For each neighbour of the same part: use(its index, x, w x).
   const auto for_each_neighbour = [&](Index i, auto&& use) {
-    const double h = model_.neighbourhood.support[i], inverse = 1 / (h * h);
+    const RowWeights weights(model_.neighbourhood.support.data(), i,
+                             part_of(model_, i).pair_length);
     for (const Index j : rows_.row(i)) {
       if (several && !are_of_one_part(model_, i, j)) continue;
       const Vec3d x = model_.position[j] - model_.position[i];
-      use(j, x, weight_shape(dot(x, x), inverse) * x);
+      use(j, x, weights(j, dot(x, x)) * x);
     }
   };
   const auto refresh = [&](auto& values) {

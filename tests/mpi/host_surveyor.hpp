@@ -29,7 +29,8 @@ class HostSurveyor final : public ShareSurveyor {
     find_moments(m);
     Around around = around_by_lists(m.neighbourhood, 0, own);
     if (!spacing.empty()) {
-      around.kernel_sum = kernel_sums(position, m.neighbourhood, {spacing.begin(), spacing.end()});
+      around.kernel_sum =
+          kernel_sums(position, m.neighbourhood, {spacing.begin(), spacing.end()}, false);
     }
     around.degenerate = m.degenerate;
     const auto keep_own = [&](std::vector<Index>& phyxels) {

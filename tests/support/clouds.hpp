@@ -38,6 +38,36 @@ inline Cloud lattice(int nx, int ny, int nz, double spacing, double jitter = 0,
   return cloud;
 }
 
+/// Maps a cloud over the cube from 0 to `side` by an inversion, which keeps angles, and a
+/// reflection. Spacings vary 8.5 to 1 along x.
+inline Cloud inverted(Cloud cloud, double side, double spacing) {
+  const Vec3d centre{-0.6 * side, side / 2, side / 2};
+  const double radius2 = side * side;
+  const auto map = [&](Vec3d p) {
+    const Vec3d d = p - centre, image = centre + (radius2 / dot(d, d)) * d;
+    return Vec3d{image.x, image.y, side - image.z};
+  };
+  cloud.spacing.clear();
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const Vec3d d = cloud.position[i] - centre;
+    const double growth = radius2 / dot(d, d);
+    cloud.position[i] = map(cloud.position[i]);
+    cloud.volume[i] *= growth * growth * growth;
+    cloud.spacing.push_back(spacing * growth);
+  }
+  for (Vec3d& p : cloud.surface.position) p = map(p);
+  if (!cloud.surface.position.empty()) {
+    cloud.surface.normal = vertex_normals(cloud.surface.position, cloud.surface.triangle);
+  }
+  cloud.lattice = false;
+  return cloud;
+}
+
+/// A graded cloud of n³ phyxels with spacings of their own, which vary 8.5 to 1.
+inline Cloud graded(int n, double jitter = 0.2, std::uint64_t seed = 1) {
+  return inverted(lattice(n, n, n, 1.0 / n, jitter, seed), 1, 1.0 / n);
+}
+
 inline Material rubber() {
   return {.young = 1e5,
           .poisson = 0.3,

@@ -28,6 +28,7 @@ struct Body : Material {
   std::vector<std::vector<int>> neighbours;
   std::vector<Material> material;  // of each phyxel; empty: that of the body
   double hourglass = 0;            // κ [N/m]
+  double pair_length = 0;          // H of weights of pairs [m]; 0 for one-sided weights
   std::vector<V3> closing;         // ĉ [1/m]; empty without closed gradients
 };
 
@@ -38,6 +39,15 @@ inline const Material& material_of(const Body& b, int i) {
 inline double w(double r, double h) {
   if (r >= h) return 0;
   return 315 / (64 * M_PI * std::pow(h, 9)) * std::pow(h * h - r * r, 3);
+}
+
+/// The weight of j in the sums of i: w(r, h_i), or η (1 - r²/h²)³ with the mean h of the two
+/// supports and η = h/H.
+inline double weight_of(const Body& b, int i, int j) {
+  const double r = (b.x[j] - b.x[i]).norm();
+  if (b.pair_length == 0) return w(r, b.h[i]);
+  const double h = (b.h[i] + b.h[j]) / 2;
+  return r < h ? h / b.pair_length * std::pow(1 - r * r / (h * h), 3) : 0;
 }
 
 /// Finds all phyxels closer than h_i.
@@ -56,7 +66,7 @@ inline M3 inverse_moment(const Body& b, int i) {
   M3 a = M3::Zero();
   for (const int j : b.neighbours[i]) {
     const V3 xij = b.x[j] - b.x[i];
-    a += w(xij.norm(), b.h[i]) * xij * xij.transpose();
+    a += weight_of(b, i, j) * xij * xij.transpose();
   }
   const Eigen::JacobiSVD<M3> svd(a, Eigen::ComputeFullU | Eigen::ComputeFullV);
   M3 inverse = M3::Zero();
@@ -73,7 +83,7 @@ inline M3 grad_u(const Body& b, const std::vector<V3>& u, int i) {
   M3 g = M3::Zero();
   for (const int j : b.neighbours[i]) {
     const V3 xij = b.x[j] - b.x[i];
-    g += (u[j] - u[i]) * (inverse_moment(b, i) * xij * w(xij.norm(), b.h[i])).transpose();
+    g += (u[j] - u[i]) * (inverse_moment(b, i) * xij * weight_of(b, i, j)).transpose();
   }
   return g;
 }
@@ -210,8 +220,9 @@ struct MooneyRivlin {
 inline V3 residual(const Body& b, const std::vector<V3>& u, const M3& g, int i, int j) {
   return u[j] - u[i] - g * (b.x[j] - b.x[i]);
 }
-/// (1 - r²/h²)³, the weight w without its unit.
+/// (1 - r²/h²)³, the weight w without its unit; the weight of a pair has none.
 inline double shape(const Body& b, int i, int j) {
+  if (b.pair_length > 0) return weight_of(b, i, j);
   return w((b.x[j] - b.x[i]).norm(), b.h[i]) / w(0, b.h[i]);
 }
 
@@ -227,7 +238,7 @@ inline M3 closed_grad_u(const Body& b, const std::vector<V3>& u, int i) {
 inline V3 grad_of(const Body& b, const M3& inverse, int i, int j) {
   const auto slope = [&](int k) {
     const V3 x = b.x[k] - b.x[i];
-    return V3(inverse * x * w(x.norm(), b.h[i]));
+    return V3(inverse * x * weight_of(b, i, k));
   };
   if (b.closing.empty()) return slope(j);
   double share = shape(b, i, j);

@@ -13,6 +13,10 @@ namespace phyxel {
 ///   OutputError if writing fails
 void write_body(const std::filesystem::path& file, const Cloud& cloud, bool overwrite);
 
+/// True if a body file holds spacings (`Cloud::spacing`), as graded clouds have; false if it cannot
+/// be read. Reads no arrays.
+bool has_spacing(const std::filesystem::path& file);
+
 /// Reads a file written by `write_body`. @throws InputError naming the file and the fault
 Cloud read_body(const std::filesystem::path& file);
 

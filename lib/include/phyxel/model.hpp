@@ -45,7 +45,11 @@ struct Part {
   Vec3d origin;                 ///< Its body's first phyxel at rest [m]: solvers count from it.
   double mass = 0, volume = 0;  ///< Of the whole part [kg, m³].
   Vec3d centre;                 ///< Of its body's mass, at rest [m].
-  double farthest = 0;          ///< Largest coordinate of its body's phyxels at rest, unsigned [m].
+  /// H [m] of the weights of pairs (`pair_weight`), the median support of its body; 0 if weights
+  /// follow from the support of one phyxel.
+  double pair_length = 0;
+  double support_cubes = 0;  ///< Σ h³ of the whole part [m³], with weights of pairs.
+  double farthest = 0;       ///< Largest coordinate of its body's phyxels at rest, unsigned [m].
 
   /// The first of its ghosts.
   Index owned_end() const { return end - ghosts; }

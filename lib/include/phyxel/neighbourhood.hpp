@@ -36,11 +36,15 @@ Csr transpose(const Csr& csr, Index columns);
 struct NeighbourhoodRule {
   /// The scope of a support radius: a body or a phyxel.
   enum class Support {
-    uniform,   ///< One h for the body, from the median of the mean distances. Lists are symmetric,
-               ///< and serve both passes.
-    adaptive,  ///< A different h for each phyxel, as in the 2004 paper (with a factor of 3).
+    automatic,  ///< `pairwise` for a cloud with spacings of its own (`Cloud::spacing`), unless
+                ///< `radius` or `max_neighbours` is set; else `uniform`.
+    uniform,    ///< One h for the body, from the median of the mean distances. Lists are symmetric,
+                ///< and serve both passes.
+    adaptive,   ///< A different h for each phyxel, as in the 2004 paper (with a factor of 3).
+    pairwise,   ///< A different h for each phyxel, and for a pair their mean. Lists and weights
+                ///< (`pair_weight`) are symmetric, as for one support.
   };
-  Support support = Support::uniform;
+  Support support = Support::automatic;
   int nearest = 10;
   double factor = 1.8;           ///< 1.8 gives about 32 neighbours in a uniform cloud.
   std::optional<double> radius;  ///< h [m], in place of the rule.
@@ -49,11 +53,23 @@ struct NeighbourhoodRule {
 
   /// True if i may be a neighbour of j without j being a neighbour of i.
   bool one_sided() const { return max_neighbours || (!radius && support == Support::adaptive); }
+  /// True if supports and weights are those of pairs. An automatic rule is not, until `resolved`.
+  bool pairwise() const { return !radius && support == Support::pairwise; }
+  /// True if supports differ from phyxel to phyxel.
+  bool differs() const {
+    return !radius && (support == Support::adaptive || support == Support::pairwise);
+  }
+  /// This rule for a cloud, with `uniform` or `pairwise` in place of `automatic`.
+  /// @param has_spacing true if the cloud has spacings of its own
+  NeighbourhoodRule resolved(bool has_spacing) const;
 };
 
-/// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i, except pairs across
-/// the boundary of a support (`Cloud::cuts`). The lists are empty if the device finds them;
-/// `support` is always set.
+/// The support h_ij [m] of a pair of phyxels whose supports differ (`Support::pairwise`).
+inline double pair_support(double h_i, double h_j) { return 0.5 * (h_i + h_j); }
+
+/// Neighbour lists of all phyxels: N(i) contains j ≠ i if |x_j - x_i| < h_i (h_ij for the supports
+/// of pairs), except pairs across the boundary of a support (`Cloud::cuts`). The lists are empty if
+/// the device finds them; `support` is always set.
 struct Neighbourhood {
   Csr neighbours;               ///< N(i)
   Csr inverse_lists;            ///< {j : i in N(j)}; empty if `symmetric`.
@@ -68,8 +84,13 @@ struct Neighbourhood {
 /// @throws InputError for a position that is not finite, or `nearest` < 1
 std::vector<double> mean_spacing(std::span<const Vec3d> position, int nearest);
 
+/// The distances between phyxels from which supports follow [m]: the cloud's own, times the median
+/// of their ratios to the mean ones; the mean ones if it has none of its own.
+/// @param mean result of `mean_spacing`. @param own `Cloud::spacing`
+std::vector<double> graded_spacing(std::span<const double> mean, std::span<const double> own);
+
 /// Neighbour search through the spatial hash of Teschner et al. 2003, in time linear in the number
-/// of phyxels. @param spacing result of `mean_spacing`
+/// of phyxels. @param spacing result of `mean_spacing`, or of `graded_spacing` for a graded cloud
 /// @throws InputError for a position or spacing that is not finite, or another number of spacings
 Neighbourhood find_neighbours(std::span<const Vec3d> position, std::span<const double> spacing,
                               const NeighbourhoodRule& rule);

@@ -169,8 +169,8 @@ struct BodyRequest {
   VolumeRule volume_rule = VolumeRule::automatic;
   /// Tolerance of the integration constraint of closed gradients (phyxel/physics/closing.hpp), as a
   /// share of the surface's areas; 0: gradients are not closed. Closed gradients need a closed
-  /// surface and one support for the body. Unset: `automatic_closure` where these are given, the
-  /// body is no regular lattice, and its volumes are not the kernel's; else 0.
+  /// surface and symmetric lists of neighbours. Unset: `automatic_closure` where these are given,
+  /// the body is no regular lattice, and its volumes are not the kernel's; else 0.
   std::optional<double> closure;
   /// Inclusions; where several contain a phyxel, the last one counts. The strength of hourglass
   /// control is the body's.

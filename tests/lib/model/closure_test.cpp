@@ -134,6 +134,44 @@ TEST(Closure, HoldsForPhyxelsBelowTheSurface) {
   }
 }
 
+/// In a graded cloud, too, where phyxels differ in size: what is left is small against the face of
+/// each phyxel, the smallest as well as the largest.
+TEST(Closure, ClosesGradedCloudsEverywhere) {
+  ShapeRequest request = block();
+  request.placement = ShapeRequest::Placement::cells;
+  request.size = {1, 1, 1};
+  request.jitter = 0.2;
+  Cloud cube = make_shape(request);
+  for (std::vector<Vec3d>* points : {&cube.position, &cube.surface.position}) {
+    for (Vec3d& p : *points) p += Vec3d{0.5, 0.5, 0.5};
+  }
+  const Cloud cloud = inverted(cube, 1, 0.1);
+  double worst[2] = {};
+  for (const double closure : {0.0, 1e-8}) {
+    const Model model = model_of_cloud(cloud, closure, linear_rubber());
+    EXPECT_TRUE(model.warnings.empty()) << model.warnings.at(0);
+    EXPECT_GT(model.parts[0].pair_length, 0);
+    EXPECT_TRUE(model.neighbourhood.symmetric);
+    const auto [least, most] = std::ranges::minmax(model.neighbourhood.support);
+    EXPECT_GT(most, 6 * least);
+    const Uniform found = under(model, some_gradient());
+    Index inside = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      double nearest = HUGE_VAL;
+      for (const Vec3d& s : cloud.surface.position) {
+        nearest = std::min(nearest, norm(s - model.position[i]));
+      }
+      if (nearest < 1.3 * model.neighbourhood.support[i]) continue;
+      ++inside;
+      const double face = std::pow(cloud.spacing[i], 2) * 1e-3 * model.parts[0].material.young;
+      worst[closure > 0] = std::max(worst[closure > 0], norm(found.force[i]) / face);
+    }
+    EXPECT_GT(inside, 50);
+  }
+  EXPECT_GT(worst[0], 0.02);
+  EXPECT_LT(worst[1], 1e-6);
+}
+
 /// Twelve triangles around a thousand phyxels: however large they are, all phyxels near get their
 /// share.
 TEST(Closure, TrianglesMayBeLarge) {

@@ -1,10 +1,15 @@
 /// The force on every phyxel, against the papers' equations and against the energy.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+
 #include "phyxel/backend.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
+#include "phyxel/physics/weight.hpp"
+#include "solver/hourglass.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
 #include "support/laws.hpp"
@@ -39,7 +44,8 @@ constexpr const char *st_venant_kirchhoff = StVenantKirchhoff<double>::name,
                      *neo_hookean = NeoHookean<double>::name, *corotated = Corotated<double>::name,
                      *hencky = Hencky<double>::name, *mooney_rivlin = MooneyRivlin<double>::name;
 constexpr auto uniform_support = NeighbourhoodRule::Support::uniform,
-               adaptive_support = NeighbourhoodRule::Support::adaptive;
+               adaptive_support = NeighbourhoodRule::Support::adaptive,
+               pair_supports = NeighbourhoodRule::Support::pairwise;
 
 const Terms all_terms[] = {
     {"GreenUniform", st_venant_kirchhoff, 0, uniform_support, {}, 0, false, false},
@@ -62,8 +68,25 @@ const Terms all_terms[] = {
     {"ClosedCauchyVolume", small_strain, 2e5, uniform_support, {}, 0, true, false},
     {"ClosedNeoHookeHourglass", neo_hookean, 0, uniform_support, {}, 0.1, true, false},
     {"Inclusions", st_venant_kirchhoff, 0, uniform_support, {}, 0.1, false, true},
+    {"Pairs", st_venant_kirchhoff, 0, pair_supports, {}, 0, false, false},
+    {"PairsVolumeHourglass", neo_hookean, 2e5, pair_supports, {}, 0.1, false, false},
+    {"PairsClosedHourglass", hencky, 0, pair_supports, {}, 0.3, true, false},
+    {"PairsInclusions", corotated, 0, pair_supports, {}, 0.1, false, true},
     {"ClosedInclusions", corotated, 2e5, uniform_support, {}, 0, true, true},
 };
+
+/// An irregular cloud of 5 x 4 x 6 phyxels whose spacings vary 2.5 to 1, with spacings of its own.
+Cloud graded_block() {
+  Cloud cloud = lattice(5, 4, 6, 0.1, 0.25);
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    Vec3d& p = cloud.position[i];
+    const double growth = 0.6 + 1.5 * p.z;
+    cloud.spacing.push_back(0.1 * growth);
+    cloud.volume[i] *= growth * growth * growth;
+    p = {p.x * growth, p.y * growth, p.z * (0.6 + 0.75 * p.z)};
+  }
+  return cloud;
+}
 
 /// An irregular cloud of 5 x 4 x 6 phyxels with the given terms.
 struct Case {
@@ -90,7 +113,8 @@ Case make_case(const Terms& terms) {
         {.select = {.ball = Selection::Ball{{0.25, 0.2, 0.3}, 0.2}}, .material = hard},
         {.select = {.box = Selection::Box{{-1, -1, 0.4}, {1, 1, 1}}}, .material = light}};
   }
-  Case c{model_of(scene, lattice(5, 4, 6, 0.1, 0.25)), {}, {}};
+  const Cloud cloud = terms.support == pair_supports ? graded_block() : lattice(5, 4, 6, 0.1, 0.25);
+  Case c{model_of(scene, cloud), {}, {}};
   c.u = random_deformation(c.model, 0.01);
   if (terms.closed) {
     // Forces follow from the energy for any closing vectors; these make a tenth of the gradient.
@@ -123,7 +147,16 @@ Case make_case(const Terms& terms) {
   // κ = α E v / tr A, where tr A sums w r² over a continuum of density 1 / v: by many shells.
   double volume = 0;
   for (const Part& part : c.model.parts) volume += part.volume;
-  const double h = c.body.h[0], v = volume / c.model.size();
+  double h = c.body.h[0], v = volume / c.model.size();
+  if (terms.support == pair_supports) {
+    // A phyxel of support H, as large as the others for its support.
+    std::vector<double> supports = c.body.h;
+    std::sort(supports.begin(), supports.end());
+    h = c.body.pair_length = supports[supports.size() / 2];
+    double cubes = 0;
+    for (const double own : c.body.h) cubes += own * own * own;
+    v = volume / cubes * h * h * h;
+  }
   double sum = 0;
   const int shells = 100'000;
   for (int k = 0; k < shells; ++k) {
@@ -391,6 +424,70 @@ TEST(Force, HourglassControlNeedsOneSupport) {
   NeighbourhoodRule rule;
   rule.support = NeighbourhoodRule::Support::adaptive;
   EXPECT_THROW(model_of(one_body(material, rule), lattice(4, 4, 4, 0.1, 0)), InputError);
+}
+
+/// Hourglass control needs one κ for a body: α E v / tr A, the same for all phyxels inside a graded
+/// cloud by the factor of pairs' weights.
+TEST(Force, TheStiffnessOfHourglassControlIsTheSameThroughoutAGradedCloud) {
+  Material material = rubber();
+  material.hourglass = 0.1;
+  const Model model = model_of(one_body(material), graded(14, 0));
+  std::vector<double> kappa;
+  for (Index i = 0; i < model.size(); ++i) {
+    const auto row = model.neighbourhood.neighbours.row(i);
+    double trace = 0;
+    for (const Index j : row) {
+      const Vec3d x = model.position[j] - model.position[i];
+      const double h = pair_support(model.neighbourhood.support[i], model.neighbourhood.support[j]);
+      trace += h / model.parts[0].pair_length * std::pow(1 - dot(x, x) / (h * h), 3) * dot(x, x);
+    }
+    const std::array edges{i % 14, i / 14 % 14, i / 196};
+    const bool inside = std::ranges::all_of(edges, [](Index k) { return k > 2 && k < 11; });
+    if (inside) kappa.push_back(0.1 * material.young * model.volume[i] / trace);
+  }
+  ASSERT_GT(kappa.size(), 300U);
+  const auto [least, most] = std::minmax_element(kappa.begin(), kappa.end());
+  EXPECT_LT(*most, 1.25 * *least);  // while supports vary fourfold there
+  const double used = hourglass_stiffness(model, model.parts[0]);
+  EXPECT_GT(used, 0.75 * *least);
+  EXPECT_LT(used, 1.25 * *most);
+}
+
+TEST(Force, WeightsOfEqualSupportsAreThoseOfOneSupport) {
+  std::mt19937_64 engine(3);
+  const auto compare = []<class Real>(Real h, Real r) {
+    const auto half = static_cast<Real>(relative_half_support(h, h));
+    const Real inverse = 1 / (h * h);
+    EXPECT_EQ(pair_weight(r * r, half, half, inverse), weight_shape_anywhere(r * r, inverse));
+  };
+  for (int trial = 0; trial < 1000; ++trial) {
+    const double h = uniform(engine, 1e-3, 10), r = uniform(engine, 0, 1.2) * h;
+    compare(h, r);
+    compare(static_cast<float>(h), static_cast<float>(r));
+    const double a = uniform(engine, 0.1, 3), b = uniform(engine, 0.1, 3);
+    EXPECT_EQ(pair_weight(r * r, a, b, 1 / (h * h)), pair_weight(r * r, b, a, 1 / (h * h)));
+    EXPECT_GE(pair_weight(r * r, a, b, 1 / (h * h)), 0);
+  }
+}
+
+/// Supports that happen to be equal give the forces of one support.
+TEST(Force, PairsOfEqualSupportsAreABodyOfOneSupport) {
+  Cloud cloud = lattice(6, 5, 7, 0.1, 0.2);
+  Material material = rubber();
+  material.hourglass = 0.2;
+  const Model one = model_of(one_body(material), cloud);
+  cloud.spacing.assign(cloud.position.size(), 0.1);
+  const Model pairs = model_of(one_body(material), cloud);
+  EXPECT_EQ(one.parts[0].pair_length, 0);
+  EXPECT_GT(pairs.parts[0].pair_length, 0);
+  EXPECT_EQ(one.neighbourhood.neighbours.indices, pairs.neighbourhood.neighbours.indices);
+  const auto u = random_deformation(one, 0.01);
+  const auto expected = backend_forces(one, u, Precision::double_),
+             found = backend_forces(pairs, u, Precision::double_);
+  const double scale = largest_norm(to_eigen(expected));
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_LT(norm(found[i] - expected[i]), 1e-12 * scale);
+  }
 }
 
 TEST(Force, CauchyStrainSeesARotationAsStrain) {

@@ -222,6 +222,8 @@ std::vector<Late> late_refusals() {
       // Supports, volumes, closed gradients
       {with_bar("hourglass = 0.1\n[body.neighbours]\nsupport = 'adaptive'\n"),
        {":5:1", "hourglass control (0.1)", "\"uniform\""}},
+      {with_bar("[body.neighbours]\nsupport = 'pairwise'\nmax_neighbours = 20\n"),
+       {"\"pairwise\"", "max_neighbours", "allowed: only one"}},
       {still + bar + "closure = 0.01\n" + material + "[body.neighbours]\nsupport = 'adaptive'\n",
        {":5:1", "closed gradients (0.01)"}},
       {with_body("file = 'bare.h5'\nvolumes = 'geometry'"), {":5:1", "volumes = \"geometry\""}},

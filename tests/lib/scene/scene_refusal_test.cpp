@@ -157,6 +157,8 @@ const std::vector<Malformed>& malformed() {
       {in_section("body.neighbours", "max_neighbours = 0"), "10:18", "0 found"},
       {in_section("body.neighbours", "factor = 2\nradius = 0.1"), "10:10", "together with radius"},
       {in_section("body.neighbours", "support = 'adaptive'\nradius = 1"), "10:11", "with radius"},
+      {in_section("body.neighbours", "support = 'pairwise'\nmax_neighbours = 9"), "10:11",
+       "with max_neighbours"},
       {in_section("body.neighbours", "neerest = 3"), "10:1", "(did you mean \"nearest\"?)"},
       {in_section("body.array", "count = [2, 1]\nspacing = [1, 0, 0]"), "10:9", "three integers"},
       {in_section("body.array", "count = [2, 1, 0]\nspacing = [1, 0, 0]"), "10:16", "0 found"},

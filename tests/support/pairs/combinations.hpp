@@ -61,7 +61,7 @@ inline const std::vector<FactorEntry>& factors() {
         {"damping", {"", "damping"}},
         {"external", {"", "external forces"}},
         {"boundary", {"free", "fixed", "rollers", "moved", "loaded", "growing loads", "pressure"}},
-        {"supports", {"one support", "adaptive supports", "capped lists"}},
+        {"supports", {"one support", "adaptive supports", "capped lists", "supports of pairs"}},
         {"cloud", {"lattice", "jittered lattice", "filled mesh"}},
         {"precision", {"float", "double", "mixed"}},
         {"method", {"verlet", "implicit", "equilibrium"}}};

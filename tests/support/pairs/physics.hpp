@@ -432,7 +432,9 @@ class Physics {
     }
     EXPECT_EQ(whole_.closing.empty(), !row_.is_closed());
     EXPECT_EQ(whole_.parts.size(), row_.has(inclusions) ? 2u : 1u);
-    EXPECT_EQ(whole_.neighbourhood.symmetric, row_.is(supports, "one support"));
+    const bool of_pairs = row_.is(supports, "supports of pairs");
+    EXPECT_EQ(whole_.parts[0].pair_length > 0, of_pairs);
+    EXPECT_EQ(whole_.neighbourhood.symmetric, of_pairs || row_.is(supports, "one support"));
   }
 
   const Combination& row_;

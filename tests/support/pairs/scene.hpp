@@ -150,6 +150,8 @@ inline Scene scene_of(const Combination& row) {
   body.spin = {1, 2, 3};
   if (row.is(supports, "adaptive supports")) {
     body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  } else if (row.is(supports, "supports of pairs")) {
+    body.neighbourhood.support = NeighbourhoodRule::Support::pairwise;
   } else if (row.is(supports, "capped lists")) {
     body.neighbourhood.max_neighbours = 20;
   }

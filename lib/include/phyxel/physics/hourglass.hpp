@@ -19,7 +19,8 @@ namespace phyxel {
 
 /// κ [N/m] = α E v / tr A of a phyxel inside a uniform cloud: residuals of a tenth of the distance
 /// then have α times the energy of a rod of modulus E under a strain of a tenth. tr A is taken of a
-/// continuum, 4π h⁵/v ∫ (1 - t²)³ t⁴ dt from 0 to 1.
+/// continuum, 4π h⁵/v ∫ (1 - t²)³ t⁴ dt from 0 to 1. With weights of pairs tr A has the factor h/H:
+/// κ is that of a phyxel of support H everywhere in a graded cloud, where v ~ h³.
 /// @param strength α, without unit
 /// @param volume v of a phyxel [m³]
 /// @param support h [m]

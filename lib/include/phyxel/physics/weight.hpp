@@ -23,6 +23,25 @@ PHYXEL_HD Real weight_shape_anywhere(Real r_squared, Real inverse_h_squared) {
   return inside * inside * inside;
 }
 
+/// h/(2H), half the support of a phyxel over the length H of its body: what a phyxel gives to the
+/// weights of its pairs. @param length H [m]
+PHYXEL_HD double relative_half_support(double h, double length) { return h / (2 * length); }
+
+/// The weight of a pair of phyxels whose supports differ, at any distance:
+///   w_ij = η (1 - r²/h_ij²)³,   h_ij = (h_i + h_j)/2,   η = h_ij/H;
+/// zero for r >= h_ij. It is the same from both sides. The factor η makes κ of hourglass control
+/// (hourglass.hpp) the same for all phyxels of a graded cloud, as v ~ h³. Where all supports are H
+/// the weight equals `weight_shape` to the last bit. @param half_i, half_j `relative_half_support`
+/// of the two. @param inverse_length_squared 1/H² [1/m²]
+template <class Real>
+PHYXEL_HD Real pair_weight(Real r_squared, Real half_i, Real half_j, Real inverse_length_squared) {
+  const Real size = half_i + half_j;
+  const Real inverse = Real(1) / size;  // exactly rounded, on GPUs too
+  const Real t = fused(-r_squared, inverse * inverse * inverse_length_squared, Real(1));
+  const Real inside = where_larger(t, Real(0), t, Real(0));
+  return size * (inside * inside * inside);
+}
+
 /// Full weight [1/m³], zero at r >= h. Used for densities.
 PHYXEL_HD double weight(double r, double h) {
   if (r >= h) return 0;
