@@ -3,22 +3,23 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
 
 #include "mesh/surface_points.hpp"
-#include "model/box.hpp"
 #include "model/spatial_hash.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Sample points on the surface for each square of the spacing of a body without grading: a place
-/// as thin as a third of that spacing is still seen.
-constexpr double samples_on_square = 16;
+/// Sample points on the surface for each square of the spacing of a body without grading. The two
+/// sides of a place as thin as a tenth of that spacing still see each other.
+constexpr double samples_on_square = 4;
 /// Cosine between the outward normals of two faces from which they are two sides of a thin place.
 constexpr double opposite = -0.6;
 
-/// The nearest of the two ends, or a place between them.
+/// An edge between two triangles that are nearly in one plane.
 struct SmoothEdge {
   Vec3d from, to;  ///< [m]
   double radius;   ///< Of the curvature across the edge [m].
@@ -73,9 +74,9 @@ void add_thin(const GradedBody& body, double across, double uniform, double most
     normal[k] = normalised(area_of(body.surface, static_cast<Index>(points[k].piece)));
   }
   const SpatialHash hash(place, 0.5 * uniform);
-  // Thicker places ask for no less than the coarsest spacing, or three times the uniform one, which
-  // is more than grading makes of most.
-  const double farthest = across * std::min(most, 3 * uniform);
+  // Thicker places ask for no less than the coarsest spacing, or twice the uniform one, and coarser
+  // phyxels would save little.
+  const double farthest = across * std::min(most, 2 * uniform);
   std::vector<double> thickness(points.size(), HUGE_VAL);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -98,7 +99,7 @@ void add_thin(const GradedBody& body, double across, double uniform, double most
   }
 }
 
-/// Leaves of sources that are near each other, by their spacings, the smallest.
+/// Of sources that are near each other, by their spacings, one with the smallest.
 std::vector<SpacingSource> thinned_out(std::vector<SpacingSource> sources, double least) {
   using Cell = std::tuple<int, std::int64_t, std::int64_t, std::int64_t>;
   std::map<Cell, SpacingSource> kept;
@@ -116,47 +117,52 @@ std::vector<SpacingSource> thinned_out(std::vector<SpacingSource> sources, doubl
   return left;
 }
 
-/// Number of phyxels for a spacing that changes: V/s³ + A/(2 s²).
-class Expected {
- public:
-  Expected(const GradedBody& body, double uniform) : cell_(std::pow(body.voxel, 3)) {
-    for (const SampleBlock& block : body.inside) {
-      for (std::size_t k = 0; k < block.offset.size(); ++k) inside_.push_back(block.position(k));
-    }
-    double area = 0;
-    for (std::size_t t = 0; t < body.surface.triangle.size(); ++t) {
-      area += norm(area_of(body.surface, static_cast<Index>(t)));
-    }
-    for (const PointOn& p : points_over(body.surface, SpacingField(uniform), samples_on_square, 2)) {
-      on_surface_.push_back(p.point);
-    }
-    square_ = area / static_cast<double>(std::max<std::size_t>(on_surface_.size(), 1));
-  }
+/// Sample points inside a body or on its surface, with what sources want there.
+struct WeighedPoints {
+  std::vector<Vec3d> place;
+  std::vector<double> of_sources;  ///< [m]
+  double size = 0;                 ///< Of the part that a point stands for [m³] or [m²].
 
-  double phyxels(const SpacingField& spacing) const {
-    const auto sum = [](const std::vector<Vec3d>& points, auto&& term) {
-      std::vector<double> terms(points.size());
-#pragma omp parallel for schedule(static)
-      for (std::size_t k = 0; k < points.size(); ++k) terms[k] = term(points[k]);
-      double all = 0;
-      for (const double t : terms) all += t;
-      return all;
-    };
-    return sum(inside_,
-               [&](Vec3d p) {
-                 const double s = spacing.at(p);
-                 return cell_ / (s * s * s);
-               }) +
-           sum(on_surface_, [&](Vec3d p) {
-             const double s = spacing.at(p);
-             return square_ / (2 * s * s);
-           });
+  /// The sum of `term`, of the spacing at each point.
+  template <class Term>
+  double sum(const SpacingField& spacing, Term&& term) const {
+    const auto terms = tabulated(place.size(), [&](std::size_t k) {
+      return term(spacing.at(place[k], of_sources[k]));
+    });
+    return size * std::accumulate(terms.begin(), terms.end(), 0.0);
   }
-
- private:
-  double cell_, square_;
-  std::vector<Vec3d> inside_, on_surface_;
 };
+
+/// The coarsest spacing of a field for which the body has its number of phyxels, V/s³ + A/(2 s²).
+double fitting_spacing(const GradedBody& body, const SpacingField& field, double area, double low,
+                       double high) {
+  WeighedPoints inside, on_surface;
+  for (const SampleBlock& block : body.inside) {
+    for (std::size_t k = 0; k < block.offset.size(); ++k) {
+      inside.place.push_back(block.position(k));
+    }
+  }
+  inside.size = std::pow(body.voxel, 3);
+  for (const PointOn& p : points_over(body.surface, SpacingField(low), samples_on_square, 2)) {
+    on_surface.place.push_back(p.point);
+  }
+  on_surface.size = area / static_cast<double>(std::max<std::size_t>(on_surface.place.size(), 1));
+  for (WeighedPoints* points : {&inside, &on_surface}) {
+    points->of_sources = tabulated(points->place.size(), [&](std::size_t k) {
+      return field.of_sources(points->place[k]);
+    });
+  }
+  const auto phyxels = [&](double coarsest) {
+    const SpacingField tried = field.with_coarsest(coarsest);
+    return inside.sum(tried, [](double s) { return 1 / (s * s * s); }) +
+           on_surface.sum(tried, [](double s) { return 1 / (2 * s * s); });
+  };
+  for (int k = 0; k < 40; ++k) {
+    const double middle = 0.5 * (low + high);
+    (phyxels(middle) > body.phyxels ? low : high) = middle;
+  }
+  return high;
+}
 
 }  // namespace
 
@@ -191,13 +197,7 @@ SpacingField graded_spacing(const GradedBody& body, const Grading& request) {
   std::vector<FinerRegion> regions;
   for (const Grading::Finer& finer : request.finer) regions.push_back({finer.region, finer.by});
   const SpacingField field(cone, regions, request.growth, request.ratio, uniform);
-  const Expected expected(body, uniform);
-  double low = uniform, high = most;
-  for (int k = 0; k < 40; ++k) {
-    const double middle = 0.5 * (low + high);
-    (expected.phyxels(field.with_coarsest(middle)) > body.phyxels ? low : high) = middle;
-  }
-  return field.with_coarsest(high);
+  return field.with_coarsest(fitting_spacing(body, field, area, uniform, most));
 }
 
 }  // namespace phyxel

@@ -88,10 +88,9 @@ double SpacingCone::at(Vec3d place) const {
   return spacing;
 }
 
-double SpacingField::at(Vec3d place) const {
+double SpacingField::at(Vec3d place, double of_sources) const {
   if (is_uniform()) return coarsest_;
-  double spacing = coarsest_;
-  if (cone_) spacing = std::min(spacing, cone_->at(place));
+  double spacing = std::min(coarsest_, of_sources);
   for (const FinerRegion& finer : regions_) {
     const double beyond = std::max(0.0, finer.region.distance(place));
     spacing = std::min(spacing, coarsest_ / finer.ratio + growth_ * beyond);

@@ -1,6 +1,7 @@
 /// The distance between phyxels that is wanted at each place of a body.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -66,7 +67,14 @@ class SpacingField {
         ratio_(ratio),
         coarsest_(coarsest) {}
 
-  double at(Vec3d place) const;
+  /// The distance wanted at a place [m].
+  double at(Vec3d place) const { return at(place, of_sources(place)); }
+  /// The part of it that does not depend on the coarsest spacing [m]: what sources want.
+  double of_sources(Vec3d place) const {
+    return cone_ ? cone_->at(place) : std::numeric_limits<double>::infinity();
+  }
+  /// The distance wanted at a place [m]. @param of_sources as above
+  double at(Vec3d place, double of_sources) const;
   bool is_uniform() const { return ratio_ == 1; }
   double coarsest() const { return coarsest_; }          ///< [m]
   double finest() const { return coarsest_ / ratio_; }   ///< [m]

@@ -156,16 +156,15 @@ TEST(LatticeFilling, ADisplacedNodeOfALatticeGoesSixTenthsBack) {
       for (int z = -3; z <= 3; ++z) lattice.push_back(a * Vec3d{double(x), double(y), double(z)});
     }
   }
-  const SpatialHash hash = hash_for_repulsion(lattice, a);
+  const Repulsion repulsion(lattice, SpacingField(a));
   const auto self = static_cast<Index>(lattice.size() / 2);
   for (const Vec3d off : {Vec3d{1e-4, 0, 0}, Vec3d{0, -1e-4, 0}, Vec3d{6e-5, 6e-5, 6e-5}}) {
-    const Vec3d step = repulsion_step(hash, a * off, self, a, [](Index) { return 1.0; });
+    const Vec3d step = repulsion.step(a * off, self, [](Index) { return 1.0; });
     EXPECT_LT(norm(step + 0.6 * a * off), 0.01 * norm(a * off));  // 0.998, and terms of order 2
   }
   // Steps are no longer than 0.15 spacings.
-  EXPECT_NEAR(
-      norm(repulsion_step(hash, a * Vec3d{0.9, 0.1, 0}, self, a, [](Index) { return 1.0; })),
-      0.15 * a, 1e-12);
+  EXPECT_NEAR(norm(repulsion.step(a * Vec3d{0.9, 0.1, 0}, self, [](Index) { return 1.0; })),
+              0.15 * a, 1e-12);
 }
 
 TEST(LatticeFilling, TheNearestPointOfATriangleIsThatOfAllItsPoints) {
