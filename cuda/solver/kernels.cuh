@@ -219,6 +219,25 @@ struct Gradients {
   Real* residuals = nullptr;   ///< Residuals of the fits (`add_residual`), or null.
 };
 
+/// Returns the residual of the fit of this lane's phyxel [m²] (`add_residual`). @param own its
+/// point
+/// @param fit its gradient. @param weight_of weights of its neighbours
+template <class Real, class WeightOf>
+__device__ __forceinline__ Real residual_of(const char* image, const DeviceLists& lists,
+                                            TileLists::Row row,
+                                            const typename Points<Real>::Value& own,
+                                            const Mat3<Real>& fit, const WeightOf& weight_of) {
+  Real residual{};
+  walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
+    const auto p = Points<Real>::at(image, lists.slots, offset);
+    const Vec3<Real> x = p.x - own.x;
+    const Real w = weight_of(x, offset);
+    // Null slots are skipped: the squares of their distances leave the range of float.
+    if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
+  });
+  return residual;
+}
+
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`,
 /// only the gradients are written. @tparam Terms a list of pair terms
 /// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
@@ -283,17 +302,10 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
     if (!gradients.residuals) return;
-    Real residual{};
     weighted([&](auto&& weight_of) {
-      walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
-        const auto p = Points<Real>::at(image, lists.slots, offset);
-        const Vec3<Real> x = p.x - own.x;
-        const Real w = weight_of(x, offset);
-        // Null slots are skipped: the squares of their distances leave the range of float.
-        if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
-      });
+      gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] =
+          residual_of<Real>(image, lists, row, own, fit, weight_of);
     });
-    gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
     const HistoryColumns<Real> history{f.history, f.places, place};
     Mat3<Real> stress;
