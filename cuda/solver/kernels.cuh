@@ -21,11 +21,10 @@ template <class Real, class StateReal>
 struct TileConstants {
   Real law[law_numbers];   ///< As in `ChosenLaw::constants`.
   Real hourglass;          ///< κ [N/m]; 0 without hourglass control.
-  Real inverse_h_squared;  ///< [1/m²], if the body has one support; 1/H² with weights of pairs.
+  Real inverse_h_squared;  ///< [1/m²], if the body has one support; -1/H² with weights of pairs.
   StateReal keep, gain;    ///< Factors of `damped_flow`; gain is the step without damping.
   bool damped;             ///< For kernels that serve damped and undamped bodies.
-  bool pairwise;  ///< True with weights of pairs (`pair_weight`); kernels that send know them.
-  int law_index;  ///< Index in `Laws`, for kernels that serve bodies of any law.
+  int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
 };
 
 /// `TileLists` in device memory.
@@ -263,7 +262,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
       f.inverse_h_squared ? f.inverse_h_squared[place] : body.inverse_h_squared;
   Real* supports = reinterpret_cast<Real*>(image + Points<Real>::bytes * lists.slots);
   if constexpr (Terms::sends) {
-    if (body.pairwise) fetch_supports(f, lists, tile, supports);
+    if (body.pairwise()) fetch_supports(f, lists, tile, supports);
   }
   wait_for_copies();
   __syncthreads();
@@ -272,7 +271,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
   // Calls use(weight_of): a tile is of one body, so that its warps do not diverge.
   const auto weighted = [&](auto&& use) {
     if constexpr (Terms::sends) {
-      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
     }
     use([&](Vec3<Real> x, unsigned) {
       return weight_shape_anywhere(dot(x, x), inverse_h_squared);
@@ -360,7 +359,7 @@ __global__ void __launch_bounds__(tile_size,
   // Calls use(weight_of), as in pass 1.
   const auto weighted = [&](auto&& use) {
     if constexpr (own_supports && Terms::sends) {
-      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
     }
     use([&](Vec3<Real> x, unsigned offset) {
       const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;
