@@ -25,6 +25,10 @@ struct TileConstants {
   StateReal keep, gain;    ///< Factors of `damped_flow`; gain is the step without damping.
   bool damped;             ///< For kernels that serve damped and undamped bodies.
   int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
+
+  /// True with weights of pairs (`pair_weight`), which kernels with closed gradients know. The sign
+  /// tells, so that constants of other kernels stay where they are.
+  __host__ __device__ bool pairwise() const { return inverse_h_squared < Real(0); }
 };
 
 /// `TileLists` in device memory.
