@@ -4,9 +4,7 @@
 #include <tuple>
 #include <utility>
 
-#include "model/cell_grid.hpp"
-#include "model/neighbour_search.hpp"
-#include "model/spatial_hash.hpp"
+#include "model/graded_hash.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "parallel_sort.hpp"
 #include "phyxel/error.hpp"
@@ -34,23 +32,28 @@ Index sample_stride(const ShareSetup& setup, const WholeBodies& whole) {
 /// Finds the edges of samples by a search from all phyxels for the samples around them, since
 /// samples are few.
 void find_edges(const WholeBodies& whole, std::span<const MigratingPhyxel> phyxels,
-                std::span<const MigratingPhyxel> samples, const SpatialHash& hash, double largest,
+                std::span<const MigratingPhyxel> samples, const GradedHash& hash,
                 std::size_t first_sample, Bulk<std::pair<Index, Index>>& edges) {
+  const auto reach = [&](const MigratingPhyxel& p, double other) {
+    const bool pairwise = whole.bodies[static_cast<std::size_t>(p.body)].rule.pairwise();
+    return pairwise ? pair_support(p.support, other) : std::max(p.support, other);
+  };
 #pragma omp parallel
   {
     Bulk<std::pair<Index, Index>> mine;
 #pragma omp for schedule(static) nowait
     for (std::size_t k = 0; k < phyxels.size(); ++k) {
       const MigratingPhyxel& p = phyxels[k];
-      const int rings = rings_within(std::max(p.support, largest), hash.cell_size());
-      hash.visit_near(p.position, rings, [&](const SpatialHash::Entry& e) {
-        const MigratingPhyxel& sample = samples[static_cast<std::size_t>(e.index)];
-        const double h = std::max(p.support, sample.support);
-        const Vec3d apart = p.position - e.position;
-        if (dot(apart, apart) < h * h && p.number != sample.number) {
-          mine.emplace_back(static_cast<Index>(first_sample) + e.index, whole.group_of(p));
-        }
-      });
+      hash.visit_ball(
+          p.position, [&](double largest) { return reach(p, largest); },
+          [&](const GradedHash::Entry& e) {
+            const MigratingPhyxel& sample = samples[static_cast<std::size_t>(e.index)];
+            const double h = reach(p, sample.support);
+            const Vec3d apart = p.position - e.position;
+            if (dot(apart, apart) < h * h && p.number != sample.number) {
+              mine.emplace_back(static_cast<Index>(first_sample) + e.index, whole.group_of(p));
+            }
+          });
     }
 #pragma omp critical
     edges.insert(edges.end(), mine.begin(), mine.end());
@@ -74,12 +77,10 @@ Samples samples_of(const ShareSetup& setup, const WholeBodies& whole, const Migr
     const auto support =
         in_bulk(of_sampled.size(), [&](std::size_t s) { return of_sampled[s].support; });
     if (!of_sampled.empty()) {
-      const SpatialHash hash(position, median_of(support));
-      const double largest = *std::max_element(support.begin(), support.end());
-      find_edges(whole, std::span(own).subspan(first, last - first), of_sampled, hash, largest,
-                 first_sample, edges);
-      find_edges(whole, of_body(others.phyxels, body), of_sampled, hash, largest, first_sample,
+      const GradedHash hash(position, support);
+      find_edges(whole, std::span(own).subspan(first, last - first), of_sampled, hash, first_sample,
                  edges);
+      find_edges(whole, of_body(others.phyxels, body), of_sampled, hash, first_sample, edges);
     }
     first_sample += of_sampled.size();
   }

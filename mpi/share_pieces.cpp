@@ -246,6 +246,8 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       whole.bodies[b].has_spacing = with_spacings[b] > 0;
       whole.bodies[b].rule =
           setup.scene.bodies[b].neighbourhood.resolved(whole.bodies[b].has_spacing);
+      if (setup.options.surveyor)
+        refuse_pairs_surveyed(setup.scene.bodies[b], whole.bodies[b].rule);
       whole.bodies[b].kernel_volumes =
           wants_kernel_volumes(setup.scene.bodies[b], with_volumes[b] > 0,
                                static_cast<std::size_t>(whole.bodies[b].size));

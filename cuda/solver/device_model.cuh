@@ -454,10 +454,10 @@ class DeviceModel {
     for (int k = 0; k < law_numbers; ++k) tile.law[k] = static_cast<Real>(law.constants[k]);
     tile.hourglass = static_cast<Real>(hourglass_stiffness(model_, part));
     tile.inverse_h_squared = static_cast<Real>(h > 0 ? 1 / (h * h) : 0);
+    if (part.pair_length > 0) tile.inverse_h_squared = -tile.inverse_h_squared;
     tile.keep = static_cast<StateReal>(flow.keep);
     tile.gain = static_cast<StateReal>(flow.gain);
     tile.damped = m.damping > 0;
-    tile.pairwise = part.pair_length > 0;
     tile.law_index = law.index;
     return tile;
   }

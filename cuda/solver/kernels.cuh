@@ -21,11 +21,14 @@ template <class Real, class StateReal>
 struct TileConstants {
   Real law[law_numbers];   ///< As in `ChosenLaw::constants`.
   Real hourglass;          ///< κ [N/m]; 0 without hourglass control.
-  Real inverse_h_squared;  ///< [1/m²], if the body has one support; 1/H² with weights of pairs.
+  Real inverse_h_squared;  ///< [1/m²], if the body has one support; -1/H² with weights of pairs.
   StateReal keep, gain;    ///< Factors of `damped_flow`; gain is the step without damping.
   bool damped;             ///< For kernels that serve damped and undamped bodies.
-  bool pairwise;  ///< True with weights of pairs (`pair_weight`); kernels that send know them.
-  int law_index;  ///< Index in `Laws`, for kernels that serve bodies of any law.
+  int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
+
+  /// True with weights of pairs (`pair_weight`), which kernels with closed gradients know. The sign
+  /// tells, so that constants of other kernels stay where they are.
+  __host__ __device__ bool pairwise() const { return inverse_h_squared < Real(0); }
 };
 
 /// `TileLists` in device memory.
@@ -219,6 +222,25 @@ struct Gradients {
   Real* residuals = nullptr;   ///< Residuals of the fits (`add_residual`), or null.
 };
 
+/// Returns the residual of the fit of this lane's phyxel [m²] (`add_residual`). @param own its
+/// point
+/// @param fit its gradient. @param weight_of weights of its neighbours
+template <class Real, class WeightOf>
+__device__ __forceinline__ Real residual_of(const char* image, const DeviceLists& lists,
+                                            TileLists::Row row,
+                                            const typename Points<Real>::Value& own,
+                                            const Mat3<Real>& fit, const WeightOf& weight_of) {
+  Real residual{};
+  walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
+    const auto p = Points<Real>::at(image, lists.slots, offset);
+    const Vec3<Real> x = p.x - own.x;
+    const Real w = weight_of(x, offset);
+    // Null slots are skipped: the squares of their distances leave the range of float.
+    if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
+  });
+  return residual;
+}
+
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`,
 /// only the gradients are written. @tparam Terms a list of pair terms
 /// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
@@ -244,7 +266,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
       f.inverse_h_squared ? f.inverse_h_squared[place] : body.inverse_h_squared;
   Real* supports = reinterpret_cast<Real*>(image + Points<Real>::bytes * lists.slots);
   if constexpr (Terms::sends) {
-    if (body.pairwise) fetch_supports(f, lists, tile, supports);
+    if (body.pairwise()) fetch_supports(f, lists, tile, supports);
   }
   wait_for_copies();
   __syncthreads();
@@ -253,7 +275,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
   // Calls use(weight_of): a tile is of one body, so that its warps do not diverge.
   const auto weighted = [&](auto&& use) {
     if constexpr (Terms::sends) {
-      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
     }
     use([&](Vec3<Real> x, unsigned) {
       return weight_shape_anywhere(dot(x, x), inverse_h_squared);
@@ -283,17 +305,10 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
     Real* to = gradients.values + place_of(static_cast<Index>(blockIdx.x));
     for (int e = 0; e < 9; ++e) to[e * gradients.stride] = grad_u(e / 3, e % 3);
     if (!gradients.residuals) return;
-    Real residual{};
     weighted([&](auto&& weight_of) {
-      walk(lists, row, first_entries(lists, row), [&](unsigned offset) {
-        const auto p = Points<Real>::at(image, lists.slots, offset);
-        const Vec3<Real> x = p.x - own.x;
-        const Real w = weight_of(x, offset);
-        // Null slots are skipped: the squares of their distances leave the range of float.
-        if (w > Real(0)) add_residual(residual, p.u - own.u, fit, x, w);
-      });
+      gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] =
+          residual_of<Real>(image, lists, row, own, fit, weight_of);
     });
-    gradients.residuals[place_of(static_cast<Index>(blockIdx.x))] = residual;
   } else {
     const HistoryColumns<Real> history{f.history, f.places, place};
     Mat3<Real> stress;
@@ -348,7 +363,7 @@ __global__ void __launch_bounds__(tile_size,
   // Calls use(weight_of), as in pass 1.
   const auto weighted = [&](auto&& use) {
     if constexpr (own_supports && Terms::sends) {
-      if (body.pairwise) return with_pair_weights(supports, body.inverse_h_squared, use);
+      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
     }
     use([&](Vec3<Real> x, unsigned offset) {
       const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;

@@ -44,9 +44,9 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
         const auto own = static_cast<std::size_t>(slice.first_place) + p;
         const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
         const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
-        if (body.pairwise) {
+        if (body.pairwise()) {
           weight = pair_weight(dot(x, x), f.inverse_h_squared[own], f.inverse_h_squared[other],
-                               body.inverse_h_squared);
+                               -body.inverse_h_squared);
         } else {
           const Real inverse_h_squared = f.inverse_h_squared
                                              ? f.inverse_h_squared[pass == 0 ? own : other]

@@ -87,6 +87,14 @@ void check_terms(const BodyRequest& request) {
   refuse_if(request.closure.value_or(0), "closed gradients", "closure");
 }
 
+void refuse_pairs_surveyed(const BodyRequest& request, const NeighbourhoodRule& rule) {
+  if (!rule.pairwise()) return;
+  throw InputError(fmt::format(
+      "{}: body \"{}\" has supports of pairs (neighbours.support = \"pairwise\"), whose lists are "
+      "made on the host: allowed is a model built without a surveyor, or \"uniform\"",
+      request.where, request.name));
+}
+
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels) {
   const bool kernel = request.volume_rule == VolumeRule::kernel ||
                       (request.volume_rule == VolumeRule::automatic && !has_volumes);

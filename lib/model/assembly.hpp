@@ -40,6 +40,10 @@ double hourglass_of(const BodyRequest& request);
 /// @throws InputError if a body asks for terms that do not go together
 void check_terms(const BodyRequest& request);
 
+/// Lists of bodies with supports of pairs are made on the host.
+/// @throws InputError if a surveyor is to find those of a body. @param rule resolved
+void refuse_pairs_surveyed(const BodyRequest& request, const NeighbourhoodRule& rule);
+
 /// Whether the volumes of a body follow from the kernel.
 /// @throws InputError if it can have none as asked
 bool wants_kernel_volumes(const BodyRequest& request, bool has_volumes, std::size_t phyxels);

@@ -117,6 +117,12 @@ void check_parts(const Model& m) {
       refuse(name + ".ghosts", fmt::format("is {}", part.ghosts),
              fmt::format("0 to {}", part.end - part.begin));
     }
+    if (!(part.pair_length >= 0 && std::isfinite(part.pair_length)) ||
+        (part.pair_length > 0 && part.size > 0 && !(part.support_cubes > 0))) {
+      refuse(name + ", pair_length and support_cubes",
+             fmt::format("are {:g} m and {:g} m^3", part.pair_length, part.support_cubes),
+             "a finite length >= 0 and, where it is > 0, a sum > 0");
+    }
     if (part.body != body && part.body != body + 1) {
       refuse(name + ".body", fmt::format("is {}", part.body),
              body < 0 ? "0" : fmt::format("{} or {}", body, body + 1));

@@ -72,13 +72,7 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
         request.where, request.name,
         request.closure ? fmt::format("{:g}", *request.closure) : "\"auto\""));
   }
-  if (request.neighbourhood.pairwise()) {
-    throw InputError(
-        fmt::format("{}: body \"{}\" has supports of pairs (neighbours.support = \"pairwise\"), "
-                    "whose lists are "
-                    "made on the host: allowed is a model built without a surveyor, or \"uniform\"",
-                    request.where, request.name));
-  }
+  refuse_pairs_surveyed(request, request.neighbourhood);
   if (!walls_of(request, cloud).regions.empty()) {
     throw InputError(fmt::format(
         "{}: a support of body \"{}\" ends inside the body, and its phyxels are parted from others "

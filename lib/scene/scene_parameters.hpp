@@ -134,7 +134,11 @@ void visit_body(const BodyRequest& body, Visit&& visit) {
   visit_material("body.material", body, body.material, visit);
   visit("body.material", "hourglass", body.material.hourglass.value_or(default_hourglass(body)));
   const NeighbourhoodRule& rule = body.neighbourhood;
-  visit("body.neighbours", "support", word(rule.support));
+  // An automatic rule is recorded as "uniform", which it was before there were graded clouds, so
+  // that earlier runs can be resumed; the digest of the model tells supports apart.
+  using Support = NeighbourhoodRule::Support;
+  const bool automatic = rule.support == Support::automatic;
+  visit("body.neighbours", "support", word(automatic ? Support::uniform : rule.support));
   visit("body.neighbours", "nearest", rule.nearest);
   visit("body.neighbours", "factor", rule.factor);
   if (rule.radius) visit("body.neighbours", "radius", *rule.radius);

@@ -224,6 +224,34 @@ inline BuildCase closed_by_default() {
   return c;
 }
 
+/// Graded clouds: with spacings of their own, a part of another material and a pull; closed; and
+/// with supports and volumes that follow from the places of phyxels alone.
+inline BuildCase graded_clouds() {
+  BuildCase c{"Graded", plain(3), {testing::graded(11)}};
+  BodyRequest& body = c.scene.bodies[0];
+  Material stiff = body.material;
+  stiff.young *= 3;
+  body.inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0.3, 0.5, 0.5}, 0.3}}, .material = stiff});
+  body.loads.push_back({.select = {.all = true}, .force_density = {0, 0, 2}});
+  for (BodyRequest& other : c.scene.bodies) other.material.hourglass = 0.1;
+  Cloud cube = make_shape({.name = "block",
+                           .size = {1, 1, 1},
+                           .spacing = 0.1,
+                           .jitter = 0.2,
+                           .placement = ShapeRequest::Placement::cells});
+  for (std::vector<Vec3d>* points : {&cube.position, &cube.surface.position}) {
+    for (Vec3d& p : *points) p += Vec3d{0.5, 0.5, 0.5};
+  }
+  c.clouds.push_back(testing::inverted(cube, 1, 0.1));
+  c.scene.bodies[1].closure = 1e-2;
+  c.clouds.push_back(testing::graded(10));
+  c.clouds[2].spacing.clear();
+  c.scene.bodies[2].neighbourhood.support = NeighbourhoodRule::Support::pairwise;
+  c.scene.bodies[2].volume_rule = VolumeRule::kernel;
+  return c;
+}
+
 inline const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{beam(),         rules(),
                                             nearest(),      small(),
@@ -231,7 +259,8 @@ inline const std::vector<BuildCase>& build_cases() {
                                             astray(),       lattice(),
                                             included(),     closed(),
                                             mixed(),        closed_alone(),
-                                            many_regions(), closed_by_default()};
+                                            many_regions(), closed_by_default(),
+                                            graded_clouds()};
   return cases;
 }
 

@@ -128,6 +128,8 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
     ASSERT_EQ(here_.closing.size(), expected.closing.size());
     EXPECT_TRUE(here_.closing.empty() || same_bits(here_.closing, expected.closing));
     EXPECT_EQ(part.material.young, whole_.parts[p].material.young);
+    EXPECT_EQ(part.pair_length, other.pair_length);
+    EXPECT_EQ(part.support_cubes, other.support_cubes);
     EXPECT_TRUE(!has_lists || alike(here_.inverse_moment, expected.inverse_moment));
     EXPECT_TRUE(!has_lists || alike(here_.moment_offset, expected.moment_offset));
   }

@@ -25,6 +25,7 @@ class HostSurveyor final : public ShareSurveyor {
     if (one_sided) rule.support = NeighbourhoodRule::Support::adaptive;
     Model m;
     m.position = {position.begin(), position.end()};
+    m.parts.push_back({.end = static_cast<Index>(position.size())});
     m.neighbourhood = neighbours_within(position, {support.begin(), support.end()}, rule);
     find_moments(m);
     Around around = around_by_lists(m.neighbourhood, 0, own);

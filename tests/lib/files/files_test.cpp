@@ -28,6 +28,7 @@ Cloud small_cloud() {
   Cloud cloud;
   cloud.position = {{0.1, 0.2, 0.3}, {1.0 / 3, -2e-300, 1e6}, {4, 5, 6}};
   cloud.volume = {1e-3, 2e-3, 1.0 / 7};
+  cloud.spacing = {0.1, 0.2, 0.5};
   cloud.surface.position = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   cloud.surface.normal = {{0, 0, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   cloud.surface.triangle = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
@@ -58,6 +59,7 @@ TEST_F(Files, ABodyComesBackToTheBit) {
   const Cloud back = read_body(folder_ / "body.h5");
   EXPECT_TRUE(back.position == cloud.position);
   EXPECT_EQ(back.volume, cloud.volume);
+  EXPECT_EQ(back.spacing, cloud.spacing);
   EXPECT_TRUE(back.surface.position == cloud.surface.position);
   EXPECT_TRUE(back.surface.normal == cloud.surface.normal);
   EXPECT_EQ(back.surface.triangle, cloud.surface.triangle);
@@ -71,6 +73,7 @@ TEST_F(Files, ABodyWithoutVolumesOrSurfaceComesBackWithoutThem) {
   const Cloud back = read_body(folder_ / "body.h5");
   EXPECT_TRUE(back.position == cloud.position);
   EXPECT_TRUE(back.volume.empty());
+  EXPECT_TRUE(back.spacing.empty());
   EXPECT_TRUE(back.surface.position.empty());
   EXPECT_TRUE(back.regions.empty());
 }
@@ -323,6 +326,12 @@ TEST_F(Files, WrongContentIsNamedByArrayAndRow) {
          base(o);
          points(o);
          o.array<double>("/volume", std::vector<double>(3, 1));
+       }},
+      {"/spacing is 0 in row 1",
+       [&](Hdf5Writer& o) {
+         base(o);
+         points(o);
+         o.array<double>("/spacing", std::vector<double>{1, 0});
        }},
       {"/volume is 0 in row 1",
        [&](Hdf5Writer& o) {

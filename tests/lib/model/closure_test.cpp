@@ -369,8 +369,8 @@ TEST(Closure, NeedsAClosedSurfaceAndOneSupport) {
   EXPECT_THAT(refusal(inside_out), HasSubstr("face inward"));
   NeighbourhoodRule adaptive;
   adaptive.support = NeighbourhoodRule::Support::adaptive;
-  EXPECT_THAT(refusal(whole, adaptive), HasSubstr("has closed gradients (0.001), which needs one "
-                                                  "support for the body"));
+  EXPECT_THAT(refusal(whole, adaptive), HasSubstr("has closed gradients (0.001), which needs "
+                                                  "symmetric lists"));
 }
 
 /// A sheet of one layer has no moments across it, nor area to hold there.

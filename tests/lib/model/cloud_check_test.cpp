@@ -70,6 +70,12 @@ TEST(CloudCheck, RefusesSurfacesAndRegionsThatDoNotFit) {
                 HasSubstr("phyxel 3 after phyxel 5 in region \"end\"; allowed: ascending"));
     EXPECT_THAT(with([](Cloud& c) { c.regions["end"] = {5, 5}; }), HasSubstr("each once"));
     EXPECT_THAT(with([](Cloud& c) { c.volume.resize(3); }), HasSubstr("3 volumes for 27"));
+    EXPECT_THAT(with([](Cloud& c) { c.spacing.assign(2, 0.1); }), HasSubstr("2 spacings for 27"));
+    EXPECT_THAT(with([](Cloud& c) {
+                  c.spacing.assign(27, 0.1);
+                  c.spacing[4] = 0;
+                }),
+                HasSubstr("phyxel 4 of body \"body\" has a spacing of 0 m; allowed: > 0"));
     EXPECT_THAT(with([](Cloud& c) { c.position.clear(); }), HasSubstr("has no phyxel"));
   }
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 
 #include "model/neighbour_search.hpp"
 #include "support/clouds.hpp"
@@ -115,6 +116,47 @@ TEST(GradedHash, ListsOfPairsAreSymmetricAndEqualBruteForce) {
   const Csr transposed = transpose(hood.neighbours, n);
   EXPECT_EQ(transposed.indices, hood.neighbours.indices);
   EXPECT_EQ(transposed.offsets, hood.neighbours.offsets);
+}
+
+TEST(GradedClouds, SpacingsTravelWithTheirPhyxels) {
+  Cloud cloud = graded(6);
+  const auto spacing_by_place = [](const Cloud& c, double scale) {
+    std::map<double, double> found;
+    for (std::size_t i = 0; i < c.position.size(); ++i) {
+      found[c.position[i].x / scale] = c.spacing[i] / scale;
+    }
+    return found;
+  };
+  const auto expected = spacing_by_place(cloud, 1);
+  order_along_curve(cloud);
+  EXPECT_EQ(spacing_by_place(cloud, 1), expected);
+  Scene scene = one_body();
+  scene.bodies[0].source.cloud = "graded";
+  scene.bodies[0].scale = 4;
+  scene.bodies.push_back(scene.bodies[0]);
+  for (const Cloud& placed : make_clouds(scene, {{"graded", cloud}})) {
+    EXPECT_EQ(spacing_by_place(placed, 4), expected);
+  }
+}
+
+/// Supports follow the cloud's spacings, scaled to the mean distances, and not the place of a
+/// phyxel at the surface; a scene may ask for one support all the same.
+TEST(GradedClouds, SupportsFollowTheirSpacings) {
+  const Cloud cloud = graded(10);
+  const Model model = model_of(one_body(), cloud);
+  const std::vector<double>& support = model.neighbourhood.support;
+  const double ratio = support[0] / cloud.spacing[0];
+  for (std::size_t i = 0; i < support.size(); ++i) {
+    EXPECT_NEAR(support[i] / cloud.spacing[i], ratio, 1e-12 * ratio);
+  }
+  EXPECT_EQ(model.parts[0].pair_length, median_of(support));
+  EXPECT_EQ(model.parts[0].neighbourhood.substr(0, 8), "pairwise");
+  Scene scene = one_body();
+  scene.bodies[0].neighbourhood.support = NeighbourhoodRule::Support::uniform;
+  EXPECT_EQ(model_of(scene, cloud).parts[0].pair_length, 0);
+  scene.bodies[0].neighbourhood = {};
+  scene.bodies[0].neighbourhood.radius = 0.2;
+  EXPECT_EQ(model_of(scene, cloud).neighbourhood.support[5], 0.2);
 }
 
 }  // namespace

@@ -340,6 +340,9 @@ TEST(ModelDigest, TellsModelsApartByEveryValueTheyHave) {
       {"hourglass", digest_with([](Body& b) { b.material.hourglass = 0.3; })},
       {"factor", digest_with([](Body& b) { b.neighbourhood.factor = 1.9; })},
       {"nearest", digest_with([](Body& b) { b.neighbourhood.nearest = 11; })},
+      {"pairs", digest_with([](Body& b) {
+         b.neighbourhood.support = NeighbourhoodRule::Support::pairwise;
+       })},
       {"radius", digest_with([](Body& b) { b.neighbourhood.radius = 0.2; })},
       {"most", digest_with([](Body& b) { b.neighbourhood.max_neighbours = 20; })},
       {"displacement", digest_with([](Body& b) { b.motions[0].displacement.y = 1; })},
