@@ -243,13 +243,21 @@ MotionRequest read_motion(const SceneTable& table) {
   return motion;
 }
 
+/// Reads how a load or traction changes with time.
+template <class Request>
+void read_growth(const SceneTable& table, Request& request) {
+  table.expect_apart("curve", "ramp");
+  table.read("ramp", request.ramp);
+  table.read("curve", request.curve);
+}
+
 LoadRequest read_load(const SceneTable& table) {
   LoadRequest load;
   load.select = read_selection(table);
   table.expect_one_of({"force", "force_density"});
   table.read("force", load.force);
   table.read("force_density", load.force_density);
-  table.read("ramp", load.ramp);
+  read_growth(table, load);
   return load;
 }
 
@@ -283,7 +291,7 @@ TractionRequest read_traction(const SceneTable& table) {
     table.refuse("normal", "[0, 0, 0] found; allowed: a direction");
   }
   table.read("angle", traction.angle);
-  table.read("ramp", traction.ramp);
+  read_growth(table, traction);
   return traction;
 }
 

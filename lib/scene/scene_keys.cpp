@@ -25,6 +25,7 @@ constexpr double stiffest = 1e18;     // moduli [Pa]
 constexpr double fastest = 1e9;       // speeds [m/s] and spins [rad/s]
 constexpr double largest_angle = 1e9; // [degrees]
 constexpr double largest_force = 1e24;  // [N], [N/m^3]
+constexpr double largest_factor = 1e12; // of loads
 
 Range at_least(double low) { return {low, infinity, false}; }
 Range between(double low, double high) { return {low, high, false}; }
@@ -372,6 +373,10 @@ std::vector<SceneKey> boundary_keys() {
        .meaning = "Force per area against the outward normal; negative: along it."},
       {.section = "body.traction", .name = "follower", .type = KeyType::boolean, .fallback = "false",
        .meaning = "Whether the pressure acts on the deformed surface, against its normals, as that of a gas or a liquid; "
+      {.section = "body.load", .name = "curve", .type = KeyType::curve, .otherwise = "none", .range = within(largest_factor),
+       .meaning = "Factor of the force by time, in place of `ramp`: linear between the points, constant before the first and "
+           "after the last. [[0, 0], [1, 2], [3, -1]] grows to twice the force in 1 s and turns round in the next 2 s. The "
+           "method \"equilibrium\" takes the last factor."},
            "else its force stays as it is at rest."},
       {.section = "body.traction", .name = "gas", .otherwise = "none", .range = between(0, 100),
        .meaning = "Exponent g of a gas in a cavity of the body, whose whole surface is selected: its pressure is `pressure` "
@@ -390,6 +395,10 @@ std::vector<SceneKey> boundary_keys() {
 std::vector<SceneKey> place_keys() {
   return {
       {.section = "probe", .name = "name", .type = KeyType::text, .otherwise = "\"probe 1\", \"probe 2\", ...",
+      {.section = "body.traction", .name = "curve", .type = KeyType::curve, .otherwise = "none", .range = within(largest_factor),
+       .meaning = "Factor of the force by time, in place of `ramp`: linear between the points, constant before the first and "
+           "after the last. [[0, 0], [1, 2], [3, -1]] grows to twice the force in 1 s and turns round in the next 2 s. The "
+           "method \"equilibrium\" takes the last factor. Of a gas no factor is negative."},
        .meaning = "The probe's name in `probes.csv`."},
       {.section = "probe", .name = "body", .type = KeyType::text, .otherwise = "the only body",
        .meaning = "The name of the body that the probe is in."},

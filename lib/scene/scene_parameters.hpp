@@ -156,6 +156,7 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.load", "force", load.force);
     inner("body.load", "force_density", load.force_density);
     inner("body.load", "ramp", load.ramp);
+    if (!load.curve.empty()) inner("body.load", "curve", load.curve);
   });
   each(body.tractions, "traction", [](const TractionRequest& traction, auto&& inner) {
     inner("body.traction", "traction", traction.traction);
@@ -165,6 +166,7 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.traction", "normal", traction.normal);
     inner("body.traction", "angle", traction.angle);
     inner("body.traction", "ramp", traction.ramp);
+    if (!traction.curve.empty()) inner("body.traction", "curve", traction.curve);
   });
 }
 

@@ -288,7 +288,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
                energy_drift(now), peak_energy_);
   } else {
     fmt::print(
-        "  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n",
+        "  energy      {:.6g} J, not conserved in this scene (damping, motion or changing load)\n",
         now.total_energy());
   }
   fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",

@@ -107,11 +107,13 @@ force_density = [1, 0, 0] # body.load.force_density => force_density = [2, 0, 0]
 [[body.traction]]
 all = true
 traction = [1, 0, 0] # body.traction.traction => traction = [2, 0, 0]
+curve = [[0, 0], [1, 1]] # body.load.curve => curve = [[0, 0], [1, 2]]
 normal = [1, 0, 0] # body.traction.normal => normal = [0, 1, 0]
 angle = 30 # body.traction.angle => angle = 40
 [[body.traction]]
 all = true
 pressure = 1 # body.traction.pressure => pressure = 2
+curve = [[0, 1]] # body.traction.curve => curve = [[1, 1]]
 follower = true # body.traction.follower => follower = false
 ramp = 1 # body.traction.ramp => ramp = 2
 [[body.traction]]
@@ -359,6 +361,14 @@ TEST(ModelDigest, TellsModelsApartByEveryValueTheyHave) {
       {"loaded", digest_with([](Body& b) {
          b.loads[0].select = {.indices = std::vector<Index>{1, 2}};
        })}};
+      {"curve", digest_with([](Body& b) {
+         b.loads[0].ramp = 0;
+         b.loads[0].curve = {{0, 0}, {1, 2}};
+       })},
+      {"time of curve", digest_with([](Body& b) {
+         b.loads[0].ramp = 0;
+         b.loads[0].curve = {{0.5, 0}, {1, 2}};
+       })},
   std::map<std::uint64_t, std::string> names;
   for (const auto& [name, digest] : digests) {
     const auto [other, is_new] = names.emplace(digest, name);
