@@ -324,6 +324,12 @@ BodyRequest read_body_request(const SceneTable& table) {
   for (const SceneTable& fixed : table.tables("fixed")) {
     body.fixed.push_back({read_selection(fixed), read_axes(fixed)});
   }
+  for (const SceneTable& symmetry : table.tables("symmetry")) {
+    SymmetryRequest& plane = body.symmetries.emplace_back();
+    symmetry.read_choice("normal", plane.normal);
+    symmetry.read("at", plane.at);
+    plane.where = symmetry.where("at");
+  }
   for (const SceneTable& motion : table.tables("motion")) {
     body.motions.push_back(read_motion(motion));
   }
@@ -345,6 +351,9 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
   copy.translation += by;
   for (InclusionRequest& inclusion : copy.inclusions) move(inclusion.select, by);
   for (FixRequest& fix : copy.fixed) move(fix.select, by);
+  for (SymmetryRequest& plane : copy.symmetries) {
+    plane.at += component(by, static_cast<int>(plane.normal));
+  }
   for (MotionRequest& motion : copy.motions) {
     move(motion.select, by);
     motion.about += by;

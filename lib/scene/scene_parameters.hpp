@@ -170,6 +170,18 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
   });
 }
 
+/// `visit(entry, plane, values)` for each plane of symmetry of a body, as `visit_lists`.
+template <class Visit>
+void visit_symmetries(const BodyRequest& body, Visit&& visit) {
+  for (std::size_t k = 0; k < body.symmetries.size(); ++k) {
+    const SymmetryRequest& plane = body.symmetries[k];
+    visit(k + 1, plane, [&](auto&& inner) {
+      inner("body.symmetry", "normal", word(plane.normal));
+      inner("body.symmetry", "at", plane.at);
+    });
+  }
+}
+
 /// `visit(entry, probe, values)` for each probe of a body, as `visit_lists`.
 template <class Visit>
 void visit_probes(const BodyRequest& body, Visit&& visit) {
@@ -221,6 +233,10 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
           detail::visit_selection(select, inner);
           values(inner);
         });
+    detail::visit_symmetries(body,
+                             [&](std::size_t entry, const SymmetryRequest& plane, auto&& values) {
+                               values(of({&body, b + 1, "symmetry", entry, &plane.where}));
+                             });
     detail::visit_probes(body, [&](std::size_t entry, const ProbeRequest& probe, auto&& values) {
       values(of({&body, b + 1, "probe", entry, &probe.where}));
     });

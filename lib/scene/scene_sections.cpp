@@ -51,6 +51,12 @@ std::vector<SceneSection> make_sections() {
        "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
        "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
        "both sets, along their axes."},
+      {"body.symmetry", "[[body.symmetry]]", "",
+       "A plane of symmetry, at which the body ends: half a body, a quarter or an eighth of it stands for the "
+       "whole. Its phyxels on the plane, those within a hundredth of a spacing, are held along the normal and free in the plane. "
+       "Where another entry holds or moves them along the normal, they are left to that. "
+       "Bodies without phyxels on the plane, as with `lattice = \"cells\"`, are held by their outermost "
+       "layer, less accurately, and with a warning. Each plane is a set of its own in `reactions.csv`, e.g. `symmetry 1`."},
       {"body.motion", "[[body.motion]]", "selection",
        "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
        "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
@@ -67,7 +73,8 @@ std::vector<SceneSection> make_sections() {
        "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
        "`all`. The force keeps its size and "
        "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
-       "those on the triangles."},
+       "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
+       "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},
       {"probe", "[[probe]]", "selection",
        "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
        "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "

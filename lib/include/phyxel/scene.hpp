@@ -76,6 +76,17 @@ struct FixRequest {
   Axes axes{};
 };
 
+/// The normal of a plane of symmetry: an axis of the scene.
+enum class PlaneNormal { x, y, z };
+
+/// A plane of symmetry, at which the body ends: its phyxels there are held along the normal, unless
+/// another entry holds or moves them along it.
+struct SymmetryRequest {
+  PlaneNormal normal = PlaneNormal::x;
+  double at = 0;           ///< Coordinate of the plane, once the body is in place [m].
+  std::string where = {};  ///< "scene.toml:30:1", for errors.
+};
+
 /// Phyxels with a prescribed displacement:
 /// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency
 /// t), turned about a point by rotation * smoothstep(t / duration).
@@ -169,6 +180,7 @@ struct BodyRequest {
   /// control is the body's.
   std::vector<InclusionRequest> inclusions;
   std::vector<FixRequest> fixed;
+  std::vector<SymmetryRequest> symmetries;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;
   std::vector<TractionRequest> tractions;
