@@ -1,4 +1,6 @@
 /// All sections of a scene file: one entry each.
+#include <utility>
+
 #include "scene/scene_schema.hpp"
 
 namespace phyxel {
@@ -6,43 +8,9 @@ namespace {
 
 // clang-format off
 
-std::vector<SceneSection> make_sections() {
+/// The sections of what acts on a body, and of probes.
+std::vector<SceneSection> boundary_sections() {
   return {
-      {"", "At the top of the file", "", "Before the first section."},
-      {"time", "[time]", "", "How long to simulate, and in which steps."},
-      {"solver", "[solver]", "", "What computes, and in which precision."},
-      {"output", "[output]", "", "What is written, where and how often."},
-      {"render", "[render]", "", "Pictures made at the end of a run."},
-      {"body", "[[body]]", "",
-       "One such section for each body. Exactly one of `shape`, `mesh`, `file` and `cloud` says "
-       "where its rest shape comes from:\n\n"
-       "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
-       "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
-       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
-       "along x from the origin, with its axis on the x axis; the others are centred on the "
-       "origin, the cylinder along z.\n"
-       "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
-       "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
-       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`. Named groups of its triangles "
-       "are regions: an OBJ file's groups, objects and materials, the solids of an STL file, and colours: "
-       "`\"#ff0000\"` of the faces of a PLY file, `\"attribute 31\"` of the triangles of a binary STL file. A region has "
-       "the phyxels on its triangles; if all phyxels lie inside, those within a spacing of them.\n"
-       "- `file` needs nothing else.\n"
-       "- `cloud` names what a program that links phyxel, or uses it from Python, passes along with "
-       "the scene: it needs nothing else either.\n\n"
-       "The shape is scaled, then rotated, then translated."},
-      {"body.material", "[body.material]", "", "What the body is made of. Required."},
-      {"body.inclusion", "[[body.inclusion]]", "selection",
-       "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
-       "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
-       "phyxels of a body with inclusions are numbered material by material."},
-      {"body.neighbours", "[body.neighbours]", "",
-       "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
-       "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
-      {"body.array", "[body.array]", "",
-       "Repeats the body on a grid, with everything it has: the copies of `name = \"dino\"` are "
-       "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
-       "Box and ball selections move along with each copy."},
       {"body.fixed", "[[body.fixed]]", "selection",
        "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
        "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
@@ -81,6 +49,12 @@ std::vector<SceneSection> make_sections() {
        "time, the probe's name, the number of the point, its position at rest, displacement [m], velocity [m/s], "
        "Cauchy stress [Pa], its von Mises equivalent, and Green's strain. At a point the values are those of a "
        "quadratic polynomial through the phyxels within a support, which ends where materials and supports do."},
+  };
+}
+
+/// The sections of selections.
+std::vector<SceneSection> selection_sections() {
+  return {
       {"selection", "Selections", "",
        "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]`, `[[body.traction]]` and each "
        "`[[probe]]` without points has exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
@@ -91,6 +65,49 @@ std::vector<SceneSection> make_sections() {
        "the phyxels whose centres lie in it."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
+}
+
+std::vector<SceneSection> make_sections() {
+  std::vector<SceneSection> all = {
+      {"", "At the top of the file", "", "Before the first section."},
+      {"time", "[time]", "", "How long to simulate, and in which steps."},
+      {"solver", "[solver]", "", "What computes, and in which precision."},
+      {"output", "[output]", "", "What is written, where and how often."},
+      {"render", "[render]", "", "Pictures made at the end of a run."},
+      {"body", "[[body]]", "",
+       "One such section for each body. Exactly one of `shape`, `mesh`, `file` and `cloud` says "
+       "where its rest shape comes from:\n\n"
+       "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
+       "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
+       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
+       "along x from the origin, with its axis on the x axis; the others are centred on the "
+       "origin, the cylinder along z.\n"
+       "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
+       "2008; their counts of phyxels and surfels are fixed, and only `surfels` may be added.\n"
+       "- `mesh` needs `phyxels`, and may have `seed`, `relaxations` and `on_surface`. Named groups of its triangles "
+       "are regions: an OBJ file's groups, objects and materials, the solids of an STL file, and colours: "
+       "`\"#ff0000\"` of the faces of a PLY file, `\"attribute 31\"` of the triangles of a binary STL file. A region has "
+       "the phyxels on its triangles; if all phyxels lie inside, those within a spacing of them.\n"
+       "- `file` needs nothing else.\n"
+       "- `cloud` names what a program that links phyxel, or uses it from Python, passes along with "
+       "the scene: it needs nothing else either.\n\n"
+       "The shape is scaled, then rotated, then translated."},
+      {"body.material", "[body.material]", "", "What the body is made of. Required."},
+      {"body.inclusion", "[[body.inclusion]]", "selection",
+       "Phyxels of another material: what is not said here is as in `[body.material]`, and so is "
+       "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
+       "phyxels of a body with inclusions are numbered material by material."},
+      {"body.neighbours", "[body.neighbours]", "",
+       "Which phyxels interact: those closer than the support radius h. Either `radius` gives h, "
+       "or it is `factor` times the mean distance to the `nearest` nearest phyxels."},
+      {"body.array", "[body.array]", "",
+       "Repeats the body on a grid, with everything it has: the copies of `name = \"dino\"` are "
+       "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
+       "Box and ball selections move along with each copy."},
+  };
+  for (SceneSection& section : boundary_sections()) all.push_back(std::move(section));
+  for (SceneSection& section : selection_sections()) all.push_back(std::move(section));
+  return all;
 }
 
 // clang-format on
