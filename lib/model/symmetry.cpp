@@ -108,8 +108,8 @@ std::vector<SymmetryPlane> symmetry_planes(const BodyRequest& request, const Bod
     }
     warnings.push_back(fmt::format(
         "body \"{}\", {}: no layer of phyxels lies on the plane {} = {:g} m; the {} within {:g} m "
-        "of it are held, and the body is that much stiffer. Phyxels on the surface (lattice = "
-        "\"nodes\", on_surface = true) put the plane where it is",
+        "of it are held instead, at a distance from the plane. Phyxels on the surface (lattice = "
+        "\"nodes\", on_surface = true) lie on it",
         request.name, entry_name("symmetry", k), letter_of(asked.normal), asked.at, counts[k].near,
         near_plane * extent.spacing));
   }
