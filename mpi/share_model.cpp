@@ -316,16 +316,57 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   return naming(request, [&] { return choose_boundary(request, cloud, number, body.size); });
 }
 
+/// Finds the planes of symmetry of each body from its phyxels on all ranks.
+std::vector<std::vector<SymmetryPlane>> planes_of_bodies(const ShareSetup& setup,
+                                                         WholeBodies& whole,
+                                                         const LocalModel& local) {
+  std::vector<BodyExtent> extents(whole.bodies.size());
+  std::vector<std::int64_t> sums;  // of `PlaneCounts::on` and `near`, plane by plane
+  for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+    const BodyRequest& request = setup.scene.bodies[b];
+    if (request.symmetries.empty()) continue;
+    extents[b] = extent_of(whole.boxes[b], whole.surfaces[b], whole.bodies[b].size);
+    std::vector<Vec3d> own;
+    for (Index i = local.bodies[b].begin; i < local.bodies[b].end; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (owns(local, k)) own.push_back(local.phyxels[k].position);
+    }
+    for (const PlaneCounts& count : count_at_planes(request, extents[b].spacing, own)) {
+      sums.insert(sums.end(), {count.on, count.near});
+    }
+  }
+  setup.ranks.add(sums);
+  std::vector<std::vector<SymmetryPlane>> planes(whole.bodies.size());
+  setup.ranks.collectively([&] {
+    auto sum = sums.begin();
+    for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+      const BodyRequest& request = setup.scene.bodies[b];
+      std::vector<PlaneCounts> counts;
+      for (std::size_t k = 0; k < request.symmetries.size(); ++k, sum += 2) {
+        counts.push_back({sum[0], sum[1]});
+      }
+      planes[b] = naming(
+          request, [&] { return symmetry_planes(request, extents[b], counts, whole.warnings); });
+    }
+  });
+  return planes;
+}
+
 void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) {
   Model& m = local.model;
   std::vector<BoundaryChoice> choices(whole.bodies.size());
   std::vector<std::int64_t> counts;
   std::vector<std::vector<LoadSums>> sums(whole.bodies.size());
+  const std::vector<std::vector<SymmetryPlane>> planes = planes_of_bodies(setup, whole, local);
   setup.ranks.collectively([&] {
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-      if (selections_of(setup.scene.bodies[b]).empty()) continue;
+      if (selections_of(setup.scene.bodies[b]).empty() && planes[b].empty()) continue;
       const Index begin = local.bodies[b].begin;
       choices[b] = choice_of(setup, whole, local, b);
+      const std::span<const MigratingPhyxel> here = of_range(local.phyxels, local.bodies[b]);
+      choices[b].add_planes(setup.scene.bodies[b],
+                            tabulated(here.size(), [&](std::size_t k) { return here[k].position; }),
+                            planes[b]);
       BoundaryChoice own = choices[b];
       for (std::vector<Index>& chosen : own.chosen) {
         std::erase_if(chosen,

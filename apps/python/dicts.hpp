@@ -1,10 +1,11 @@
-/// Energies and reactions as Python's dicts.
+/// Energies, reactions and gases as Python's dicts.
 #pragma once
 
 #include <vector>
 
 #include "arrays.hpp"
 #include "files/frame_file.hpp"
+#include "phyxel/gases.hpp"
 #include "phyxel/probes.hpp"
 #include "phyxel/state.hpp"
 
@@ -34,6 +35,20 @@ inline py::list dicts_of(const std::vector<Reaction>& reactions) {
     values["torque"] = reaction.torque;
     values["centre"] = reaction.centre;
     values["work"] = reaction.work;
+    list.append(values);
+  }
+  return list;
+}
+
+/// Returns a dict of each gas.
+inline py::list dicts_of(const std::vector<GasReading>& gases) {
+  py::list list;
+  for (const GasReading& gas : gases) {
+    py::dict values;
+    values["body"] = gas.body;
+    values["set"] = gas.set;
+    values["pressure"] = gas.pressure;
+    values["volume"] = gas.volume;
     list.append(values);
   }
   return list;

@@ -57,8 +57,13 @@ void add_simulation(py::module_& module) {
           "Energies [J], momenta and the other columns of energy.csv, now: {name: value}.")
       .def(
           "reactions", [](Simulation& s) { return dicts_of(s.reactions()); },
-          "Reactions of supports, now: a list of dicts, one for each entry of fixed and motion:\n"
+          "Reactions of supports, now: a list of dicts, one for each entry of fixed, motion\n"
+          "and symmetry:\n"
           "body, set, force [N], torque [N m] about centre [m], work [J].")
+      .def(
+          "gases", [](Simulation& s) { return dicts_of(s.gases()); },
+          "Gases in cavities, now: a list of dicts, one for each traction with gas:\n"
+          "body, set, pressure [Pa], volume [m^3].")
       .def(
           "forces", [](Simulation& s) { return taken(s.internal_forces()); },
           "Internal forces [N], (n, 3), a copy.")

@@ -12,6 +12,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/gases.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/reactions.hpp"
@@ -184,6 +185,11 @@ class Simulation {
     return Probes(model_, {{.name = "points", .body = body, .points = points}})
         .read(*backend_, recovery());
   }
+  std::vector<GasReading> gases() {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    return read_gases(model_, *backend_, *solver_);
+  }
   /// The readings of the scene's probes.
   std::vector<ProbeReading> readings() {
     const auto turn = my_turn();
@@ -257,7 +263,8 @@ class Simulation {
     frame.state = &state;
     frame.diagnostics = look();
     frame.readings = {find_reactions(model_, *backend_, *solver_),
-                      probes().read(*backend_, recovery())};
+                      probes().read(*backend_, recovery()),
+                      read_gases(model_, *backend_, *solver_)};
     SurfelState surfels;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);

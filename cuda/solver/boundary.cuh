@@ -1,7 +1,11 @@
 /// Prescribed motions and loads on the GPU.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "exact_sum.hpp"
+#include "solver/boundary_conditions.hpp"
 #include "solver/following.cuh"
 #include "solver/support_work.hpp"
 
@@ -93,26 +97,26 @@ class Boundary {
     make_loads();
   }
 
-  /// True if motions or loads that grow or follow the surface change from step to step.
+  /// True if motions or loads that change in size or follow the surface change from step to step.
   bool changes() const {
     return !paths_.empty() || !following_.empty() ||
-           std::any_of(loads_.begin(), loads_.end(), [](const auto& l) { return l.of->ramp > 0; });
+           std::any_of(loads_.begin(), loads_.end(),
+                       [](const auto& l) { return !l.of->curve.is_constant(); });
   }
   /// Sets the caller's forces [N], shape [3, places]; an empty list clears them. They act from the
   /// next launch on.
   void set_external(const std::vector<Real>& force) {
     m_.set_external(force);
-    load_scales_ = -1;
+    load_scales_.reset();
     sum_loads(time_);
   }
   /// Sums the applied forces at a time [s] without loads that follow the surface, which may be
   /// added to the sum (`DeviceFollowing::add`). Repeated calls sum again only while a load still
-  /// grows or follows the surface.
+  /// changes or follows the surface.
   void sum_loads(double time) {
     time_ = time;
     if (!m_.loads()) return;
-    double scales = 0;
-    for (const Loading& load : loads_) scales += load.of->scale_at(time);
+    const std::vector<double> scales = load_scales(m_.model(), time);
     if (scales == load_scales_ && following_.empty()) return;
     load_scales_ = scales;
     const std::size_t bytes = 3 * m_.places() * sizeof(Real);
@@ -300,8 +304,9 @@ class Boundary {
   std::vector<Moved> paths_;
   std::vector<Loading> loads_;
   DeviceFollowing<Real, StateReal> following_{m_};
-  double load_scales_ = -1, time_ = 0;  // scale and time [s] of the last sum
-  double work_step_ = 0;                // step for which inertias were made [s]
+  std::optional<std::vector<double>> load_scales_;  // of the last sum; none before the first
+  double time_ = 0;                                 // of the last sum [s]
+  double work_step_ = 0;                            // step for which inertias were made [s]
   DeviceArray<Index> held_;
   DeviceArray<char> moved_;
 };

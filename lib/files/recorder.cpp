@@ -166,6 +166,9 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
     probes_.emplace(directory_ / probes_name,
                     header_of("step,time [s],probe,point", probe_columns()));
   }
+  if (has_gas(model)) {
+    gases_.emplace(directory_ / gas_name, header_of("step,time [s],body,set", gas_columns()));
+  }
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -242,6 +245,7 @@ void Recorder::create_files() {
   log_size_ = log_header().size();
   if (reactions_) reactions_->create();
   if (probes_) probes_->create();
+  if (gases_) gases_->create();
 }
 
 void Recorder::continue_after(const Continuation& point, bool overwrite) {
@@ -263,7 +267,8 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
   const std::string reactions = reactions_ ? reactions_->kept(log.last_step) : "",
-                    probes = probes_ ? probes_->kept(log.last_step) : "";
+                    probes = probes_ ? probes_->kept(log.last_step) : "",
+                    gases = gases_ ? gases_->kept(log.last_step) : "";
   // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
   fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run
@@ -275,6 +280,7 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   log_size_ = log.text.size();
   if (reactions_) reactions_->create(reactions);
   if (probes_) probes_->create(probes);
+  if (gases_) gases_->create(gases);
 }
 
 void Recorder::write(const Frame& frame) {
@@ -309,6 +315,11 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
           return fmt::format("{},{}", cell_of(r.probe), r.number + 1);
         }));
   }
+  if (gases_ && !readings.gases.empty()) {
+    gases_->append(lines_of(diagnostics, readings.gases, gas_columns(), [](const GasReading& r) {
+      return cell_of(r.body) + "," + cell_of(r.set);
+    }));
+  }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
@@ -333,6 +344,7 @@ std::vector<fs::path> Recorder::files() const {
   files.push_back(directory_ / log_name);
   if (reactions_) files.push_back(reactions_->file());
   if (probes_) files.push_back(probes_->file());
+  if (gases_) files.push_back(gases_->file());
   return files;
 }
 

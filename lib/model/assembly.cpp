@@ -315,13 +315,21 @@ std::vector<const Selection*> selections_of(const BodyRequest& request) {
   return all;
 }
 
+namespace {
+/// Returns the axes of the fixed and moved entries of a body, in the order of `selections_of`.
+std::vector<Axes> axes_of_supports(const BodyRequest& request) {
+  std::vector<Axes> axes;
+  for (const FixRequest& fix : request.fixed) axes.push_back(fix.axes);
+  for (const MotionRequest& motion : request.motions) axes.push_back(motion.axes);
+  return axes;
+}
+}  // namespace
+
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
   BoundaryChoice choice;
   std::vector<char> moved(cloud.position.size(), 0);  // a bit for each axis
-  std::vector<Axes> axes;
-  for (const FixRequest& fix : request.fixed) axes.push_back(fix.axes);
-  for (const MotionRequest& motion : request.motions) axes.push_back(motion.axes);
+  const std::vector<Axes> axes = axes_of_supports(request);
   const SomePhyxels here{cloud, number, size};
   choice.first_load = request.fixed.size() + request.motions.size();
   choice.first_probe = choice.first_load + request.loads.size();
@@ -343,10 +351,31 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
   return choice;
 }
 
+void BoundaryChoice::add_planes(const BodyRequest& request, std::span<const Vec3d> position,
+                                std::vector<SymmetryPlane> symmetry) {
+  planes = std::move(symmetry);
+  std::vector<char> moved(planes.empty() ? 0 : position.size(), 0);  // a bit for each axis
+  const std::vector<Axes> axes = axes_of_supports(request);
+  for (std::size_t entry = 0; entry < axes.size() && !planes.empty(); ++entry) {
+    for (const Index i : chosen[entry]) moved[i] = static_cast<char>(moved[i] | axes[entry].bits());
+  }
+  for (const SymmetryPlane& plane : planes) {
+    const char bit = plane.axes().bits();
+    std::vector<Index>& held = at_plane.emplace_back();
+    for (std::size_t i = 0; i < position.size(); ++i) {
+      if ((moved[i] & bit) || !plane.holds(position[i])) continue;
+      held.push_back(static_cast<Index>(i));
+      moved[i] = static_cast<char>(moved[i] | bit);
+    }
+  }
+}
+
 void BoundaryChoice::renumber(const std::vector<Index>& place) {
-  for (std::vector<Index>& phyxels : chosen) {
-    for (Index& i : phyxels) i = place[i];
-    std::sort(phyxels.begin(), phyxels.end());
+  for (auto* list : {&chosen, &at_plane}) {
+    for (std::vector<Index>& phyxels : *list) {
+      for (Index& i : phyxels) i = place[i];
+      std::sort(phyxels.begin(), phyxels.end());
+    }
   }
 }
 
@@ -399,11 +428,11 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                             const std::vector<LoadSums>& loaded, Vec3d origin,
                             const std::vector<std::optional<BodyPiece>>& pieces) const {
   auto entry = chosen.begin();
-  const auto next = [&] {
-    std::vector<Index> phyxels = *entry++;
+  const auto in_model = [&](std::vector<Index> phyxels) {
     for (Index& i : phyxels) i += shift;
     return phyxels;
   };
+  const auto next = [&] { return in_model(*entry++); };
   const auto numbered = [](const char* kind, const auto& one, const auto& all) {
     return entry_name(kind, static_cast<std::size_t>(&one - all.data()));
   };
@@ -425,6 +454,12 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                              .axes = m.axes,
                              .body = request.name,
                              .set = numbered("motion", m, request.motions)});
+  }
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    model.motions.push_back({.phyxels = in_model(at_plane[k]),
+                             .axes = planes[k].axes(),
+                             .body = request.name,
+                             .set = entry_name("symmetry", k)});
   }
   for (std::size_t l = 0; l < request.loads.size(); ++l) {
     std::vector<Index> phyxels = next();

@@ -11,6 +11,7 @@
 #include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
 #include "model/loads.hpp"
+#include "model/symmetry.hpp"
 #include "model/walls.hpp"
 #include "phyxel/model.hpp"
 
@@ -125,6 +126,13 @@ std::vector<const Selection*> selections_of(const BodyRequest& request);
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
   std::size_t first_load = 0, first_probe = 0;
+  std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
+  std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
+
+  /// Adds planes of symmetry. A phyxel that another entry, or an earlier plane, holds or moves
+  /// along a plane's normal is left to that.
+  void add_planes(const BodyRequest& request, std::span<const Vec3d> position,
+                  std::vector<SymmetryPlane> symmetry);
 
   /// Phyxel i of the cloud is phyxel place[i] of the body.
   void renumber(const std::vector<Index>& place);

@@ -216,7 +216,15 @@ void check_boundary(const Model& m) {
     check_indices(name + "phyxels", load.phyxels, m.size());
     check_size(name + "force", load.force.size(), load.phyxels.size(), "phyxels");
     check_finite(name + "force", load.force);
-    check_finite(name + "ramp", load.ramp);
+    for (std::size_t p = 0; p < load.curve.points.size(); ++p) {
+      const auto [time, factor] = load.curve.points[p];
+      const std::string point = fmt::format("{}curve.points[{}].", name, p);
+      check_finite(point + "time", time);
+      check_finite(point + "factor", factor);
+      if (p > 0 && !(time > load.curve.points[p - 1].time)) {
+        refuse(point + "time", fmt::format("is {:g} s", time), "times that ascend");
+      }
+    }
   }
   for (std::size_t k = 0; k < m.probes.size(); ++k) {
     check_indices(fmt::format("probes[{}].phyxels", k), m.probes[k].phyxels, m.size());

@@ -130,7 +130,7 @@ Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> 
   Load load{.phyxels = std::move(phyxels),
             .total = asked.force,
             .density = asked.force_density,
-            .ramp = asked.ramp,
+            .curve = LoadCurve::of(asked.ramp, asked.curve),
             .body = request.name,
             .set = entry_name("load", number)};
   const double mass = sums.mass.value();
@@ -248,13 +248,14 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
 }
 
 Load traction_load(const BodyRequest& request, std::size_t number, const LoadedFacets& loaded) {
-  Load load{.ramp = request.tractions[number].ramp,
+  const TractionRequest& asked = request.tractions[number];
+  Load load{.curve = LoadCurve::of(asked.ramp, asked.curve),
             .body = request.name,
             .set = entry_name("traction", number),
             .on_surface = true,
-            .follows = request.tractions[number].follower,
-            .pressure = request.tractions[number].pressure,
-            .gas = request.tractions[number].gas};
+            .follows = asked.follower,
+            .pressure = asked.pressure,
+            .gas = asked.gas};
   double sizes = 0;
   Vec3d moment;
   const Vec3d origin = loaded.facets.front().centroid;

@@ -225,8 +225,17 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
                   const SortedCloud* sorted, Index shift) {
   BoundaryChoice choice =
       choose_boundary(request, given, {}, static_cast<Index>(given.position.size()));
+  const Box box = box_around(given.position);
+  if (!request.symmetries.empty()) {
+    const BodyExtent extent =
+        extent_of(box, given.surface, static_cast<Index>(given.position.size()));
+    const std::vector<PlaneCounts> counts =
+        count_at_planes(request, extent.spacing, given.position);
+    choice.add_planes(request, given.position,
+                      symmetry_planes(request, extent, counts, model.warnings));
+  }
   if (sorted) choice.renumber(sorted->place);
-  choice.refuse_empty(request, choice.counts(), box_around(given.position));
+  choice.refuse_empty(request, choice.counts(), box);
   choice.warn_of_few(request, choice.counts(), model.warnings);
   const Vec3d origin = model.position[shift];
   choice.add_to(model, request, shift, choice.load_sums(model, shift, origin), origin,

@@ -15,6 +15,15 @@ void add(XXH3_state_t* state, const std::vector<T>& values) {
   XXH3_64bits_update(state, values.data(), values.size() * sizeof(T));
 }
 
+/// Returns the numbers of a load's curve: the duration of a ramp, else times and factors.
+std::vector<double> numbers_of(const LoadCurve& curve) {
+  const double duration = curve.points.empty() ? 0 : curve.points.back().time;
+  if (curve == LoadCurve::of(duration, {})) return {duration};
+  std::vector<double> numbers;
+  for (const auto [time, factor] : curve.points) numbers.insert(numbers.end(), {time, factor});
+  return numbers;
+}
+
 /// Adds the surface of a part, from which closing vectors follow beside the phyxels. The first part
 /// of a body has its surface. @param surfaces of the bodies; empty: the model has them
 void add_surface(XXH3_state_t* state, const Model& model, const Part& part,
@@ -106,7 +115,7 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
   }
   for (const Load& load : model.loads) {
     add(state.get(), std::vector<Vec3d>{load.total, load.density});
-    add(state.get(), std::vector<double>{load.ramp});
+    add(state.get(), numbers_of(load.curve));
     if (load.follows) add(state.get(), std::vector<double>{1, load.gas.value_or(-1)});
   }
   return XXH3_64bits_digest(state.get());

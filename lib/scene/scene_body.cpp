@@ -283,13 +283,21 @@ MotionRequest read_motion(const SceneTable& table) {
   return motion;
 }
 
+/// Reads how a load or traction changes with time.
+template <class Request>
+void read_growth(const SceneTable& table, Request& request) {
+  table.expect_apart("curve", "ramp");
+  table.read("ramp", request.ramp);
+  table.read("curve", request.curve);
+}
+
 LoadRequest read_load(const SceneTable& table) {
   LoadRequest load;
   load.select = read_selection(table);
   table.expect_one_of({"force", "force_density"});
   table.read("force", load.force);
   table.read("force_density", load.force_density);
-  table.read("ramp", load.ramp);
+  read_growth(table, load);
   return load;
 }
 
@@ -323,7 +331,7 @@ TractionRequest read_traction(const SceneTable& table) {
     table.refuse("normal", "[0, 0, 0] found; allowed: a direction");
   }
   table.read("angle", traction.angle);
-  table.read("ramp", traction.ramp);
+  read_growth(table, traction);
   return traction;
 }
 
@@ -359,6 +367,12 @@ BodyRequest read_body_request(const SceneTable& table) {
   for (const SceneTable& fixed : table.tables("fixed")) {
     body.fixed.push_back({read_selection(fixed), read_axes(fixed)});
   }
+  for (const SceneTable& symmetry : table.tables("symmetry")) {
+    SymmetryRequest& plane = body.symmetries.emplace_back();
+    symmetry.read_choice("normal", plane.normal);
+    symmetry.read("at", plane.at);
+    plane.where = symmetry.where("at");
+  }
   for (const SceneTable& motion : table.tables("motion")) {
     body.motions.push_back(read_motion(motion));
   }
@@ -381,6 +395,9 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
   for (InclusionRequest& inclusion : copy.inclusions) move(inclusion.select, by);
   for (FinerRequest& finer : copy.finer) move(finer.select, by);
   for (FixRequest& fix : copy.fixed) move(fix.select, by);
+  for (SymmetryRequest& plane : copy.symmetries) {
+    plane.at += component(by, static_cast<int>(plane.normal));
+  }
   for (MotionRequest& motion : copy.motions) {
     move(motion.select, by);
     motion.about += by;

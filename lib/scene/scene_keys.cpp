@@ -25,6 +25,7 @@ constexpr double stiffest = 1e18;     // moduli [Pa]
 constexpr double fastest = 1e9;       // speeds [m/s] and spins [rad/s]
 constexpr double largest_angle = 1e9; // [degrees]
 constexpr double largest_force = 1e24;  // [N], [N/m^3]
+constexpr double largest_factor = 1e12; // of loads
 
 Range at_least(double low) { return {low, infinity, false}; }
 Range between(double low, double high) { return {low, high, false}; }
@@ -259,6 +260,8 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Phyxels of another material."},
       {.section = "body", .name = "fixed", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Phyxels held where they are."},
+      {.section = "body", .name = "symmetry", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Planes of symmetry at which the body ends."},
       {.section = "body", .name = "motion", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Phyxels moved along a path."},
       {.section = "body", .name = "load", .type = KeyType::tables, .otherwise = "none",
@@ -361,6 +364,11 @@ std::vector<SceneKey> boundary_keys() {
        .words = axes,
        .meaning = "Along which axes they are held; along the others they are free, as on rollers."},
 
+      {.section = "body.symmetry", .name = "normal", .type = KeyType::choice, .required = true,
+       .words = {"x", "y", "z"}, .meaning = "Normal of the plane, an axis of the scene."},
+      {.section = "body.symmetry", .name = "at", .unit = "m", .fallback = "0", .range = within(10 * longest),
+       .meaning = "Coordinate of the plane along its normal, once the body is in place. The body ends there."},
+
       {.section = "body.motion", .name = "displacement", .type = KeyType::vector, .unit = "m",
        .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Reached after `duration`, then kept."},
       {.section = "body.motion", .name = "rotation", .type = KeyType::vector, .unit = "degrees",
@@ -387,6 +395,10 @@ std::vector<SceneKey> boundary_keys() {
        .fallback = "[0, 0, 0]", .range = within(largest_force), .meaning = "Force per volume at rest."},
       {.section = "body.load", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
+      {.section = "body.load", .name = "curve", .type = KeyType::curve, .otherwise = "none", .range = within(largest_factor),
+       .meaning = "Factor of the force by time, in place of `ramp`: linear between the points, constant before the first and "
+           "after the last. [[0, 0], [1, 2], [3, -1]] grows to twice the force in 1 s and turns round in the next 2 s. The "
+           "method \"equilibrium\" takes the last factor."},
 
       {.section = "body.traction", .name = "traction", .type = KeyType::vector, .unit = "Pa",
        .fallback = "[0, 0, 0]", .range = within(stiffest), .meaning = "Force per area at rest."},
@@ -405,6 +417,10 @@ std::vector<SceneKey> boundary_keys() {
        .meaning = "Largest angle between the normal and that direction."},
       {.section = "body.traction", .name = "ramp", .unit = "s", .fallback = "0", .range = between(0, 1e9),
        .meaning = "Time over which the force grows from zero; 0: at once."},
+      {.section = "body.traction", .name = "curve", .type = KeyType::curve, .otherwise = "none", .range = within(largest_factor),
+       .meaning = "Factor of the force by time, in place of `ramp`: linear between the points, constant before the first and "
+           "after the last. [[0, 0], [1, 2], [3, -1]] grows to twice the force in 1 s and turns round in the next 2 s. The "
+           "method \"equilibrium\" takes the last factor. Of a gas no factor is negative."},
 
   };
 }

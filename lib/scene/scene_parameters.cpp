@@ -82,6 +82,15 @@ std::string in_words(const char*, const char*, const std::vector<Index>& v) {
   return fmt::format("{} indices, hash {:016x}", v.size(),
                      XXH3_64bits(v.data(), v.size() * sizeof(Index)));
 }
+std::string in_words(const char*, const char*, const std::vector<LoadCurve::Point>& v) {
+  if (v.size() > most_named_indices) {
+    return fmt::format("{} points, hash {:016x}", v.size(),
+                       XXH3_64bits(v.data(), v.size() * sizeof(v[0])));
+  }
+  std::vector<std::string> points;
+  for (const auto [time, factor] : v) points.push_back(fmt::format("[{}, {}]", time, factor));
+  return fmt::format("[{}]", fmt::join(points, ", "));
+}
 std::string in_words(const char* section, const char* name, Word word) {
   const SceneKey* key = find_key(section, name);
   return key && word.index < key->words.size() ? on_one_line(key->words[word.index])

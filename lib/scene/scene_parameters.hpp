@@ -169,6 +169,7 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.load", "force", load.force);
     inner("body.load", "force_density", load.force_density);
     inner("body.load", "ramp", load.ramp);
+    if (!load.curve.empty()) inner("body.load", "curve", load.curve);
   });
   each(body.tractions, "traction", [](const TractionRequest& traction, auto&& inner) {
     inner("body.traction", "traction", traction.traction);
@@ -178,7 +179,20 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
     inner("body.traction", "normal", traction.normal);
     inner("body.traction", "angle", traction.angle);
     inner("body.traction", "ramp", traction.ramp);
+    if (!traction.curve.empty()) inner("body.traction", "curve", traction.curve);
   });
+}
+
+/// `visit(entry, plane, values)` for each plane of symmetry of a body, as `visit_lists`.
+template <class Visit>
+void visit_symmetries(const BodyRequest& body, Visit&& visit) {
+  for (std::size_t k = 0; k < body.symmetries.size(); ++k) {
+    const SymmetryRequest& plane = body.symmetries[k];
+    visit(k + 1, plane, [&](auto&& inner) {
+      inner("body.symmetry", "normal", word(plane.normal));
+      inner("body.symmetry", "at", plane.at);
+    });
+  }
 }
 
 /// `visit(entry, probe, values)` for each probe of a body, as `visit_lists`.
@@ -232,6 +246,10 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
           detail::visit_selection(select, inner);
           values(inner);
         });
+    detail::visit_symmetries(body,
+                             [&](std::size_t entry, const SymmetryRequest& plane, auto&& values) {
+                               values(of({&body, b + 1, "symmetry", entry, &plane.where}));
+                             });
     detail::visit_probes(body, [&](std::size_t entry, const ProbeRequest& probe, auto&& values) {
       values(of({&body, b + 1, "probe", entry, &probe.where}));
     });

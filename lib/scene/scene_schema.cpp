@@ -44,6 +44,9 @@ std::string plain_words(const SceneKey& key) {
       return "a list of integers";
     case KeyType::box:
       return "[[x, y, z], [x, y, z]]";
+    case KeyType::curve:
+      return fmt::format("[[t, f], ...], 1 to {} points, {} [s], times ascend",
+                         LoadCurve::most_points, curve_times.in_words("t"));
     case KeyType::table:
       return header_of(key);
     case KeyType::tables:
@@ -71,6 +74,16 @@ std::string Range::in_words(const std::string& name) const {
   return "";
 }
 
+std::optional<std::size_t> wrong_point(std::span<const LoadCurve::Point> points,
+                                       const Range& factors) {
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const bool good = curve_times.contains(points[k].time) && factors.contains(points[k].factor) &&
+                      (k == 0 || points[k].time > points[k - 1].time);
+    if (!good) return k;
+  }
+  return std::nullopt;
+}
+
 const SceneSection& scene_section(const std::string& path) {
   for (const SceneSection& section : scene_sections()) {
     if (section.path == path) return section;
@@ -90,7 +103,8 @@ std::vector<const SceneKey*> keys_of(const std::string& section) {
 std::string allowed_words(const SceneKey& key) {
   const bool several =
       key.type == KeyType::vector || key.type == KeyType::counts || key.type == KeyType::indices;
-  const std::string range = key.range.in_words(several ? "each" : key.name);
+  const std::string one = key.type == KeyType::curve ? "f" : key.name;
+  const std::string range = key.range.in_words(several ? "each" : one);
   std::string words = plain_words(key);
   if (!range.empty()) words += ", " + range;
   if (!key.unit.empty()) words += " [" + key.unit + "]";

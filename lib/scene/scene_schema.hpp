@@ -2,10 +2,14 @@
 /// from it.
 #pragma once
 
+#include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "phyxel/load_curve.hpp"
 
 namespace phyxel {
 
@@ -23,6 +27,7 @@ enum class KeyType {
   counts,   ///< [x, y, z], integers.
   indices,  ///< A list of integers, at least one.
   box,      ///< [[x, y, z], [x, y, z]]
+  curve,    ///< [[time, factor], ...]; `range` is that of the factors.
   table,
   tables,  ///< [[...]], one or more.
 };
@@ -57,6 +62,14 @@ struct SceneSection {
   std::string base;    ///< Section whose keys it has too; "" if none.
   std::string meaning;
 };
+
+/// Allowed times of the points of a curve [s].
+inline constexpr Range curve_times{0, 1e9, false};
+
+/// Returns the number of the first point of a curve that may not stand there: times ascend strictly
+/// within `curve_times`, factors lie in a range. Unset if all may.
+std::optional<std::size_t> wrong_point(std::span<const LoadCurve::Point> points,
+                                       const Range& factors);
 
 /// All sections and all keys, in the order of the documentation.
 std::span<const SceneSection> scene_sections();

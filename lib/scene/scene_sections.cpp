@@ -1,4 +1,6 @@
 /// All sections of a scene file: one entry each.
+#include <utility>
+
 #include "scene/scene_schema.hpp"
 
 namespace phyxel {
@@ -6,8 +8,67 @@ namespace {
 
 // clang-format off
 
-std::vector<SceneSection> make_sections() {
+/// The sections of what acts on a body, and of probes.
+std::vector<SceneSection> boundary_sections() {
   return {
+      {"body.fixed", "[[body.fixed]]", "selection",
+       "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
+       "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
+       "of its own in `reactions.csv`, which has one line for each frame and set, named by its body and "
+       "entry, e.g. `fixed 1`, `motion 2`: force [N] and torque [N m] of the support on the body, and the "
+       "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
+       "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
+       "both sets, along their axes."},
+      {"body.symmetry", "[[body.symmetry]]", "",
+       "A plane of symmetry, at which the body ends: half a body, a quarter or an eighth of it stands for the "
+       "whole. Its phyxels on the plane, those within a hundredth of a spacing, are held along the normal and free in the plane. "
+       "Where another entry holds or moves them along the normal, they are left to that. "
+       "Bodies without phyxels on the plane, as with `lattice = \"cells\"`, are held by their outermost "
+       "layer, less accurately, and with a warning. Each plane is a set of its own in `reactions.csv`, e.g. `symmetry 1`."},
+      {"body.motion", "[[body.motion]]", "selection",
+       "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
+       "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
+       "to s = 1, and turned by rotation * smoothstep(t / duration). At least one of the four terms "
+       "is needed; `displacement` and `rotation` need `duration`, and `amplitude` and `frequency` "
+       "go together."},
+      {"body.load", "[[body.load]]", "selection",
+       "A force on phyxels: exactly one of `force` and `force_density`. In a box or a ball it acts on "
+       "the space there: its centroid, and with `force_density` its total, are those of the part of the "
+       "body's inside that lies in the region, if the body has a closed surface and one material, and as far as the "
+       "phyxels there are not in one plane; the plan of a run says where each load acts."},
+      {"body.traction", "[[body.traction]]", "selection",
+       "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
+       "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
+       "`all`. The force keeps its size and "
+       "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
+       "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
+       "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},
+      {"probe", "[[probe]]", "selection",
+       "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
+       "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "
+       "time, the probe's name, the number of the point, its position at rest, displacement [m], velocity [m/s], "
+       "Cauchy stress [Pa], its von Mises equivalent, and Green's strain. At a point the values are those of a "
+       "quadratic polynomial through the phyxels within a support, which ends where materials and supports do."},
+  };
+}
+
+/// The sections of selections.
+std::vector<SceneSection> selection_sections() {
+  return {
+      {"selection", "Selections", "",
+       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]`, `[[body.traction]]` and each "
+       "`[[probe]]` without points has exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
+       "A box or ball that holds or moves a part of a body made from a `mesh` acts where it ends: phyxels "
+       "lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
+       "has one layer of phyxels, in its middle; a ball that small has none of its own. In other bodies, "
+       "and where a layer of the body beside the boundary is too thin for phyxels on both, the support ends with "
+       "the phyxels whose centres lie in it."},
+      {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
+  };
+}
+
+std::vector<SceneSection> make_sections() {
+  std::vector<SceneSection> all = {
       {"", "At the top of the file", "", "Before the first section."},
       {"time", "[time]", "", "How long to simulate, and in which steps."},
       {"solver", "[solver]", "", "What computes, and in which precision."},
@@ -49,47 +110,10 @@ std::vector<SceneSection> make_sections() {
        "Repeats the body on a grid, with everything it has: the copies of `name = \"dino\"` are "
        "called \"dino 1\", \"dino 2\", ..., x counting fastest, and each is a body of its own. "
        "Box and ball selections move along with each copy."},
-      {"body.fixed", "[[body.fixed]]", "selection",
-       "Phyxels held where they are, with one of the selection keys below, along all `axes` or "
-       "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
-       "of its own in `reactions.csv`, which has one line for each frame and set, named by its body and "
-       "entry, e.g. `fixed 1`, `motion 2`: force [N] and torque [N m] of the support on the body, and the "
-       "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
-       "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
-       "both sets, along their axes."},
-      {"body.motion", "[[body.motion]]", "selection",
-       "Phyxels moved along a given path, u(t) = displacement * smoothstep(t / duration) + "
-       "velocity * t + amplitude * sin(2 pi frequency t), with smoothstep(s) = s^2 (3 - 2 s) up "
-       "to s = 1, and turned by rotation * smoothstep(t / duration). At least one of the four terms "
-       "is needed; `displacement` and `rotation` need `duration`, and `amplitude` and `frequency` "
-       "go together."},
-      {"body.load", "[[body.load]]", "selection",
-       "A force on phyxels: exactly one of `force` and `force_density`. In a box or a ball it acts on "
-       "the space there: its centroid, and with `force_density` its total, are those of the part of the "
-       "body's inside that lies in the region, if the body has a closed surface and one material, and as far as the "
-       "phyxels there are not in one plane; the plan of a run says where each load acts."},
-      {"body.traction", "[[body.traction]]", "selection",
-       "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
-       "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
-       "`all`. The force keeps its size and "
-       "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
-       "those on the triangles."},
-      {"probe", "[[probe]]", "selection",
-       "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
-       "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "
-       "time, the probe's name, the number of the point, its position at rest, displacement [m], velocity [m/s], "
-       "Cauchy stress [Pa], its von Mises equivalent, and Green's strain. At a point the values are those of a "
-       "quadratic polynomial through the phyxels within a support, which ends where materials and supports do."},
-      {"selection", "Selections", "",
-       "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]`, `[[body.traction]]` and each "
-       "`[[probe]]` without points has exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
-       "A box or ball that holds or moves a part of a body made from a `mesh` acts where it ends: phyxels "
-       "lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
-       "has one layer of phyxels, in its middle; a ball that small has none of its own. In other bodies, "
-       "and where a layer of the body beside the boundary is too thin for phyxels on both, the support ends with "
-       "the phyxels whose centres lie in it."},
-      {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
+  for (SceneSection& section : boundary_sections()) all.push_back(std::move(section));
+  for (SceneSection& section : selection_sections()) all.push_back(std::move(section));
+  return all;
 }
 
 // clang-format on

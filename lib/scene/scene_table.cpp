@@ -80,6 +80,26 @@ const toml::node* offender_in_box(const toml::node& node, const Range& range) {
   return deep ? deep : found;
 }
 
+std::vector<LoadCurve::Point> as_curve(const toml::array& list) {
+  std::vector<LoadCurve::Point> points;
+  for (const toml::node& point : list) {
+    const toml::array& pair = *point.as_array();
+    points.push_back({as_number(*pair.get(0)), as_number(*pair.get(1))});
+  }
+  return points;
+}
+
+const toml::node* offender_in_curve(const toml::node& node, const Range& factors) {
+  const toml::node* found = offender_in(node, 0, [](const toml::node& point) {
+    return !offender_in(point, 2, [](const toml::node& x) { return x.is_number(); });
+  });
+  if (found) return found;
+  const toml::array& list = *node.as_array();
+  if (list.size() > LoadCurve::most_points) return &node;
+  const auto wrong = wrong_point(as_curve(list), factors);
+  return wrong ? list.get(*wrong) : nullptr;
+}
+
 /// The part of `node` that is not what `key` allows, or null.
 const toml::node* offender(const toml::node& node, const SceneKey& key) {
   const auto unless = [&](bool good) { return good ? nullptr : &node; };
@@ -108,6 +128,8 @@ const toml::node* offender(const toml::node& node, const SceneKey& key) {
       return offender_in(node, 0, integer);
     case KeyType::box:
       return offender_in_box(node, key.range);
+    case KeyType::curve:
+      return offender_in_curve(node, key.range);
     case KeyType::table:
       return unless(node.is_table());
     case KeyType::tables:
@@ -328,6 +350,10 @@ void SceneTable::read(const char* name, Selection::Box& value) const {
   if (!has(name)) return;
   const toml::array& corners = *table_->get(name)->as_array();
   value = {as_vector(*corners.get(0)), as_vector(*corners.get(1))};
+}
+
+void SceneTable::read(const char* name, std::vector<LoadCurve::Point>& value) const {
+  if (has(name)) value = as_curve(*table_->get(name)->as_array());
 }
 
 std::string SceneTable::where() const { return place(position_); }

@@ -53,6 +53,37 @@ void check_number(const ParameterOwner& owner, const SceneKey* key, double value
       fmt::format("{}: {} found; allowed: {}", place_of(owner, *key), value, allowed_words(*key)));
 }
 
+void check_curve(const ParameterOwner& owner, const SceneKey& key,
+                 const std::vector<LoadCurve::Point>& points) {
+  const std::string allowed = allowed_words(key);
+  if (points.size() > LoadCurve::most_points) {
+    throw InputError(fmt::format("{}: {} points found; allowed: {}", place_of(owner, key),
+                                 points.size(), allowed));
+  }
+  const auto wrong = wrong_point(points, key.range);
+  if (!wrong) return;
+  const auto [time, factor] = points[*wrong];
+  throw InputError(fmt::format("{}: point {} is [{}, {}]; allowed: {}", place_of(owner, key),
+                               *wrong + 1, time, factor, allowed));
+}
+
+/// Checks that a load has one way to change with time, and that no gas has a negative pressure.
+void check_growth(const BodyRequest& body, const std::string& section, const Selection& select,
+                  double ramp, const std::vector<LoadCurve::Point>& curve, bool is_gas) {
+  const auto refuse = [&](const std::string& problem) {
+    const std::string& where = select.where.empty() ? body.where : select.where;
+    throw InputError(fmt::format("{}{}key {}.curve of body \"{}\": {}", where,
+                                 where.empty() ? "" : ": ", section, body.name, problem));
+  };
+  if (ramp > 0 && !curve.empty()) refuse("found together with ramp; allowed: only one");
+  for (const auto [time, factor] : curve) {
+    if (is_gas && factor < 0) {
+      refuse(fmt::format("a factor of {:g} found at {:g} s; allowed with gas: none below 0", factor,
+                         time));
+    }
+  }
+}
+
 void check_one_choice(const BodyRequest& body, const Selection& select) {
   const int set = static_cast<int>(select.region.has_value()) +
                   static_cast<int>(select.indices.has_value()) +
@@ -78,6 +109,8 @@ void validate(const Scene& scene) {
       for (const double x : {value.x, value.y, value.z}) {
         check_number(owner, key_of(section, name), x);
       }
+    } else if constexpr (std::is_same_v<Value, std::vector<LoadCurve::Point>>) {
+      check_curve(owner, *key_of(section, name), value);
     } else if constexpr (std::is_arithmetic_v<Value> && !std::is_same_v<Value, bool>) {
       check_number(owner, key_of(section, name), static_cast<double>(value));
     }
@@ -90,6 +123,12 @@ void validate(const Scene& scene) {
     detail::visit_lists(body, [&](std::size_t, const char*, const Selection& select, auto&&) {
       check_one_choice(body, select);
     });
+    for (const LoadRequest& load : body.loads) {
+      check_growth(body, "body.load", load.select, load.ramp, load.curve, false);
+    }
+    for (const TractionRequest& t : body.tractions) {
+      check_growth(body, "body.traction", t.select, t.ramp, t.curve, t.gas.has_value());
+    }
     for (const ProbeRequest& probe : body.probes) {
       if (probe.select) check_one_choice(body, *probe.select);
       if (probe.select.has_value() != probe.points.empty()) {

@@ -6,11 +6,24 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/solver.hpp"
 
 namespace phyxel {
 
 /// The time at which every load has its full size [s].
 inline constexpr double full_loads = HUGE_VAL;
+
+/// Returns the time [s] of the loads that act at a solver's present state.
+inline double time_of_loads(const Solver& solver) {
+  return solver.method() == Method::equilibrium ? full_loads : solver.time();
+}
+
+/// Returns the share of each load that acts at `time` [s].
+inline std::vector<double> load_scales(const Model& model, double time) {
+  std::vector<double> scales;
+  for (const Load& load : model.loads) scales.push_back(load.scale_at(time));
+  return scales;
+}
 
 /// Calls add(phyxel, force) for the force at rest [N] of every load on every phyxel, either of the
 /// loads that follow the surface or of the others. @param time [s]

@@ -222,15 +222,14 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     this->clear_padding();
   }
   /// Sums the forces that are applied at `time` [s]. Repeated calls sum again only while a load
-  /// still grows or follows the surface.
+  /// still changes or follows the surface.
   void apply_loads(double time) {
     if (applied_.empty()) return;
-    double scales = 0;
-    for (const Load& load : model_.loads) scales += load.scale_at(time);
+    std::vector<double> scales = load_scales(model_, time);
     const bool same = load_time_ && scales == load_scales_;
     load_time_ = time;
     if (same && following_.empty()) return;
-    load_scales_ = scales;
+    load_scales_ = std::move(scales);
     std::fill(applied_.begin(), applied_.end(), Real(0));
     const auto add = [&](Index i, Vec3d force) {
       const Index slot = layout_.slot(i);
@@ -253,8 +252,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   // without such loads.
   std::vector<Vec3d> followed_force_ =
       std::vector<Vec3d>(following_.empty() ? 0 : model_.position.size());
-  std::optional<double> load_time_;  // time of `applied_`; none before the first sum
-  double load_scales_ = 0;
+  std::optional<double> load_time_;               // time of `applied_`; none before the first sum
+  std::vector<double> load_scales_;               // of each load at that time
   std::optional<CpuSurfels<StateReal>> surfels_;  // created on the first `update_surfels`
   SurfelState moved_surfels_;                     // result of `update_surfels`
 };

@@ -28,7 +28,7 @@ class PresentForces {
     }
     backend.internal_forces(force_);
     refresh_for_following(model, state_.displacement);
-    add_loads(FollowingLoads(model), dt_ > 0 ? time_ : full_loads, state_.displacement, force_);
+    add_loads(FollowingLoads(model), time_of_loads(solver), state_.displacement, force_);
     const std::span<const Vec3d> external = backend.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];
     for (std::size_t i = 0; i < force_.size(); ++i) force_[i] += model.mass[i] * model.gravity;

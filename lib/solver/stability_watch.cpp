@@ -46,7 +46,8 @@ double largest_acceleration(const Model& model, const Load& load) {
   for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
     largest = std::max(largest, norm(load.force[k]) / model.mass[load.phyxels[k]]);
   }
-  return (load.follows ? most_growth : 1) * largest_over_ranks(model, largest);
+  return (load.follows ? most_growth : 1) * load.curve.largest() *
+         largest_over_ranks(model, largest);
 }
 
 }  // namespace
@@ -56,7 +57,7 @@ bool is_conservative(const Model& model) {
     if (part.material.damping > 0) return false;
   }
   for (const Load& load : model.loads) {
-    if (load.ramp > 0 || load.follows) return false;
+    if (!load.curve.is_constant() || load.follows) return false;
   }
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) return false;

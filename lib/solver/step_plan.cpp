@@ -72,12 +72,12 @@ struct Resolution {
   std::string where;
 };
 
-/// Fewest steps per period, duration, turn or ramp of a motion or load. Leapfrog and the
-/// second-order implicit method follow a sine of twenty steps per period to within 1%.
+/// Fewest steps per period, duration, turn, ramp or rise of a curve of a motion or load. Leapfrog
+/// and the second-order implicit method follow a sine of twenty steps per period to within 1%.
 constexpr double steps_per_period = 20;
 
-/// Returns the resolution of the fastest motion or load of a scene. A ramp of 0 is a load that acts
-/// at once, on purpose, and is ignored.
+/// Returns the resolution of the fastest motion or load of a scene. A load without a ramp or a
+/// curve acts at once, on purpose, and is ignored.
 Resolution finest_resolution(const Scene& scene) {
   Resolution finest;
   for (const BodyRequest& body : scene.bodies) {
@@ -105,17 +105,16 @@ Resolution finest_resolution(const Scene& scene) {
                         motion.duration));
       }
     }
-    for (const LoadRequest& load : body.loads) {
-      if (load.ramp > 0) {
-        add(load.ramp, load.select, fmt::format("body.load.ramp = {:g} s", load.ramp));
-      }
-    }
-    for (const TractionRequest& traction : body.tractions) {
-      if (traction.ramp > 0) {
-        add(traction.ramp, traction.select,
-            fmt::format("body.traction.ramp = {:g} s", traction.ramp));
-      }
-    }
+    const auto add_load = [&](const auto& load, const char* section) {
+      const double rise = LoadCurve::of(load.ramp, load.curve).shortest_rise();
+      add(rise, load.select,
+          load.curve.empty()
+              ? fmt::format("{}.ramp = {:g} s", section, rise)
+              : fmt::format("{}.curve, whose steepest piece would cross its range in {:g} s,",
+                            section, rise));
+    };
+    for (const LoadRequest& load : body.loads) add_load(load, "body.load");
+    for (const TractionRequest& traction : body.tractions) add_load(traction, "body.traction");
   }
   return finest;
 }
@@ -125,7 +124,7 @@ void check_resolves(const Scene& scene, const Resolution& finest) {
   if (!scene.time.step || *scene.time.step <= finest.step * (1 + 1e-9)) return;
   throw InputError(fmt::format(
       "{}time.step = {:g} s does not resolve {}: allowed at most {:g} s there, {:g} steps to a "
-      "period, turn, duration or ramp",
+      "period, turn, duration, ramp or rise of a curve",
       finest.where, *scene.time.step, finest.what, finest.step, steps_per_period));
 }
 

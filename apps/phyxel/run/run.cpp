@@ -198,7 +198,8 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
 Readings Run::read_off() {
   return spent_.timed("energies", [&] {
     return Readings{find_reactions(model(), *backend_, solver_),
-                    probes_.read(*backend_, recovery_.get())};
+                    probes_.read(*backend_, recovery_.get()),
+                    read_gases(model(), *backend_, solver_)};
   });
 }
 

@@ -130,7 +130,7 @@ class Run {
 
   void check_resumed() const;
 
-  /// Reactions and probes at the present state. Collective.
+  /// Reactions, probes and gases at the present state. Collective.
   Readings read_off();
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const;
@@ -172,6 +172,8 @@ class Run {
   void say_reactions() const;
   /// Prints what probes read at the end.
   void say_probes() const;
+  /// Prints pressures and volumes of gases at the end.
+  void say_gases() const;
 
   const RunOptions& options_;
   StopSignal signals_{ranks().rank() == 0};  // first, to catch signals during set-up

@@ -40,7 +40,7 @@ nlohmann::ordered_json json_of(const std::vector<Load>& loads) {
   return list;
 }
 
-/// Reactions, and readings of probes, that a summary prints.
+/// Reactions, readings of probes, and gases that a summary prints.
 constexpr std::size_t most_printed = 8;
 
 nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
@@ -54,6 +54,17 @@ nlohmann::ordered_json json_of(const std::vector<Reaction>& reactions) {
              {"centre_m", json_of(r.centre)},
              {"work_j", nullptr}};
     if (std::isfinite(r.work)) entry["work_j"] = r.work;
+  }
+  return list;
+}
+
+nlohmann::ordered_json json_of(const std::vector<GasReading>& gases) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const GasReading& gas : gases) {
+    list.push_back({{"body", gas.body},
+                    {"set", gas.set},
+                    {"pressure_pa", gas.pressure},
+                    {"volume_m3", gas.volume}});
   }
   return list;
 }
@@ -208,6 +219,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"loads", json_of(model().loads)},
             {"reactions", json_of(readings_.reactions)},
             {"probes", json_of(readings_.probes)},
+            {"gases", json_of(readings_.gases)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
@@ -226,6 +238,18 @@ void Run::say_probes() const {
   }
   if (printed < readings_.probes.size()) {
     fmt::print("              {} more: probes.csv\n", readings_.probes.size() - printed);
+  }
+}
+
+void Run::say_gases() const {
+  const std::size_t printed = std::min(readings_.gases.size(), most_printed);
+  for (std::size_t k = 0; k < printed; ++k) {
+    const GasReading& gas = readings_.gases[k];
+    fmt::print("  gas         {}, {}: pressure {:.6g} Pa, volume {:.6g} m^3\n", gas.body, gas.set,
+               gas.pressure, gas.volume);
+  }
+  if (printed < readings_.gases.size()) {
+    fmt::print("              {} more: gas.csv\n", readings_.gases.size() - printed);
   }
 }
 
@@ -288,13 +312,14 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
                energy_drift(now), peak_energy_);
   } else {
     fmt::print(
-        "  energy      {:.6g} J, not conserved in this scene (damping, motion or growing load)\n",
+        "  energy      {:.6g} J, not conserved in this scene (damping, motion or changing load)\n",
         now.total_energy());
   }
   fmt::print("  momentum    internal forces sum to {:.1e} of their size, torques to {:.1e}\n",
              force_balance(now), torque_balance(now));
   say_reactions();
   say_probes();
+  say_gases();
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

@@ -130,7 +130,8 @@ class _Family:
 
 class Trajectory:
     """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
-    energy.csv, `reactions`, those of reactions.csv, and `probes`, those of probes.csv.
+    energy.csv, `reactions`, those of reactions.csv, `probes`, those of probes.csv, and `gases`,
+    those of gas.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -160,8 +161,14 @@ class Trajectory:
     @property
     def reactions(self):
         """{(body, set): {column: values}}, one for each frame; forces [N], torques [N m], work [J].
-        Sets are entries of fixed and motion, e.g. ("beam", "fixed 1"). Empty without any."""
+        Sets are entries of fixed, motion and symmetry, e.g. ("beam", "fixed 1"). Empty without any."""
         return self._log("reactions.csv", str)
+
+    @property
+    def gases(self):
+        """{(body, set): {column: values}}, one for each frame; pressure [Pa] and volume [m^3] of the
+        gases in cavities, by tractions, e.g. ("ball", "traction 1"). Empty without any."""
+        return self._log("gas.csv", str)
 
     @property
     def probes(self):

@@ -70,7 +70,7 @@ class StabilityWatch {
   std::optional<Diagnostics> good_;  // the last one found good
 };
 
-/// True if the model conserves total energy: it has no damping, no motion and no growing load.
+/// True if the model conserves total energy: it has no damping, no motion and no changing load.
 bool is_conservative(const Model& model);
 
 }  // namespace phyxel

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "phyxel/cloud.hpp"
+#include "phyxel/load_curve.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/share.hpp"
@@ -107,14 +108,14 @@ struct Motion {
   }
 };
 
-/// Forces on some phyxels, grown over `ramp` seconds. They are constant, unless they follow the
-/// surface.
+/// Forces on some phyxels, times the factor of a curve. Their directions are constant, unless they
+/// follow the surface.
 struct Load {
   std::vector<Index> phyxels;
   std::vector<Vec3d> force;  ///< At rest [N], shape [phyxels].
   Vec3d total;               ///< Sum of the forces but for those by volume [N].
   Vec3d density;             ///< Force by volume [N/m³].
-  double ramp = 0;           ///< [s]
+  LoadCurve curve = {};      ///< How the forces change with time.
   std::string body = {};     ///< Name of the body to which the phyxels belong.
   std::string set = {};      ///< Entry of that body in the scene, e.g. "load 1", "traction 2".
   Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
@@ -122,8 +123,8 @@ struct Load {
   bool follows = false;      ///< True of a pressure on the deformed surface (physics/follower.hpp).
   double pressure = 0;       ///< Of a pressure at rest [Pa].
   std::optional<double> gas = {};  ///< γ of a gas in a cavity, whose pressure grows as V^-γ.
-  /// Which share of the force acts at a time [s].
-  double scale_at(double time) const { return ramp > 0 && time < ramp ? time / ramp : 1; }
+  /// Returns the share of the force that acts at a time [s].
+  double scale_at(double time) const { return curve.at(time); }
 };
 
 /// Where a load that follows the surface acts on phyxels of this rank. The gradient of displacement

@@ -11,6 +11,7 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
+#include "phyxel/gases.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/point_fields.hpp"
 #include "phyxel/probes.hpp"
@@ -23,6 +24,7 @@ namespace phyxel {
 struct Readings {
   std::vector<Reaction> reactions;   ///< Of supports (`find_reactions`), or none.
   std::vector<ProbeReading> probes;  ///< Of the scene's probes (`Probes::read`), or none.
+  std::vector<GasReading> gases;     ///< Of gases in cavities (`read_gases`), or none.
 };
 
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
@@ -125,6 +127,7 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   surface.hdf.series energy.csv              one line a frame: time, energies, momenta
 ///   reactions.csv                              of a scene with supports: one line a frame and set
 ///   probes.csv                                 of a scene with probes: one line a frame and point
+///   gas.csv                                    of a scene with gases: one line a frame and gas
 ///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
@@ -177,7 +180,8 @@ class Recorder {
   SeriesFile phyxels_, surface_;
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
-  std::optional<FrameLog> reactions_, probes_;   // set if the model has supports, and probes
+  // Set if the model has supports, probes, and gases.
+  std::optional<FrameLog> reactions_, probes_, gases_;
 };
 
 /// The content of a frame.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "phyxel/grading.hpp"
+#include "phyxel/load_curve.hpp"
 #include "phyxel/material.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/shapes.hpp"
@@ -76,6 +77,17 @@ struct FixRequest {
   Axes axes{};
 };
 
+/// The normal of a plane of symmetry: an axis of the scene.
+enum class PlaneNormal { x, y, z };
+
+/// A plane of symmetry, at which the body ends: its phyxels there are held along the normal, unless
+/// another entry holds or moves them along it.
+struct SymmetryRequest {
+  PlaneNormal normal = PlaneNormal::x;
+  double at = 0;           ///< Coordinate of the plane, once the body is in place [m].
+  std::string where = {};  ///< "scene.toml:30:1", for errors.
+};
+
 /// Phyxels with a prescribed displacement:
 /// u(t) = displacement * smoothstep(t / duration) + velocity * t + amplitude * sin(2 pi frequency
 /// t), turned about a point by rotation * smoothstep(t / duration).
@@ -92,19 +104,20 @@ struct MotionRequest {
 };
 
 /// A force on phyxels: either `force`, the total [N] shared out by mass, or `force_density`
-/// [N/m^3]. Grows linearly from zero during `ramp` seconds. In a box or a ball it acts on the space
+/// [N/m^3]. It changes with time by `ramp` or `curve`. In a box or a ball it acts on the space
 /// there: its centroid, and with `force_density` its total, are those of the part of the body's
 /// inside that lies in the region, if the body has a closed surface and one material.
 struct LoadRequest {
   Selection select;
   Vec3d force;          ///< [N]
   Vec3d force_density;  ///< [N/m^3]
-  double ramp = 0;      ///< [s]
+  double ramp = 0;      ///< Time of linear growth from zero [s]; 0: the force acts at once.
+  std::vector<LoadCurve::Point> curve = {};  ///< Factors by time, in place of a ramp; or empty.
 };
 
 /// A force on a part of a body's surface: either `traction`, along a direction, or `pressure`,
 /// against the outward normals. It keeps its size and direction while the body deforms, unless it
-/// follows the surface, and grows linearly from zero during `ramp` seconds.
+/// follows the surface, and changes with time by `ramp` or `curve`.
 struct TractionRequest {
   Selection select;       ///< By box, ball or all: the triangles, or parts of them, that lie there.
   Vec3d traction;         ///< [Pa]
@@ -115,7 +128,8 @@ struct TractionRequest {
   std::optional<double> gas;
   Vec3d normal;       ///< If not zero, only where the outward normal is nearly along it.
   double angle = 45;  ///< Largest angle between the two [degrees].
-  double ramp = 0;    ///< [s]
+  double ramp = 0;    ///< Time of linear growth from zero [s]; 0: the force acts at once.
+  std::vector<LoadCurve::Point> curve = {};  ///< Factors by time, in place of a ramp; or empty.
 };
 
 /// A place whose values a run logs at each frame: points of a body at rest, or phyxels of it over
@@ -177,6 +191,7 @@ struct BodyRequest {
   std::vector<InclusionRequest> inclusions;
   std::vector<FinerRequest> finer;
   std::vector<FixRequest> fixed;
+  std::vector<SymmetryRequest> symmetries;
   std::vector<MotionRequest> motions;
   std::vector<LoadRequest> loads;
   std::vector<TractionRequest> tractions;

@@ -74,12 +74,13 @@ struct StepPlan {
 
 /// Chooses the step: the scene's, or the safety factor times the largest stable one, of which three
 /// digits are kept; slightly shortened so that frames and the end fall on whole steps. A step that
-/// the scene leaves open is at most a twentieth of every period, duration, turn and ramp of the
-/// scene's motions and loads, and 0.5 / c under damping c, where distances are 1% off. A search for
-/// equilibrium is one step. Uses the arrays of the backend.
+/// the scene leaves open is at most a twentieth of every period, duration, turn, ramp and rise
+/// of a curve (`LoadCurve::shortest_rise`) of the scene's motions and loads, and 0.5 / c under
+/// damping c, where distances are 1% off. A search for equilibrium is one step. Uses the arrays of
+/// the backend.
 /// @throws InputError for a step above the largest stable one or above 1 / c unless `unsafe_step`,
-///   for one that leaves a motion or a ramp fewer than twenty steps, for implicit steps of no given
-///   size, and for more steps than can be counted.
+///   for one that leaves a motion, a ramp or a rise fewer than twenty steps, for implicit steps of
+///   no given size, and for more steps than can be counted.
 StepPlan plan_steps(const Scene& scene, const Model& model, Backend& backend,
                     bool unsafe_step = false);
 

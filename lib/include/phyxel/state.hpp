@@ -121,7 +121,7 @@ struct Diagnostics {
   /// Kinetic and elastic energy [J], without the potentials of gravity and loads.
   double kinetic_and_elastic_energy() const { return kinetic_energy + elastic_energy(); }
   /// Total energy [J], with what has become heat: constant in a scene without mass-proportional
-  /// damping, motions and growing loads (`is_conservative`).
+  /// damping, motions and changing loads (`is_conservative`).
   double total_energy() const {
     return kinetic_and_elastic_energy() + plastic_work + viscous_work + gravity_energy +
            load_energy;

@@ -135,7 +135,14 @@ constexpr Fault faults[] = {
     {"loads[0].phyxels[0] is -3", [](Model& m) { m.loads[0].phyxels[0] = -3; }},
     {"loads[0].force has 1 entries for 2 phyxels", [](Model& m) { m.loads[0].force.pop_back(); }},
     {"loads[0].force[1] is [nan", [](Model& m) { m.loads[0].force[1].x = nan_value; }},
-    {"loads[0].ramp is nan", [](Model& m) { m.loads[0].ramp = nan_value; }},
+    {"loads[0].curve.points[0].factor is nan",
+     [](Model& m) {
+       m.loads[0].curve.points = {{0, nan_value}};
+     }},
+    {"loads[0].curve.points[1].time is 1 s; allowed: times that ascend",
+     [](Model& m) {
+       m.loads[0].curve.points = {{1, 0}, {1, 1}};
+     }},
     {"gravity is [0, 0, inf]", [](Model& m) { m.gravity.z = infinity; }},
 };
 INSTANTIATE_TEST_SUITE_P(Faults, CheckModel, ::testing::ValuesIn(faults));

@@ -153,7 +153,26 @@ std::vector<Late> refused_loads() {
       {with_bar("[[body.load]]\nbox = [[0.4, -9, -9], [0.4, 9, 9]]\nforce_density = [1, 0, 0]\n"),
        {":14:", "holds no part of the inside of body \"beam\""}},
       {step + bar + material + "[[body.traction]]\nall = true\npressure = 1\nramp = 1e-5\n",
-       {"time.step = 0.0001 s", "body.traction.ramp = 1e-05 s"}}};
+       {"time.step = 0.0001 s", "body.traction.ramp = 1e-05 s"}},
+      {step + bar + material +
+           "[[body.traction]]\nall = true\npressure = 1\ncurve = [[0, 2], [1e-5, 0]]\n",
+       {"time.step = 0.0001 s", "body.traction.curve", "1e-05 s"}},
+      {with_bar("[[body.load]]\nall = true\nforce = [1, 0, 0]\ncurve = [[0, 2], [0, 1]]\n"),
+       {":16:", "body.load.curve", "[0, 1] found", "times ascend"}},
+      {with_bar("[[body.traction]]\nall = true\npressure = 1\ngas = 1\ncurve = [[0, -2]]\n"),
+       {":14:", "body.traction.curve", "-2 found at 0 s", "allowed with gas: none below 0"}}};
+}
+
+/// Planes of symmetry at which no body ends.
+std::vector<Late> refused_planes() {
+  const std::string one = "[[body.symmetry]]\n";
+  return {{with_bar(one), {":13:", "body.symmetry.normal", "missing"}},
+          {with_bar(one + "normal = 'x'\nat = 0.1\n"),
+           {":15:6: key body.symmetry.at", "x = 0.1 m cuts the body",
+            "extends 0.1 m to x- and 0.3 m to x+", "an end of body \"beam\", x = 0 or 0.4 m"}},
+          {with_bar(one + "normal = 'y'\n"), {":13:", "y = 0 m cuts the body", "0.05 m to y-"}},
+          {with_bar(one + "normal = 'z'\nat = 3\n"),
+           {":15:", "z = 3 m is 2.95 m away from the body", "z = -0.05 or 0.05 m"}}};
 }
 
 /// Probes that are nowhere, or of nothing.
@@ -258,7 +277,8 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   bare.volume.clear();
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
-  for (const std::vector<Late>& refusals : {late_refusals(), refused_loads(), refused_probes()}) {
+  for (const std::vector<Late>& refusals :
+       {late_refusals(), refused_loads(), refused_planes(), refused_probes()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);

@@ -87,6 +87,9 @@ viscosity = 1 # body.inclusion.viscosity => viscosity = 2
 [[body.fixed]]
 indices = [1, 2] # selection.indices => indices = [1, 3]
 axes = 'x' # body.fixed.axes => axes = 'xz'
+[[body.symmetry]]
+normal = 'x' # body.symmetry.normal => normal = 'y'
+at = 0.5 # body.symmetry.at => at = 0.25
 [[body.motion]]
 box = [[0, 0, 0], [1, 1, 1]] # selection.box => box = [[0, 0, 0], [1, 1, 2]]
 displacement = [1, 0, 0] # body.motion.displacement => displacement = [2, 0, 0]
@@ -104,11 +107,13 @@ ramp = 1 # body.load.ramp => ramp = 2
 [[body.load]]
 ball = {centre = [0, 0, 0], radius = 1} # selection.ball.radius => ball = {centre = [0, 0, 0], radius = 2}
 force_density = [1, 0, 0] # body.load.force_density => force_density = [2, 0, 0]
+curve = [[0, 0], [1, 1]] # body.load.curve => curve = [[0, 0], [1, 2]]
 [[body.traction]]
 all = true
 traction = [1, 0, 0] # body.traction.traction => traction = [2, 0, 0]
 normal = [1, 0, 0] # body.traction.normal => normal = [0, 1, 0]
 angle = 30 # body.traction.angle => angle = 40
+curve = [[0, 1]] # body.traction.curve => curve = [[1, 1]]
 [[body.traction]]
 all = true
 pressure = 1 # body.traction.pressure => pressure = 2
@@ -359,6 +364,14 @@ TEST(ModelDigest, TellsModelsApartByEveryValueTheyHave) {
       {"force", digest_with([](Body& b) { b.loads[0].force.z = 1; })},
       {"density of force", digest_with([](Body& b) { b.loads[0].force_density.x = 1; })},
       {"ramp", digest_with([](Body& b) { b.loads[0].ramp = 2; })},
+      {"curve", digest_with([](Body& b) {
+         b.loads[0].ramp = 0;
+         b.loads[0].curve = {{0, 0}, {1, 2}};
+       })},
+      {"time of curve", digest_with([](Body& b) {
+         b.loads[0].ramp = 0;
+         b.loads[0].curve = {{0.5, 0}, {1, 2}};
+       })},
       {"loaded", digest_with([](Body& b) {
          b.loads[0].select = {.indices = std::vector<Index>{1, 2}};
        })}};

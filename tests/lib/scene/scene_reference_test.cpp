@@ -42,7 +42,7 @@ std::string digest(const Scene& s) {
     }
     for (const LoadRequest& l : b.loads) {
       vector(l.force), vector(l.force_density);
-      text << l.ramp << '\n';
+      text << l.ramp << ' ' << l.curve.size() << '\n';
     }
   }
   return text.str();

@@ -35,6 +35,11 @@ std::string of_material(const std::string& lines) {
   return time_section + "[[body]]\nshape = 'dino'\n[body.material]\n" + lines;
 }
 
+/// A scene with a load whose curve, on line 15, is `text`.
+std::string with_curve(const std::string& text) {
+  return after_beam("[[body.load]]\nall = true\nforce = [0, 0, 1]\ncurve = " + text + "\n");
+}
+
 const std::vector<Malformed>& malformed() {
   static const std::vector<Malformed> table = {
       // Not TOML
@@ -196,6 +201,16 @@ const std::vector<Malformed>& malformed() {
        "15:17", "found together with force"},
       {after_beam("[[body.load]]\nall = true\nforce = [0, 0, 1]\nramp = -1\n"), "15:8",
        "0 <= ramp <= 1e+09"},
+      {with_curve("[]"), "15:9", "body.load.curve: an empty list found; allowed: [[t, f], ...]"},
+      {with_curve("[[0, 0], [2, 1], [2, 0]]"), "15:26", "[2, 0] found; allowed: [[t, f], ...], 1 "},
+      {with_curve("[[0, 0], [2, 1], [1, 0]]"), "15:26", "times ascend"},
+      {with_curve("[[-1, 0]]"), "15:10", "[-1, 0] found; allowed"},
+      {with_curve("[[0, nan]]"), "15:10", "[0, nan] found"},
+      {with_curve("[[nan, 1]]"), "15:10", "[nan, 1] found"},
+      {with_curve("[[0, 1, 2]]"), "15:10", "[0, 1, 2] found"},
+      {with_curve("[0, 1]"), "15:10", "0 found"},
+      {with_curve("[[0, 1e13]]"), "15:10", "-1e+12 <= f <= 1e+12"},
+      {with_curve("[[0, 1]]\nramp = 1"), "15:9", "found together with ramp; allowed: only one"},
   };
   return table;
 }
@@ -230,6 +245,7 @@ TEST(SceneRefusal, EveryRangeRefusesWhatLiesJustOutside) {
       std::string text = whole ? fmt::format("{:.0f}", out) : fmt::format("{:.6e}", out);
       if (vector || key.type == KeyType::counts) text = "[1, 1, " + text + "]";
       if (list) text = "[" + text + "]";
+      if (key.type == KeyType::curve) text = "[[0, " + text + "]]";
       const std::string message = message_of(scene_with(key, text));
       EXPECT_THAT(message, StartsWith("scene.toml:")) << text;
       EXPECT_THAT(message, HasSubstr(": key " + path_in_file(key) + ": ")) << text;

@@ -89,6 +89,7 @@ ramp = 0.75
 [[body.load]]
 all = true
 force_density = [1, 2, 3]
+curve = [[0.5, -1], [2, 1.5]]
 )";
 
 TEST(Scene, RunKeysAreReadExactly) {
@@ -199,6 +200,8 @@ TEST(Scene, BoundaryKeysAreReadExactly) {
   EXPECT_EQ(body.loads[0].select.ball->radius, 0.5);
   expect_vector(body.loads[0].force, {10, 20, 30});
   EXPECT_EQ(body.loads[0].ramp, 0.75);
+  EXPECT_TRUE(body.loads[0].curve.empty());
+  EXPECT_EQ(body.loads[1].curve, (std::vector<LoadCurve::Point>{{0.5, -1}, {2, 1.5}}));
   EXPECT_TRUE(body.loads[1].select.all);
   expect_vector(body.loads[1].force_density, {1, 2, 3});
 }

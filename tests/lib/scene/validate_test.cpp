@@ -118,7 +118,8 @@ TEST(Validate, AsksForCloudsThatCarryThePhysics) {
 TEST(Validate, EveryNumberOfASceneIsBounded) {
   for (const SceneKey& key : scene_keys()) {
     const bool number = key.type == KeyType::number || key.type == KeyType::number_or_word ||
-                        key.type == KeyType::vector || key.type == KeyType::box;
+                        key.type == KeyType::vector || key.type == KeyType::box ||
+                        key.type == KeyType::curve;
     if (!number) continue;
     EXPECT_TRUE(std::isfinite(key.range.low) && std::isfinite(key.range.high))
         << key.section << '.' << key.name;

@@ -236,20 +236,33 @@ class Physics {
     return false;
   }
 
+  /// The share of a load at a time [s]: the mean of its points, weighted by how near they are.
+  static double share_of(const Load& load, double time) {
+    const auto& points = load.curve.points;
+    if (points.empty()) return 1;
+    if (time <= points.front().time) return points.front().factor;
+    for (std::size_t k = 1; k < points.size(); ++k) {
+      const auto [t0, f0] = points[k - 1];
+      const auto [t1, f1] = points[k];
+      if (time < t1) return ((t1 - time) * f0 + (time - t0) * f1) / (t1 - t0);
+    }
+    return points.back().factor;
+  }
+
   /// Gravity, loads and the caller's forces [N] at a time [s] and at displacements.
   std::vector<Vec3d> applied_at(double time, const State& state) const {
     std::vector<Vec3d> force = external_;
     force.resize(whole_.position.size());
     for (Index i = 0; i < whole_.size(); ++i) force[i] += whole_.mass[i] * whole_.gravity;
     for (const Load& load : whole_.loads) {
-      const double share = load.ramp > time ? time / load.ramp : 1;
+      const double share = share_of(load, time);
       for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
         if (!load.follows) force[load.phyxels[k]] += share * load.force[k];
       }
     }
     for (const Following& f : whole_.following) {
       const Load& load = whole_.loads[f.load];
-      const double share = load.ramp > time ? time / load.ramp : 1;
+      const double share = share_of(load, time);
       for (std::size_t k = 0; k < f.entry.size(); ++k) {
         Eigen::Matrix3d deformation = Eigen::Matrix3d::Identity();
         for (Offset e = f.near.offsets[k]; e < f.near.offsets[k + 1]; ++e) {

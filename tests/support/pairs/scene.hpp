@@ -103,6 +103,11 @@ inline void set_boundary(const Combination& row, Scene& scene) {
     const double ramp = row.is(boundary, "loaded") ? 0 : 0.02;
     body.loads.push_back({.select = high, .force = {20, 1, 3}, .ramp = ramp});
     body.loads.push_back({.select = {.all = true}, .force_density = {0, 30, 0}});
+    if (ramp > 0) {
+      body.loads.push_back({.select = {.all = true},
+                            .force_density = {0, 0, 40},
+                            .curve = {{0.001, 1}, {0.02, -1.5}, {0.04, 0.5}}});
+    }
   }
 }
 
