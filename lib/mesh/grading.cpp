@@ -1,6 +1,8 @@
 #include "mesh/grading.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -19,16 +21,15 @@ constexpr double samples_on_square = 4;
 /// Cosine between the outward normals of two faces from which they are two sides of a thin place.
 constexpr double opposite = -0.6;
 
-/// An edge between two triangles that are nearly in one plane.
+/// An edge between two triangles that are nearly, but not quite, in one plane.
 struct SmoothEdge {
-  Vec3d from, to;  ///< [m]
-  double radius;   ///< Of the curvature across the edge [m].
+  Index low, high;  ///< Vertices, as in `SurfaceEdge`.
+  double angle;     ///< By which the surface turns across the edge [rad], of either sign.
+  std::array<Index, 2> triangle;
 };
 
-/// The smooth edges across which a surface curves. The radius is the distance across the two
-/// triangles, half of each, over the angle between them.
-std::vector<SmoothEdge> curved_edges(const Surface& surface, const SurfaceTopology& topology) {
-  std::vector<SmoothEdge> curved;
+std::vector<SmoothEdge> smooth_edges(const Surface& surface, const SurfaceTopology& topology) {
+  std::vector<SmoothEdge> smooth;
   const std::vector<SurfaceEdge>& edges = topology.edges;
   for (std::size_t k = 0, next = 0; k < edges.size(); k = next) {
     while (next < edges.size() && edges[next].low == edges[k].low &&
@@ -36,25 +37,64 @@ std::vector<SmoothEdge> curved_edges(const Surface& surface, const SurfaceTopolo
       ++next;
     }
     if (next - k != 2) continue;
-    const Vec3d from = surface.position[edges[k].low], to = surface.position[edges[k].high];
+    const Vec3d along = surface.position[edges[k].high] - surface.position[edges[k].low];
     const Vec3d a = area_of(surface, edges[k].triangle),
                 b = area_of(surface, edges[k + 1].triangle);
-    const double length = norm(to - from), size = norm(a) * norm(b);
-    if (!(size > 0) || !(length > 0)) continue;
-    const double cosine = dot(a, b) / size, sine = norm(cross(a, b)) / size;
-    if (cosine < sharp) continue;
-    const double angle = std::atan2(sine, cosine), across = (norm(a) + norm(b)) / length;
-    if (angle > 1e-6) curved.push_back({from, to, across / angle});
+    const double size = norm(a) * norm(b);
+    if (!(size > 0) || dot(a, b) < sharp * size) continue;
+    const Vec3d turn = cross(a, b);
+    const double angle = std::atan2(norm(turn), dot(a, b));
+    // Rounding errors of flat faces turn by less.
+    if (angle < 1e-5) continue;
+    const bool outward = (dot(turn, along) > 0) == edges[k].forward;
+    smooth.push_back({edges[k].low,
+                      edges[k].high,
+                      outward ? angle : -angle,
+                      {edges[k].triangle, edges[k + 1].triangle}});
   }
-  return curved;
+  return smooth;
+}
+
+/// The largest curvature of the surface at each vertex [1/m]: the largest eigenvalue, but for its
+/// sign, of the tensor Σ θ l e eᵀ / A over the edges around, of which each vertex has half, and a
+/// third of each triangle that is curved at all.
+/// Source: Cohen-Steiner and Morvan 2003 (Restricted Delaunay triangulations and normal cycle).
+std::vector<double> curvatures(const GradedBody& body, const std::vector<SmoothEdge>& edges) {
+  const Surface& surface = body.surface;
+  std::vector<Eigen::Matrix3d> turning(surface.position.size(), Eigen::Matrix3d::Zero());
+  std::vector<double> area(surface.position.size(), 0);
+  std::vector<char> counted(surface.triangle.size(), 0);
+  for (const SmoothEdge& edge : edges) {
+    for (const Index t : edge.triangle) {
+      if (counted[t]) continue;
+      counted[t] = 1;
+      const double third = norm(area_of(surface, t)) / 3;
+      for (const Index corner : surface.triangle[t]) area[body.topology.corner[corner]] += third;
+    }
+    const Vec3d along = surface.position[edge.high] - surface.position[edge.low];
+    const Eigen::Vector3d e{along.x, along.y, along.z};
+    const Eigen::Matrix3d half = 0.5 * edge.angle / e.norm() * e * e.transpose();
+    turning[edge.low] += half;
+    turning[edge.high] += half;
+  }
+  return tabulated(area.size(), [&](std::size_t v) {
+    if (!(area[v] > 0)) return 0.0;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(turning[v],
+                                                                Eigen::EigenvaluesOnly);
+    return solver.eigenvalues().cwiseAbs().maxCoeff() / area[v];
+  });
 }
 
 /// Sources along the edges across which a surface curves: `per_radius` phyxels over the radius.
 void add_curved(const GradedBody& body, double per_radius, double least, double most,
                 std::vector<SpacingSource>& sources) {
-  for (const auto& [from, to, radius] : curved_edges(body.surface, body.topology)) {
-    const double spacing = radius / per_radius;
-    if (spacing >= most) continue;
+  const std::vector<SmoothEdge> edges = smooth_edges(body.surface, body.topology);
+  const std::vector<double> curvature = curvatures(body, edges);
+  for (const SmoothEdge& edge : edges) {
+    const double spacing =
+        1 / (per_radius * std::max(curvature[edge.low], curvature[edge.high]));
+    if (!(spacing < most)) continue;
+    const Vec3d from = body.surface.position[edge.low], to = body.surface.position[edge.high];
     const double step = 2 * std::max(spacing, least);
     const auto pieces = static_cast<int>(std::ceil(std::min(norm(to - from) / step, 1e4)));
     for (int k = 0; k < pieces; ++k) {

@@ -52,7 +52,7 @@ bool needs_lists_on_host(const BodyRequest& request) {
   const bool may_be_cut = !request.source.mesh.empty() && !support_regions(request).empty();
   const NeighbourhoodRule& rule = request.neighbourhood;
   // A cloud of the caller's is not known here.
-  const bool may_have_spacing = !request.source.cloud.empty() ||
+  const bool may_have_spacing = request.source.grading || !request.source.cloud.empty() ||
                                 (!request.source.file.empty() && has_spacing(request.source.file));
   const bool pairwise = rule.resolved(may_have_spacing).pairwise();
   return may_close(request) || !request.inclusions.empty() || may_be_cut || pairwise;
