@@ -127,17 +127,65 @@ Surface surface_of(const py::object& mesh) {
   return surface_from(mesh, "mesh");
 }
 
+/// A box (low, high) or a ball (centre, radius) of a grading.
+SpaceRegion region_from(const py::dict& finer) {
+  SpaceRegion region;
+  if (finer.contains("ball") == finer.contains("box")) {
+    throw InputError("grading: finer needs exactly one of \"ball\": (centre, radius) and \"box\": "
+                     "(low, high)");
+  }
+  if (finer.contains("ball")) {
+    std::tie(region.centre, region.radius) = finer["ball"].cast<std::pair<Vec3d, double>>();
+    region.is_ball = true;
+  } else {
+    std::tie(region.low, region.high) = finer["box"].cast<std::pair<Vec3d, Vec3d>>();
+  }
+  return region;
+}
+
+/// A grading from a dictionary with the keys of a scene's.
+Grading grading_from(const py::dict& given) {
+  Grading grading;
+  if (given.contains("ratio")) grading.ratio = given["ratio"].cast<double>();
+  for (const auto& [key, value] : given) {
+    const auto name = key.cast<std::string>();
+    if (name == "ratio") continue;
+    if (name == "growth") {
+      grading.growth = value.cast<double>();
+    } else if (name == "per_radius") {
+      grading.per_radius = value.cast<double>();
+    } else if (name == "across") {
+      grading.across = value.cast<double>();
+    } else if (name == "finer") {
+      for (const py::handle& one : value) {
+        const auto finer = one.cast<py::dict>();
+        grading.finer.push_back(
+            {region_from(finer), finer.contains("by") ? finer["by"].cast<double>() : grading.ratio});
+      }
+    } else {
+      throw InputError(fmt::format(
+          "grading: key \"{}\" found; allowed: ratio, growth, per_radius, across, finer", name));
+    }
+  }
+  return grading;
+}
+
 Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int relaxations,
-             std::optional<bool> on_surface, const py::object& progress) {
+             std::optional<bool> on_surface, const std::optional<py::dict>& grading,
+             const py::object& progress) {
   if (phyxels < 1) throw InputError(fmt::format("phyxels: {} found; allowed: >= 1", phyxels));
   const ObserveStages observing = stages_for(progress);
   const Surface surface = surface_of(mesh);
+  SampleRequest request{.phyxels = phyxels,
+                        .seed = seed,
+                        .relaxations = relaxations,
+                        .on_surface = on_surface,
+                        .cuts = {},
+                        .grading = {}};
+  if (grading) request.grading = grading_from(*grading);
   const py::gil_scoped_release others;
   SampleReport report;
-  Cloud cloud = sample_surface(
-      surface,
-      {.phyxels = phyxels, .seed = seed, .relaxations = relaxations, .on_surface = on_surface},
-      &report);
+  Cloud cloud = sample_surface(surface, request, &report);
   cloud.warnings = std::move(report.warnings);
   return cloud;
 }
@@ -201,9 +249,11 @@ void add_clouds(py::module_& module) {
           "file"_a, "overwrite"_a = false, "Writes a body file, which scenes name as `file`.");
   module.def("read_body", &read_body, "file"_a, "Reads a body file as `phyxel sample` writes it.");
   module.def("sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
-             "on_surface"_a = py::none(), "progress"_a = py::none(),
+             "on_surface"_a = py::none(), "grading"_a = py::none(), "progress"_a = py::none(),
              "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
-             "exactly so many phyxels. progress(stage, share) is called meanwhile.");
+             "exactly so many phyxels. progress(stage, share) is called meanwhile.\n\n"
+             "grading: a dictionary with the keys of a scene's `[body.grading]`; finer regions are\n"
+             "dictionaries, {\"ball\": (centre, radius), \"by\": 4} or {\"box\": (low, high)} [m].");
   module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
              "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
              "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,

@@ -134,12 +134,10 @@ BodySource read_source(const SceneTable& body) {
   body.read("seed", source.seed);
   body.read("relaxations", source.relaxations);
   body.read("on_surface", source.on_surface);
-  if (body.has("grading")) {
-    source.grading = read_grading(body.table("grading"));
-    if (source.on_surface == false) {
-      body.refuse("on_surface", "false found, but a graded body has phyxels on its surface; allowed: "
-                                "true, or no grading");
-    }
+  if (body.has("grading") && source.on_surface == false) {
+    body.refuse("on_surface",
+                "false found, but a graded body has phyxels on its surface; allowed: true, or no "
+                "grading");
   }
   shape.seed = source.seed;
   return source;
@@ -151,7 +149,7 @@ BodySource read_source(const SceneTable& body) {
 void choose_placement(const SceneTable& table, BodyRequest& body) {
   ShapeRequest& shape = body.source.shape;
   const bool kernel = body.volume_rule == VolumeRule::kernel;
-  if (kernel && !body.source.on_surface) body.source.on_surface = false;
+  if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
   if (table.has("lattice") || kernel || (shape.name != "beam" && shape.name != "block")) return;
   const double thinnest = std::min({shape.size.x, shape.size.y, shape.size.z});
   if (!(thinnest > 0)) return;  // refused later
@@ -344,7 +342,14 @@ std::string name_of_source(const BodySource& source) {
 BodyRequest read_body_request(const SceneTable& table) {
   BodyRequest body;
   body.where = table.where();
+  // Before the source, which may not be one that can be graded.
+  std::optional<Grading> grading;
+  if (table.has("grading")) {
+    grading = read_grading(table.table("grading"));
+    body.finer = read_finer(table.table("grading"), grading->ratio);
+  }
   body.source = read_source(table);
+  body.source.grading = grading;
   body.name = name_of_source(body.source);
   table.read("name", body.name);
   table.read("scale", body.scale);
@@ -360,9 +365,6 @@ BodyRequest read_body_request(const SceneTable& table) {
   if (!body.material.hourglass) body.material.hourglass = default_hourglass(body);
   for (const SceneTable& inclusion : table.tables("inclusion")) {
     body.inclusions.push_back(read_inclusion(inclusion, body.material));
-  }
-  if (body.source.grading) {
-    body.finer = read_finer(table.table("grading"), body.source.grading->ratio);
   }
   for (const SceneTable& fixed : table.tables("fixed")) {
     body.fixed.push_back({read_selection(fixed), read_axes(fixed)});

@@ -142,6 +142,61 @@ TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
                           HasSubstr("three, traction 1: [100, 0, 50] N about [5, 0.5, 0.5] m")));
 }
 
+/// A graded cube of two materials that a support cuts, with viscosity, loads and probes.
+const char* const graded_cube = R"([time]
+end = 0.03
+[solver]
+threads = 1
+device = "cpu"
+[output]
+frames_per_second = 100
+fields = ["displacement", "stress", "boundary"]
+[[body]]
+mesh = "cube.stl"
+phyxels = 1500
+[body.grading]
+ratio = 4
+per_radius = 0
+[[body.grading.finer]]
+ball = { centre = [1, 1, 0.5], radius = 0.2 }
+[body.material]
+young = 2e4
+poisson = 0.3
+density = 1000
+viscosity = 1e-3
+[[body.inclusion]]
+box = [[0.4, 0, 0], [0.7, 1, 1]]
+young = 8e4
+[[body.fixed]]
+box = [[-1, -1, -1], [2, 2, 0.2]]
+[[body.load]]
+ball = { centre = [1, 1, 1], radius = 0.3 }
+force = [0, 30, 10]
+[[body.traction]]
+all = true
+normal = [1, 0, 0]
+pressure = 300
+follower = true
+[[probe]]
+from = [0.2, 0.5, 0.5]
+to = [1, 0.5, 0.5]
+points = 9
+)";
+
+TEST_F(Mpirun, GradedBodiesAreTheSameOnAllRanks) {
+  write("cube.stl", test::binary_stl(test::unit_cube()));
+  write("graded.toml", graded_cube);
+  const Outcome alone = run_on(0, {"run", "graded.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));
+  for (const int ranks : {2, 3}) {
+    const std::string name = std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "graded.toml", "--out", name});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", name);
+  }
+}
+
 /// The sampler warns of a vertex that no triangle uses; all ranks sample, and one prints the
 /// warning.
 TEST_F(Mpirun, WarningsOfMeshesAreShownOnce) {

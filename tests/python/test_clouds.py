@@ -25,6 +25,18 @@ def test_a_mesh_of_numpy_is_filled_with_exactly_so_many():
     assert phyxel.inspect(cube()) == phyxel.inspect(cube(3))
 
 
+def test_a_mesh_is_graded():
+    finer = {"ball": ((1, 1, 1), 0.2), "by": 3}
+    cloud = phyxel.sample(cube(), phyxels=1500, grading={"ratio": 4, "across": 0, "finer": [finer]})
+    assert len(cloud) == 1500 and cloud.spacing.shape == (1500,)
+    assert cloud.spacing.max() / cloud.spacing.min() == pytest.approx(3, rel=1e-2)
+    assert np.linalg.norm(cloud.position[cloud.spacing.argmin()] - 1) < 0.2
+    with pytest.raises(phyxel.InputError, match='key "ration" found'):
+        phyxel.sample(cube(), phyxels=100, grading={"ration": 4})
+    with pytest.raises(phyxel.InputError, match="exactly one of"):
+        phyxel.sample(cube(), phyxels=100, grading={"finer": [{"by": 2}]})
+
+
 def test_clouds_come_back_from_files(tmp_path):
     file = tmp_path / "beam.h5"
     BEAM.write(file)

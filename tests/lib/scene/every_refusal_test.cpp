@@ -262,6 +262,23 @@ std::vector<Late> late_refusals() {
       {with_body("mesh = 'ball.txt'\nphyxels = 50"), {":5:1", "ball.txt: the extension"}},
       {with_body("mesh = 'flat.obj'\nphyxels = 50\non_surface = true"), {":5:1", "flat.obj: "}},
       {with_body(mesh + "on_surface = true"), {":5:1", "ball.obj: "}},
+      {with_body("mesh = 'flat.obj'\nphyxels = 50\n[body.grading]"),
+       {":5:1", "flat.obj: ", "encloses no"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\non_surface = false\n[body.grading]"),
+       {":8:14", "on_surface", "false found", "no grading"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647\n[body.grading]\nratio = 10"),
+       {":5:1", "ball.obj: 2147483647", "GiB"}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.5\n[body.grading]"),
+       {":9:1", "grading", "shape"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nregion = 'x+'"),
+       {":11:10", "no box and no ball"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nall = true\nball = {centre = [0, 0, 0], radius = 1}"),
+       {":11:7", "all", "ball"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nball = {centre = [0, 0, 0], radius = 1}\nby = 4"),
+       {":12:6", "body.grading.finer.by", "4 found", "the ratio of the grading, 3"}},
       {with_body("file = 'ball.obj'"), {":5:1", "ball.obj: not a file written by phyxel"}},
       {with_body("cloud = 'mine'"), {":5:1", "key body.cloud: \"mine\" found"}},
       {with_body("mesh = 'gone.obj'\nphyxels = 5"), {":6:8", "gone.obj"}},

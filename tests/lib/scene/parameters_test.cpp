@@ -141,6 +141,22 @@ all = true # selection.all => region = 'x-'
 count = [2, 1, 1] # body.array.count => count = [3, 1, 1]
 spacing = [5, 0, 0] # body.array.spacing => spacing = [6, 0, 0]
 [[body]]
+name = 'graded'
+mesh = 'a.obj'
+phyxels = 100
+[body.grading]
+ratio = 5 # body.grading.ratio => ratio = 6
+growth = 0.2 # body.grading.growth => growth = 0.3
+per_radius = 6 # body.grading.per_radius => per_radius = 0
+across = 3 # body.grading.across => across = 4
+[[body.grading.finer]]
+ball = {centre = [0, 0, 0], radius = 1}
+by = 2 # body.grading.finer.by => by = 3
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body]]
 name = 'third'
 shape = 'cylinder'
 radius = 1 # body.radius => radius = 2
@@ -261,11 +277,11 @@ class Parameters : public SceneFiles {
 TEST_F(Parameters, EveryKeyIsComparedByNameOrFreeForAReason) {
   // Keys that become something else.
   const std::map<std::string, std::string> known_as = {
-      {"body.array.count", "bodies: 8 then, 9 now"},
+      {"body.array.count", "bodies: 9 then, 10 now"},
       {"body.array.spacing",
        "body.translation of body 3 (\"second 2\"): [5, 0, 0] then, "
        "[6, 0, 0] now"},
-      {"probe.body", "probe.point of body 5 (\"fourth\"), probe 1: nothing then"},
+      {"probe.body", "probe.point of body 6 (\"fourth\"), probe 1: nothing then"},
       {"probe.from", "[0, 1, 0] then, [0, 0, 1], "},
       {"probe.to", "[0, 1, 0] then, [0, 0, 0], [0, 1, 0], [0, 2, 0] now"},
       {"probe.points", "[0, 1, 0] then, [0, 0, 0], [0, 0.3333333333333333, 0], "}};
