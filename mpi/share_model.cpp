@@ -302,7 +302,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
       const int region = body.region_of_entry[choice.chosen.size()];
       choice.chosen.push_back(region >= 0
                                   ? in_region(region)
-                                  : select(*selection, {cloud, {}, body.size}, request.name));
+                                  : select(*selection, {cloud, {}, body.size}, request));
     }
     return choice;
   }
@@ -327,11 +327,16 @@ std::vector<std::vector<SymmetryPlane>> planes_of_bodies(const ShareSetup& setup
     if (request.symmetries.empty()) continue;
     extents[b] = extent_of(whole.boxes[b], whole.surfaces[b], whole.bodies[b].size);
     std::vector<Vec3d> own;
+    std::vector<double> spacing;
+    const bool graded = whole.bodies[b].rule.pairwise();
+    if (!graded) spacing = {extents[b].spacing};
     for (Index i = local.bodies[b].begin; i < local.bodies[b].end; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      if (owns(local, k)) own.push_back(local.phyxels[k].position);
+      if (!owns(local, k)) continue;
+      own.push_back(local.phyxels[k].position);
+      if (graded) spacing.push_back(local_spacing(request.neighbourhood, local.phyxels[k].support));
     }
-    for (const PlaneCounts& count : count_at_planes(request, extents[b].spacing, own)) {
+    for (const PlaneCounts& count : count_at_planes(request, spacing, own)) {
       sums.insert(sums.end(), {count.on, count.near});
     }
   }

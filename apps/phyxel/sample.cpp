@@ -197,13 +197,12 @@ void add_sample(CLI::App& program) {
       ->needs(ratio);
   command
       ->add_option("--per-radius", options->grading.per_radius,
-                   "Phyxels over a radius of curvature; 0: however the surface curves")
-      ->capture_default_str()
+                   "Phyxels over a radius of curvature; 0: however the surface curves. Default: 8, "
+                   "or 0 with --finer")
       ->needs(ratio);
   command
       ->add_option("--across", options->grading.across,
-                   "Phyxels through thin places; 0: however thin they are")
-      ->capture_default_str()
+                   "Phyxels through thin places, 2 at least. Default: 5, or 2 with --finer")
       ->needs(ratio);
   command
       ->add_option("--finer", options->balls,

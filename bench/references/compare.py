@@ -2,6 +2,7 @@
 """Runs phyxel on the scenes of this folder and prints its errors against references.json.
 
     compare.py path/to/phyxel [--meshes FOLDER] [--cases sphere ...] [--counts 2000 10000] [--out FILE.csv]
+               [--grading "ratio = 4" ...]
 
 Needs Python 3.11 with numpy, scipy and h5py 3.16.0 from PyPI. FOLDER holds fandisk.obj and spot.obj.
 
@@ -13,6 +14,7 @@ that of the scene's probes.
 import argparse
 import csv
 import glob
+import itertools
 import json
 import os
 import re
@@ -28,7 +30,7 @@ import cases
 import surfaces
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-COLUMNS = ["case", "clamp", "closure", "phyxels", "held", "compliance", "end", "largest displacement",
+COLUMNS = ["case", "clamp", "closure", "grading", "phyxels", "held", "compliance", "end", "largest displacement",
            "median von Mises", "95% von Mises", "peak von Mises"]
 
 
@@ -41,12 +43,15 @@ def write_meshes(folder, meshes, names):
         surfaces.write_obj(os.path.join(folder, name + "_cut.obj"), body.cut_vertices / body.scale, body.cut_faces)
 
 
-def scene_of(case, reference, clamp, closure, count):
-    """The text of a case's scene with this clamp, closure and number of phyxels."""
+def scene_of(case, reference, clamp, closure, grading, count):
+    """The text of a case's scene with this clamp, closure, grading and number of phyxels."""
     with open(os.path.join(HERE, "scenes", case + ".toml")) as file:
         text = file.read()
     text = re.sub(r"(?m)^phyxels = .*", f"phyxels = {count}", text)
     text = re.sub(r"(?m)^closure = .*", f"closure = {closure}", text)
+    if grading:
+        lines = "\n".join(line.strip() for line in grading.split(","))
+        text = text.replace("[body.material]", f"[body.grading]\n{lines}\n\n[body.material]", 1)
     if clamp == "cut":
         axis, slack = "xyz".index(reference["axis"]), 1e-4 * reference["longest_side"]
         low, high = [-10.0] * 3, [10.0] * 3
@@ -127,6 +132,7 @@ def main():
                                                        "bar"])
     parser.add_argument("--counts", nargs="+", type=int, default=[2000, 10000])
     parser.add_argument("--closures", nargs="+", default=["0", '"auto"'], help="as scenes have them")
+    parser.add_argument("--grading", nargs="+", default=[""], help='keys of [body.grading], e.g. "ratio = 4, across = 0"; "": none')
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--out", help="CSV file for the table")
     options = parser.parse_args()
@@ -140,17 +146,16 @@ def main():
         for case in options.cases:
             reference = references[case]
             for clamp in (["box", "cut"] if "plane" in reference else ["face"]):
-                for closure in options.closures:
-                    for count in options.counts:
-                        text = scene_of(case, reference, clamp, closure, count)
-                        try:
-                            x, u, mass, stress, probes = run(options.phyxel, folder, text, options.threads)
-                        except RuntimeError as error:
-                            print(f"{case}, {clamp}, closure {closure}, {count}: {error}", file=sys.stderr)
-                            continue
-                        row = {"case": case, "clamp": clamp, "closure": closure.strip('"'), "phyxels": len(x),
-                               "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, x, u, mass, stress, probes)}
-                        out.writerow([f"{v:.2e}" if isinstance(v, float) else v for c, v in ((c, row.get(c, "")) for c in COLUMNS)])
+                for closure, grading, count in itertools.product(options.closures, options.grading, options.counts):
+                    text = scene_of(case, reference, clamp, closure, grading, count)
+                    try:
+                        x, u, mass, stress, probes = run(options.phyxel, folder, text, options.threads)
+                    except RuntimeError as error:
+                        print(f"{case}, {clamp}, closure {closure}, {count}: {error}", file=sys.stderr)
+                        continue
+                    row = {"case": case, "clamp": clamp, "closure": closure.strip('"'), "grading": grading, "phyxels": len(x),
+                           "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, x, u, mass, stress, probes)}
+                    out.writerow([f"{v:.2e}" if isinstance(v, float) else v for c, v in ((c, row.get(c, "")) for c in COLUMNS)])
 
 
 if __name__ == "__main__":

@@ -45,7 +45,9 @@ class Levels {
   int level_at(Vec3d place) const { return level_of(spacing_.at(place)); }
   /// False if no place of a ball has a spacing of the level.
   bool may_reach(int level, Vec3d middle, double radius) const {
-    const double here = spacing_.at(middle), change = spacing_.growth() * radius;
+    // Outside the body the field may grow faster, in two directions at once.
+    const double here = spacing_.at(middle),
+                 change = std::numbers::sqrt2 * spacing_.growth() * radius;
     return level_of(std::max(here - change, spacing_.finest())) <= level &&
            level_of(here + change) >= level;
   }

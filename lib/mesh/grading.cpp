@@ -18,6 +18,9 @@ namespace {
 /// Sample points on the surface for each square of the spacing of a body without grading. The two
 /// sides of a place as thin as a tenth of that spacing still see each other.
 constexpr double samples_on_square = 4;
+/// Phyxels through a place, of which there are at least so many wherever the finest spacing allows
+/// it: with fewer, phyxels on opposite sides would be nearer to each other than those side by side.
+constexpr double least_across = 2;
 /// Cosine between the outward normals of two faces from which they are two sides of a thin place.
 constexpr double opposite = -0.6;
 
@@ -116,7 +119,7 @@ void add_thin(const GradedBody& body, double across, double uniform, double most
   const SpatialHash hash(place, 0.5 * uniform);
   // Thicker places ask for no less than the coarsest spacing, or twice the uniform one, and coarser
   // phyxels would save little.
-  const double farthest = across * std::min(most, 2 * uniform);
+  const double farthest = across * std::min(most, (across > 2 * least_across ? 2 : 4) * uniform);
   std::vector<double> thickness(points.size(), HUGE_VAL);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -227,12 +230,15 @@ SpacingField graded_spacing(const GradedBody& body, const Grading& request) {
   // If all were as fine as can be, the finest spacing would be the uniform one.
   const double most = request.ratio * uniform, least = uniform / request.ratio;
   std::vector<SpacingSource> sources;
-  if (request.per_radius > 0) add_curved(body, request.per_radius, least, most, sources);
-  if (request.across > 0) add_thin(body, request.across, uniform, most, sources);
+  const bool finer = !request.finer.empty();
+  const double per_radius = request.per_radius.value_or(finer ? 0 : 8),
+               across = std::max(least_across, request.across.value_or(finer ? 0 : 5));
+  if (per_radius > 0) add_curved(body, per_radius, least, most, sources);
+  add_thin(body, across, uniform, most, sources);
   std::shared_ptr<const SpacingCone> cone;
   if (!sources.empty()) {
     cone = std::make_shared<SpacingCone>(thinned_out(std::move(sources), least), request.growth,
-                                         least, most);
+                                         least, most, box_around(body.surface.position));
   }
   std::vector<FinerRegion> regions;
   for (const Grading::Finer& finer : request.finer) regions.push_back({finer.region, finer.by});

@@ -79,8 +79,8 @@ void check_grading(const SampleRequest& request) {
   };
   check("ratio", grading.ratio, 1, 10);
   check("growth", grading.growth, 0.05, 0.5);
-  check("per_radius", grading.per_radius, 0, 1000);
-  check("across", grading.across, 0, 1000);
+  if (grading.per_radius) check("per_radius", *grading.per_radius, 0, 1000);
+  if (grading.across) check("across", *grading.across, 0, 1000);
   for (const Grading::Finer& finer : grading.finer) check("by", finer.by, 1, grading.ratio);
   if (request.on_surface == false) {
     throw InputError(
@@ -308,6 +308,25 @@ SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& 
   return spacing;
 }
 
+/// Warns of a grading, or of finer regions, without effect.
+void warn_of_no_effect(const Cloud& cloud, const Grading& grading, int exponent,
+                       SampleReport& found) {
+  const auto [finest, coarsest] = std::ranges::minmax(cloud.spacing);
+  if (grading.ratio > 1.1 && coarsest < 1.1 * finest) {
+    found.warnings.push_back(
+        "the grading has no effect: either nothing asks for phyxels nearer to each other than "
+        "elsewhere, or the whole body asks for the nearest; other values of per_radius and across, "
+        "or more phyxels, may grade it");
+  }
+  for (std::size_t k = 0; k < grading.finer.size(); ++k) {
+    const SpaceRegion region = grading.finer[k].region.scaled(std::ldexp(1.0, exponent));
+    const auto inside = [&](Vec3d p) { return region.contains(p); };
+    if (std::ranges::any_of(cloud.position, inside)) continue;
+    found.warnings.push_back(
+        fmt::format("finer region {} of the grading holds no phyxel of the body", k + 1));
+  }
+}
+
 /// The phyxels on the triangles of each named group, or, if all phyxels lie inside, those within a
 /// spacing of them: regions of the cloud.
 /// @param on_surface number of phyxels on the surface, which come first
@@ -382,6 +401,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   found.volume = exact ? volume : total;
   for (double& v : cloud.volume) v *= found.volume / total;
 
+  if (request.grading) warn_of_no_effect(cloud, *request.grading, prepared.exponent, found);
   measure_gaps(cloud.position, spacing, found);
   add_regions(cloud, prepared.surface, sites.position.size(), spacing.finest());
   cloud.surface = std::move(prepared.surface);

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "model/box.hpp"
-
 namespace phyxel {
 namespace {
 
@@ -22,17 +20,13 @@ Vec3d middle_of_child(Vec3d middle, double half, int child) {
 }  // namespace
 
 SpacingCone::SpacingCone(std::span<const SpacingSource> sources, double growth, double least,
-                         double most)
+                         double most, const Box& box)
     : sources_(sources.begin(), sources.end()), growth_(growth), least_(least), most_(most) {
   std::erase_if(sources_, [&](const SpacingSource& s) { return !(s.spacing < most); });
   nodes_.emplace_back();
   if (sources_.empty()) return;
-  std::vector<Vec3d> places;
-  for (const SpacingSource& s : sources_) places.push_back(s.place);
-  const Box box = box_around(places);
   middle_ = 0.5 * (box.low + box.high);
-  const Vec3d size = box.high - box.low;
-  half_ = 0.5 * std::max({size.x, size.y, size.z}) + most / growth;
+  half_ = 0.5 * box.extent() + least;
   std::vector<std::uint32_t> all(sources_.size());
   for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<std::uint32_t>(k);
   divide(0, middle_, half_, std::move(all), 0);
@@ -68,8 +62,13 @@ void SpacingCone::divide(std::size_t node, Vec3d middle, double half,
 }
 
 double SpacingCone::at(Vec3d place) const {
-  const Vec3d from = place - middle_;
-  if (!(std::max({std::abs(from.x), std::abs(from.y), std::abs(from.z)}) <= half_)) return most_;
+  const auto within = [&](double at, double middle_of_cube) {
+    return std::clamp(at, middle_of_cube - half_, middle_of_cube + half_);
+  };
+  const Vec3d inside{within(place.x, middle_.x), within(place.y, middle_.y),
+                     within(place.z, middle_.z)};
+  if (sources_.empty()) return most_;
+  if (!(inside == place)) return std::min(most_, at(inside) + growth_ * norm(place - inside));
   std::size_t node = 0;
   Vec3d middle = middle_;
   double half = half_;

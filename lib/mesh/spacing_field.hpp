@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "model/box.hpp"
 #include "phyxel/space_region.hpp"
 #include "phyxel/types.hpp"
 
@@ -28,9 +29,12 @@ class SpacingCone {
  public:
   /// @param most spacings beyond this are not wanted [m]
   /// @param least distances below this may be resolved no further [m]
-  SpacingCone(std::span<const SpacingSource> sources, double growth, double least, double most);
+  /// @param box around all places that matter, sources included
+  SpacingCone(std::span<const SpacingSource> sources, double growth, double least, double most,
+              const Box& box);
 
-  /// The spacing wanted at a place [m]; `most` where no source asks for less.
+  /// The spacing wanted at a place [m]; `most` where no source asks for less. Outside the box it
+  /// grows from the box's faces.
   double at(Vec3d place) const;
 
  private:
@@ -45,7 +49,7 @@ class SpacingCone {
   std::vector<SpacingSource> sources_;
   double growth_, least_, most_;
   Vec3d middle_;
-  double half_ = 0;  ///< Half the side of the tree's cube; beyond it no source counts [m].
+  double half_ = 0;  ///< Half the side of the tree's cube [m].
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> listed_;
 };

@@ -249,6 +249,18 @@ void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSit
   sites.cut_area += gap * gap * static_cast<double>(points.size());
 }
 
+/// The area of a surface in squares of the spacing.
+double squares_on(const Surface& surface, const SpacingField& spacing) {
+  double squares = 0;
+  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
+    const auto [a, b, c] = surface.triangle[t];
+    const double s =
+        spacing.at((surface.position[a] + surface.position[b] + surface.position[c]) / 3.0);
+    squares += norm(area_of(surface, static_cast<Index>(t))) / (s * s);
+  }
+  return squares;
+}
+
 /// A subset of the corners that are not too near to each other [m].
 std::vector<Vec3d> corners_of(const Features& features, const SpacingField& spacing,
                               std::uint64_t seed) {
@@ -279,10 +291,8 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
   for (int attempt = 0; attempt < 8; ++attempt) {
     const SpacingField s = found.spacing;
     if (s.finest() > 2 * volume / area) break;
-    if (s.is_uniform()) {
-      const double samples = samples_on_faces * area / (s.coarsest() * s.coarsest());
-      require_host_memory("phyxels on a surface", phyxels, bytes_per_sample * samples / phyxels);
-    }
+    require_host_memory("phyxels on a surface", phyxels,
+                        bytes_per_sample * samples_on_faces * squares_on(surface, s) / phyxels);
     found.cuts = {.list = {},
                   .depth = 1e-7 * s.finest() + rounding,
                   .spacing = s.coarsest(),

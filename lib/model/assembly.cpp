@@ -34,17 +34,19 @@ Mat3d rotation_by(Vec3d radians) {
 
 Mat3d rotation_of(const BodyRequest& request) { return rotation_by(degree * request.rotation); }
 
+void place(std::vector<Vec3d>& points, const BodyRequest& request) {
+  const Mat3d rotation = rotation_of(request);
+#pragma omp parallel for schedule(static)
+  for (Vec3d& p : points) p = rotation * (request.scale * p) + request.translation;
+}
+
 void place(Cloud& cloud, const BodyRequest& request) {
   const Mat3d rotation = rotation_of(request);
-  const auto placed = [&](Vec3d p) { return rotation * (request.scale * p) + request.translation; };
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
-    cloud.position[i] = placed(cloud.position[i]);
-  }
+  place(cloud.position, request);
   for (double& v : cloud.volume) v *= request.scale * request.scale * request.scale;
   for (double& s : cloud.spacing) s *= request.scale;
   place_cuts(cloud, request);
-  for (Vec3d& p : cloud.surface.position) p = placed(p);
+  place(cloud.surface.position, request);
   for (Vec3d& n : cloud.surface.normal) n = rotation * n;
 }
 
@@ -337,7 +339,7 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
     const std::size_t entry = choice.chosen.size();
     const int bits = entry < choice.first_load ? axes[entry].bits() : 0;
     const std::vector<Index>& chosen =
-        choice.chosen.emplace_back(select(*selection, here, request.name));
+        choice.chosen.emplace_back(select(*selection, here, request));
     for (const Index i : chosen) {
       if (moved[i] & bits) {
         throw InputError(fmt::format(

@@ -32,6 +32,8 @@ Mat3d rotation_by(Vec3d radians);
 /// The rotation of a body.
 Mat3d rotation_of(const BodyRequest& request);
 
+/// Scales, turns and moves points as asked.
+void place(std::vector<Vec3d>& points, const BodyRequest& request);
 /// Scales, turns and moves a cloud as asked.
 void place(Cloud& cloud, const BodyRequest& request);
 

@@ -12,7 +12,7 @@ namespace phyxel {
 MaterialChoice choose_materials(const BodyRequest& request, const SomePhyxels& here) {
   MaterialChoice choice{std::vector<Index>(here.cloud.position.size(), 0), {}, {}};
   for (std::size_t k = 0; k < request.inclusions.size(); ++k) {
-    const std::vector<Index> chosen = select(request.inclusions[k].select, here, request.name);
+    const std::vector<Index> chosen = select(request.inclusions[k].select, here, request);
     for (const Index i : chosen) choice.material_of[i] = static_cast<Index>(k + 1);
     choice.selected.push_back(static_cast<std::int64_t>(chosen.size()));
   }

@@ -165,6 +165,12 @@ namespace {
 /// The triangles on which a traction may act: those of its group, or all.
 std::vector<Triangle> chosen_triangles(const BodyRequest& request, const TractionRequest& traction,
                                        const BodySurface& surface) {
+  if (traction.select.indices || !traction.select.mesh.empty()) {
+    throw InputError(fmt::format(
+        "{}: a traction of body \"{}\" acts on phyxels; allowed: a group, a box, a ball or all, "
+        "which select a part of the surface",
+        traction.select.where, request.name));
+  }
   if (!traction.select.region) return {surface.triangle.begin(), surface.triangle.end()};
   const auto found = surface.groups.find(*traction.select.region);
   if (found == surface.groups.end()) {

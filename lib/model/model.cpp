@@ -18,6 +18,7 @@
 #include "phyxel/error.hpp"
 #include "scene/scene_error.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -229,8 +230,15 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
   if (!request.symmetries.empty()) {
     const BodyExtent extent =
         extent_of(box, given.surface, static_cast<Index>(given.position.size()));
-    const std::vector<PlaneCounts> counts =
-        count_at_planes(request, extent.spacing, given.position);
+    std::vector<double> spacing{extent.spacing};
+    const auto begin = static_cast<std::size_t>(shift);
+    if (model.parts.back().pair_length > 0) {
+      spacing = tabulated(given.position.size(), [&](std::size_t i) {
+        return local_spacing(request.neighbourhood, model.neighbourhood.support[begin + i]);
+      });
+    }
+    const std::vector<PlaneCounts> counts = count_at_planes(
+        request, spacing, std::span(model.position).subspan(begin, given.position.size()));
     choice.add_planes(request, given.position,
                       symmetry_planes(request, extent, counts, model.warnings));
   }

@@ -13,6 +13,8 @@ constexpr int quadratic_terms = 6;
 constexpr Eigen::Index fewest_for_quadratic = 14;
 /// Least length of a quadratic term beside the longest, in what the linear part leaves.
 constexpr double least_term = 1e-3;
+/// The same for gradients, in which terms that few phyxels tell apart would be large.
+constexpr double least_term_of_slopes = 0.05;
 
 using Terms = Eigen::Matrix<double, quadratic_terms, 1>;
 using Slopes = Eigen::Matrix<double, quadratic_terms, 3>;
@@ -31,8 +33,9 @@ Eigen::Vector3d in_eigen(Vec3d v) { return {v.x, v.y, v.z}; }
 /// A least-squares fit of a polynomial to values of phyxels.
 class Fit {
  public:
-  /// Parameters as of `shares_at`.
-  Fit(Vec3d point, std::span<const Vec3d> near, double reach)
+  /// Other parameters as of `shares_at`. @param least length of a quadratic term beside the
+  /// longest that counts
+  Fit(Vec3d point, std::span<const Vec3d> near, double reach, double least)
       : reach_(reach), weight_(static_cast<Eigen::Index>(near.size())) {
     Vec3d first;
     for (Eigen::Index k = 0; k < size(); ++k) {
@@ -68,7 +71,7 @@ class Fit {
     }
     const Eigen::VectorXd root = weight_.cwiseSqrt();
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> fit;
-    fit.setThreshold(least_term);
+    fit.setThreshold(least);
     fit.compute(root.asDiagonal() * term);
     rest_ = root.asDiagonal() * fit.pseudoInverse().transpose();
   }
@@ -114,11 +117,11 @@ class Fit {
 }  // namespace
 
 std::vector<double> shares_at(Vec3d point, std::span<const Vec3d> near, double reach) {
-  return Fit(point, near, reach).shares();
+  return Fit(point, near, reach, least_term).shares();
 }
 
 std::vector<Vec3d> slopes_at(Vec3d point, std::span<const Vec3d> near, double reach) {
-  return Fit(point, near, reach).slopes();
+  return Fit(point, near, reach, least_term_of_slopes).slopes();
 }
 
 }  // namespace phyxel

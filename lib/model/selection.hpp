@@ -23,9 +23,10 @@ struct SomePhyxels {
 };
 
 /// The selected phyxels, ascending, counted in the cloud; there may be none.
-/// @throws InputError if a region is unknown or an index out of range.
+/// @param request of the body
+/// @throws InputError if a region is unknown, an index out of range, or a mesh not closed
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
-                          const std::string& name);
+                          const BodyRequest& request);
 
 /// Words for a message about a name that is not among the `named` sets, e.g.
 /// ` (did you mean "x-"?); it has: x-, x+`.

@@ -65,15 +65,22 @@ BodyExtent extent_of(const Box& phyxels, const Surface& surface, Index size) {
   return extent;
 }
 
-std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, double spacing,
+double local_spacing(const NeighbourhoodRule& rule, double support) {
+  // The mean distance to the ten nearest is that many spacings, inside a body and out.
+  constexpr double distance_to_ten = 1.15;
+  return support / (rule.factor * distance_to_ten);
+}
+
+std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, std::span<const double> spacing,
                                          std::span<const Vec3d> position) {
   std::vector<PlaneCounts> counts;
   for (const SymmetryRequest& plane : request.symmetries) {
     PlaneCounts& count = counts.emplace_back();
-    for (const Vec3d x : position) {
-      const double distance = std::abs(along(plane.normal, x) - plane.at);
-      count.on += distance <= on_plane * spacing;
-      count.near += distance <= near_plane * spacing;
+    for (std::size_t i = 0; i < position.size(); ++i) {
+      const double distance = std::abs(along(plane.normal, position[i]) - plane.at);
+      const double s = spacing[spacing.size() == 1 ? 0 : i];
+      count.on += distance <= on_plane * s;
+      count.near += distance <= near_plane * s;
     }
   }
   return counts;

@@ -27,8 +27,11 @@ struct PlaneCounts {
   std::int64_t on = 0;    ///< On the plane, within a hundredth of a spacing.
   std::int64_t near = 0;  ///< Within three quarters of a spacing.
 };
+/// The spacing at a phyxel of a graded body, by its support [m].
+double local_spacing(const NeighbourhoodRule& rule, double support);
 /// Counts phyxels at each plane of symmetry of a body.
-std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, double spacing,
+/// @param spacing at each phyxel [m]; of one element: of all
+std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, std::span<const double> spacing,
                                          std::span<const Vec3d> position);
 
 /// A plane of symmetry that holds the phyxels within a distance.

@@ -440,7 +440,7 @@ std::vector<BodyRequest> copies(const BodyRequest& body, const SceneTable& array
 }  // namespace
 
 Selection read_selection(const SceneTable& table) {
-  const std::vector<const char*> kinds = {"region", "indices", "box", "ball", "all"};
+  const std::vector<const char*> kinds = {"region", "indices", "box", "ball", "mesh", "all"};
   table.expect_one_of(kinds);
   Selection select;
   for (const char* kind : kinds) {
@@ -450,6 +450,8 @@ Selection read_selection(const SceneTable& table) {
   table.read("indices", select.indices);
   table.read("box", select.box);
   if (table.has("ball")) select.ball = read_ball(table.table("ball"));
+  table.read("mesh", select.mesh);
+  if (table.has("mesh")) check_file_exists(table, "mesh", select.mesh);
   table.read("all", select.all);
   if (table.has("all") && !select.all) {
     table.refuse("all", "false found, which selects nothing; allowed: true");

@@ -345,11 +345,11 @@ std::vector<SceneKey> grading_keys() {
        .meaning = "Largest over smallest distance between neighbours."},
       {.section = "body.grading", .name = "growth", .fallback = "0.25", .range = between(0.05, 0.5),
        .meaning = "How fast the distance between neighbours grows along a path, by the path's length, at most."},
-      {.section = "body.grading", .name = "per_radius", .fallback = "4", .range = between(0, 1000),
+      {.section = "body.grading", .name = "per_radius", .otherwise = "8; 0 with finer regions", .range = between(0, 1000),
        .meaning = "Phyxels over a radius of curvature of the surface; 0: however it curves. Edges "
            "sharper than 40 degrees are no curvature."},
-      {.section = "body.grading", .name = "across", .fallback = "5", .range = between(0, 1000),
-       .meaning = "Phyxels through thin places; 0: however thin they are."},
+      {.section = "body.grading", .name = "across", .otherwise = "5; 2 with finer regions", .range = between(0, 1000),
+       .meaning = "Phyxels through thin places, as far as `ratio` allows; at least 2, whatever is asked."},
       {.section = "body.grading", .name = "finer", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Regions in which phyxels are nearer to each other."},
       {.section = "body.grading.finer", .name = "by", .otherwise = "`ratio`", .range = between(1, 10),
@@ -451,6 +451,9 @@ std::vector<SceneKey> place_keys() {
        .otherwise = "none", .range = within(10 * longest), .meaning = "Lowest and highest corner."},
       {.section = "selection", .name = "ball", .type = KeyType::table, .otherwise = "none",
        .meaning = "Centre and radius."},
+      {.section = "selection", .name = "mesh", .type = KeyType::path, .otherwise = "none",
+       .meaning = "A file with a closed surface (OBJ, PLY or STL), scaled, rotated and translated as the body is: what "
+           "lies inside or on it, such as the core of another material. Not for tractions."},
       {.section = "selection", .name = "all", .type = KeyType::boolean, .otherwise = "none",
        .meaning = "Only `true`: the whole body."},
 

@@ -52,6 +52,7 @@ void visit_selection(const Selection& select, Visit&& visit) {
     visit("selection.ball", "centre", select.ball->centre);
     visit("selection.ball", "radius", select.ball->radius);
   }
+  if (!select.mesh.empty()) visit("selection", "mesh", select.mesh.string());
   if (select.all) visit("selection", "all", true);
 }
 
@@ -76,10 +77,11 @@ void visit_source(const BodySource& source, Visit&& visit) {
   visit("body", "relaxations", source.relaxations);
   if (source.on_surface) visit("body", "on_surface", *source.on_surface);
   if (source.grading) {
-    visit("body.grading", "ratio", source.grading->ratio);
-    visit("body.grading", "growth", source.grading->growth);
-    visit("body.grading", "per_radius", source.grading->per_radius);
-    visit("body.grading", "across", source.grading->across);
+    const Grading& grading = *source.grading;
+    visit("body.grading", "ratio", grading.ratio);
+    visit("body.grading", "growth", grading.growth);
+    if (grading.per_radius) visit("body.grading", "per_radius", *grading.per_radius);
+    if (grading.across) visit("body.grading", "across", *grading.across);
   }
   visit("body", "surfels", shape.surface);
 }

@@ -32,7 +32,7 @@ std::vector<Vec3d> read_points(const SceneTable& table) {
 }
 
 ProbeRequest read_probe(const SceneTable& table, std::size_t number) {
-  table.expect_one_of({"point", "from", "region", "indices", "box", "ball", "all"});
+  table.expect_one_of({"point", "from", "region", "indices", "box", "ball", "mesh", "all"});
   table.expect_together("from", "to");
   if (table.has("points") && !table.has("from")) {
     table.refuse("points",

@@ -1,6 +1,7 @@
 /// Grading: bodies whose phyxels are nearer to each other in some places than in others.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "phyxel/space_region.hpp"
@@ -11,8 +12,11 @@ namespace phyxel {
 struct Grading {
   double ratio = 4;       ///< Largest over smallest distance between neighbours, 1 to 10.
   double growth = 0.25;   ///< Growth of that distance along a path, by its length; 0.05 to 0.5.
-  double per_radius = 4;  ///< Phyxels over a radius of curvature of the surface; 0: as it comes.
-  double across = 5;      ///< Phyxels through thin places; 0: as it comes.
+  /// Phyxels over a radius of curvature of the surface; 0: however it curves. Unset: 8, or 0 where
+  /// there are finer regions.
+  std::optional<double> per_radius;
+  /// Phyxels through thin places, two at least. Unset: 5, or 2 where there are finer regions.
+  std::optional<double> across;
   /// A region in which phyxels are nearer to each other.
   struct Finer {
     SpaceRegion region;

@@ -50,6 +50,8 @@ struct Selection {
   std::optional<std::vector<Index>> indices;  ///< Phyxel indices within the body.
   std::optional<Box> box;
   std::optional<Ball> ball;
+  /// A file with a closed surface, which is placed as the body is: what lies inside or on it.
+  std::filesystem::path mesh;
   bool all = false;   ///< The whole body.
   std::string where;  ///< "scene.toml:12:3", for errors.
 };

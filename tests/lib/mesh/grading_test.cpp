@@ -23,7 +23,17 @@ namespace {
 using testing::HasSubstr;
 
 /// No grading but what regions ask for.
-Grading plain(double ratio) { return {.ratio = ratio, .per_radius = 0, .across = 0, .finer = {}}; }
+Grading plain(double ratio) {
+  Grading grading;
+  grading.ratio = ratio;
+  grading.per_radius = grading.across = 0;
+  return grading;
+}
+Grading ratio_of(double ratio) {
+  Grading grading;
+  grading.ratio = ratio;
+  return grading;
+}
 
 SpaceRegion ball(Vec3d centre, double radius) {
   SpaceRegion region;
@@ -106,7 +116,8 @@ TEST(SpacingCone, IsTheSmallestOfAllSources) {
     sources.push_back({{x, y, 0.1 * z}, 0.01 + 0.2 * along(engine)});
   }
   const double growth = 0.3, most = 0.15;
-  const SpacingCone cone(sources, growth, 0.01, most);
+  const Box box{{-1, -1, -1}, {2, 2, 2}};
+  const SpacingCone cone(sources, growth, 0.01, most, box);
   for (int trial = 0; trial < 2000; ++trial) {
     const double x = along(engine), y = along(engine), z = along(engine);
     const Vec3d p = 2.0 * Vec3d{x - 0.3, y - 0.3, z - 0.3};
@@ -117,7 +128,7 @@ TEST(SpacingCone, IsTheSmallestOfAllSources) {
     EXPECT_DOUBLE_EQ(cone.at(p), smallest);
   }
   EXPECT_EQ(cone.at({50, 0, 0}), most);
-  EXPECT_EQ(SpacingCone({}, growth, 0.01, most).at({0, 0, 0}), most);
+  EXPECT_EQ(SpacingCone({}, growth, 0.01, most, box).at({0, 0, 0}), most);
 }
 
 /// Between two fine regions the distance grows from either, and nowhere faster than asked.
@@ -268,6 +279,30 @@ TEST(Grading, WithoutWishesIsOneDistance) {
   const Cloud cloud = sampled(test::unit_cube(), 2000, plain(4));
   const auto [finest, coarsest] = std::ranges::minmax(cloud.spacing);
   EXPECT_DOUBLE_EQ(finest, coarsest);
+  SampleReport report;
+  sample_surface(test::unit_cube(),
+                 {.phyxels = 1000, .grading = finer_in(ball({9, 9, 9}, 1), 4)}, &report);
+  EXPECT_THAT(report.warnings,
+              testing::ElementsAre(HasSubstr("the grading has no effect"),
+                                   HasSubstr("finer region 1 of the grading holds no phyxel")));
+}
+
+/// However much a scene grades, at least two phyxels are through the thickness of a bar far from the
+/// finer region.
+TEST(Grading, LeavesPhyxelsThroughTheThickness) {
+  Grading grading = finer_in(ball({4, 0.1, 0.1}, 0.2), 10);
+  grading.growth = 0.5;
+  const Cloud cloud = sampled(test::box({0, 0, 0}, {4, 0.4, 0.4}), 3000, grading);
+  EXPECT_LT(*std::ranges::max_element(cloud.spacing), 0.4 / 2 * 1.05);
+  // Half of the volume is not on the faces of a bar: a single layer has all of it there.
+  double second = 0;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    if (cloud.position[i].x > 2) continue;
+    const double z = cloud.position[i].z - 0.2;
+    second += cloud.volume[i] * z * z;
+  }
+  const double exact = 2 * std::pow(0.4, 4) / 12;
+  EXPECT_LT(second / exact, 1.6);  // 1 + 2 (s/H)² with two layers; 3 with one
 }
 
 void expect_refusal(const Surface& surface, const SampleRequest& request, const char* words) {
@@ -281,11 +316,13 @@ void expect_refusal(const Surface& surface, const SampleRequest& request, const 
 
 TEST(Grading, RefusesWhatCannotBe) {
   const Surface cube = test::unit_cube();
-  expect_refusal(cube, {.phyxels = 100, .grading = Grading{.ratio = 11, .finer = {}}},
+  expect_refusal(cube, {.phyxels = 100, .grading = ratio_of(11)},
                  "grading: ratio is 11; allowed: 1 to 10");
-  expect_refusal(cube, {.phyxels = 100, .grading = Grading{.ratio = std::nan(""), .finer = {}}},
+  expect_refusal(cube, {.phyxels = 100, .grading = ratio_of(std::nan(""))},
                  "grading: ratio is nan; allowed: 1 to 10");
-  expect_refusal(cube, {.phyxels = 100, .grading = Grading{.growth = 0, .finer = {}}},
+  Grading slow;
+  slow.growth = 0;
+  expect_refusal(cube, {.phyxels = 100, .grading = slow},
                  "grading: growth is 0; allowed: 0.05 to 0.5");
   Grading finer = finer_in(ball({0, 0, 0}, 1), 4);
   finer.finer[0].by = 5;

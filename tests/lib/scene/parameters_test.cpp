@@ -137,6 +137,9 @@ density = 1000
 radius = 0.3 # body.neighbours.radius => radius = 0.4
 [[body.fixed]]
 all = true # selection.all => region = 'x-'
+[[body.load]]
+mesh = 'a.obj' # selection.mesh => mesh = 'b.obj'
+force = [1, 0, 0]
 [body.array]
 count = [2, 1, 1] # body.array.count => count = [3, 1, 1]
 spacing = [5, 0, 0] # body.array.spacing => spacing = [6, 0, 0]
