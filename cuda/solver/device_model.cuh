@@ -340,7 +340,7 @@ class DeviceModel {
                      " bytes of shared memory, of which a block may have " +
                      std::to_string(most_shared_memory_) +
                      ": allowed are a smaller support, precision \"float\"" +
-                     (closed() ? ", closure = 0" : "") + " or the CPU");
+                     (closed() && !pairwise() ? ", closure = 0" : "") + " or the CPU");
   }
 
   void make_fields() {
