@@ -103,8 +103,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const std::vector<Cloud>& clouds, const ShareOptions& options) {
   ShareOptions own = options_for(scene, options);
   for (std::size_t b = 0; b < std::min(clouds.size(), scene.bodies.size()); ++b) {
-    const bool has_spacing = !clouds[b].spacing.empty();
-    if (scene.bodies[b].neighbourhood.resolved(has_spacing).pairwise()) own.surveyor = nullptr;
+    if (needs_lists_on_host(scene.bodies[b], clouds[b])) own.surveyor = nullptr;
   }
   return naming(scene, [&] {
     if (clouds.size() != scene.bodies.size()) {

@@ -140,6 +140,12 @@ void check_paper_model(const Model& model) {
   if (part.closure > 0) {
     refuse(fmt::format("body \"{}\" has closed gradients; allowed: closure = 0", part.name));
   }
+  if (part.pair_length > 0) {
+    refuse(
+        fmt::format("body \"{}\" has supports of pairs; allowed: neighbours.support = "
+                    "\"uniform\" or \"adaptive\"",
+                    part.name));
+  }
   if (!model.loads.empty()) refuse("loads; allowed: gravity");
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) refuse("prescribed motion; allowed: fixed phyxels");

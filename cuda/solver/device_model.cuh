@@ -53,7 +53,7 @@ class DeviceModel {
     pairwise_ = std::any_of(model.parts.begin(), model.parts.end(),
                             [](const Part& part) { return part.pair_length > 0; });
     own_supports_ = pairwise_ || !one_support_each();
-    // Kernels with closed gradients alone have weights of pairs; closing vectors are then zero.
+    // Weights of pairs come with closed gradients (`WithPairWeights`).
     closed_ = pairwise_ || !model.closing.empty();
     if (share()) {
       own_supports_ = share()->communicator->largest(own_supports_) > 0;
@@ -84,6 +84,8 @@ class DeviceModel {
   bool has_history() const { return history_.columns() > 0; }
   /// True with closed gradients, or with weights of pairs, on any rank.
   bool closed() const { return closed_; }
+  /// True if a body has weights of pairs.
+  bool pairwise() const { return pairwise_; }
   int most_shared_memory() const { return most_shared_memory_; }  ///< Limit for one block [bytes].
 
   const AllFields& fields() const { return fields_; }
@@ -338,7 +340,7 @@ class DeviceModel {
                      " bytes of shared memory, of which a block may have " +
                      std::to_string(most_shared_memory_) +
                      ": allowed are a smaller support, precision \"float\"" +
-                     (closed() ? ", closure = 0" : "") + " or the CPU");
+                     (closed() && !pairwise() ? ", closure = 0" : "") + " or the CPU");
   }
 
   void make_fields() {

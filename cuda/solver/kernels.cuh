@@ -16,6 +16,13 @@
 
 namespace phyxel::cuda {
 
+/// A tag in a list of pair terms: kernels of such a list have weights of pairs (`pair_weight`), for
+/// which other kernels do not pay.
+struct PairWeights : PairTerm {};
+/// The list of bodies with weights of pairs. Their closing vectors are zero if their gradients are
+/// not closed.
+using WithPairWeights = PairTerms<ClosedGradients, HourglassControl, PairWeights>;
+
 /// Constants of a tile's body, in the working precision.
 template <class Real, class StateReal>
 struct TileConstants {
@@ -26,8 +33,8 @@ struct TileConstants {
   bool damped;             ///< For kernels that serve damped and undamped bodies.
   int law_index;           ///< Index in `Laws`, for kernels that serve bodies of any law.
 
-  /// True with weights of pairs (`pair_weight`), which kernels with closed gradients know. The sign
-  /// tells, so that constants of other kernels stay where they are.
+  /// True with weights of pairs (`pair_weight`). The sign tells, so that constants of other kernels
+  /// stay where they are.
   __host__ __device__ bool pairwise() const { return inverse_h_squared < Real(0); }
 };
 
@@ -202,11 +209,11 @@ __device__ __forceinline__ void fetch_supports(const Fields<Real, StateReal>& f,
 }
 
 /// Calls use(weight_of) with the weights of pairs of this lane's phyxel: weight_of(x_ij, offset).
-/// @param supports result of `fetch_supports`
-template <class Real, class Use>
-__device__ __forceinline__ void with_pair_weights(const Real* supports, Real inverse_length_squared,
+/// @param supports result of `fetch_supports`. @param body constants of the tile
+template <class Real, class Constants, class Use>
+__device__ __forceinline__ void with_pair_weights(const Real* supports, const Constants& body,
                                                   Use&& use) {
-  const Real own = supports[threadIdx.x];
+  const Real own = supports[threadIdx.x], inverse_length_squared = -body.inverse_h_squared;
   use([&](Vec3<Real> x, unsigned offset) {
     return pair_weight(dot(x, x), own, supports[offset / 16], inverse_length_squared);
   });
@@ -265,17 +272,16 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
   const Real inverse_h_squared =
       f.inverse_h_squared ? f.inverse_h_squared[place] : body.inverse_h_squared;
   Real* supports = reinterpret_cast<Real*>(image + Points<Real>::bytes * lists.slots);
-  if constexpr (Terms::sends) {
-    if (body.pairwise()) fetch_supports(f, lists, tile, supports);
-  }
+  if constexpr (Terms::template has<PairWeights>) fetch_supports(f, lists, tile, supports);
   wait_for_copies();
   __syncthreads();
 
   const auto own = Points<Real>::at(image, lists.slots, 16 * threadIdx.x);
-  // Calls use(weight_of): a tile is of one body, so that its warps do not diverge.
+  // Calls use(weight_of). Only launches for gradients have tiles with and without weights of pairs;
+  // a tile is of one body, so that its warps do not diverge.
   const auto weighted = [&](auto&& use) {
-    if constexpr (Terms::sends) {
-      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
+    if constexpr (Terms::template has<PairWeights>) {
+      if (!only_gradient || body.pairwise()) return with_pair_weights(supports, body, use);
     }
     use([&](Vec3<Real> x, unsigned) {
       return weight_shape_anywhere(dot(x, x), inverse_h_squared);
@@ -333,6 +339,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
 /// Pass 2: gathers Q into forces and takes one step. With `only_force`, only the internal forces
 /// are written, to `force`, shape [3, places]. With `extra_forces`, loads and the forces of
 /// hourglass control are added. @tparam Terms a list of pair terms
+/// @tparam own_supports true if weights use `Fields::inverse_h_squared`; those of pairs do
 template <class Real, class StateReal, bool own_supports, bool damped, bool extra_forces,
           bool only_force, class Halo = NoHalo, class Terms = NoPairTerms>
 __global__ void __launch_bounds__(tile_size,
@@ -360,10 +367,10 @@ __global__ void __launch_bounds__(tile_size,
   __syncthreads();
 
   const Vec3<Real> x_i = Stresses<Real>::at(image, lists.slots, 16 * threadIdx.x).x;
-  // Calls use(weight_of), as in pass 1.
+  // Calls use(weight_of), as in pass 1. Only launches for forces have tiles of both kinds.
   const auto weighted = [&](auto&& use) {
-    if constexpr (own_supports && Terms::sends) {
-      if (body.pairwise()) return with_pair_weights(supports, -body.inverse_h_squared, use);
+    if constexpr (Terms::template has<PairWeights>) {
+      if (!only_force || body.pairwise()) return with_pair_weights(supports, body, use);
     }
     use([&](Vec3<Real> x, unsigned offset) {
       const Real inverse_h_squared = own_supports ? supports[offset / 16] : body.inverse_h_squared;

@@ -28,7 +28,7 @@ class Passes {
         fused_(0, direct_ && !m_.closed() ? m_.tiles() : 0, *this),
         fused_closed_(0, direct_ && m_.closed() ? m_.tiles() : 0, *this) {
     linear_ = runs_of<Pass1<NoHalo>>(0, m_.tiles(),
-                                     [&](const Material& m) { return linear_pass_1_of(m); });
+                                     [&](const Part& part) { return linear_pass_1_of(part); });
   }
 
   /// Launches pass 1. Interior tiles, which need no ghosts, are launched before the wait for
@@ -97,9 +97,7 @@ class Passes {
   /// [3, places]
   void gather(Real* forces) const {
     receive(Sent::stresses);
-    launch_pass_2<NoHalo>(
-        {m_.closed() ? gather_of<WithClosing>() : gather_of<NoPairTerms>(), 0, m_.tiles()},
-        StateReal(0), forces, {});
+    launch_pass_2<NoHalo>({force_kernel(), 0, m_.tiles()}, StateReal(0), forces, {});
   }
   /// Advances histories to the present displacements.
   void commit(double interval) const {
@@ -128,12 +126,7 @@ class Passes {
   /// Computes the gradients of the first `tiles` tiles.
   void put_gradients(Gradients<Real> gradients, Index tiles) const {
     receive(Sent::displacements);
-    using Any = StVenantKirchhoff<Real>;  // gradients do not depend on the law
-    launch_pass_1<NoHalo>(m_.fields(),
-                          {m_.closed() ? pass_1<Real, StateReal, Any, WithClosing, true>
-                                       : pass_1<Real, StateReal, Any, NoPairTerms, true>,
-                           0, tiles},
-                          gradients, {});
+    launch_pass_1<NoHalo>(m_.fields(), {gradient_kernel(), 0, tiles}, gradients, {});
   }
 
  private:
@@ -143,12 +136,11 @@ class Passes {
     Kernel kernel;
     Index first_tile, tiles;
   };
-  /// Returns the launches for tiles [begin, end). @param kernel_of returns the kernel of a part's
-  /// material
+  /// Returns the launches for tiles [begin, end). @param kernel_of returns the kernel of a part
   template <class Kernel, class KernelOf>
   std::vector<Run<Kernel>> runs_of(Index begin, Index end, KernelOf&& kernel_of) const {
     std::vector<Kernel> of_part;
-    for (const Part& part : m_.model().parts) of_part.push_back(kernel_of(part.material));
+    for (const Part& part : m_.model().parts) of_part.push_back(kernel_of(part));
     std::vector<Run<Kernel>> runs;
     for (Index tile = begin; tile < end; ++tile) {
       const Kernel kernel = of_part[m_.tiling().part[tile]];
@@ -166,11 +158,9 @@ class Passes {
     Runs(Index begin, Index end, const Passes& passes)
         : of(passes),
           pass_1(of.template runs_of<Pass1<Halo1>>(
-              begin, end, [&](const Material& m) { return of.template pass_1_of<Halo1>(m); })),
-          pass_2(of.template runs_of<Pass2<Halo2>>(begin, end, [&](const Material& m) {
-            return of.m_.own_supports() ? of.template pass_2_of<true, Halo2>(m)
-                                        : of.template pass_2_of<false, Halo2>(m);
-          })) {}
+              begin, end, [&](const Part& part) { return of.template pass_1_of<Halo1>(part); })),
+          pass_2(of.template runs_of<Pass2<Halo2>>(
+              begin, end, [&](const Part& part) { return of.template pass_2_of<Halo2>(part); })) {}
     void stress(const AllFields& fields, const Halo1& exchange) const {
       for (const auto& run : pass_1) {
         of.template launch_pass_1<Halo1>(fields, run, {}, exchange);
@@ -199,17 +189,35 @@ class Passes {
     return array;
   }
 
-  /// Returns the kernel of a material: the one place where terms chosen at run time select kernels.
-  template <class Halo>
-  Pass1<Halo> pass_1_of(const Material& m) const {
-    if constexpr (std::is_same_v<Halo, FusedClosed1>) {
-      return pass_1_of<WithClosing, Halo>(m);
-    } else {
-      if constexpr (std::is_same_v<Halo, NoHalo>) {
-        if (m_.closed()) return pass_1_of<WithClosing, Halo>(m);
-      }
-      return m.hourglass > 0 ? pass_1_of<WithHourglass, Halo>(m) : pass_1_of<NoPairTerms, Halo>(m);
+  /// Calls use(std::type_identity<Terms>) with the list of pair terms of a kernel, but for
+  /// hourglass control. All kernels are selected by this function or the next.
+  /// @tparam Halo exchange of the kernel: some exist only with, some only without closed gradients
+  /// @param pairwise true if a body that the kernel serves has weights of pairs
+  template <class Halo, class Use>
+  auto with_terms(bool pairwise, Use&& use) const {
+    constexpr bool always_closed = std::is_same_v<Halo, FusedClosed1>;
+    if constexpr (!std::is_same_v<Halo, Fused1>) {
+      if (pairwise) return use(std::type_identity<WithPairWeights>{});
+      if (m_.closed()) return use(std::type_identity<WithClosing>{});
     }
+    return use(std::type_identity<std::conditional_t<always_closed, WithClosing, NoPairTerms>>{});
+  }
+  /// Calls `use` likewise, with hourglass control.
+  template <class Halo, class Use>
+  auto with_terms(bool pairwise, bool hourglass, Use&& use) const {
+    return with_terms<Halo>(pairwise, [&]<class Terms>(std::type_identity<Terms> terms) {
+      // Lists with closed gradients include hourglass control.
+      using Controlled = std::conditional_t<Terms::sends, Terms, WithHourglass>;
+      return hourglass ? use(std::type_identity<Controlled>{}) : use(terms);
+    });
+  }
+  template <class Halo>
+  Pass1<Halo> pass_1_of(const Part& part) const {
+    const Material& m = part.material;
+    const auto of_terms = [&]<class Terms>(std::type_identity<Terms>) {
+      return pass_1_of<Terms, Halo>(m);
+    };
+    return with_terms<Halo>(part.pair_length > 0, m.hourglass > 0, of_terms);
   }
   template <class Terms, class Halo>
   static Pass1<Halo> pass_1_of(const Material& m) {
@@ -222,39 +230,52 @@ class Passes {
     });
   }
   /// Returns the kernel of pass 1 with the linearisation of a law at rest.
-  Pass1<NoHalo> linear_pass_1_of(const Material& m) const {
-    return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
-      using Linear = decltype(std::declval<Law>().at_rest(Real()));
-      if (m_.closed()) {
-        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, WithClosing, false>);
-      }
-      return m_.fields().pull
-                 ? Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, WithHourglass, false>)
-                 : cuda::pass_1<Real, StateReal, Linear, NoPairTerms, false>;
+  Pass1<NoHalo> linear_pass_1_of(const Part& part) const {
+    const int law = chosen_law(part.material).index;
+    const auto of_terms = [&]<class Terms>(std::type_identity<Terms>) {
+      return Laws::with_type<Real>(law, [&]<class Law>(std::type_identity<Law>) {
+        using Linear = decltype(std::declval<Law>().at_rest(Real()));
+        return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Linear, Terms, false>);
+      });
+    };
+    return with_terms<NoHalo>(part.pair_length > 0, m_.fields().pull, of_terms);
+  }
+  /// Returns the kernel for the gradients of all bodies.
+  Pass1<NoHalo> gradient_kernel() const {
+    using Any = StVenantKirchhoff<Real>;  // gradients do not depend on the law
+    return with_terms<NoHalo>(m_.pairwise(), []<class Terms>(std::type_identity<Terms>) {
+      return Pass1<NoHalo>(cuda::pass_1<Real, StateReal, Any, Terms, true>);
     });
   }
-  template <bool own_supports, class Halo>
-  Pass2<Halo> pass_2_of(const Material& m) const {
-    if (m_.closed()) {
-      return m.damping > 0
-                 ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo, WithClosing>
-                 : cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo,
-                                WithClosing>;
-    }
-    const bool extra_forces = m_.fields().load || m_.fields().pull;
-    if (m.damping > 0) {
-      return extra_forces ? cuda::pass_2<Real, StateReal, own_supports, true, true, false, Halo>
-                          : cuda::pass_2<Real, StateReal, own_supports, true, false, false, Halo>;
-    }
-    return extra_forces ? cuda::pass_2<Real, StateReal, own_supports, false, true, false, Halo>
-                        : cuda::pass_2<Real, StateReal, own_supports, false, false, false, Halo>;
-  }
 
-  template <class Terms>
-  Pass2<NoHalo> gather_of() const {
+  /// Returns a kernel of pass 2. Weights of pairs always use `Fields::inverse_h_squared`.
+  template <bool damped, bool extra_forces, bool only_force, class Halo, class Terms>
+  Pass2<Halo> pass_2_of() const {
+    constexpr bool pairwise = Terms::template has<PairWeights>;
     return m_.own_supports()
-               ? cuda::pass_2<Real, StateReal, true, false, false, true, NoHalo, Terms>
-               : cuda::pass_2<Real, StateReal, false, false, false, true, NoHalo, Terms>;
+               ? cuda::pass_2<Real, StateReal, true, damped, extra_forces, only_force, Halo, Terms>
+               : cuda::pass_2<Real, StateReal, pairwise, damped, extra_forces, only_force, Halo,
+                              Terms>;
+  }
+  template <class Halo>
+  Pass2<Halo> pass_2_of(const Part& part) const {
+    const bool damped = part.material.damping > 0;
+    return with_terms<Halo>(part.pair_length > 0, [&]<class Terms>(std::type_identity<Terms>) {
+      if constexpr (!Terms::sends) {  // beside closing stresses, other forces cost nothing
+        if (!m_.fields().load && !m_.fields().pull) {
+          return damped ? pass_2_of<true, false, false, Halo, Terms>()
+                        : pass_2_of<false, false, false, Halo, Terms>();
+        }
+      }
+      return damped ? pass_2_of<true, true, false, Halo, Terms>()
+                    : pass_2_of<false, true, false, Halo, Terms>();
+    });
+  }
+  /// Returns the kernel for the internal forces of all bodies.
+  Pass2<NoHalo> force_kernel() const {
+    return with_terms<NoHalo>(m_.pairwise(), [&]<class Terms>(std::type_identity<Terms>) {
+      return pass_2_of<false, false, true, NoHalo, Terms>();
+    });
   }
 
   template <class Halo>

@@ -104,9 +104,11 @@ class Residence {
     pairs_ = {plan.entries.size(), what};
     if (kept_weights() != KeptWeights::none) weights_ = {plan.entries.size(), what};
     const auto slices = static_cast<unsigned>(plan.slices.size());
-    weigh_pairs<<<slices, threads, 0, m_.stream()>>>(m_.fields(), slices_.data(), place_.data(),
-                                                     entries.data(), m_.tiling().inverse ? 2 : 1,
-                                                     pairs_.data(), weights_.data());
+    const auto kernel =
+        m_.pairwise() ? weigh_pairs<Real, StateReal, true> : weigh_pairs<Real, StateReal, false>;
+    kernel<<<slices, threads, 0, m_.stream()>>>(m_.fields(), slices_.data(), place_.data(),
+                                                entries.data(), m_.tiling().inverse ? 2 : 1,
+                                                pairs_.data(), weights_.data());
     m_.launched("weigh_pairs", slices, threads);
     m_.wait();
   }

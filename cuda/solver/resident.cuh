@@ -26,12 +26,14 @@ namespace phyxel::cuda {
 
 /// The weighted distances of all slices, one block each: for the first pass by the phyxel's
 /// support, for the second by the neighbour's. @param weights w_ij of both passes, or null
-template <class Real, class StateReal>
+/// @tparam pairwise true if a body has weights of pairs
+template <class Real, class StateReal, bool pairwise>
 __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, const Slice* slices,
                             const Index* place, const std::uint16_t* entries, int passes,
                             Pair<Real>* pairs, Real* weights) {
   const Slice& slice = slices[blockIdx.x];
   const TileConstants<Real, StateReal>& body = f.tiles[slice.first_place / tile_size];
+  const Real body_support = body.inverse_h_squared;
   for (int pass = 0; pass < passes; ++pass) {
     const Slice::Rows& rows = slice.rows[pass];
     for (int k = static_cast<int>(threadIdx.x); k < rows.longest * slice_size;
@@ -44,13 +46,12 @@ __global__ void weigh_pairs(const __grid_constant__ Fields<Real, StateReal> f, c
         const auto own = static_cast<std::size_t>(slice.first_place) + p;
         const auto other = static_cast<std::size_t>(place[slice.first_slot + entry]);
         const Vec3<Real> x = f.points.get(other).x - f.points.get(own).x;
-        if (body.pairwise()) {
+        if (pairwise && body.pairwise()) {
           weight = pair_weight(dot(x, x), f.inverse_h_squared[own], f.inverse_h_squared[other],
                                -body.inverse_h_squared);
         } else {
-          const Real inverse_h_squared = f.inverse_h_squared
-                                             ? f.inverse_h_squared[pass == 0 ? own : other]
-                                             : body.inverse_h_squared;
+          const Real inverse_h_squared =
+              f.inverse_h_squared ? f.inverse_h_squared[pass == 0 ? own : other] : body_support;
           weight = weight_shape_anywhere(dot(x, x), inverse_h_squared);
         }
         pair = {weight * x, entry};

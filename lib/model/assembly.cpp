@@ -60,6 +60,11 @@ bool needs_lists_on_host(const BodyRequest& request) {
   return may_close(request) || !request.inclusions.empty() || may_be_cut || pairwise;
 }
 
+bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud) {
+  return needs_lists_on_host(request) ||
+         request.neighbourhood.resolved(!cloud.spacing.empty()).pairwise();
+}
+
 double hourglass_of(const BodyRequest& request) {
   return request.material.hourglass.value_or(default_hourglass(request));
 }

@@ -19,6 +19,8 @@ namespace phyxel {
 
 /// True if the neighbour lists of a body cannot be left to a device.
 bool needs_lists_on_host(const BodyRequest& request);
+/// True likewise, for a body whose cloud the caller has made.
+bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud);
 
 /// The rest cloud of a source, before it is scaled and moved. Only meshes have phyxels where they
 /// are cut.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "model/assembly.hpp"
 #include "mpi/communicator.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/error.hpp"
@@ -80,8 +81,12 @@ Model build_model(const Scene& scene, const ChosenDevice& device) {
 }
 
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device) {
-  return surveys(device, scene) ? build_model(scene, clouds, cuda_surveyor(device.gpu->index))
-                                : build_model(scene, clouds);
+  bool on_host = !surveys(device, scene);
+  for (std::size_t b = 0; b < std::min(clouds.size(), scene.bodies.size()); ++b) {
+    on_host = on_host || needs_lists_on_host(scene.bodies[b], clouds[b]);
+  }
+  return on_host ? build_model(scene, clouds)
+                 : build_model(scene, clouds, cuda_surveyor(device.gpu->index));
 }
 
 const std::vector<std::string>& transport_names() {

@@ -181,7 +181,22 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Inclusions", false, false, true, false, false, true},
         Case{"Plastic", false, false, true, false, false, false, true},
         Case{"PlasticViscous", false, false, false, false, false, true, true, true},
-        Case{"ClosedPlasticViscous", false, false, true, true, false, false, true, true}),
+        Case{"ClosedPlasticViscous", false, false, true, true, false, false, true, true},
+        Case{.name = "Pairs", .pairs = true},
+        Case{.name = "PairsEverything", .everything = true, .pairs = true},
+        Case{.name = "PairsBesideAdaptive", .everything = true, .one_each = true, .pairs = true},
+        Case{.name = "ClosedPairs", .everything = true, .closed = true, .pairs = true},
+        Case{.name = "ClosedPairsBesideAdaptive",
+             .everything = true,
+             .closed = true,
+             .one_each = true,
+             .pairs = true},
+        Case{.name = "PairsInclusions", .everything = true, .inclusions = true, .pairs = true},
+        Case{.name = "PairsPlasticViscous",
+             .everything = true,
+             .plastic = true,
+             .viscous = true,
+             .pairs = true}),
     [](const auto& test) { return std::string(test.param.name); });
 
 TEST(CudaSurfels, EqualTheCpus) {

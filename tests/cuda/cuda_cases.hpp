@@ -14,12 +14,13 @@ namespace phyxel::testing {
 
 struct Case {
   const char* name;
-  bool adaptive, capped, everything;
-  bool closed = false;      ///< Gradients of the first body,
-  bool one_each = false;    ///< whose neighbour has supports of its own.
+  bool adaptive = false, capped = false, everything = false;
+  bool closed = false;      ///< The first body has closed gradients.
+  bool one_each = false;    ///< The second body has adaptive supports.
   bool inclusions = false;  ///< Of other materials, in the first body.
   bool plastic = false;     ///< The first body yields.
   bool viscous = false;     ///< All materials are viscous.
+  bool pairs = false;       ///< The first body has supports of pairs.
 };
 inline void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 
@@ -33,10 +34,9 @@ inline Scene scene_of(const Case& c) {
   if (c.capped) body.neighbourhood.max_neighbours = 24;
   scene.bodies = {body, body};
   BodyRequest &first = scene.bodies[0], &second = scene.bodies[1];
-  if (c.closed) {
-    first.closure = 0.01;
-    if (c.one_each) second.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
-  }
+  if (c.closed) first.closure = 0.01;
+  if (c.pairs) first.neighbourhood.support = NeighbourhoodRule::Support::pairwise;
+  if (c.one_each) second.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
   FixRequest fix;
   fix.select.box = Selection::Box{{-1, -1, -1}, {0.15, 3, 3}};
   first.fixed.push_back(fix);

@@ -189,6 +189,23 @@ INSTANTIATE_TEST_SUITE_P(
                      "blocks",
                      {"", false, false, true, true, false, false, true, true},
                      with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"MailPairs",
+                     "blocks",
+                     {.name = "", .everything = true, .pairs = true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"MailPairsBesideAdaptive",
+                     "blocks",
+                     {.name = "", .everything = true, .one_each = true, .pairs = true},
+                     with_surface(large_clouds(), {1.4, 1, 1.2})},
+        ResidentCase{"ClusterPairs",
+                     "clusters",
+                     {.name = "", .everything = true, .pairs = true},
+                     small_clouds()},
+        ResidentCase{
+            "ClusterClosedPairsBesideAdaptive",
+            "clusters",
+            {.name = "", .everything = true, .closed = true, .one_each = true, .pairs = true},
+            with_surface(small_clouds(), {1.3, 0.4, 0.6})},
         ResidentCase{"ManyClusters", "clusters", {"", false, false, false}, many_clouds()}),
     [](const auto& test) { return std::string(test.param.name); });
 

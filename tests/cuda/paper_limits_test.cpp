@@ -131,6 +131,9 @@ TEST(PaperModel, RefusesWhatTheProgramOf2008CouldNotDo) {
   scene.bodies[0].material.volume_stiffness = 1;
   refused(scene, "volume conservation");
   scene = body_scene("horn_bug");
+  scene.bodies[0].neighbourhood = {.support = NeighbourhoodRule::Support::pairwise};
+  refused(scene, "supports of pairs");
+  scene = body_scene("horn_bug");
   scene.bodies[0].loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
   refused(scene, "loads");
   scene = body_scene("horn_bug");

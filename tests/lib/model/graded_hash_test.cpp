@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "model/assembly.hpp"
 #include "model/neighbour_search.hpp"
 #include "support/clouds.hpp"
 
@@ -157,6 +158,15 @@ TEST(GradedClouds, SupportsFollowTheirSpacings) {
   scene.bodies[0].neighbourhood = {};
   scene.bodies[0].neighbourhood.radius = 0.2;
   EXPECT_EQ(model_of(scene, cloud).neighbourhood.support[5], 0.2);
+}
+
+TEST(GradedClouds, HaveTheirListsMadeOnTheHost) {
+  BodyRequest request = one_body().bodies[0];
+  request.closure = 0;
+  EXPECT_FALSE(needs_lists_on_host(request, lattice(3, 3, 3, 0.1)));
+  EXPECT_TRUE(needs_lists_on_host(request, graded(3)));
+  request.neighbourhood.support = NeighbourhoodRule::Support::uniform;
+  EXPECT_FALSE(needs_lists_on_host(request, graded(3)));
 }
 
 }  // namespace
