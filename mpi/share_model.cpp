@@ -300,9 +300,8 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
     choice.first_probe = choice.first_load + request.loads.size();
     for (const Selection* selection : selections_of(request)) {
       const int region = body.region_of_entry[choice.chosen.size()];
-      choice.chosen.push_back(region >= 0
-                                  ? in_region(region)
-                                  : select(*selection, {cloud, {}, body.size}, request));
+      choice.chosen.push_back(region >= 0 ? in_region(region)
+                                          : select(*selection, {cloud, {}, body.size}, request));
     }
     return choice;
   }

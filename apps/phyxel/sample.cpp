@@ -39,8 +39,9 @@ std::optional<Grading> grading_of(const SampleOptions& options) {
   for (std::size_t k = 0; k + 3 < options.balls.size(); k += 4) {
     const double* const b = &options.balls[k];
     if (!(b[3] > 0)) {
-      throw InputError(fmt::format("--finer {:g} {:g} {:g} {:g}: the radius is {:g} m; allowed: > 0",
-                                   b[0], b[1], b[2], b[3], b[3]));
+      throw InputError(
+          fmt::format("--finer {:g} {:g} {:g} {:g}: the radius is {:g} m; allowed: > 0", b[0], b[1],
+                      b[2], b[3], b[3]));
     }
     SpaceRegion ball;
     ball.is_ball = true;

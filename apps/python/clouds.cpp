@@ -131,8 +131,9 @@ Surface surface_of(const py::object& mesh) {
 SpaceRegion region_from(const py::dict& finer) {
   SpaceRegion region;
   if (finer.contains("ball") == finer.contains("box")) {
-    throw InputError("grading: finer needs exactly one of \"ball\": (centre, radius) and \"box\": "
-                     "(low, high)");
+    throw InputError(
+        "grading: finer needs exactly one of \"ball\": (centre, radius) and \"box\": "
+        "(low, high)");
   }
   if (finer.contains("ball")) {
     std::tie(region.centre, region.radius) = finer["ball"].cast<std::pair<Vec3d, double>>();
@@ -159,8 +160,9 @@ Grading grading_from(const py::dict& given) {
     } else if (name == "finer") {
       for (const py::handle& one : value) {
         const auto finer = one.cast<py::dict>();
-        grading.finer.push_back(
-            {region_from(finer), finer.contains("by") ? finer["by"].cast<double>() : grading.ratio});
+        grading.finer.push_back({region_from(finer), finer.contains("by")
+                                                         ? finer["by"].cast<double>()
+                                                         : grading.ratio});
       }
     } else {
       throw InputError(fmt::format(
@@ -188,6 +190,36 @@ Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int rela
   Cloud cloud = sample_surface(surface, request, &report);
   cloud.warnings = std::move(report.warnings);
   return cloud;
+}
+
+/// Adds what makes clouds and reads meshes.
+void add_functions(py::module_& module) {
+  using namespace py::literals;
+  module.def("read_body", &read_body, "file"_a, "Reads a body file as `phyxel sample` writes it.");
+  module.def(
+      "sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
+      "on_surface"_a = py::none(), "grading"_a = py::none(), "progress"_a = py::none(),
+      "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
+      "exactly so many phyxels. progress(stage, share) is called meanwhile.\n\n"
+      "grading: a dictionary with the keys of a scene's `[body.grading]`; finer regions are\n"
+      "dictionaries, {\"ball\": (centre, radius), \"by\": 4} or {\"box\": (low, high)} [m].");
+  module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
+             "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
+             "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,
+             "A built-in shape, as scenes have it: beam, block (size), cylinder (radius, length),\n"
+             "sphere (radius), each with `spacing` or `phyxels`; alien_head, horn_bug, dino.");
+  module.def(
+      "read_mesh",
+      [](const std::filesystem::path& file) {
+        Surface surface = read_mesh(file);
+        return py::make_tuple(taken(std::move(surface.position)),
+                              taken(std::move(surface.triangle)));
+      },
+      "file"_a, "Reads points (n, 3) [m] and triangles (t, 3) of an OBJ, PLY or STL file.");
+  module.def(
+      "inspect",
+      [](const py::object& mesh) { return inspect_surface(surface_of(mesh)).describe(); }, "mesh"_a,
+      "Describes the defects of a surface in one line.");
 }
 
 }  // namespace
@@ -247,30 +279,7 @@ void add_clouds(py::module_& module) {
             write_body(file, cloud, overwrite);
           },
           "file"_a, "overwrite"_a = false, "Writes a body file, which scenes name as `file`.");
-  module.def("read_body", &read_body, "file"_a, "Reads a body file as `phyxel sample` writes it.");
-  module.def("sample", &sample, "mesh"_a, "phyxels"_a, "seed"_a = 1, "relaxations"_a = 30,
-             "on_surface"_a = py::none(), "grading"_a = py::none(), "progress"_a = py::none(),
-             "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
-             "exactly so many phyxels. progress(stage, share) is called meanwhile.\n\n"
-             "grading: a dictionary with the keys of a scene's `[body.grading]`; finer regions are\n"
-             "dictionaries, {\"ball\": (centre, radius), \"by\": 4} or {\"box\": (low, high)} [m].");
-  module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
-             "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
-             "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,
-             "A built-in shape, as scenes have it: beam, block (size), cylinder (radius, length),\n"
-             "sphere (radius), each with `spacing` or `phyxels`; alien_head, horn_bug, dino.");
-  module.def(
-      "read_mesh",
-      [](const std::filesystem::path& file) {
-        Surface surface = read_mesh(file);
-        return py::make_tuple(taken(std::move(surface.position)),
-                              taken(std::move(surface.triangle)));
-      },
-      "file"_a, "Reads points (n, 3) [m] and triangles (t, 3) of an OBJ, PLY or STL file.");
-  module.def(
-      "inspect",
-      [](const py::object& mesh) { return inspect_surface(surface_of(mesh)).describe(); }, "mesh"_a,
-      "Describes the defects of a surface in one line.");
+  add_functions(module);
 }
 
 }  // namespace phyxel::python

@@ -24,8 +24,7 @@ void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField&
     const Repulsion repulsion(site, spacing);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
-      const Vec3d step =
-          repulsion.step(site[i], static_cast<Index>(i), [](Index) { return 1.0; });
+      const Vec3d step = repulsion.step(site[i], static_cast<Index>(i), [](Index) { return 1.0; });
       moved[i] = move(site[i], step);
     }
     site.swap(moved);

@@ -30,9 +30,9 @@ class Levels {
  public:
   explicit Levels(const SpacingField& spacing)
       : spacing_(spacing),
-        count_(1 + static_cast<int>(levels_of_octave *
-                                    std::log2(spacing.coarsest() / spacing.finest()) * (1 + 1e-9))) {
-  }
+        count_(1 +
+               static_cast<int>(levels_of_octave *
+                                std::log2(spacing.coarsest() / spacing.finest()) * (1 + 1e-9))) {}
   int count() const { return count_; }
   /// The smallest spacing of a level [m].
   double smallest(int level) const {
@@ -70,8 +70,8 @@ class Clear {
       place.push_back(p.point);
     }
     place.insert(place.end(), request.sites.cut_points.begin(), request.sites.cut_points.end());
-    hash_.emplace(place, tabulated(place.size(),
-                                   [&](std::size_t k) { return 0.5 * spacing.at(place[k]); }));
+    hash_.emplace(
+        place, tabulated(place.size(), [&](std::size_t k) { return 0.5 * spacing.at(place[k]); }));
   }
 
   /// The clearance of a place, in spacings; 1 for all that is farther.
@@ -112,22 +112,23 @@ std::vector<Node> nodes_inside(const LatticeRequest& request, const SpacingField
     const auto wanted = [&](Vec3d middle, double half) {
       return levels.may_reach(level, middle, std::numbers::sqrt3 * half);
     };
-    request.sampler.visit({.voxel = constant,
-                           .seed = request.seed + static_cast<std::uint64_t>(level),
-                           .at_random = false,
-                           .turn = turn_of_lattice(),
-                           .wanted = wanted},
-                          [&](std::size_t task, const SampleBlock& block) {
-                            for (std::size_t k = 0; k < block.offset.size(); ++k) {
-                              const Vec3d p = block.position(k);
-                              const double s = spacing.at(p);
-                              if (levels.level_of(s) != level) continue;
-                              const double clearance = clear.at(p);
-                              if (clearance < least_clearance) continue;
-                              by_task[task].push_back({p, static_cast<float>(clearance),
-                                                       static_cast<float>(std::pow(constant / s, 3))});
-                            }
-                          });
+    request.sampler.visit(
+        {.voxel = constant,
+         .seed = request.seed + static_cast<std::uint64_t>(level),
+         .at_random = false,
+         .turn = turn_of_lattice(),
+         .wanted = wanted},
+        [&](std::size_t task, const SampleBlock& block) {
+          for (std::size_t k = 0; k < block.offset.size(); ++k) {
+            const Vec3d p = block.position(k);
+            const double s = spacing.at(p);
+            if (levels.level_of(s) != level) continue;
+            const double clearance = clear.at(p);
+            if (clearance < least_clearance) continue;
+            by_task[task].push_back(
+                {p, static_cast<float>(clearance), static_cast<float>(std::pow(constant / s, 3))});
+          }
+        });
     for (std::vector<Node>& nodes : by_task) {
       all.insert(all.end(), nodes.begin(), nodes.end());
       nodes = {};
@@ -185,8 +186,7 @@ class GradedSkin {
         beside_surface |= other < on_surface;
         return other < on_surface ? surface_strength : 1;
       };
-      const Vec3d after =
-          point_[k] + repulsion.step(point_[k], static_cast<Index>(k), strength);
+      const Vec3d after = point_[k] + repulsion.step(point_[k], static_cast<Index>(k), strength);
       if (!beside_surface || request_.sampler.inside(after)) moved[k] = after;
     }
     point_.swap(moved);
@@ -262,9 +262,10 @@ LatticeFilling fill_graded(const LatticeRequest& request, SpacingField& spacing)
   for (int attempt = 0;; ++attempt) {
     nodes = nodes_inside(request, spacing);
     const double ratio = weight_of(nodes, usual_clearance) / static_cast<double>(n);
-    const auto enough = static_cast<std::size_t>(
-        std::count_if(nodes.begin(), nodes.end(),
-                      [](const Node& node) { return node.clearance >= usual_clearance; }));
+    const auto enough =
+        static_cast<std::size_t>(std::count_if(nodes.begin(), nodes.end(), [](const Node& node) {
+          return node.clearance >= usual_clearance;
+        }));
     if (enough >= n && std::abs(ratio - 1) < 0.02) break;
     if (attempt == most_attempts && nodes.size() >= n) {
       clearance = enough >= n ? usual_clearance : least_clearance;

@@ -82,8 +82,7 @@ std::vector<double> curvatures(const GradedBody& body, const std::vector<SmoothE
   }
   return tabulated(area.size(), [&](std::size_t v) {
     if (!(area[v] > 0)) return 0.0;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(turning[v],
-                                                                Eigen::EigenvaluesOnly);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(turning[v], Eigen::EigenvaluesOnly);
     return solver.eigenvalues().cwiseAbs().maxCoeff() / area[v];
   });
 }
@@ -94,8 +93,7 @@ void add_curved(const GradedBody& body, double per_radius, double least, double 
   const std::vector<SmoothEdge> edges = smooth_edges(body.surface, body.topology);
   const std::vector<double> curvature = curvatures(body, edges);
   for (const SmoothEdge& edge : edges) {
-    const double spacing =
-        1 / (per_radius * std::max(curvature[edge.low], curvature[edge.high]));
+    const double spacing = 1 / (per_radius * std::max(curvature[edge.low], curvature[edge.high]));
     if (!(spacing < most)) continue;
     const Vec3d from = body.surface.position[edge.low], to = body.surface.position[edge.high];
     const double step = 2 * std::max(spacing, least);
@@ -143,7 +141,7 @@ void add_thin(const GradedBody& body, double across, double uniform, double most
 }
 
 /// Of sources that are near each other, by their spacings, one with the smallest.
-std::vector<SpacingSource> thinned_out(std::vector<SpacingSource> sources, double least) {
+std::vector<SpacingSource> thinned_out(const std::vector<SpacingSource>& sources, double least) {
   using Cell = std::tuple<int, std::int64_t, std::int64_t, std::int64_t>;
   std::map<Cell, SpacingSource> kept;
   for (SpacingSource source : sources) {
@@ -169,9 +167,8 @@ struct WeighedPoints {
   /// The sum of `term`, of the spacing at each point.
   template <class Term>
   double sum(const SpacingField& spacing, Term&& term) const {
-    const auto terms = tabulated(place.size(), [&](std::size_t k) {
-      return term(spacing.at(place[k], of_sources[k]));
-    });
+    const auto terms = tabulated(
+        place.size(), [&](std::size_t k) { return term(spacing.at(place[k], of_sources[k])); });
     return size * std::accumulate(terms.begin(), terms.end(), 0.0);
   }
 };
@@ -191,9 +188,8 @@ double fitting_spacing(const GradedBody& body, const SpacingField& field, double
   }
   on_surface.size = area / static_cast<double>(std::max<std::size_t>(on_surface.place.size(), 1));
   for (WeighedPoints* points : {&inside, &on_surface}) {
-    points->of_sources = tabulated(points->place.size(), [&](std::size_t k) {
-      return field.of_sources(points->place[k]);
-    });
+    points->of_sources = tabulated(
+        points->place.size(), [&](std::size_t k) { return field.of_sources(points->place[k]); });
   }
   const auto phyxels = [&](double coarsest) {
     const SpacingField tried = field.with_coarsest(coarsest);
@@ -237,8 +233,8 @@ SpacingField graded_spacing(const GradedBody& body, const Grading& request) {
   add_thin(body, across, uniform, most, sources);
   std::shared_ptr<const SpacingCone> cone;
   if (!sources.empty()) {
-    cone = std::make_shared<SpacingCone>(thinned_out(std::move(sources), least), request.growth,
-                                         least, most, box_around(body.surface.position));
+    cone = std::make_shared<SpacingCone>(thinned_out(sources, least), request.growth, least, most,
+                                         box_around(body.surface.position));
   }
   std::vector<FinerRegion> regions;
   for (const Grading::Finer& finer : request.finer) regions.push_back({finer.region, finer.by});

@@ -87,8 +87,8 @@ class Clearance {
  private:
   static std::vector<Vec3d> samples(const LatticeRequest& request, double spacing) {
     std::vector<Vec3d> points;
-    for (const PointOn& p : points_over(request.surface, SpacingField(spacing), surface_samples,
-                                        request.seed + 1)) {
+    for (const PointOn& p :
+         points_over(request.surface, SpacingField(spacing), surface_samples, request.seed + 1)) {
       points.push_back(p.point);
     }
     const std::vector<Vec3d>& on_cuts = request.sites.cut_points;

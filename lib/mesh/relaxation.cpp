@@ -336,9 +336,9 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
   for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
 }
 
-std::vector<std::uint32_t> NearestSite::samples_of_sites(const InsideSampler& sampler,
-                                               const SampleSweep& sweep, Stage& stage,
-                                               const std::function<bool(Vec3d)>& counts) const {
+std::vector<std::uint32_t> NearestSite::samples_of_sites(
+    const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
+    const std::function<bool(Vec3d)>& counts) const {
   std::vector<std::uint32_t> count(sites_, 0);
   sampler.visit(
       sweep,

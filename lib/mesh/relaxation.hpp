@@ -50,9 +50,9 @@ class NearestSite {
   std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
                               const std::function<bool(Vec3d)>& counts = nullptr) const;
   /// The number of sample points that each site gets, likewise.
-  std::vector<std::uint32_t> samples_of_sites(const InsideSampler& sampler,
-                                              const SampleSweep& sweep, Stage& stage,
-                                    const std::function<bool(Vec3d)>& counts = nullptr) const;
+  std::vector<std::uint32_t> samples_of_sites(
+      const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
+      const std::function<bool(Vec3d)>& counts = nullptr) const;
 
  private:
   SpatialHash hash_;

@@ -56,8 +56,8 @@ void SpacingCone::divide(std::size_t node, Vec3d middle, double half,
   nodes_[node].first_child = static_cast<std::int32_t>(first);
   nodes_.resize(first + 8);
   for (int child = 0; child < 8; ++child) {
-    divide(first + static_cast<std::size_t>(child), middle_of_child(middle, half, child), 0.5 * half,
-           sources, depth + 1);
+    divide(first + static_cast<std::size_t>(child), middle_of_child(middle, half, child),
+           0.5 * half, sources, depth + 1);
   }
 }
 
@@ -73,8 +73,8 @@ double SpacingCone::at(Vec3d place) const {
   Vec3d middle = middle_;
   double half = half_;
   while (nodes_[node].first_child >= 0) {
-    const int child = (place.x > middle.x ? 1 : 0) + (place.y > middle.y ? 2 : 0) +
-                      (place.z > middle.z ? 4 : 0);
+    const int child =
+        (place.x > middle.x ? 1 : 0) + (place.y > middle.y ? 2 : 0) + (place.z > middle.z ? 4 : 0);
     middle = middle_of_child(middle, half, child);
     half *= 0.5;
     node = static_cast<std::size_t>(nodes_[node].first_child + child);

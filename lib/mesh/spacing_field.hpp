@@ -40,7 +40,7 @@ class SpacingCone {
  private:
   /// A cube: either a leaf, or one with eight children in a row.
   struct Node {
-    std::int32_t first_child = -1;  ///< -1 for a leaf.
+    std::int32_t first_child = -1;     ///< -1 for a leaf.
     std::uint32_t begin = 0, end = 0;  ///< Its sources, in `listed_`.
   };
   void divide(std::size_t node, Vec3d middle, double half, std::vector<std::uint32_t> sources,
@@ -80,8 +80,8 @@ class SpacingField {
   /// The distance wanted at a place [m]. @param of_sources as above
   double at(Vec3d place, double of_sources) const;
   bool is_uniform() const { return ratio_ == 1; }
-  double coarsest() const { return coarsest_; }          ///< [m]
-  double finest() const { return coarsest_ / ratio_; }   ///< [m]
+  double coarsest() const { return coarsest_; }         ///< [m]
+  double finest() const { return coarsest_ / ratio_; }  ///< [m]
   double growth() const { return growth_; }
   /// The same wishes with another coarsest spacing [m].
   SpacingField with_coarsest(double coarsest) const;

@@ -167,8 +167,8 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const Spacin
                   std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
   const Bulk<PointOn> sample = points_over(surface, spacing, samples_on_faces, seed);
-  const std::vector<Vec3d> more = fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing,
-                                                  gap_on_faces, seed + 1, site);
+  const std::vector<Vec3d> more =
+      fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing, gap_on_faces, seed + 1, site);
   site.insert(site.end(), more.begin(), more.end());
   relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
 }
@@ -268,8 +268,8 @@ std::vector<Vec3d> corners_of(const Features& features, const SpacingField& spac
   std::vector<Vec3d> site = fill_with_darts(blocks, spacing, gap_at_corners, seed, {});
   if (site.empty()) return site;
   // Sample offsets are rounded to float; this restores the exact corners.
-  SampledVoronoi(blocks).snap(site, spacing.coarsest(),
-                              std::vector<std::uint8_t>(site.size(), 1), 0);
+  SampledVoronoi(blocks).snap(site, spacing.coarsest(), std::vector<std::uint8_t>(site.size(), 1),
+                              0);
   return site;
 }
 
@@ -293,14 +293,11 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     if (s.finest() > 2 * volume / area) break;
     require_host_memory("phyxels on a surface", phyxels,
                         bytes_per_sample * samples_on_faces * squares_on(surface, s) / phyxels);
-    found.cuts = {.list = {},
-                  .depth = 1e-7 * s.finest() + rounding,
-                  .spacing = s.coarsest(),
-                  .shift = 0};
+    found.cuts = {
+        .list = {}, .depth = 1e-7 * s.finest() + rounding, .spacing = s.coarsest(), .shift = 0};
     found.boundaries.clear();
     for (const SpaceRegion& region : regions) {
-      const PlannedCut planned =
-          plan_cut(sampler, surface, region, finest_on(s, sampler, region));
+      const PlannedCut planned = plan_cut(sampler, surface, region, finest_on(s, sampler, region));
       if (planned.is_cut) found.boundaries.push_back(planned.boundary);
       if (planned.has_inside) found.cuts.list.push_back({region, planned.boundary});
     }

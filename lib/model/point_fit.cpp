@@ -13,8 +13,11 @@ constexpr int quadratic_terms = 6;
 constexpr Eigen::Index fewest_for_quadratic = 14;
 /// Least length of a quadratic term beside the longest, in what the linear part leaves.
 constexpr double least_term = 1e-3;
-/// The same for gradients, in which terms that few phyxels tell apart would be large.
-constexpr double least_term_of_slopes = 0.05;
+
+/// Largest sum of the lengths of slopes, by the reach. Where few phyxels are around, as at edges
+/// and corners, the quadratic part is taken in a share, so that small differences of displacements
+/// make no large gradient.
+constexpr double largest_slopes = 12;
 
 using Terms = Eigen::Matrix<double, quadratic_terms, 1>;
 using Slopes = Eigen::Matrix<double, quadratic_terms, 3>;
@@ -33,9 +36,8 @@ Eigen::Vector3d in_eigen(Vec3d v) { return {v.x, v.y, v.z}; }
 /// A least-squares fit of a polynomial to values of phyxels.
 class Fit {
  public:
-  /// Other parameters as of `shares_at`. @param least length of a quadratic term beside the
-  /// longest that counts
-  Fit(Vec3d point, std::span<const Vec3d> near, double reach, double least)
+  /// Parameters as of `shares_at`.
+  Fit(Vec3d point, std::span<const Vec3d> near, double reach)
       : reach_(reach), weight_(static_cast<Eigen::Index>(near.size())) {
     Vec3d first;
     for (Eigen::Index k = 0; k < size(); ++k) {
@@ -71,7 +73,7 @@ class Fit {
     }
     const Eigen::VectorXd root = weight_.cwiseSqrt();
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> fit;
-    fit.setThreshold(least);
+    fit.setThreshold(least_term);
     fit.compute(root.asDiagonal() * term);
     rest_ = root.asDiagonal() * fit.pseudoInverse().transpose();
   }
@@ -89,14 +91,24 @@ class Fit {
     return {share.begin(), share.end()};
   }
   std::vector<Vec3d> slopes() const {
-    std::vector<Vec3d> slopes(static_cast<std::size_t>(size()));
-    if (!(sum_ > 0)) return slopes;
-    Eigen::MatrixXd rest = Eigen::MatrixXd::Zero(size(), 3);
-    if (rest_.size() > 0) rest = rest_ * (slopes_of_terms_at(here_) - linear_);
-    for (Eigen::Index k = 0; k < size(); ++k) {
-      const Vec3d of_rest{rest(k, 0), rest(k, 1), rest(k, 2)};
-      slopes[static_cast<std::size_t>(k)] =
-          (slope_[static_cast<std::size_t>(k)] + of_rest) / reach_;
+    std::vector<Vec3d> slopes = slope_, rest(static_cast<std::size_t>(size()));
+    slopes.resize(static_cast<std::size_t>(size()));
+    if (rest_.size() > 0) {
+      const Eigen::MatrixXd of_terms = rest_ * (slopes_of_terms_at(here_) - linear_);
+      for (Eigen::Index k = 0; k < size(); ++k) {
+        rest[static_cast<std::size_t>(k)] = {of_terms(k, 0), of_terms(k, 1), of_terms(k, 2)};
+      }
+    }
+    // The sum of lengths is convex in the share of the quadratic part.
+    double linear = 0, all = 0;
+    for (std::size_t k = 0; k < slopes.size(); ++k) {
+      linear += norm(slopes[k]);
+      all += norm(slopes[k] + rest[k]);
+    }
+    const double share =
+        all > largest_slopes ? std::max(0.0, (largest_slopes - linear) / (all - linear)) : 1;
+    for (std::size_t k = 0; k < slopes.size(); ++k) {
+      slopes[k] = (slopes[k] + share * rest[k]) / reach_;
     }
     return slopes;
   }
@@ -117,11 +129,11 @@ class Fit {
 }  // namespace
 
 std::vector<double> shares_at(Vec3d point, std::span<const Vec3d> near, double reach) {
-  return Fit(point, near, reach, least_term).shares();
+  return Fit(point, near, reach).shares();
 }
 
 std::vector<Vec3d> slopes_at(Vec3d point, std::span<const Vec3d> near, double reach) {
-  return Fit(point, near, reach, least_term_of_slopes).slopes();
+  return Fit(point, near, reach).slopes();
 }
 
 }  // namespace phyxel

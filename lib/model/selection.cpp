@@ -61,9 +61,10 @@ std::vector<Index> inside_mesh(const Selection& selection, const Cloud& cloud,
   Surface surface = read_mesh(selection.mesh);
   const SurfaceDefects defects = inspect_surface(surface);
   if (!connect(surface).closed) {
-    throw InputError(fmt::format(
-        "{}: {}: the surface is not closed ({}), so that nothing lies inside; allowed: a closed one",
-        selection.where, selection.mesh.string(), defects.describe()));
+    throw InputError(
+        fmt::format("{}: {}: the surface is not closed ({}), so that nothing lies inside; allowed: "
+                    "a closed one",
+                    selection.where, selection.mesh.string(), defects.describe()));
   }
   orient(surface);
   place(surface.position, request);

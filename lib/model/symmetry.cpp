@@ -71,7 +71,8 @@ double local_spacing(const NeighbourhoodRule& rule, double support) {
   return support / (rule.factor * distance_to_ten);
 }
 
-std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, std::span<const double> spacing,
+std::vector<PlaneCounts> count_at_planes(const BodyRequest& request,
+                                         std::span<const double> spacing,
                                          std::span<const Vec3d> position) {
   std::vector<PlaneCounts> counts;
   for (const SymmetryRequest& plane : request.symmetries) {

@@ -31,7 +31,8 @@ struct PlaneCounts {
 double local_spacing(const NeighbourhoodRule& rule, double support);
 /// Counts phyxels at each plane of symmetry of a body.
 /// @param spacing at each phyxel [m]; of one element: of all
-std::vector<PlaneCounts> count_at_planes(const BodyRequest& request, std::span<const double> spacing,
+std::vector<PlaneCounts> count_at_planes(const BodyRequest& request,
+                                         std::span<const double> spacing,
                                          std::span<const Vec3d> position);
 
 /// A plane of symmetry that holds the phyxels within a distance.

@@ -173,9 +173,9 @@ CutSource source_of(const BodyRequest& request) {
     made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
   }
   for (const FinerRequest& finer : request.finer) {
-    made.finer.push_back({region_of(finer.select)->before_placement(request.scale, rotation,
-                                                                    request.translation),
-                          finer.by});
+    made.finer.push_back(
+        {region_of(finer.select)->before_placement(request.scale, rotation, request.translation),
+         finer.by});
   }
   made.shift = norm(request.translation) / request.scale;
   return made;

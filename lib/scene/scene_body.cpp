@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "model/selection.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
 #include "phyxel/shapes.hpp"
@@ -25,7 +24,8 @@ SourceKeys lattice_keys(std::vector<const char*> needed) {
 }
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
-  if (std::string(kind) == "mesh") return {{"phyxels"}, {"seed", "relaxations", "on_surface", "grading"}};
+  if (std::string(kind) == "mesh")
+    return {{"phyxels"}, {"seed", "relaxations", "on_surface", "grading"}};
   if (std::string(kind) == "file" || std::string(kind) == "cloud") return {};
   if (is_paper_shape(shape)) return {{}, {"surfels"}};
   if (shape == "cylinder") return lattice_keys({"radius", "length"});
@@ -86,11 +86,8 @@ Grading read_grading(const SceneTable& table) {
 std::vector<FinerRequest> read_finer(const SceneTable& table, double ratio) {
   std::vector<FinerRequest> all;
   for (const SceneTable& finer : table.tables("finer")) {
+    finer.expect_one_of({"box", "ball"});
     FinerRequest request{read_selection(finer), ratio};
-    if (!region_of(request.select)) {
-      throw InputError(fmt::format("{}: finer has no box and no ball; allowed: one of the two",
-                                   request.select.where));
-    }
     finer.read("by", request.by);
     if (request.by > ratio) {
       finer.refuse("by", fmt::format("{:g} found; allowed: 1 to the ratio of the grading, {:g}",

@@ -471,8 +471,9 @@ std::vector<SceneKey> place_keys() {
 std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {
     std::vector<SceneKey> keys;
-    for (const auto& part : {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
-                             law_keys("body.inclusion"), grading_keys(), boundary_keys(), place_keys()}) {
+    for (const auto& part :
+         {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
+          law_keys("body.inclusion"), grading_keys(), boundary_keys(), place_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

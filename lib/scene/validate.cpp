@@ -85,11 +85,10 @@ void check_growth(const BodyRequest& body, const std::string& section, const Sel
 }
 
 void check_one_choice(const BodyRequest& body, const Selection& select) {
-  const int set = static_cast<int>(select.region.has_value()) +
-                  static_cast<int>(select.indices.has_value()) +
-                  static_cast<int>(select.box.has_value()) +
-                  static_cast<int>(select.ball.has_value()) +
-                  static_cast<int>(!select.mesh.empty()) + static_cast<int>(select.all);
+  const int set =
+      static_cast<int>(select.region.has_value()) + static_cast<int>(select.indices.has_value()) +
+      static_cast<int>(select.box.has_value()) + static_cast<int>(select.ball.has_value()) +
+      static_cast<int>(!select.mesh.empty()) + static_cast<int>(select.all);
   if (set == 1) return;
   throw InputError(fmt::format(
       "{}: a selection of body \"{}\" has {} of region, indices, box, ball, mesh and all; allowed: "

@@ -10,8 +10,8 @@ namespace phyxel {
 
 /// Where the phyxels of a body are to be nearer to each other than elsewhere.
 struct Grading {
-  double ratio = 4;       ///< Largest over smallest distance between neighbours, 1 to 10.
-  double growth = 0.25;   ///< Growth of that distance along a path, by its length; 0.05 to 0.5.
+  double ratio = 4;      ///< Largest over smallest distance between neighbours, 1 to 10.
+  double growth = 0.25;  ///< Growth of that distance along a path, by its length; 0.05 to 0.5.
   /// Phyxels over a radius of curvature of the surface; 0: however it curves. Unset: 8, or 0 where
   /// there are finer regions.
   std::optional<double> per_radius;

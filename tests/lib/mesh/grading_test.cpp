@@ -167,8 +167,7 @@ TEST(Repulsion, DoesNotPushFinePointsAmongCoarseOnes) {
 }
 
 TEST(Grading, HasExactlyAsManyPhyxelsAtTheWantedDistances) {
-  const Cloud cloud =
-      sampled(test::unit_cube(), 6000, finer_in(ball({0.5, 0.5, 0.5}, 0.15), 5));
+  const Cloud cloud = sampled(test::unit_cube(), 6000, finer_in(ball({0.5, 0.5, 0.5}, 0.15), 5));
   EXPECT_EQ(cloud.position.size(), 6000u);
   ASSERT_EQ(cloud.spacing.size(), 6000u);
   const auto [finest, coarsest] = std::ranges::minmax(cloud.spacing);
@@ -258,10 +257,9 @@ TEST(Grading, SupportsCutGradedBodies) {
   SpaceRegion clamp;
   clamp.low = {-1, -1, -1};
   clamp.high = {2, 2, 0.3};
-  const Cloud cloud = sample_surface(test::unit_cube(),
-                                     {.phyxels = 6000,
-                                      .cuts = {clamp},
-                                      .grading = finer_in(ball({0.5, 0.5, 0.3}, 0.1), 4)});
+  const Cloud cloud = sample_surface(
+      test::unit_cube(),
+      {.phyxels = 6000, .cuts = {clamp}, .grading = finer_in(ball({0.5, 0.5, 0.3}, 0.1), 4)});
   EXPECT_EQ(cloud.position.size(), 6000u);
   ASSERT_EQ(cloud.cuts.list.size(), 1u);
   std::size_t on_cut = 0, fine = 0;
@@ -280,15 +278,15 @@ TEST(Grading, WithoutWishesIsOneDistance) {
   const auto [finest, coarsest] = std::ranges::minmax(cloud.spacing);
   EXPECT_DOUBLE_EQ(finest, coarsest);
   SampleReport report;
-  sample_surface(test::unit_cube(),
-                 {.phyxels = 1000, .grading = finer_in(ball({9, 9, 9}, 1), 4)}, &report);
+  sample_surface(test::unit_cube(), {.phyxels = 1000, .grading = finer_in(ball({9, 9, 9}, 1), 4)},
+                 &report);
   EXPECT_THAT(report.warnings,
               testing::ElementsAre(HasSubstr("the grading has no effect"),
                                    HasSubstr("finer region 1 of the grading holds no phyxel")));
 }
 
-/// However much a scene grades, at least two phyxels are through the thickness of a bar far from the
-/// finer region.
+/// However much a scene grades, at least two phyxels are through the thickness of a bar far from
+/// the finer region.
 TEST(Grading, LeavesPhyxelsThroughTheThickness) {
   Grading grading = finer_in(ball({4, 0.1, 0.1}, 0.2), 10);
   grading.growth = 0.5;

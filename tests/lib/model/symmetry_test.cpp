@@ -264,5 +264,35 @@ TEST(Symmetry, AQuarterOfATubeWidensAsTheWholeDoes) {
   EXPECT_NEAR(quarter, whole, 0.02 * expected);
 }
 
+/// A cube that is strongly graded towards the corner where three planes meet, under tension: the
+/// layers of fine phyxels beside a plane are not taken for one.
+TEST(Symmetry, HoldsTheFaceAloneOfAGradedBody) {
+  Grading grading;
+  grading.ratio = 10;
+  grading.growth = 0.5;
+  SpaceRegion corner;
+  corner.is_ball = true;
+  corner.radius = 0.15;
+  grading.finer.push_back({corner, 10});
+  const Cloud cloud = sample_surface(test::unit_cube(), {.phyxels = 2000, .grading = grading});
+  Scene scene = block({1, 1, 1}, {0, 0, 0});
+  scene.bodies[0].source = {};
+  scene.bodies[0].closure = 1e-4;
+  cut_at_origin(scene);
+  pull(scene, {1000, 0, 0});
+  const Model model = build_model(scene, std::span(&cloud, 1));
+  EXPECT_THAT(model.warnings, IsEmpty());
+  const State rest = rest_of(model);
+  const double strain = 1000 / rubber().young;
+  double worst = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    const Vec3d x = model.position[i],
+                exact{strain * x.x, -0.3 * strain * x.y, -0.3 * strain * x.z};
+    worst = std::max(worst, norm(rest.displacement[i] - exact));
+  }
+  // Areas of tractions differ by some percent from phyxel to phyxel.
+  EXPECT_LT(worst, 5e-3 * strain);
+}
+
 }  // namespace
 }  // namespace phyxel

@@ -178,7 +178,8 @@ std::vector<Late> refused_planes() {
 /// Probes that are nowhere, or of nothing.
 std::vector<Late> refused_probes() {
   const std::string one = "[[probe]]\n";
-  return {{with_bar(one), {":13:", "exactly one of: point, from, region, indices, box, ball, all"}},
+  return {{with_bar(one),
+           {":13:", "exactly one of: point, from, region, indices, box, ball, mesh, all"}},
           {with_bar(one + "point = [0, 0, 0]\nall = true\n"), {"exactly one of"}},
           {with_bar(one + "from = [0, 0, 0]\n"), {"from", "to"}},
           {with_bar(one + "point = [0, 0, 0]\npoints = 4\n"), {":15:", "points", "from and to"}},
@@ -191,6 +192,29 @@ std::vector<Late> refused_probes() {
             "at most"}},
           {with_bar(one + "region = 'left'\n"), {":14:", "no region \"left\""}},
           {with_bar(one + "box = [[7, 7, 7], [8, 8, 8]]\n"), {":14:", "selects no phyxel"}}};
+}
+
+/// Gradings of bodies that cannot have them, and finer regions.
+std::vector<Late> refused_gradings() {
+  return {
+      {with_body("mesh = 'flat.obj'\nphyxels = 50\n[body.grading]"),
+       {":5:1", "flat.obj: ", "encloses no"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\non_surface = false\n[body.grading]"),
+       {":8:14", "on_surface", "false found", "no grading"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647\n[body.grading]\nratio = 10"),
+       {":5:1", "ball.obj: 2147483647", "GiB"}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.5\n[body.grading]"),
+       {":9:1", "grading", "shape"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nregion = 'x+'"),
+       {":10:1", "box", "ball"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nall = true\nball = {centre = [0, 0, 0], radius = 1}"),
+       {":11:7", "body.grading.finer.all"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
+                 "[[body.grading.finer]]\nball = {centre = [0, 0, 0], radius = 1}\nby = 4"),
+       {":12:6", "body.grading.finer.by", "4 found", "the ratio of the grading, 3"}},
+  };
 }
 
 /// What only shows when the model is built or its steps are planned.
@@ -262,23 +286,6 @@ std::vector<Late> late_refusals() {
       {with_body("mesh = 'ball.txt'\nphyxels = 50"), {":5:1", "ball.txt: the extension"}},
       {with_body("mesh = 'flat.obj'\nphyxels = 50\non_surface = true"), {":5:1", "flat.obj: "}},
       {with_body(mesh + "on_surface = true"), {":5:1", "ball.obj: "}},
-      {with_body("mesh = 'flat.obj'\nphyxels = 50\n[body.grading]"),
-       {":5:1", "flat.obj: ", "encloses no"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 50\non_surface = false\n[body.grading]"),
-       {":8:14", "on_surface", "false found", "no grading"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647\n[body.grading]\nratio = 10"),
-       {":5:1", "ball.obj: 2147483647", "GiB"}},
-      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.5\n[body.grading]"),
-       {":9:1", "grading", "shape"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
-                 "[[body.grading.finer]]\nregion = 'x+'"),
-       {":11:10", "no box and no ball"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
-                 "[[body.grading.finer]]\nall = true\nball = {centre = [0, 0, 0], radius = 1}"),
-       {":11:7", "all", "ball"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
-                 "[[body.grading.finer]]\nball = {centre = [0, 0, 0], radius = 1}\nby = 4"),
-       {":12:6", "body.grading.finer.by", "4 found", "the ratio of the grading, 3"}},
       {with_body("file = 'ball.obj'"), {":5:1", "ball.obj: not a file written by phyxel"}},
       {with_body("cloud = 'mine'"), {":5:1", "key body.cloud: \"mine\" found"}},
       {with_body("mesh = 'gone.obj'\nphyxels = 5"), {":6:8", "gone.obj"}},
@@ -295,7 +302,7 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
   for (const std::vector<Late>& refusals :
-       {late_refusals(), refused_loads(), refused_planes(), refused_probes()}) {
+       {late_refusals(), refused_gradings(), refused_loads(), refused_planes(), refused_probes()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);

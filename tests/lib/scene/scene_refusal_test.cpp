@@ -171,7 +171,8 @@ const std::vector<Malformed>& malformed() {
       {in_section("body.array", "count = [99, 99, 99]\nspacing = [1, 1, 1]"), "10:9",
        "970299 copies found; allowed: at most 10000"},
       // Selections, motions, loads
-      {after_beam("[[body.fixed]]\n"), "12:1", "exactly one of: region, indices, box, ball, all"},
+      {after_beam("[[body.fixed]]\n"), "12:1",
+       "exactly one of: region, indices, box, ball, mesh, all"},
       {after_beam("[[body.fixed]]\nregion = 'x-'\nall = true\n"), "14:7", "together with region"},
       {after_beam("[[body.fixed]]\nregion = ''\n"), "13:10", "\"\" found"},
       {after_beam("[[body.fixed]]\nall = false\n"), "13:7", "selects nothing; allowed: true"},

@@ -73,9 +73,10 @@ TEST(Validate, AsksForOneMemberOfEachSelection) {
   scene.bodies[0].fixed.push_back({.select = {.all = true, .where = "code:3"}});
   EXPECT_EQ(refusal_of(scene), "accepted");
   scene.bodies[0].fixed[0].select.box = Selection::Box{{0, 0, 0}, {1, 1, 1}};
-  EXPECT_EQ(refusal_of(scene),
-            "code:3: a selection of body \"body\" has 2 of region, indices, box, ball and all; "
-            "allowed: exactly one");
+  EXPECT_EQ(
+      refusal_of(scene),
+      "code:3: a selection of body \"body\" has 2 of region, indices, box, ball, mesh and all; "
+      "allowed: exactly one");
   scene.bodies[0].fixed[0].select = {};
   EXPECT_THAT(refusal_of(scene), HasSubstr("has 0 of region"));
   scene.bodies[0].fixed[0].select = {.indices = std::vector<Index>{27}};

@@ -367,5 +367,39 @@ TEST(Follower, KeepsTheEnergyOfAGas) {
   }
 }
 
+/// A face with free edges of an irregular body, under a tenth of Young's modulus: where few phyxels
+/// are around, gradients must not be so large that the load's stiffness exceeds the body's.
+TEST(Follower, IsStableAtTheEdgesOfFaces) {
+  for (const Index phyxels : {1000, 3000}) {
+    const Cloud cloud = sample_surface(test::unit_cube(), {.phyxels = phyxels});
+    const auto rest = [&](bool follower) {
+      Material material = rubber();
+      material.law = "neo-hookean";
+      material.hourglass = 0.1;
+      Scene scene = one_body(material);
+      scene.bodies[0].fixed.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {2, 2, 0}}}});
+      scene.bodies[0].tractions.push_back({.select = {.all = true},
+                                           .pressure = 0.1 * material.young,
+                                           .follower = follower,
+                                           .normal = {0, 0, 1}});
+      const Model model = build_model(scene, std::span(&cloud, 1));
+      const auto backend = make_test_backend(model, Precision::double_);
+      const Equilibrium found = find_equilibrium(model, *backend, {.most_steps = 12});
+      double top = 0, all = 0;
+      for (Index i = 0; i < model.size(); ++i) {
+        if (model.position[i].z < 0.99) continue;
+        top += model.mass[i] * found.state.displacement[i].z;
+        all += model.mass[i];
+      }
+      return top / all;
+    };
+    // The face grows by some percent, and with it the force.
+    const double dead = rest(false), following = rest(true);
+    EXPECT_LT(dead, -0.07);
+    EXPECT_GT(following / dead, 1);
+    EXPECT_LT(following / dead, 1.1);
+  }
+}
+
 }  // namespace
 }  // namespace phyxel
