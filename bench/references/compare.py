@@ -140,7 +140,8 @@ def main():
         references = json.load(file)
     file = open(options.out, "w", newline="", buffering=1) if options.out else sys.stdout
     out = csv.writer(file, lineterminator="\n")
-    out.writerow(COLUMNS)
+    columns = [c for c in COLUMNS if c != "grading" or any(options.grading)]
+    out.writerow(columns)
     with tempfile.TemporaryDirectory() as folder:
         write_meshes(folder, options.meshes, {references[c]["mesh"][:-4] for c in options.cases if "mesh" in references[c]})
         for case in options.cases:
@@ -155,7 +156,7 @@ def main():
                         continue
                     row = {"case": case, "clamp": clamp, "closure": closure.strip('"'), "grading": grading, "phyxels": len(x),
                            "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, x, u, mass, stress, probes)}
-                    out.writerow([f"{v:.2e}" if isinstance(v, float) else v for c, v in ((c, row.get(c, "")) for c in COLUMNS)])
+                    out.writerow([f"{v:.2e}" if isinstance(v, float) else v for v in (row.get(c, "") for c in columns)])
 
 
 if __name__ == "__main__":
