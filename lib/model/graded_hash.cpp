@@ -24,7 +24,8 @@ GradedHash::GradedHash(std::span<const Vec3d> position, std::span<const double> 
     octave.largest = std::max(octave.largest, size[i]);
     largest = std::max(largest, size[i]);
   }
-  for (auto& [power, octave] : found) {
+  for (auto& entry : found) {
+    Octave& octave = entry.second;
     const std::vector<Vec3d> here =
         tabulated(octave.member.size(), [&](std::size_t k) { return position[octave.member[k]]; });
     // From level to level cells are four times as large. One more level could be of use only to
