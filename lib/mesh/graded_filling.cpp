@@ -14,12 +14,6 @@
 namespace phyxel {
 namespace {
 
-/// Clearance from the surface and from phyxels on it that a node has at the start, in spacings, and
-/// the least to which it is reduced where there is no room for all.
-constexpr double usual_clearance = 0.62, least_clearance = 0.45;
-/// Strength of the repulsion by a phyxel on the surface, as beside a lattice.
-constexpr double surface_strength = 0.85;
-constexpr double surface_samples = 12;
 /// Sample points for a volume along a spacing.
 constexpr double samples_along = 5;
 /// Levels of an octave, each with a lattice and a size of samples of its own.
@@ -61,9 +55,7 @@ class Levels {
 class Clear {
  public:
   Clear(const LatticeRequest& request, const SpacingField& spacing) : spacing_(spacing) {
-    std::vector<Vec3d> place = request.sites.position;
-    place.insert(place.end(), request.sites.on_cuts.begin(), request.sites.on_cuts.end());
-    // A distance to a point between phyxels counts for more than one to a phyxel.
+    std::vector<Vec3d> place = all_sites(request.sites);
     sites_ = place.size();
     for (const PointOn& p :
          points_over(request.surface, spacing, surface_samples, request.seed + 1)) {
@@ -76,7 +68,6 @@ class Clear {
 
   /// The clearance of a place, in spacings; 1 for all that is farther.
   double at(Vec3d place) const {
-    constexpr double sample_factor = 1.2;
     const double spacing = spacing_.at(place);
     double clearance = spacing;
     hash_->visit_ball(
@@ -145,14 +136,14 @@ double weight_of(const std::vector<Node>& nodes, double clearance) {
 
 /// Leaves nodes out such that each run of nodes keeps about the sum of its weights, and n are kept.
 std::vector<Vec3d> thinned_out(const std::vector<Node>& nodes, double clearance, std::size_t n) {
-  double weight = weight_of(nodes, clearance), left = static_cast<double>(n);
+  const double phyxels_for_weight = static_cast<double>(n) / weight_of(nodes, clearance);
   std::size_t candidates = 0;
   for (const Node& node : nodes) candidates += node.clearance >= clearance;
   std::vector<Vec3d> kept;
   double owed = 0.5;
   for (const Node& node : nodes) {
     if (node.clearance < clearance) continue;
-    owed += node.weight * (left / weight);
+    owed += node.weight * phyxels_for_weight;
     // The last nodes are all kept if they are needed.
     const bool needed = n - kept.size() >= candidates--;
     if (kept.size() < n && (owed >= 1 || needed)) {
@@ -168,8 +159,7 @@ class GradedSkin {
  public:
   GradedSkin(const LatticeRequest& request, const SpacingField& spacing,
              const std::vector<Vec3d>& inside)
-      : request_(request), spacing_(spacing), point_(request.sites.position) {
-    point_.insert(point_.end(), request.sites.on_cuts.begin(), request.sites.on_cuts.end());
+      : request_(request), spacing_(spacing), point_(all_sites(request.sites)) {
     first_inside_ = point_.size();
     point_.insert(point_.end(), inside.begin(), inside.end());
   }
@@ -178,16 +168,9 @@ class GradedSkin {
   void sweep() {
     const Repulsion repulsion(point_, spacing_);
     std::vector<Vec3d> moved = point_;
-    const auto on_surface = static_cast<Index>(request_.sites.position.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t k = first_inside_; k < point_.size(); ++k) {
-      bool beside_surface = false;
-      const auto strength = [&](Index other) {
-        beside_surface |= other < on_surface;
-        return other < on_surface ? surface_strength : 1;
-      };
-      const Vec3d after = point_[k] + repulsion.step(point_[k], static_cast<Index>(k), strength);
-      if (!beside_surface || request_.sampler.inside(after)) moved[k] = after;
+      moved[k] = repelled_inside(request_, repulsion, point_[k], static_cast<Index>(k));
     }
     point_.swap(moved);
   }
@@ -267,7 +250,7 @@ LatticeFilling fill_graded(const LatticeRequest& request, SpacingField& spacing)
           return node.clearance >= usual_clearance;
         }));
     if (enough >= n && std::abs(ratio - 1) < 0.02) break;
-    if (attempt == most_attempts && nodes.size() >= n) {
+    if (attempt >= most_attempts && nodes.size() >= n) {
       clearance = enough >= n ? usual_clearance : least_clearance;
       break;
     }

@@ -23,26 +23,13 @@ constexpr double moving_clearance = 2;
 constexpr double regular_clearance = 3;
 /// Largest clearance that is found: moving nodes meet no nodes beyond it.
 constexpr double largest_clearance = 4;
-/// Clearances of the nodes nearest to the surface: as a rule, and the limits beyond which a finer
-/// lattice is tried, or a coarser one.
-constexpr double usual_clearance = 0.62, least_clearance = 0.45, most_clearance = 0.8;
+/// Clearance of the nodes nearest to the surface beyond which a coarser lattice is tried.
+constexpr double most_clearance = 0.8;
 /// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
 /// which closed bars bend right.
 constexpr double surface_strength = 0.85;
-/// Sample points on the surface for each square of the lattice constant.
-constexpr double surface_samples = 12;
-/// A distance to a sample point of the surface counts that many times: nodes keep off the middle of
-/// a face nearly as far as off a phyxel on it.
-constexpr double sample_factor = 1.2;
 /// Sample points for a volume along a lattice constant.
 constexpr double samples_along = 6;
-
-/// Phyxels on the surface, then those on cuts [m].
-std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
-  std::vector<Vec3d> all = sites.position;
-  all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
-  return all;
-}
 
 /// A test that tells places deep inside a surface and far from cuts.
 class Depth {
@@ -192,7 +179,9 @@ class Skin {
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const Vec3d before = point_[sites() + k];
-      moved[k] = clearance_of(k) < moving_clearance ? moved_from(before, k, repulsion) : before;
+      moved[k] = clearance_of(k) < moving_clearance
+                     ? repelled_inside(request_, repulsion, before, static_cast<Index>(sites() + k))
+                     : before;
     }
     std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
   }
@@ -258,19 +247,6 @@ class Skin {
     }
     return volume;
   }
-  Vec3d moved_from(Vec3d before, std::ptrdiff_t k, const Repulsion& repulsion) const {
-    const auto first_inside = static_cast<Index>(on_surface());
-    bool beside_surface = false;
-    const auto strength = [&](Index other) {
-      beside_surface |= other < first_inside;
-      return other < first_inside ? surface_strength : 1;
-    };
-    const auto self = static_cast<Index>(static_cast<std::ptrdiff_t>(sites()) + k);
-    const Vec3d after = before + repulsion.step(before, self, strength);
-    // Only nodes beside phyxels on the surface can leave it.
-    return !beside_surface || request_.sampler.inside(after) ? after : before;
-  }
-
   const LatticeRequest& request_;
   Nodes& nodes_;
   double spacing_;
@@ -279,6 +255,25 @@ class Skin {
 };
 
 }  // namespace
+
+std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
+  std::vector<Vec3d> all = sites.position;
+  all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
+  return all;
+}
+
+Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
+                      Index self) {
+  const auto on_surface = static_cast<Index>(request.sites.position.size());
+  bool beside_surface = false;
+  const auto strength = [&](Index other) {
+    beside_surface |= other < on_surface;
+    return other < on_surface ? surface_strength : 1;
+  };
+  const Vec3d after = before + repulsion.step(before, self, strength);
+  // Only nodes beside phyxels on the surface can leave it.
+  return !beside_surface || request.sampler.inside(after) ? after : before;
+}
 
 Mat3d turn_of_lattice() {
   constexpr double w = 30, x = 8, y = 6, z = -9, all = w * w + x * x + y * y + z * z;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mesh/inside_samples.hpp"
+#include "mesh/repulsion.hpp"
 #include "mesh/surface_sites.hpp"
 #include "phyxel/cloud.hpp"
 
@@ -30,6 +31,24 @@ struct LatticeFilling {
   std::vector<double> volume;
   double spacing = 0;  ///< Lattice constant [m].
 };
+
+/// Clearance of the nodes nearest to the surface as a rule, and the least that is allowed where
+/// there is no room for all, in spacings. These and the next were chosen by the accuracy of the
+/// clouds.
+inline constexpr double usual_clearance = 0.62, least_clearance = 0.45;
+/// Sample points on the surface, from which nodes keep off too, for each square of the spacing.
+inline constexpr double surface_samples = 12;
+/// A distance to a sample point of the surface counts that many times: nodes keep off the middle of
+/// a face nearly as far as off a phyxel on it.
+inline constexpr double sample_factor = 1.2;
+
+/// Phyxels on the surface, then those on cuts [m].
+std::vector<Vec3d> all_sites(const SurfaceSites& sites);
+
+/// The place of a point inside after a step of repulsion; the place before it if the step would
+/// leave the surface [m]. @param self index of the point, after those of the sites
+Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
+                      Index self);
 
 /// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
 /// that of a face that people draw, so that no layer of nodes has one clearance for all.

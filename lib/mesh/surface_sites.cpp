@@ -279,10 +279,7 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
                       const SpacingField& wanted, const InsideSampler& sampler,
                       std::span<const SpaceRegion> regions, Index phyxels, std::uint64_t seed,
                       int relaxations, Stage& stage) {
-  double area = 0;
-  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
-    area += norm(area_of(surface, static_cast<Index>(t)));
-  }
+  const double area = sampler.area();
   const Features features = features_of(surface, topology);
   const double rounding =
       16 * std::numeric_limits<double>::epsilon() * box_around(surface.position).farthest();
