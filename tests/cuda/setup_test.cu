@@ -197,7 +197,7 @@ TEST_P(Setup, WhatIsAroundEqualsTheCpus) {
     NeighbourhoodRule rule;
     if (one_sided) rule.support = NeighbourhoodRule::Support::adaptive;
     const Neighbourhood hood = neighbours_within(position, support, rule);
-    const std::vector<double> sums = kernel_sums(position, hood, spacing);
+    const std::vector<double> sums = kernel_sums(position, hood, spacing, rule.pairwise());
     const Around around = surveyor->around(position, support, spacing, own, one_sided),
                  expected = around_by_lists(hood, 0, own);
     EXPECT_EQ(around.needed, expected.needed);
