@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "device_option.hpp"
 #include "kind.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
+#include "phyxel/share.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -126,7 +128,25 @@ BoundarySize boundary_size(const Model& model) {
   return size;
 }
 
-std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary) {
+std::vector<SupportRange> support_ranges(const Model& model) {
+  std::vector<SupportRange> ranges;
+  for (const Part& part : model.parts) {
+    double least = std::numeric_limits<double>::infinity(), largest = 0;
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      least = std::min(least, model.neighbourhood.support[i]);
+      largest = std::max(largest, model.neighbourhood.support[i]);
+    }
+    if (model.share) {
+      least = model.share->communicator->smallest(least);
+      largest = model.share->communicator->largest(largest);
+    }
+    ranges.push_back({std::min(least, largest), largest});
+  }
+  return ranges;
+}
+
+std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary,
+                           const std::vector<SupportRange>& supports) {
   std::string text;
   const std::size_t shown = std::min<std::size_t>(model.parts.size(), 12);
   for (std::size_t p = 0; p < shown; ++p) {
@@ -137,6 +157,11 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
         part.size, part.surfels, part.mass, part.volume,
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
+    if (supports[p].least < supports[p].largest) {
+      text += fmt::format(
+          "              supports of {:.4g} to {:.4g} m; the smallest limit explicit steps\n",
+          supports[p].least, supports[p].largest);
+    }
     text += fmt::format("              {}rho = {:g} kg/m^3; {}\n", moduli_of(m), m.density,
                         terms_of(part));
   }

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "phyxel/backend.hpp"
 #include "phyxel/scene.hpp"
@@ -31,10 +32,19 @@ struct BoundarySize {
 /// Counts the boundary phyxels of a model, without ghosts.
 BoundarySize boundary_size(const Model& model);
 
+/// The least and the largest support of a part [m].
+struct SupportRange {
+  double least = 0, largest = 0;
+};
+/// The range of each part of a model. Collective on a share.
+std::vector<SupportRange> support_ranges(const Model& model);
+
 /// Description of bodies, materials, terms, neighbours and warnings, line by line.
 /// @param model may be a rank's share
 /// @param boundary counts of the whole model
-std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary);
+/// @param supports result of `support_ranges`
+std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary,
+                           const std::vector<SupportRange>& supports);
 
 /// The value of `--precision`. @throws InputError
 Precision precision_option(const std::string& name);

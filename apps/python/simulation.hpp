@@ -15,6 +15,7 @@
 #include "phyxel/gases.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/output_fields.hpp"
 #include "phyxel/reactions.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
@@ -270,7 +271,8 @@ class Simulation {
       backend_->advect_surfels(surfels);
       frame.surfels = &surfels;
     }
-    frame.fields = find_fields(model_, *backend_, wanted_fields(scene_.output), recovery());
+    if (!fields_) fields_.emplace(model_, scene_.output);
+    frame.fields = fields_->find(*backend_, frame.surfels, recovery());
     recorder_->write(frame);
   }
 
@@ -353,6 +355,7 @@ class Simulation {
   std::optional<StabilityWatch> watch_;
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<const Recovery> recovery_;
+  std::optional<OutputFields> fields_;
   std::optional<Probes> probes_;
   std::int64_t looked_ = 0;
   RunProgress told_;

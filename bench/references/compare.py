@@ -9,7 +9,7 @@ Needs Python 3.11 with numpy, scipy and h5py 3.16.0 from PyPI. FOLDER holds fand
 Clamp "box": the whole body, whose phyxels below the plane are held. Clamp "cut": the mesh is cut at the plane, and a
 thin box holds the phyxels on the cut. Displacements and stresses at points are those of a linear fit over the twelve
 nearest phyxels; the compliance is the sum of loads times displacements over phyxels. The peak stress at the hole is
-that of the scene's probes.
+that of the scene's probes, and the largest of the surface's vertices.
 """
 import argparse
 import csv
@@ -31,7 +31,7 @@ import surfaces
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 COLUMNS = ["case", "clamp", "closure", "grading", "phyxels", "held", "compliance", "end", "largest displacement",
-           "median von Mises", "95% von Mises", "peak von Mises"]
+           "median von Mises", "95% von Mises", "peak von Mises", "peak on the surface"]
 
 
 def write_meshes(folder, meshes, names):
@@ -62,7 +62,8 @@ def scene_of(case, reference, clamp, closure, grading, count):
 
 
 def run(phyxel, folder, text, threads):
-    """Rest positions, displacements, masses and von Mises stresses of phyxels at rest, and those of probes."""
+    """Rest positions, displacements, masses and von Mises stresses of phyxels at rest, those of probes, and the largest
+    of the surface; None if the scene has no surface frames."""
     scene, out = os.path.join(folder, "scene.toml"), os.path.join(folder, "out")
     with open(scene, "w") as file:
         file.write(text)
@@ -75,9 +76,13 @@ def run(phyxel, folder, text, threads):
         x = file["VTKHDF/Points"][:].astype(float)
     with open(os.path.join(out, "run.json")) as file:
         probes = [probe["von_mises_pa"] for probe in json.load(file)["probes"]]
+    peak, surface = None, sorted(glob.glob(os.path.join(out, "surface_*.hdf")))
+    if surface:
+        with h5py.File(surface[-1]) as file:
+            peak = float(file["VTKHDF/PointData/von_mises"][:].max())
     with h5py.File(last) as file:
         data = file["VTKHDF/PointData"]
-        return x, *(data[name][:].astype(float) for name in ("displacement", "mass", "von_mises")), probes
+        return x, *(data[name][:].astype(float) for name in ("displacement", "mass", "von_mises")), probes, peak
 
 
 def fitted(points, x, values, near=12):
@@ -97,7 +102,7 @@ def end_of(x, u, reference):
     return fitted(points, x, u).mean(0)
 
 
-def errors(reference, x, u, mass, stress, probes):
+def errors(reference, x, u, mass, stress, probes, peak):
     """Relative errors by column of the table."""
     row, known = {}, reference["quantities"]
     if "load" in reference:
@@ -121,6 +126,7 @@ def errors(reference, x, u, mass, stress, probes):
         row["median von Mises"], row["95% von Mises"] = np.percentile(wrong, [50, 95])
     if "peak_von_mises" in known:
         row["peak von Mises"] = np.mean(probes) / known["peak_von_mises"]["value"] - 1
+        row["peak on the surface"] = peak / known["peak_von_mises"]["value"] - 1
     return row
 
 
@@ -150,12 +156,13 @@ def main():
                 for closure, grading, count in itertools.product(options.closures, options.grading, options.counts):
                     text = scene_of(case, reference, clamp, closure, grading, count)
                     try:
-                        x, u, mass, stress, probes = run(options.phyxel, folder, text, options.threads)
+                        found = run(options.phyxel, folder, text, options.threads)
                     except RuntimeError as error:
                         print(f"{case}, {clamp}, closure {closure}, {count}: {error}", file=sys.stderr)
                         continue
+                    x, u = found[:2]
                     row = {"case": case, "clamp": clamp, "closure": closure.strip('"'), "grading": grading, "phyxels": len(x),
-                           "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, x, u, mass, stress, probes)}
+                           "held": int((np.abs(u).max(1) == 0).sum()), **errors(reference, *found)}
                     out.writerow([f"{v:.2e}" if isinstance(v, float) else v for v in (row.get(c, "") for c in columns)])
 
 

@@ -126,6 +126,16 @@ Hdf5Writer::Fill<Index> bodies(std::vector<std::int64_t> ends) {
   };
 }
 
+/// Calls use(name, quantity) for the computed fields and for what the materials of a scene
+/// remember, if frames hold it.
+template <class Use>
+void for_each_found_field(const Model& model, const Scene& scene, Use&& use) {
+  for (const PointField& computed : point_fields()) use(computed.name, computed.quantity);
+  if (!scene.output.wants("history")) return;
+  const std::vector<std::string> columns = history_columns(model);
+  for (std::size_t k = 0; k < columns.size(); ++k) use(columns[k].c_str(), history_quantity(k));
+}
+
 }  // namespace
 
 bool floats_hold_positions(const Model& model, double displacement, Points points) {
@@ -197,15 +207,9 @@ void write_phyxel_frame(const std::filesystem::path& file, const Model& model, c
   };
   if (scene.output.wants("displacement")) field("displacement", as_float, Quantity::displacement);
   if (scene.output.wants("velocity")) field("velocity", as_float, Quantity::velocity);
-  for (const PointField& computed : point_fields()) {
-    if (values.has(computed.quantity)) field(computed.name, true, computed.quantity);
-  }
-  if (scene.output.wants("history")) {
-    const std::vector<std::string> columns = history_columns(model);
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      field(columns[k].c_str(), true, history_quantity(k));
-    }
-  }
+  for_each_found_field(model, scene, [&](const char* name, Quantity quantity) {
+    if (is_history(quantity) || values.has(quantity)) field(name, true, quantity);
+  });
   if (scene.output.wants("mass")) field("mass", true, Quantity::mass);
   if (scene.output.wants("volume")) field("volume", true, Quantity::volume);
   if (cells > 1 || scene.output.wants("body")) {
@@ -246,6 +250,13 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   out.later<std::int64_t>("/VTKHDF/Offsets", cells + 1, 0, stretch, counting(3));
   out.group("/VTKHDF/PointData");
   vectors("/VTKHDF/PointData/Normals", true, Quantity::surfel_normal);
+  const auto field = [&](const char* name, bool as_float, Quantity quantity) {
+    if (!values.has(on_surface(quantity))) return;
+    vectors((std::string("/VTKHDF/PointData/") + name).c_str(), as_float, on_surface(quantity));
+  };
+  field("displacement", scene.solver.precision == Precision::single, Quantity::displacement);
+  for_each_found_field(model, scene,
+                       [&](const char* name, Quantity quantity) { field(name, true, quantity); });
   if (ends.surfels.size() > 1) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }

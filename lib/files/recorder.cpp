@@ -89,8 +89,13 @@ void check_frame(const Model& model, const Frame& frame) {
     const auto width = static_cast<Index>(width_of(field.quantity));
     check(field.name, found->second.size(), width * model.size(), true);
   }
-  if (!frame.surfels) return;
   const auto surfels = static_cast<Index>(model.surfels.position.size());
+  for (const auto& [quantity, values] : frame.fields) {
+    if (!is_on_surface(quantity)) continue;
+    check("a field of surfels", values.size(), static_cast<Index>(width_of(quantity)) * surfels,
+          true);
+  }
+  if (!frame.surfels) return;
   check("surfels.position", frame.surfels->position.size(), surfels, false);
   check("surfels.normal", frame.surfels->normal.size(), surfels, false);
 }

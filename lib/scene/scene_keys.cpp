@@ -62,7 +62,7 @@ std::string field_meanings() {
       "What each phyxel carries beside its position: displacement [m], velocity [m/s], mass [kg], volume "
       "[m^3], number of its body, and what its material remembers";
   for (const PointField& field : point_fields()) all += fmt::format("; `{}`: {}", field.name, field.meaning);
-  return all + ".";
+  return all + ". The surface has them, too, but for velocity, mass and volume.";
 }
 
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
@@ -158,8 +158,8 @@ std::vector<SceneKey> run_keys() {
        .words = field_names(), .meaning = field_meanings()},
       {.section = "output", .name = "recovery", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Recovers the gradients of phyxels on the surface for stresses and strains of frames and "
-           "probes, and keeps the tractions that the balance of forces gives. Phyxels whose law has a history keep their "
-           "own gradients. false: all phyxels keep them."},
+           "probes, and keeps the tractions that the balance of forces gives. false: "
+           "they are those from which forces follow."},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},

@@ -30,13 +30,14 @@ class PartLaw {
   const ChosenLaw& chosen() const { return chosen_; }
 
   /// The response at the end of a step of `dt` [s].
-  /// @param history the phyxel's history at the start of the step, in the law's order
+  /// @param history the phyxel's history at the start of the step, in the law's order; advanced to
+  ///   its end
   PointResponse<double> after_step(const Mat3d& grad_u, std::span<double> history,
                                    double dt) const {
     if (custom_) return of_custom(grad_u, history, dt);
     return response_after_step<double>(
         chosen_.index, chosen_.constants.data(), grad_u,
-        [&](int k) { return history[static_cast<std::size_t>(k)]; }, dt);
+        [&](int k) -> double& { return history[static_cast<std::size_t>(k)]; }, dt);
   }
 
  private:
@@ -57,7 +58,7 @@ class PartLaw {
     const std::array<double, 4> beside{material_.lame_lambda(), material_.lame_mu(), stiffness,
                                        material_.viscosity};
     if (stiffness > 0 || material_.viscosity > 0) {
-      const auto number = [&](int k) {
+      const auto number = [&](int k) -> double& {
         return history[custom_numbers_ + static_cast<std::size_t>(k)];
       };
       constexpr int hooke = Laws::index_of<SmallStrain>;

@@ -1,13 +1,12 @@
 #include "phyxel/point_fields.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/history.hpp"
+#include "solver/field_point.hpp"
 #include "solver/first_error.hpp"
-#include "solver/part_law.hpp"
 #include "solver/tensors.hpp"
 
 namespace phyxel {
@@ -70,47 +69,7 @@ bool is_stress(Quantity quantity) {
   return quantity == Quantity::von_mises || quantity == Quantity::stress ||
          quantity == Quantity::principal_stress;
 }
-
-/// A gradient that differs from `grad_u` by a nᵀ and has the traction P n of another one, found by
-/// Newton's method. @returns `fallback` if it is not found
-Mat3d with_traction(const PartLaw& law, const Mat3d& grad_u, Vec3d traction, Vec3d normal,
-                    const Mat3d& fallback) {
-  constexpr int most_steps = 5;
-  constexpr double difference = 1e-7, tolerance = 1e-6;
-  const auto traction_at = [&](const Mat3d& g) {
-    return law.after_step(g, {}, 0).first_piola_stress * normal;
-  };
-  Mat3d g = grad_u;
-  Vec3d here = traction_at(g);
-  const double size = norm(here) + norm(traction);
-  for (int step = 0; step < most_steps; ++step) {
-    const Vec3d left = traction - here;
-    if (norm(left) <= tolerance * size) return g;
-    Eigen::Matrix3d slope;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3d along{k == 0 ? difference : 0, k == 1 ? difference : 0, k == 2 ? difference : 0};
-      const Vec3d change = (traction_at(g + outer(along, normal)) - here) / difference;
-      slope.col(k) = Eigen::Vector3d(change.x, change.y, change.z);
-    }
-    const Eigen::Vector3d a = slope.fullPivLu().solve(Eigen::Vector3d(left.x, left.y, left.z));
-    g += outer(Vec3d{a[0], a[1], a[2]}, normal);
-    here = traction_at(g);
-  }
-  return norm(traction - here) <= tolerance * size ? g : fallback;
-}
-
-/// The gradient of a phyxel's fields: the recovered one, with the traction of its own.
-Mat3d field_gradient(const PartLaw& law, const Recovery& recovery, Index i, const Mat3d& own,
-                     const Mat3d& recovered) {
-  const double share = recovery.share(i);
-  if (!(share > 0)) return own;
-  const Vec3d normal = recovery.normal(i);
-  const Vec3d traction = law.after_step(own, {}, 0).first_piola_stress * normal;
-  const Mat3d kept = with_traction(law, recovered, traction, normal, own);
-  const Mat3d mixed = own + share * (kept - own);
-  const double ratio = (1 + volume_change(mixed)) / (1 + volume_change(own));
-  return ratio > 0.5 && ratio < 2 ? mixed : own;
-}
+bool follows_from_history(Quantity quantity) { return is_stress(quantity) || is_history(quantity); }
 
 }  // namespace
 
@@ -152,25 +111,37 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   check_fits(model, backend);
   std::vector<Mat3d> own;
   backend.displacement_gradients(own);
-  const bool stresses = std::any_of(computed.begin(), computed.end(), is_stress);
+  const bool needs_points = std::any_of(computed.begin(), computed.end(), follows_from_history);
   const std::vector<std::string> columns = history_columns(model);
   State state;
-  if (recovery || (stresses && !columns.empty())) backend.download(state);
+  if (recovery || (needs_points && !columns.empty())) backend.download(state);
   std::vector<Mat3d> recovered;
   if (recovery) recovered = recovery->gradients(state.displacement);
   Arrays arrays(values, computed, static_cast<Index>(own.size()));
+  const bool has_stresses = std::any_of(computed.begin(), computed.end(), is_stress);
   for (const Part& part : model.parts) {
     const PartLaw law(part.material);
     const PartHistory history(state, part.material, columns);
-    const bool recovers = recovery && history.size() == 0;  // a history is of the own gradient
+    const std::vector<std::size_t> column = columns_of(part.material, columns);
     std::vector<double> numbers(history.size());
     for (Index i = part.begin; i < part.owned_end(); ++i) {
-      const Mat3d g = recovers ? field_gradient(law, *recovery, i, own[i], recovered[i]) : own[i];
-      set_strains(arrays, i, g);
-      if (!stresses) continue;
-      const PointResponse<double> response =
-          law.after_step(g, history.of(i, numbers), state.history_interval);
-      set_stresses(arrays, i, cauchy_stress(response.first_piola_stress, g));
+      const bool is_recovered = recovery && recovery->share(i) > 0;
+      if (!is_recovered && !needs_points) {
+        set_strains(arrays, i, own[i]);
+        continue;
+      }
+      FieldPoint point = own_point(law, own[i], history.of(i, numbers), state.history_interval);
+      if (is_recovered) {
+        point = recovered_point(law, point, recovered[i], recovery->normal(i), recovery->share(i));
+      }
+      set_strains(arrays, i, point.grad_u);
+      if (has_stresses) {
+        set_stresses(arrays, i, cauchy_stress(point.first_piola_stress, point.grad_u));
+      }
+      for (std::size_t k = 0; k < column.size(); ++k) {
+        const Quantity number = history_quantity(column[k]);
+        if (arrays.has(number)) arrays.set(number, i, std::array{point.history[k]});
+      }
     }
   }
   return values;

@@ -68,7 +68,8 @@ Recovery::Recovery(const Model& model)
     });
     const PseudoInverse<double> inverse = pseudo_inverse(of_part);
     inverse_moment_[i] = inverse.matrix;
-    // In half of a ball the fit of any quadratic displacement is its gradient at this distance.
+    // In half of a ball the fit of a displacement that is quadratic along the normal, or whose
+    // slopes along the surface change along the normal, is its gradient at this distance.
     const Vec3d shift = 0.25 * (inverse.matrix * third);
     const double distance = norm(shift);
     if (distance > 0) normal_[i] = -shift / distance;

@@ -26,6 +26,12 @@ std::vector<std::string> loads_said(const std::string& plan) {
   return lines;
 }
 
+/// The first line of a plan about supports that differ.
+std::string supports_said(const std::string& plan) {
+  const std::size_t begin = plan.find("supports of "), end = plan.find('\n', begin);
+  return begin == std::string::npos ? "" : plan.substr(begin, end - begin);
+}
+
 /// Two cubes with supports, loads and probes in space.
 const char* const cut_cubes = R"([time]
 end = 0.05
@@ -34,7 +40,7 @@ threads = 1
 device = "cpu"
 [output]
 frames_per_second = 40
-fields = ["displacement", "stress", "strain", "principal_stress", "boundary"]
+fields = ["displacement", "stress", "strain", "principal_stress", "boundary", "history"]
 [[body]]
 name = "two"
 mesh = "cube.stl"
@@ -80,6 +86,22 @@ force_density = [0, 0, -5000]
 all = true
 normal = [1, 0, 0]
 traction = [0, 100, 0]
+[[body]]
+name = "ball"
+mesh = "ball.stl"
+phyxels = 3000
+translation = [0, 3, 0]
+[body.material]
+law = "j2"
+young = 2e4
+poisson = 0.3
+yield_stress = 100
+density = 1000
+[[body.fixed]]
+box = [[-9, 0, -9], [9, 2.8, 9]]
+[[body.load]]
+all = true
+force_density = [0, 0, -900]
 [[probe]]
 body = "two"
 from = [0.2, 0.5, 0.5]
@@ -122,6 +144,7 @@ region = "right"
 /// it, loaded in a ball and pressed upon. A second one, of one material, hangs by its own box.
 TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
   write("cube.stl", test::binary_stl(test::unit_cube()));
+  write("ball.stl", test::binary_stl(test::sphere({0, 0, 0}, 0.5, 3)));
   write("groups.obj", grouped_cube);
   write("cube.toml", std::string(cut_cubes) + cube_of_groups);
   const Outcome alone = run_on(0, {"run", "cube.toml", "--out", "alone"});
@@ -138,6 +161,7 @@ TEST_F(Mpirun, PartsSupportsFromTheRestOfTheirBodyAlikeOnAllRanks) {
   EXPECT_THAT(loads_said(alone.out),
               ElementsAre(HasSubstr("two, load 1: [0, 30, 10] N"),
                           HasSubstr("one, load 1: [0, 0, -1400] N about [2.35, 0.5, 0.2] m"),
+                          HasSubstr("ball, load 1: [0, 0, -900] N/m^3"),
                           HasSubstr("two, traction 1"), HasSubstr("one, traction 1"),
                           HasSubstr("three, traction 1: [100, 0, 50] N about [5, 0.5, 0.5] m")));
 }
@@ -189,10 +213,12 @@ TEST_F(Mpirun, GradedBodiesAreTheSameOnAllRanks) {
   const Outcome alone = run_on(0, {"run", "graded.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));
+  EXPECT_THAT(supports_said(alone.out), HasSubstr("the smallest limit explicit steps"));
   for (const int ranks : {2, 3}) {
     const std::string name = std::to_string(ranks);
     const Outcome outcome = run_on(ranks, {"run", "graded.toml", "--out", name});
     ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(supports_said(outcome.out), supports_said(alone.out));
     expect_same_files("alone", name);
   }
 }

@@ -299,7 +299,7 @@ def test_ctrl_c_stops_a_set_up():
     try:
         with pytest.raises(KeyboardInterrupt):
             # A method of dict runs no Python code, which would hear the signal itself.
-            phyxel.sample(cube(), phyxels=30000, progress=heard.__setitem__)
+            phyxel.sample(cube(), phyxels=300000, progress=heard.__setitem__)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, previous)

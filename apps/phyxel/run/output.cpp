@@ -56,9 +56,9 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
     frame.surfels = &moment->surfels;
     moment->optional.push_back(Quantity::surfel_position);
   }
-  const std::vector<Quantity> wanted = wanted_fields(scene_.output);
-  moment->optional.insert(moment->optional.end(), wanted.begin(), wanted.end());
-  frame.fields = find_fields(model(), *backend_, wanted, recovery_.get());
+  const std::vector<Quantity>& found = fields_.quantities();
+  moment->optional.insert(moment->optional.end(), found.begin(), found.end());
+  frame.fields = fields_.find(*backend_, frame.surfels, recovery_.get());
   hand_over(moment,
             [this, diagnostics = good->diagnostics, readings = readings_](ChunkedSource& values) {
               const Phase writing("writing a frame");

@@ -29,6 +29,7 @@ Run::Run(const RunOptions& options)
                                                           options_.transport);
                             })),
       recovery_(spent_.timed("backend", [&] { return recovery_for(scene_.output, model()); })),
+      fields_(model(), scene_.output),
       probes_(alike([&] { return Probes(model()); })),
       plan_(alike([&] {
         return spent_.timed("time step", [&] {
@@ -50,6 +51,7 @@ Run::Run(const RunOptions& options)
   });
   if (const auto exchanges = backend_->exchanges()) transport_ = exchanges->transport;
   if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
+  supports_ = support_ranges(model());
   const BoundarySize boundary = boundary_size(model());
   boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
   setup_seconds_ = seconds_since(start_);

@@ -190,9 +190,11 @@ class Run {
   SharedModel shared_;
   std::unique_ptr<Backend> backend_;
   std::unique_ptr<const Recovery> recovery_;  // of gradients for output; null if there is none
+  OutputFields fields_;
   Probes probes_;
   StepPlan plan_;
   BoundarySize boundary_;  // of the whole model
+  std::vector<SupportRange> supports_;
   Solver solver_;
   StepControl control_;
   std::int64_t first_step_ = 0;

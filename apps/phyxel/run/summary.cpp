@@ -103,7 +103,7 @@ void Run::say_plan() const {
   if (options_.json || options_.quiet || !leads()) return;
   fmt::print("{}: {}\n", program_version(),
              scene_.title.empty() ? scene_.file.string() : scene_.title);
-  fmt::print("{}", describe_model(scene_, model(), boundary_));
+  fmt::print("{}", describe_model(scene_, model(), boundary_, supports_));
   const std::string why = backend_->path_reason();
   fmt::print("  device      {}{}\n", backend_->name(), why.empty() ? "" : " (" + why + ")");
   if (ranks().size() > 1) {

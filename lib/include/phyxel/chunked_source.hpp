@@ -29,12 +29,24 @@ enum class Quantity {
   history  ///< The first column of a state's history; further ones follow (`history_quantity`).
 };
 
+/// From here on, quantities of phyxels as surfels have them.
+inline constexpr std::size_t first_on_surface = std::size_t{1} << 20;
+/// A quantity of phyxels as surfels have it (`OutputFields`).
+constexpr Quantity on_surface(Quantity of_phyxels) {
+  return static_cast<Quantity>(first_on_surface + static_cast<std::size_t>(of_phyxels));
+}
+constexpr bool is_on_surface(Quantity quantity) {
+  return static_cast<std::size_t>(quantity) >= first_on_surface;
+}
+
 /// Column k of a state's history.
 constexpr Quantity history_quantity(std::size_t k) {
   return static_cast<Quantity>(static_cast<std::size_t>(Quantity::history) + k);
 }
 /// True for a column of a state's history.
-constexpr bool is_history(Quantity quantity) { return quantity >= Quantity::history; }
+constexpr bool is_history(Quantity quantity) {
+  return quantity >= Quantity::history && !is_on_surface(quantity);
+}
 /// Which one.
 constexpr std::size_t history_column(Quantity quantity) {
   return static_cast<std::size_t>(quantity) - static_cast<std::size_t>(Quantity::history);
@@ -42,6 +54,9 @@ constexpr std::size_t history_column(Quantity quantity) {
 
 /// The components of a quantity.
 constexpr std::size_t width_of(Quantity quantity) {
+  if (is_on_surface(quantity)) {
+    return width_of(static_cast<Quantity>(static_cast<std::size_t>(quantity) - first_on_surface));
+  }
   if (is_history(quantity)) return 1;
   switch (quantity) {
     case Quantity::mass:
@@ -59,7 +74,8 @@ constexpr std::size_t width_of(Quantity quantity) {
 }
 /// True for a quantity of surfels, false for one of phyxels.
 constexpr bool is_of_surfels(Quantity quantity) {
-  return quantity == Quantity::surfel_position || quantity == Quantity::surfel_normal;
+  return quantity == Quantity::surfel_position || quantity == Quantity::surfel_normal ||
+         is_on_surface(quantity);
 }
 
 /// An array of an HDF5 file: the sum of some quantities of so many phyxels, or surfels.

@@ -16,6 +16,7 @@
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
+#include "phyxel/output_fields.hpp"
 #include "phyxel/point_fields.hpp"
 #include "phyxel/probes.hpp"
 #include "phyxel/progress.hpp"

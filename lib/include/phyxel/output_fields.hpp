@@ -1,0 +1,45 @@
+/// The computed fields of a run's frames.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "phyxel/point_fields.hpp"
+
+namespace phyxel {
+
+/// What the frames of a run show of its phyxels and of its surface, beside positions. Made once for
+/// a model, or for a rank's share.
+class OutputFields {
+ public:
+  /// @param model must outlive this object
+  OutputFields(const Model& model, const OutputRequest& output);
+  ~OutputFields();
+  OutputFields(const OutputFields&) = delete;
+  OutputFields& operator=(const OutputFields&) = delete;
+
+  /// What `find` fills: on ranks, the same on all.
+  const std::vector<Quantity>& quantities() const { return quantities_; }
+
+  /// Finds the fields of phyxels (`find_fields`), and those of surfels (`on_surface`). A surfel has
+  /// the value of a quadratic polynomial fitted to the phyxels around it that are of the same
+  /// material as the nearest, within the least and the largest value of theirs, so that rough
+  /// fields cannot overshoot; its von Mises and principal stresses are those of the stress so
+  /// found. The mark "boundary" is that of the nearest phyxel. The displacement of a surfel is the
+  /// way from its place at rest. Collective on a share.
+  /// @param surfels the present surface, or null if it is not written
+  /// @param recovery as of `find_fields`
+  FieldValues find(Backend& backend, const SurfelState* surfels, const Recovery* recovery) const;
+
+ private:
+  class SurfaceFit;
+
+  const Model& model_;
+  std::vector<Quantity> wanted_;  // of phyxels
+  std::vector<std::string> history_;
+  bool has_displacement_ = false;  // of surfels
+  std::vector<Quantity> quantities_;
+  std::unique_ptr<const SurfaceFit> surface_;
+};
+
+}  // namespace phyxel
