@@ -6,14 +6,25 @@
 
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
+#include "model/space_filling_curve.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
+/// Orders all points but the first `fixed` along a curve, so that those near each other are worked
+/// on one after the other.
+void order_along_curve(std::vector<Vec3d>& site, std::size_t fixed) {
+  const std::span<const Vec3d> points = std::span(site).subspan(fixed);
+  const std::vector<Index> order = curve_order(points, 0, static_cast<Index>(points.size()));
+  const std::vector<Vec3d> sorted =
+      tabulated(order.size(), [&](std::size_t k) { return points[order[k]]; });
+  std::copy(sorted.begin(), sorted.end(), site.begin() + static_cast<std::ptrdiff_t>(fixed));
+}
+
 /// Sweeps of repulsion over all points but the first `fixed`.
-/// @param move move(place, step) returns the place of a point after a step [m]
+/// @param move move(i, place, step) returns the place of point i after a step [m]
 /// @param done done(sweeps) is told the number of sweeps done
 template <class Move, class Done>
 void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
@@ -25,7 +36,7 @@ void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField&
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
       const Vec3d step = repulsion.step(site[i], static_cast<Index>(i), [](Index) { return 1.0; });
-      moved[i] = move(site[i], step);
+      moved[i] = move(static_cast<std::size_t>(i), site[i], step);
     }
     site.swap(moved);
     done(sweep + 1);
@@ -84,18 +95,22 @@ class NearestPiece {
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
                     int sweeps, Stage& stage) {
+  order_along_curve(site, fixed);
   const NearestPiece nearest(sample, spacing);
-  const auto corners_at = [&](Vec3d p) {
-    const Triangle& t = surface.triangle[nearest.at(p)];
+  // The triangle on which each point lies.
+  auto piece = in_bulk(site.size(), [&](std::size_t i) { return nearest.at(site[i]); });
+  const auto corners_of = [&](std::size_t triangle) {
+    const Triangle& t = surface.triangle[triangle];
     return std::array{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
   };
-  const auto move = [&](Vec3d before, Vec3d step) {
-    const auto [a, b, c] = corners_at(before);
+  const auto move = [&](std::size_t i, Vec3d before, Vec3d step) {
+    const auto [a, b, c] = corners_of(piece[i]);
     const Vec3d normal = cross(b - a, c - a);
     const double size2 = dot(normal, normal);
     if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
     const Vec3d after = before + step;
-    const auto [d, e, f] = corners_at(after);
+    piece[i] = nearest.at(after);
+    const auto [d, e, f] = corners_of(piece[i]);
     return nearest_on_triangle(after, d, e, f);
   };
   sweep_over(site, fixed, spacing, sweeps, move,
@@ -104,7 +119,7 @@ void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
 
 void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::vector<Vec3d>& site,
                   std::size_t fixed, const SpacingField& spacing, int sweeps) {
-  const auto move = [&](Vec3d before, Vec3d step) {
+  const auto move = [&](std::size_t, Vec3d before, Vec3d step) {
     const Vec3d after = region.nearest_on_boundary(before + step);
     return sampler.inside(after) ? after : before;
   };
@@ -115,7 +130,7 @@ void relax_on_edges(std::span<const Crease> piece, std::span<const PointOn> samp
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
                     int sweeps) {
   const NearestPiece nearest(sample, spacing);
-  const auto move = [&](Vec3d before, Vec3d step) {
+  const auto move = [&](std::size_t, Vec3d before, Vec3d step) {
     const auto on_piece = [&](Vec3d p) {
       const auto& [from, to] = piece[nearest.at(p)];
       const Vec3d along = to - from;

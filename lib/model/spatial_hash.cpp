@@ -19,17 +19,18 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
 
   const std::size_t table_size = std::bit_ceil(std::max<std::size_t>(n, 8));
   grid_.table_mask = table_size - 1;
-  std::vector<std::uint64_t> cell(n);
-  std::vector<std::uint32_t> bucket(n);
+  Bulk<std::uint64_t> cell(n);
+  Bulk<std::uint32_t> bucket(n);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     cell[i] = CellGrid::name(grid_.cell_of(position[i]));
     bucket[i] = static_cast<std::uint32_t>(grid_.bucket_of(cell[i]));
   }
-  bucket_start_.assign(table_size + 1, 0);
+  bucket_start_.resize(table_size + 1);
+  bucket_start_[0] = 0;
   entries_.resize(n);
   // Each thread has a stretch of the buckets, and fills them in the order of the points.
-  std::vector<std::uint32_t> next(table_size);
+  Bulk<std::uint32_t> next(table_size);
   std::vector<std::size_t> before(static_cast<std::size_t>(omp_get_max_threads()) + 1, 0);
 #pragma omp parallel
   {
@@ -42,6 +43,7 @@ SpatialHash::SpatialHash(std::span<const Vec3d> position, double cell_size) {
         if (bucket[i] >= first && bucket[i] < last) visit(i);
       }
     };
+    for (std::size_t b = first; b < last; ++b) bucket_start_[b + 1] = 0;
     for_each_point([&](std::size_t i) { ++bucket_start_[bucket[i] + 1]; });
     for (std::size_t b = first; b < last; ++b) before[thread + 1] += bucket_start_[b + 1];
 #pragma omp barrier

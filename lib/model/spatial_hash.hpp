@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "bulk.hpp"
 #include "model/cell_grid.hpp"
 
 namespace phyxel {
@@ -61,16 +61,8 @@ class SpatialHash {
       return;
     }
     const Cell c = grid_.cell_of(place);
-    // Squares of the distances of cells along each axis, in cells; a little less, for rounding.
-    const Vec3d within = grid_.inverse_cell_size * (place - grid_.low) -
-                         Vec3d{double(c.x), double(c.y), double(c.z)};
+    const Vec3d within = within_cell(place, c);
     const double most = radius * grid_.inverse_cell_size * (1 + 1e-6) + 1e-6;
-    const auto gap2 = [&](std::int64_t d, double at) {
-      const double gap = d > 0   ? static_cast<double>(d) - at
-                         : d < 0 ? at - static_cast<double>(d + 1)
-                                 : 0;
-      return gap * gap;
-    };
     for (std::int64_t z = -rings; z <= rings; ++z) {
       const double z2 = gap2(z, within.z);
       if (z2 > most * most) continue;
@@ -88,16 +80,7 @@ class SpatialHash {
   /// The same for the cells exactly `ring` cells away.
   template <class Visit>
   void visit_ring(Vec3d place, int ring, Visit&& visit) const {
-    const Cell c = grid_.cell_of(place);
-    for (std::int64_t dz = -ring; dz <= ring; ++dz) {
-      for (std::int64_t dy = -ring; dy <= ring; ++dy) {
-        const bool face = std::abs(dz) == ring || std::abs(dy) == ring;
-        const std::int64_t stride = face || ring == 0 ? 1 : 2 * ring;
-        for (std::int64_t dx = -ring; dx <= ring; dx += stride) {
-          visit_cell({c.x + dx, c.y + dy, c.z + dz}, visit);
-        }
-      }
-    }
+    visit_ring(place, ring, HUGE_VAL, visit);
   }
 
   /// The point of the table nearest to a place.
@@ -124,7 +107,7 @@ class SpatialHash {
         visit_all(compare);
         break;
       }
-      visit_ring(place, ring, compare);
+      visit_ring(place, ring, found.distance2, compare);
       // After rings 0 to r, each point nearer than r cells has been visited.
       if (found.distance2 <= ring * cell_size_ * ring * cell_size_) break;
     }
@@ -136,6 +119,44 @@ class SpatialHash {
 
  private:
   using Cell = CellGrid::Cell;
+
+  /// A place from the corner of its cell, in cells.
+  Vec3d within_cell(Vec3d place, Cell c) const {
+    return grid_.inverse_cell_size * (place - grid_.low) -
+           Vec3d{double(c.x), double(c.y), double(c.z)};
+  }
+  /// The square of the distance along one axis from a place to the cell d cells away, in cells.
+  /// @param at the place within its cell, in cells
+  static double gap2(std::int64_t d, double at) {
+    const double gap = d > 0   ? static_cast<double>(d) - at
+                       : d < 0 ? at - static_cast<double>(d + 1)
+                               : 0;
+    return gap * gap;
+  }
+
+  /// Visits the points of the cells exactly `ring` cells away, but for cells that are farther away
+  /// than the root of `limit2` [m²], which a visit may make smaller.
+  template <class Visit>
+  void visit_ring(Vec3d place, int ring, const double& limit2, Visit&& visit) const {
+    const Cell c = grid_.cell_of(place);
+    const Vec3d within = within_cell(place, c);
+    const double cells2 = grid_.inverse_cell_size * grid_.inverse_cell_size * (1 + 1e-6);
+    const auto is_beyond = [&](double gaps2) { return gaps2 > limit2 * cells2 + 1e-6; };
+    for (std::int64_t dz = -ring; dz <= ring; ++dz) {
+      const double z2 = gap2(dz, within.z);
+      if (is_beyond(z2)) continue;
+      for (std::int64_t dy = -ring; dy <= ring; ++dy) {
+        const double yz2 = z2 + gap2(dy, within.y);
+        if (is_beyond(yz2)) continue;
+        const bool face = std::abs(dz) == ring || std::abs(dy) == ring;
+        const std::int64_t stride = face || ring == 0 ? 1 : 2 * ring;
+        for (std::int64_t dx = -ring; dx <= ring; dx += stride) {
+          if (is_beyond(yz2 + gap2(dx, within.x))) continue;
+          visit_cell({c.x + dx, c.y + dy, c.z + dz}, visit);
+        }
+      }
+    }
+  }
 
   template <class Visit>
   void visit_cell(Cell c, Visit&& visit) const {
@@ -149,8 +170,8 @@ class SpatialHash {
   CellGrid grid_;
   Vec3d high_;
   double cell_size_ = 1, mean_occupancy_ = 0;
-  std::vector<std::uint32_t> bucket_start_;
-  std::vector<Entry> entries_;
+  Bulk<std::uint32_t> bucket_start_;
+  Bulk<Entry> entries_;
 };
 
 }  // namespace phyxel
