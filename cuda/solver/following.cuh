@@ -32,22 +32,37 @@ struct FollowingView {
   }
 };
 
+/// `ForceBalance`, from the origin of a body's positions.
+template <class Real>
+struct BalanceView {
+  Vec3<Real> shift, turn, mean;
+
+  __device__ Vec3<Real> change(Vec3<Real> x, Real w) const {
+    return w * (shift + cross(turn, x - mean));
+  }
+};
+
 /// Adds the present forces of a load, times a factor, to columns of forces [N]. One thread per
 /// phyxel.
+/// @param balance zero, unless the load acts on a closed surface
 template <class Real, class StateReal>
 __global__ void add_following(const __grid_constant__ Fields<Real, StateReal> f,
-                              FollowingView<Real> load, Real factor, Real* force) {
+                              FollowingView<Real> load, Real factor, BalanceView<Real> balance,
+                              Real* force) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= load.count) return;
   const Index place = load.place[k];
-  const Vec3<Real> now = following_force(load.gradient(f.points, k), factor * load.force[k]);
-  set_column3(force, f.places, place, column3(force, f.places, place) + now);
+  const auto point = f.points.get(place);
+  const Vec3<Real> x = to<Real>(point.x) + to<Real>(point.u);
+  const Vec3<Real> now = following_force(load.gradient(f.points, k), load.force[k]) +
+                         balance.change(x, norm(load.force[k]));
+  set_column3(force, f.places, place, column3(force, f.places, place) + factor * now);
 }
 
-/// Words of `CavitySums` on the device. Phyxels are dealt out among accumulators so that few
+/// Words of `SurfaceSums` on the device. Phyxels are dealt out among accumulators so that few
 /// threads add to the same word at once.
-struct CavityWords {
-  static constexpr int sums = 8;
+struct SurfaceWords {
+  static constexpr int sums = 17;
   static constexpr unsigned accumulators = 64;
   static constexpr std::size_t size = std::size_t{sums} * ExactSum::words * accumulators;
 
@@ -62,8 +77,8 @@ struct CavityWords {
     });
   }
   /// The sums of all accumulators.
-  static CavitySums on_host(const std::vector<unsigned long long>& words) {
-    CavitySums all;
+  static SurfaceSums on_host(const std::vector<unsigned long long>& words) {
+    SurfaceSums all;
     std::size_t at = 0;
     for (ExactSum* sum : all.all()) {
       for (std::int64_t& word : sum->ready()) {
@@ -76,21 +91,28 @@ struct CavityWords {
   }
 };
 
-/// Adds the terms of `CavitySums`, in the order of its sums. One thread per phyxel.
-/// @param pressure of the gas at rest [Pa]
+/// Adds the terms of `SurfaceSums`, in the order of its sums. One thread per phyxel.
+/// @param offset from the origin of the sums to that of the body's positions [m]
 template <class Real, class StateReal>
-__global__ void sum_cavity(const __grid_constant__ Fields<Real, StateReal> f,
-                           FollowingView<Real> load, double pressure, CavityWords words) {
+__global__ void sum_surface(const __grid_constant__ Fields<Real, StateReal> f,
+                            FollowingView<Real> load, Vec3<double> offset, SurfaceWords words) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= load.count) return;
   const auto point = f.points.get(load.place[k]);
-  const Vec3<double> x = to<double>(point.x) + to<double>(point.u);
+  const Vec3<double> x = offset + to<double>(point.x) + to<double>(point.u);
   const Mat3<Real> gradient = load.gradient(f.points, k);
   Mat3<double> grad_u;
   for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient(e / 3, e % 3);
-  const Vec3<double> a = following_force(grad_u, (-1 / pressure) * to<double>(load.force[k]));
-  const double terms[CavityWords::sums] = {dot(x, a), a.x, a.y, a.z, x.x, x.y, x.z, 1};
-  for (int s = 0; s < CavityWords::sums; ++s) words.add(s, k, terms[s]);
+  const Vec3<double> at_rest = to<double>(load.force[k]), force = following_force(grad_u, at_rest),
+                     torque = cross(x, force);
+  const double w = norm(at_rest);
+  const double terms[SurfaceWords::sums] = {
+      dot(x, force),   force.x,         force.y,         force.z,
+      torque.x,        torque.y,        torque.z,        w,
+      w * x.x,         w * x.y,         w * x.z,         w * (x.x * x.x),
+      w * (x.x * x.y), w * (x.x * x.z), w * (x.y * x.y), w * (x.y * x.z),
+      w * (x.z * x.z)};
+  for (int s = 0; s < SurfaceWords::sums; ++s) words.add(s, k, terms[s]);
 }
 
 /// The loads of a model that follow the surface, on the device.
@@ -113,18 +135,19 @@ class DeviceFollowing {
       loads_.push_back({sent(place, what), sent(near, what), sent(f.near.offsets, what),
                         sent(force, what), sent(slope, what)});
     }
-    if (host_.has_gas()) words_ = {CavityWords::size, what};
+    if (host_.has_closed()) words_ = {SurfaceWords::size, what};
   }
 
   bool empty() const { return loads_.empty(); }
   /// Adds the present forces to columns of forces [N], shape [3, places]. Collective if there is a
-  /// gas. Displacements of ghosts must be here. @param time [s]
+  /// closed surface. Displacements of ghosts must be here. @param time [s]
   void add(double time, Real* force) const {
-    const std::vector<double> factor = host_.factors(time, gases());
+    const FollowingLoads::Present now = present();
+    const std::vector<double> factor = host_.factors(time, now.gases);
     for (std::size_t l = 0; l < loads_.size(); ++l) {
       const FollowingView<Real> load = loads_[l].view();
       m_.launch_each("add_following", add_following<Real, StateReal>, load.count, m_.fields(), load,
-                     static_cast<Real>(factor[l]), force);
+                     static_cast<Real>(factor[l]), balance_of(l, now.balances[l]), force);
     }
   }
   std::size_t bytes() const {
@@ -148,20 +171,33 @@ class DeviceFollowing {
     }
   };
 
-  std::vector<FollowingLoads::Gas> gases() const {
-    if (!host_.has_gas()) return {};
-    std::vector<CavitySums> sums;
+  const phyxel::Load& load_of(std::size_t l) const {
+    return host_.load_of(m_.model().following[l]);
+  }
+  /// From the origin of a load's sums to that of its body's positions [m].
+  Vec3d offset_of(std::size_t l) const {
+    const phyxel::Load& load = load_of(l);
+    for (const Part& part : m_.model().parts) {
+      if (part.name == load.body) return part.origin - FollowingLoads::origin_of(load);
+    }
+    return {};
+  }
+  BalanceView<Real> balance_of(std::size_t l, const ForceBalance& balance) const {
+    return {to<Real>(balance.shift), to<Real>(balance.turn), to<Real>(balance.mean - offset_of(l))};
+  }
+
+  FollowingLoads::Present present() const {
+    std::vector<SurfaceSums> sums;
     for (std::size_t l = 0; l < loads_.size(); ++l) {
-      const phyxel::Load& of = m_.model().loads[m_.model().following[l].load];
-      if (!of.gas) continue;
+      if (!load_of(l).closed) continue;
       const FollowingView<Real> load = loads_[l].view();
       PHYXEL_CUDA(cudaMemsetAsync(words_.data(), 0, words_.bytes(), m_.stream()));
-      m_.launch_each("sum_cavity", sum_cavity<Real, StateReal>, load.count, m_.fields(), load,
-                     of.pressure, CavityWords{words_.data()});
+      m_.launch_each("sum_surface", sum_surface<Real, StateReal>, load.count, m_.fields(), load,
+                     offset_of(l), SurfaceWords{words_.data()});
       m_.wait();
-      sums.push_back(CavityWords::on_host(fetched(words_)));
+      sums.push_back(SurfaceWords::on_host(fetched(words_)));
     }
-    return host_.gases_of(sums);
+    return host_.present_of(sums);
   }
 
   const DeviceModel<Real, StateReal>& m_;

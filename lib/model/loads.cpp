@@ -182,19 +182,28 @@ std::vector<Triangle> chosen_triangles(const BodyRequest& request, const Tractio
                    [&](std::size_t k) { return surface.triangle[found->second[k]]; });
 }
 
+/// Some triangles of a surface, seen as a surface of their own.
+struct Piece {
+  bool closed = false, inside_out = false;
+};
+Piece piece_of(const BodySurface& surface, const std::vector<Triangle>& triangles) {
+  Surface piece{.position = {surface.position.begin(), surface.position.end()}};
+  for (const Triangle& t : triangles) {
+    piece.triangle.push_back({t[0] - surface.first, t[1] - surface.first, t[2] - surface.first});
+  }
+  const SurfaceDefects defects = inspect_surface(piece);
+  return {
+      .closed = defects.open_edges == 0 && defects.crowded_edges == 0 && defects.flipped_edges == 0,
+      .inside_out = defects.inside_out};
+}
+
 /// Checks that triangles are the whole surface of a cavity, or of several.
 /// @throws InputError
 void check_cavity(const BodyRequest& request, const TractionRequest& traction,
                   const BodySurface& surface, const std::vector<Triangle>& triangles) {
   if (triangles.empty()) return;  // refused as a traction on nothing
-  Surface around{.position = {surface.position.begin(), surface.position.end()}};
-  for (const Triangle& t : triangles) {
-    around.triangle.push_back({t[0] - surface.first, t[1] - surface.first, t[2] - surface.first});
-  }
-  const SurfaceDefects defects = inspect_surface(around);
-  const bool closed =
-      defects.open_edges == 0 && defects.crowded_edges == 0 && defects.flipped_edges == 0;
-  if (closed && defects.inside_out) return;
+  const auto [closed, inside_out] = piece_of(surface, triangles);
+  if (closed && inside_out) return;
   throw InputError(fmt::format(
       "{}: key body.traction.gas: the {} selected triangles of the surface of body \"{}\" {}; "
       "allowed: those of the whole surface of a cavity in the body",
@@ -238,6 +247,8 @@ LoadedFacets loaded_facets(const BodyRequest& request, const TractionRequest& tr
     }
   } else {
     loaded.facets = facets_of(surface.position, facing, surface.first, longest);
+    loaded.closed =
+        traction.follower && !facing.empty() && (traction.gas || piece_of(surface, facing).closed);
   }
   if (loaded.facets.empty()) {
     throw InputError(fmt::format(
@@ -260,6 +271,7 @@ Load traction_load(const BodyRequest& request, std::size_t number, const LoadedF
             .set = entry_name("traction", number),
             .on_surface = true,
             .follows = asked.follower,
+            .closed = loaded.closed,
             .pressure = asked.pressure,
             .gas = asked.gas};
   double sizes = 0;

@@ -48,6 +48,7 @@ Load load_of(const BodyRequest& request, std::size_t number, std::vector<Index> 
 struct LoadedFacets {
   std::vector<Facet> facets;
   std::vector<Vec3d> force;  ///< [N], shape [facets]
+  bool closed = false;       ///< True of a follower on surfaces without an edge.
 };
 /// The surface of a body, in a model or by itself.
 struct BodySurface {

@@ -1,40 +1,81 @@
 #include "solver/following_loads.hpp"
 
+#include <algorithm>
+
 #include "model/owned_vectors.hpp"
+#include "phyxel/physics/moment.hpp"
 #include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
 
-void CavitySums::add(Vec3d x, Vec3d a) {
-  flux.add(dot(x, a));
-  area.add(a);
-  place.add(x);
-  phyxels.add(1);
+void SurfaceSums::add(Vec3d x, Vec3d f, double w) {
+  flux.add(dot(x, f));
+  force.add(f);
+  torque.add(cross(x, f));
+  weight.add(w);
+  place.add(w * x);
+  const double terms[6] = {x.x * x.x, x.x * x.y, x.x * x.z, x.y * x.y, x.y * x.z, x.z * x.z};
+  for (int k = 0; k < 6; ++k) second[k].add(w * terms[k]);
 }
 
-double CavitySums::volume() const {
-  const Vec3d mean = (1 / phyxels.value()) * place.value();
-  return -(flux.value() - dot(mean, area.value())) / 3;
+std::vector<ExactSum*> SurfaceSums::all() {
+  std::vector<ExactSum*> sums{&flux};
+  for (ExactVector* v : {&force, &torque}) sums.insert(sums.end(), {&v->x, &v->y, &v->z});
+  sums.insert(sums.end(), {&weight, &place.x, &place.y, &place.z});
+  for (ExactSum& sum : second) sums.push_back(&sum);
+  return sums;
+}
+
+double SurfaceSums::volume(double p) const {
+  const Vec3d mean = (1 / weight.value()) * place.value();
+  return (flux.value() - dot(mean, force.value())) / (3 * p);
+}
+
+ForceBalance ForceBalance::of(const SurfaceSums& sums) {
+  const double weight = sums.weight.value();
+  if (!(weight > 0)) return {};
+  ForceBalance balance;
+  balance.mean = (1 / weight) * sums.place.value();
+  const Vec3d force = sums.force.value(), torque = sums.torque.value() - cross(balance.mean, force);
+  const auto value = [&](int k) { return sums.second[k].value(); };
+  const Sym3d second = Sym3d{value(0), value(1), value(2), value(3), value(4), value(5)} +
+                       moment_term(balance.mean, -weight);
+  const double t = trace(second);
+  const Sym3d inertia = Sym3d{t, 0, 0, t, 0, t} + -1.0 * second;
+  balance.shift = (-1 / weight) * force;
+  balance.turn = -(pseudo_inverse(inertia).matrix * torque);
+  return balance;
 }
 
 FollowingLoads::FollowingLoads(const Model& model) : model_(model) {
   for (const Following& f : model.following) {
-    if (model.loads[f.load].gas) volume_at_rest_.push_back(1);
+    if (load_of(f).gas) volume_at_rest_.push_back(1);
   }
-  const std::vector<Gas> at_rest = gases([](Index) { return Vec3d{}; });
+  if (volume_at_rest_.empty()) return;
+  const std::vector<Gas> at_rest = present([](Index) { return Vec3d{}; }).gases;
   for (std::size_t g = 0; g < at_rest.size(); ++g) volume_at_rest_[g] = at_rest[g].volume;
 }
 
-std::vector<FollowingLoads::Gas> FollowingLoads::gases_of(std::vector<CavitySums>& sums) const {
-  add_each_over_ranks(model_, sums);
-  std::vector<Gas> all;
+bool FollowingLoads::has_closed() const {
+  return std::any_of(model_.following.begin(), model_.following.end(),
+                     [&](const Following& f) { return load_of(f).closed; });
+}
+
+FollowingLoads::Present FollowingLoads::present_of(std::vector<SurfaceSums>& sums) const {
+  Present found;
+  found.balances.resize(model_.following.size());
+  if (!sums.empty()) add_each_over_ranks(model_, sums);
+  std::size_t next = 0;
   for (std::size_t f = 0; f < model_.following.size(); ++f) {
-    const Load& load = model_.loads[model_.following[f].load];
+    const Load& load = load_of(model_.following[f]);
+    if (!load.closed) continue;
+    const SurfaceSums& of_surface = sums[next++];
+    found.balances[f] = ForceBalance::of(of_surface);
     if (!load.gas) continue;
-    const std::size_t g = all.size();
-    all.push_back({f, *load.gas, volume_at_rest_[g], sums[g].volume()});
+    found.gases.push_back(
+        {f, *load.gas, volume_at_rest_[found.gases.size()], of_surface.volume(load.pressure)});
   }
-  return all;
+  return found;
 }
 
 std::vector<double> FollowingLoads::factors(double time, const std::vector<Gas>& gases) const {
@@ -49,7 +90,7 @@ std::vector<double> FollowingLoads::factors(double time, const std::vector<Gas>&
 double FollowingLoads::energy_of(double time, const std::vector<Gas>& gases) const {
   double energy = 0;
   for (const Gas& gas : gases) {
-    const Load& load = model_.loads[model_.following[gas.following].load];
+    const Load& load = load_of(model_.following[gas.following]);
     // The integral of p over V, whose power tends to the logarithm as its exponent tends to 1.
     const double less = gas.exponent - 1, log = std::log(gas.volume_at_rest / gas.volume);
     const double work = less == 0 ? -log : -std::expm1(less * log) / less;

@@ -1,6 +1,7 @@
 /// Loads that follow the surface: pressures on the deformed surface, and gases in cavities.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
@@ -14,20 +15,32 @@
 
 namespace phyxel {
 
-/// Sums over the phyxels around a cavity, from which its volume follows.
-struct CavitySums {
-  ExactSum flux;      ///< Σ x · a [m³], a being the present area.
-  ExactVector area;   ///< Σ a [m²]
-  ExactVector place;  ///< Σ x [m]
-  ExactSum phyxels;   ///< Their number.
+/// Sums over the phyxels on which a load acts that follows the surface. Places x are those of the
+/// deformed body, from some origin, and w is the size of a phyxel's force at rest.
+struct SurfaceSums {
+  ExactSum flux;                   ///< Σ x · f [N m], f being the present force at full size.
+  ExactVector force, torque;       ///< Σ f [N], Σ x × f [N m]
+  ExactSum weight;                 ///< Σ w [N]
+  ExactVector place;               ///< Σ w x [N m]
+  std::array<ExactSum, 6> second;  ///< Σ w x xᵀ [N m²]: xx, xy, xz, yy, yz, zz.
 
-  /// Adds a phyxel. @param x its position [m]. @param a area out of the body, into the cavity [m²]
-  void add(Vec3d x, Vec3d a);
-  std::vector<ExactSum*> all() {
-    return {&flux, &area.x, &area.y, &area.z, &place.x, &place.y, &place.z, &phyxels};
-  }
-  /// Returns -⅓ Σ (x - mean of x) · a [m³], which a shift of the body does not change.
-  double volume() const;
+  /// Adds a phyxel. @param x its place [m]. @param f its present force [N]. @param w [N]
+  void add(Vec3d x, Vec3d f, double w);
+  std::vector<ExactSum*> all();
+  /// Returns the volume of a cavity in which there is the pressure p, ⅓ Σ (x - mean of x) · f / p
+  /// [m³], which a shift of the body does not change. @param p at rest [Pa]
+  double volume(double p) const;
+};
+
+/// Changes of forces that take force and torque from their sums: w (shift + turn × (x - mean)).
+struct ForceBalance {
+  Vec3d shift;  ///< Without unit.
+  Vec3d turn;   ///< [1/m]
+  Vec3d mean;   ///< [m], from the origin of the sums.
+
+  /// Finds the changes of forces whose sums these are.
+  static ForceBalance of(const SurfaceSums& sums);
+  Vec3d change(Vec3d x, double w) const { return w * (shift + cross(turn, x - mean)); }
 };
 
 /// A phyxel on which a load acts that follows the surface.
@@ -38,7 +51,9 @@ struct Followed {
 };
 
 /// The loads of a model that follow the surface. A gas of pressure p₀ in a cavity has the pressure
-/// p₀ (V₀/V)^γ once the volume is V, found from the areas cof(F) S of the phyxels around it.
+/// p₀ (V₀/V)^γ once the volume is V, found from the areas cof(F) S of the phyxels around it. On
+/// surfaces without an edge the forces of a pressure have neither sum nor torque; those of the
+/// phyxels have small ones, of second order in the spacing, which are taken off.
 /// Displacements are given by a function: displacement(i) returns that of phyxel i [m], ghosts
 /// included.
 class FollowingLoads {
@@ -49,8 +64,12 @@ class FollowingLoads {
   const Model& model() const { return model_; }
   /// True if no load follows the surface.
   bool empty() const { return model_.following.empty(); }
-  /// True if a load is a gas in a cavity.
-  bool has_gas() const { return !volume_at_rest_.empty(); }
+  /// True if a load acts on a surface without an edge, and needs sums over its phyxels.
+  bool has_closed() const;
+  /// The load of entry `f` of `Model::following`.
+  const Load& load_of(const Following& f) const { return model_.loads[f.load]; }
+  /// The origin of the sums of a load [m].
+  static Vec3d origin_of(const Load& load) { return load.centroid; }
 
   /// The state of a gas.
   struct Gas {
@@ -61,40 +80,52 @@ class FollowingLoads {
     /// Its present pressure over that at rest.
     double ratio() const { return std::pow(volume_at_rest / volume, exponent); }
   };
-  /// Returns the state of each gas, in the order of the loads. Collective if there is one.
+  /// What follows from the sums of all closed surfaces.
+  struct Present {
+    std::vector<Gas> gases;              ///< In the order of the loads.
+    std::vector<ForceBalance> balances;  ///< Shape [Model::following]; zero on open surfaces.
+  };
+  /// Finds it. Collective if there is a closed surface.
   template <class U>
-  std::vector<Gas> gases(const U& displacement) const {
-    if (!has_gas()) return {};
-    std::vector<CavitySums> sums;
+  Present present(const U& displacement) const {
+    std::vector<SurfaceSums> sums;
     for (const Following& f : model_.following) {
-      const Load& load = model_.loads[f.load];
-      if (!load.gas) continue;
-      CavitySums& of_gas = sums.emplace_back();
+      const Load& load = load_of(f);
+      if (!load.closed) continue;
+      SurfaceSums& of_surface = sums.emplace_back();
       for (std::size_t k = 0; k < f.entry.size(); ++k) {
         const Followed at = followed(f, k, displacement);
-        of_gas.add(model_.position[at.phyxel] + displacement(at.phyxel),
-                   following_force(at.gradient, (-1 / load.pressure) * at.rest_force));
+        of_surface.add(place_of(load, at.phyxel, displacement),
+                       following_force(at.gradient, at.rest_force), norm(at.rest_force));
       }
     }
-    return gases_of(sums);
+    return present_of(sums);
   }
   /// The same from sums over the phyxels of this rank. Collective.
-  std::vector<Gas> gases_of(std::vector<CavitySums>& sums) const;
+  Present present_of(std::vector<SurfaceSums>& sums) const;
   /// Returns the factors of the forces at rest, in the order of `Model::following`: how far loads
   /// have grown, times `Gas::ratio`. @param time [s]
   std::vector<double> factors(double time, const std::vector<Gas>& gases) const;
 
-  /// Adds the present forces [N], shape [n]. Collective if there is a gas. @param time [s]
+  /// Adds the present forces [N], shape [n]. Collective if there is a closed surface.
+  /// @param time [s]
   template <class U>
   void add(double time, const U& displacement, std::vector<Vec3d>& force) const {
     if (empty()) return;
-    const std::vector<double> factor = factors(time, gases(displacement));
+    const Present now = present(displacement);
+    const std::vector<double> factor = factors(time, now.gases);
     for (std::size_t l = 0; l < factor.size(); ++l) {
       const Following& f = model_.following[l];
+      const Load& load = load_of(f);
 #pragma omp parallel for schedule(static)
       for (std::size_t k = 0; k < f.entry.size(); ++k) {
         const Followed at = followed(f, k, displacement);
-        force[at.phyxel] += following_force(at.gradient, factor[l] * at.rest_force);
+        Vec3d own = following_force(at.gradient, at.rest_force);
+        if (load.closed) {
+          own +=
+              now.balances[l].change(place_of(load, at.phyxel, displacement), norm(at.rest_force));
+        }
+        force[at.phyxel] += factor[l] * own;
       }
     }
   }
@@ -113,10 +144,16 @@ class FollowingLoads {
       }
     }
     if (model_.share) add_over_ranks(*model_.share->communicator, {&work});
-    return energy_of(time, gases(displacement)) - work.value();
+    const bool has_gas = !volume_at_rest_.empty();
+    return (has_gas ? energy_of(time, present(displacement).gases) : 0) - work.value();
   }
 
  private:
+  /// The place of a phyxel from the origin of a load's sums [m].
+  template <class U>
+  Vec3d place_of(const Load& load, Index i, const U& displacement) const {
+    return model_.position[i] - origin_of(load) + displacement(i);
+  }
   /// Returns the phyxel of an entry and the gradient there.
   template <class U>
   Followed followed(const Following& f, std::size_t k, const U& displacement) const {
@@ -138,7 +175,8 @@ class FollowingLoads {
 /// them. Collective on a share. @param displacement [m], shape [n]
 void refresh_for_following(const Model& model, std::vector<Vec3d>& displacement);
 
-/// Adds all loads to forces [N], shape [n]. Collective if there is a gas. @param time [s]
+/// Adds all loads to forces [N], shape [n]. Collective if there is a closed surface. @param time
+/// [s]
 /// @param displacement [m], shape [n], with those of ghosts
 void add_loads(const FollowingLoads& following, double time, std::span<const Vec3d> displacement,
                std::vector<Vec3d>& force);

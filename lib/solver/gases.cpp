@@ -20,7 +20,8 @@ std::vector<GasReading> read_gases(const Model& model, const Backend& backend,
   refresh_for_following(model, state.displacement);
   const FollowingLoads following(model);
   const auto gases =
-      following.gases([&](Index i) { return state.displacement[static_cast<std::size_t>(i)]; });
+      following.present([&](Index i) { return state.displacement[static_cast<std::size_t>(i)]; })
+          .gases;
   const std::vector<double> factors = following.factors(time_of_loads(solver), gases);
   std::vector<GasReading> readings;
   for (const FollowingLoads::Gas& gas : gases) {

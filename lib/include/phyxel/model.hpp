@@ -121,6 +121,7 @@ struct Load {
   Vec3d centroid;            ///< Centroid of the sizes of the forces on all ranks [m].
   bool on_surface = false;   ///< True of a traction, which follows the areas of phyxels.
   bool follows = false;      ///< True of a pressure on the deformed surface (physics/follower.hpp).
+  bool closed = false;       ///< True if that surface has no edge: its force and torque vanish.
   double pressure = 0;       ///< Of a pressure at rest [Pa].
   std::optional<double> gas = {};  ///< γ of a gas in a cavity, whose pressure grows as V^-γ.
   /// Returns the share of the force that acts at a time [s].
