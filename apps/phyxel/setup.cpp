@@ -157,10 +157,11 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
         part.size, part.surfels, part.mass, part.volume,
         part.kernel_volumes ? "kernel" : "geometric");
     text += fmt::format("              {}; {}\n", neighbours_of(part), part.neighbourhood);
-    if (supports[p].least < supports[p].largest) {
+    if (1.02 * supports[p].least < supports[p].largest) {
       text += fmt::format(
-          "              supports of {:.4g} to {:.4g} m; the smallest limit explicit steps\n",
-          supports[p].least, supports[p].largest);
+          "              supports from {:.4g} to {:.4g} m{}\n", supports[p].least,
+          supports[p].largest,
+          scene.solver.method == Method::verlet ? "; the time step follows from the smallest" : "");
     }
     text += fmt::format("              {}rho = {:g} kg/m^3; {}\n", moduli_of(m), m.density,
                         terms_of(part));

@@ -272,7 +272,7 @@ class Simulation {
       frame.surfels = &surfels;
     }
     if (!fields_) fields_.emplace(model_, scene_.output);
-    frame.fields = fields_->find(*backend_, frame.surfels, recovery());
+    frame.fields = fields_->find(*backend_, state, frame.surfels, recovery());
     recorder_->write(frame);
   }
 

@@ -158,8 +158,8 @@ std::vector<SceneKey> run_keys() {
        .words = field_names(), .meaning = field_meanings()},
       {.section = "output", .name = "recovery", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Recovers the gradients of phyxels on the surface for stresses and strains of frames and "
-           "probes, and keeps the tractions that the balance of forces gives. false: "
-           "they are those from which forces follow."},
+           "probes, and keeps the tractions that the balance of forces gives. Phyxels that have yielded "
+           "keep their own gradients. false: all phyxels keep them."},
       {.section = "output", .name = "checkpoint_every", .unit = "s", .fallback = "300",
        .range = between(0, 1e9),
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},

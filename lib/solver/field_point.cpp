@@ -2,31 +2,31 @@
 
 #include <Eigen/LU>
 #include <cmath>
-#include <functional>
+#include <vector>
 
 #include "phyxel/physics/strain.hpp"
 
 namespace phyxel {
 namespace {
 
-/// The Frobenius norm.
-double size_of(const Mat3d& m) {
+double frobenius_norm(const Mat3d& m) {
   double squares = 0;
   for (int e = 0; e < 9; ++e) squares += m(e / 3, e % 3) * m(e / 3, e % 3);
   return std::sqrt(squares);
 }
 
 /// A gradient that differs from `grad_u` by a nᵀ and has a traction P n, found by Newton's method.
-/// @param stress_at first Piola stress [Pa] at a gradient
+/// @param stress_at stress_at(gradient): first Piola stress [Pa]
 /// @returns `fallback` if it is not found
-Mat3d with_traction(const std::function<Mat3d(const Mat3d&)>& stress_at, const Mat3d& grad_u,
-                    Vec3d traction, Vec3d normal, const Mat3d& fallback) {
+template <class StressAt>
+Mat3d with_traction(StressAt&& stress_at, const Mat3d& grad_u, Vec3d traction, Vec3d normal,
+                    const Mat3d& fallback) {
   constexpr int most_steps = 5;
   constexpr double difference = 1e-7, tolerance = 1e-6;  // of the stress
   const auto traction_at = [&](const Mat3d& g) { return stress_at(g) * normal; };
   Mat3d g = grad_u;
   Vec3d here = traction_at(g);
-  const double size = size_of(stress_at(grad_u)) + norm(traction);
+  const double size = frobenius_norm(stress_at(grad_u)) + norm(traction);
   for (int step = 0; step < most_steps; ++step) {
     const Vec3d left = traction - here;
     if (norm(left) <= tolerance * size) return g;
@@ -43,63 +43,42 @@ Mat3d with_traction(const std::function<Mat3d(const Mat3d&)>& stress_at, const M
   return norm(traction - here) <= tolerance * size ? g : fallback;
 }
 
-/// A material at the end of a step without a duration, which causes no viscous stress.
-struct SlowStep {
-  PointResponse<double> response;
-  std::vector<double> history;
-};
-SlowStep slow_step(const PartLaw& law, const Mat3d& grad_u, std::span<const double> before) {
-  SlowStep step{.response = {}, .history = {before.begin(), before.end()}};
-  step.response = law.after_step(grad_u, step.history, 0);
-  return step;
+/// The response of a material at another gradient, reached without viscous stress, as a step of no
+/// duration has none.
+PointResponse<double> response_at(const PartLaw& law, const Mat3d& grad_u,
+                                  std::span<const double> history) {
+  thread_local std::vector<double> numbers;
+  numbers.assign(history.begin(), history.end());
+  return law.after_step(grad_u, numbers, 0);
 }
 
 }  // namespace
 
 FieldPoint own_point(const PartLaw& law, const Mat3d& own, std::span<const double> history,
                      double dt) {
-  FieldPoint point{.grad_u = own, .history = {history.begin(), history.end()}};
-  std::vector<double> advanced = point.history;
-  point.first_piola_stress = law.after_step(own, advanced, dt).first_piola_stress;
-  return point;
+  thread_local std::vector<double> numbers;
+  numbers.assign(history.begin(), history.end());
+  return {own, law.after_step(own, numbers, dt).first_piola_stress};
 }
 
-FieldPoint recovered_point(const PartLaw& law, const FieldPoint& own, const Mat3d& recovered,
-                           Vec3d normal, double share) {
-  const SlowStep here = slow_step(law, own.grad_u, own.history);
-  // Each way sets out from the own point, with the history there.
+FieldPoint recovered_point(const PartLaw& law, const FieldPoint& own,
+                           std::span<const double> history, const Mat3d& recovered, Vec3d normal,
+                           double share) {
+  constexpr double most_change = 3;  // of what recovery asks for
+  if (law.custom() && !history.empty()) return own;
+  const PointResponse<double> here = response_at(law, own.grad_u, history);
+  if (here.plastic_work > 0) return own;
+  const Mat3d &g0 = own.grad_u, &p0 = here.first_piola_stress;
   const auto stress_at = [&](const Mat3d& g) {
-    return slow_step(law, g, here.history).response.first_piola_stress;
+    return response_at(law, g, history).first_piola_stress;
   };
-  const Mat3d &g0 = own.grad_u, &p0 = here.response.first_piola_stress;
-  const auto yields = [&](const SlowStep& step) {
-    return step.response.plastic_work > here.response.plastic_work;
-  };
-  const auto towards = [&](const Mat3d& g) {
-    const Mat3d kept = with_traction(stress_at, g, p0 * normal, normal, g0);
-    return g0 + share * (kept - g0);
-  };
-  /// The point at the end of a slow step.
-  const auto at = [&](const Mat3d& g, const SlowStep& step) {
-    FieldPoint point{.grad_u = g, .first_piola_stress = own.first_piola_stress - p0};  // viscous
-    point.first_piola_stress += step.response.first_piola_stress;
-    for (std::size_t k = 0; k < own.history.size(); ++k) {
-      point.history.push_back(own.history[k] + (step.history[k] - here.history[k]));
-    }
-    const double ratio = (1 + volume_change(g)) / (1 + volume_change(g0));
-    return ratio > 0.5 && ratio < 2 ? point : own;
-  };
-  const Mat3d ahead = towards(recovered);
-  const SlowStep forward = slow_step(law, ahead, here.history);
-  if (own.history.empty() || yields(forward)) return at(ahead, forward);
-  const SlowStep backward = slow_step(law, towards(g0 + g0 - recovered), here.history);
-  if (!yields(backward)) return at(ahead, forward);
-  // The material has come less far: its history is that before a step back, taken in reverse, and
-  // the stress, that of the recovered gradient with it.
-  std::vector<double> less = here.history;
-  for (std::size_t k = 0; k < less.size(); ++k) less[k] -= backward.history[k] - here.history[k];
-  const SlowStep step = slow_step(law, ahead, less);
-  return step.response.plastic_work >= 0 ? at(ahead, step) : own;
+  const Mat3d kept = with_traction(stress_at, recovered, p0 * normal, normal, g0);
+  if (frobenius_norm(kept - g0) > most_change * frobenius_norm(recovered - g0)) return own;
+  const Mat3d g = g0 + share * (kept - g0);
+  const double ratio = (1 + volume_change(g)) / (1 + volume_change(g0));
+  if (!(ratio > 0.5 && ratio < 2)) return own;
+  const Mat3d viscous = own.first_piola_stress - p0;
+  return {g, stress_at(g) + viscous};
 }
 
 }  // namespace phyxel

@@ -1,18 +1,16 @@
-/// What fields show of a phyxel on the surface.
+/// What fields show of a phyxel.
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "solver/part_law.hpp"
 
 namespace phyxel {
 
-/// The gradient, the stress and the history that fields show of a phyxel.
+/// The gradient and the stress that fields show of a phyxel.
 struct FieldPoint {
   Mat3d grad_u;
-  Mat3d first_piola_stress;     ///< [Pa]
-  std::vector<double> history;  ///< Of the state, in the law's order.
+  Mat3d first_piola_stress;  ///< [Pa]
 };
 
 /// The point of a phyxel's own gradient, from which forces follow.
@@ -21,15 +19,17 @@ FieldPoint own_point(const PartLaw& law, const Mat3d& own, std::span<const doubl
                      double dt);
 
 /// The point of a phyxel on the surface whose gradient is recovered. The gradient is changed along
-/// the normal so that the traction is that of the own stress. A material with a history takes the
-/// way from its own gradient to this one as a further step, in which viscous stresses stay what
-/// they are. If it yields on that way, stress and history are those after the step; if it yields on
-/// the opposite way, it has come less far than its own gradient says, and the history is the own
-/// one minus what changes on that way. The stress never lies beyond the yield surface. A phyxel
-/// whose det F would change by a factor of two, as at a kink, keeps its own point.
+/// the normal so that the traction is that of the own stress. Viscous stresses, which follow from
+/// rates, stay what they are.
+///
+/// Phyxels keep their own point if their material has yielded, or has the history of a caller's
+/// law: it belongs to the own gradient, and what part of the difference to another gradient is
+/// elastic is not known. So do those whose det F would change by a factor of two, or whose gradient
+/// would change by much more than recovery asks for, as at a kink.
 /// @param own the result of `own_point`. @param normal outward. @param share of the recovered
 ///   gradient
-FieldPoint recovered_point(const PartLaw& law, const FieldPoint& own, const Mat3d& recovered,
-                           Vec3d normal, double share);
+FieldPoint recovered_point(const PartLaw& law, const FieldPoint& own,
+                           std::span<const double> history, const Mat3d& recovered, Vec3d normal,
+                           double share);
 
 }  // namespace phyxel

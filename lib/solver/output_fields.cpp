@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "model/owned_vectors.hpp"
 #include "model/parts.hpp"
@@ -19,6 +20,7 @@ class OutputFields::SurfaceFit {
     const auto count = static_cast<Index>(surfels.position.size());
     std::vector<std::vector<Index>> rows(surfels.position.size());
     std::vector<std::vector<double>> shares(surfels.position.size());
+    depth_.resize(surfels.position.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (Index s = 0; s < count; ++s) {
       rows[s] = nearest_first(surfels.position[s], surfels.carriers.row(s));
@@ -27,6 +29,7 @@ class OutputFields::SurfaceFit {
       if (rows[s].empty()) continue;
       shares[s] =
           shares_at(surfels.position[s], places, model.neighbourhood.support[rows[s].front()]);
+      depth_[s] = depth_below(s, rows[s]);
     }
     for (Index s = 0; s < count; ++s) {
       near_.indices.insert(near_.indices.end(), rows[s].begin(), rows[s].end());
@@ -35,35 +38,33 @@ class OutputFields::SurfaceFit {
     }
   }
 
-  /// How a value follows from those of the phyxels around.
-  enum class Way { fitted, nearest };
-
-  /// The values of surfels, shape [surfels, width]. Collective on a share.
+  /// Values fitted to those of the phyxels around, shape [surfels, width]. Collective on a share.
   /// @param of_phyxels shape [n, width]; those of ghosts do not matter
   template <std::size_t width>
-  std::vector<double> values(const std::vector<double>& of_phyxels, Way way) const {
-    using Entry = std::array<double, width>;
-    std::vector<Entry> value(of_phyxels.size() / width);
-    for (std::size_t k = 0; k < of_phyxels.size(); ++k) value[k / width][k % width] = of_phyxels[k];
-    if (model_.share) refresh_ghosts(*model_.share, value);
-    std::vector<double> found(width * static_cast<std::size_t>(near_.rows()), 0);
-#pragma omp parallel for schedule(static)
-    for (Index s = 0; s < near_.rows(); ++s) {
-      const std::span<const Index> row = near_.row(s);
-      if (row.empty()) continue;
-      for (std::size_t c = 0; c < width; ++c) {
-        double sum = 0, least = value[row.front()][c], most = least;
-        for (std::size_t k = 0; k < row.size(); ++k) {
-          const double here = value[row[k]][c];
-          sum += share_[static_cast<std::size_t>(near_.offsets[s]) + k] * here;
-          least = std::min(least, here);
-          most = std::max(most, here);
-        }
-        found[width * static_cast<std::size_t>(s) + c] =
-            way == Way::nearest ? value[row.front()][c] : std::clamp(sum, least, most);
+  std::vector<double> fitted(const std::vector<double>& of_phyxels) const {
+    const auto value = with_ghosts<width>(of_phyxels);
+    return for_each_surfel<width>([&](Index s, std::span<const Index> row, std::size_t c) {
+      double sum = 0;
+      for (std::size_t k = 0; k < row.size(); ++k) {
+        sum += share_[static_cast<std::size_t>(near_.offsets[s]) + k] * value[row[k]][c];
       }
-    }
-    return found;
+      return in_range(sum, s, row, [&](Index i) { return value[i][c]; });
+    });
+  }
+  /// The values of the nearest phyxels, shape [surfels]. Collective on a share.
+  std::vector<double> nearest(const std::vector<double>& of_phyxels) const {
+    const auto value = with_ghosts<1>(of_phyxels);
+    return for_each_surfel<1>(
+        [&](Index, std::span<const Index> row, std::size_t) { return value[row.front()][0]; });
+  }
+  /// Values of surfels, shape [surfels], within the range of the phyxels around. Collective on a
+  /// share.
+  std::vector<double> in_range_of(const std::vector<double>& of_phyxels,
+                                  const std::vector<double>& of_surfels) const {
+    const auto value = with_ghosts<1>(of_phyxels);
+    return for_each_surfel<1>([&](Index s, std::span<const Index> row, std::size_t) {
+      return in_range(of_surfels[s], s, row, [&](Index i) { return value[i][0]; });
+    });
   }
 
  private:
@@ -82,9 +83,58 @@ class OutputFields::SurfaceFit {
     return row;
   }
 
+  /// How far the highest of some phyxels lies below a surfel, in the height from the lowest to it;
+  /// 0 if one does not lie below, or if all are equally high.
+  double depth_below(Index s, std::span<const Index> row) const {
+    const Surfels& surfels = model_.surfels;
+    double least = std::numeric_limits<double>::infinity(), most = -least;
+    for (const Index i : row) {
+      const double depth = dot(surfels.normal[s], surfels.position[s] - model_.position[i]);
+      least = std::min(least, depth);
+      most = std::max(most, depth);
+    }
+    return least > 0 && most > least ? std::min(1.0, least / (most - least)) : 0;
+  }
+
+  template <std::size_t width>
+  std::vector<std::array<double, width>> with_ghosts(const std::vector<double>& values) const {
+    std::vector<std::array<double, width>> value(values.size() / width);
+    for (std::size_t k = 0; k < values.size(); ++k) value[k / width][k % width] = values[k];
+    if (model_.share) refresh_ghosts(*model_.share, value);
+    return value;
+  }
+
+  /// Calls value_of(surfel, phyxels around it, component).
+  template <std::size_t width, class ValueOf>
+  std::vector<double> for_each_surfel(ValueOf&& value_of) const {
+    std::vector<double> found(width * static_cast<std::size_t>(near_.rows()), 0);
+#pragma omp parallel for schedule(static)
+    for (Index s = 0; s < near_.rows(); ++s) {
+      const std::span<const Index> row = near_.row(s);
+      for (std::size_t c = 0; c < width && !row.empty(); ++c) {
+        found[width * static_cast<std::size_t>(s) + c] = value_of(s, row, c);
+      }
+    }
+    return found;
+  }
+
+  template <class ValueOf>
+  double in_range(double value, Index s, std::span<const Index> row, ValueOf&& value_of) const {
+    double least = value_of(row.front()), most = least;
+    for (const Index i : row) {
+      least = std::min(least, value_of(i));
+      most = std::max(most, value_of(i));
+    }
+    const double beyond = depth_[s] * (most - least);
+    // What is nowhere negative, as an equivalent plastic strain, stays so.
+    const double low = least < 0 ? least - beyond : std::max(0.0, least - beyond);
+    return std::clamp(value, low, most + beyond);
+  }
+
   const Model& model_;
   Csr near_;  // row s: the phyxels around surfel s, the nearest first
   std::vector<double> share_;
+  std::vector<double> depth_;  // of the phyxels below each surfel (`depth_below`)
 };
 
 namespace {
@@ -122,58 +172,54 @@ OutputFields::OutputFields(const Model& model, const OutputRequest& output)
   quantities_ = wanted_;
   if (!output.surface || model.global_surfel_count() == 0) return;
   has_displacement_ = output.wants("displacement");
-  if (output.wants("history")) history_ = history_columns(model);
+  if (output.wants("history")) columns_ = history_columns(model).size();
   if (has_displacement_) quantities_.push_back(on_surface(Quantity::displacement));
   for (const Quantity q : wanted_) quantities_.push_back(on_surface(q));
-  for (std::size_t k = 0; k < history_.size(); ++k) {
+  for (std::size_t k = 0; k < columns_; ++k) {
     quantities_.push_back(on_surface(history_quantity(k)));
   }
-  if (!wanted_.empty() || !history_.empty()) surface_ = std::make_unique<SurfaceFit>(model);
 }
 
 OutputFields::~OutputFields() = default;
 
-FieldValues OutputFields::find(Backend& backend, const SurfelState* surfels,
+FieldValues OutputFields::find(Backend& backend, const State& state, const SurfelState* surfels,
                                const Recovery* recovery) const {
   std::vector<Quantity> needed = wanted_;
-  const bool adds_stress = surfels && surface_ && !contains(wanted_, Quantity::stress) &&
+  const bool adds_stress = surfels && !contains(wanted_, Quantity::stress) &&
                            std::any_of(wanted_.begin(), wanted_.end(), follows_from_stress);
   if (adds_stress) needed.push_back(Quantity::stress);
-  for (std::size_t k = 0; surfels && k < history_.size(); ++k) {
-    needed.push_back(history_quantity(k));
-  }
   FieldValues found = find_fields(model_, backend, needed, recovery);
   if (!surfels) return found;
   if (has_displacement_) {
-    std::vector<double>& way = found[on_surface(Quantity::displacement)];
+    std::vector<double>& displacement = found[on_surface(Quantity::displacement)];
     for (std::size_t s = 0; s < surfels->position.size(); ++s) {
       const Vec3d u = surfels->position[s] - model_.surfels.position[s];
-      way.insert(way.end(), {u.x, u.y, u.z});
+      displacement.insert(displacement.end(), {u.x, u.y, u.z});
     }
   }
-  if (!surface_) return found;
+  if (wanted_.empty() && columns_ == 0) return found;
+  if (!surface_) surface_ = std::make_unique<const SurfaceFit>(model_);
   std::vector<double> stress;
   if (contains(needed, Quantity::stress)) {
-    stress = surface_->values<6>(found[Quantity::stress], SurfaceFit::Way::fitted);
+    stress = surface_->fitted<6>(found[Quantity::stress]);
   }
   if (adds_stress) found.erase(Quantity::stress);
   for (const Quantity q : wanted_) {
     std::vector<double>& of_surfels = found[on_surface(q)];
     if (q == Quantity::stress) {
       of_surfels = stress;
-    } else if (follows_from_stress(q)) {
+    } else if (q == Quantity::von_mises) {
+      of_surfels = surface_->in_range_of(found[q], of_stress(q, stress));
+    } else if (q == Quantity::principal_stress) {
       of_surfels = of_stress(q, stress);
-    } else if (width_of(q) == 6) {
-      of_surfels = surface_->values<6>(found[q], SurfaceFit::Way::fitted);
+    } else if (q == Quantity::boundary) {
+      of_surfels = surface_->nearest(found[q]);
     } else {
-      of_surfels = surface_->values<1>(
-          found[q], q == Quantity::boundary ? SurfaceFit::Way::nearest : SurfaceFit::Way::fitted);
+      of_surfels = width_of(q) == 6 ? surface_->fitted<6>(found[q]) : surface_->fitted<1>(found[q]);
     }
   }
-  for (std::size_t k = 0; k < history_.size(); ++k) {
-    const Quantity number = history_quantity(k);
-    found[on_surface(number)] = surface_->values<1>(found[number], SurfaceFit::Way::fitted);
-    found.erase(number);  // frames of phyxels show the state's
+  for (std::size_t k = 0; k < std::min(columns_, state.history.size()); ++k) {
+    found[on_surface(history_quantity(k))] = surface_->fitted<1>(state.history[k].values);
   }
   return found;
 }

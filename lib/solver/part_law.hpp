@@ -30,14 +30,13 @@ class PartLaw {
   const ChosenLaw& chosen() const { return chosen_; }
 
   /// The response at the end of a step of `dt` [s].
-  /// @param history the phyxel's history at the start of the step, in the law's order; advanced to
-  ///   its end
+  /// @param history the phyxel's history at the start of the step, in the law's order
   PointResponse<double> after_step(const Mat3d& grad_u, std::span<double> history,
                                    double dt) const {
     if (custom_) return of_custom(grad_u, history, dt);
     return response_after_step<double>(
         chosen_.index, chosen_.constants.data(), grad_u,
-        [&](int k) -> double& { return history[static_cast<std::size_t>(k)]; }, dt);
+        [&](int k) { return history[static_cast<std::size_t>(k)]; }, dt);
   }
 
  private:
@@ -58,7 +57,7 @@ class PartLaw {
     const std::array<double, 4> beside{material_.lame_lambda(), material_.lame_mu(), stiffness,
                                        material_.viscosity};
     if (stiffness > 0 || material_.viscosity > 0) {
-      const auto number = [&](int k) -> double& {
+      const auto number = [&](int k) {
         return history[custom_numbers_ + static_cast<std::size_t>(k)];
       };
       constexpr int hooke = Laws::index_of<SmallStrain>;

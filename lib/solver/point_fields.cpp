@@ -69,7 +69,6 @@ bool is_stress(Quantity quantity) {
   return quantity == Quantity::von_mises || quantity == Quantity::stress ||
          quantity == Quantity::principal_stress;
 }
-bool follows_from_history(Quantity quantity) { return is_stress(quantity) || is_history(quantity); }
 
 }  // namespace
 
@@ -111,38 +110,38 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   check_fits(model, backend);
   std::vector<Mat3d> own;
   backend.displacement_gradients(own);
-  const bool needs_points = std::any_of(computed.begin(), computed.end(), follows_from_history);
+  const bool has_stresses = std::any_of(computed.begin(), computed.end(), is_stress);
   const std::vector<std::string> columns = history_columns(model);
   State state;
-  if (recovery || (needs_points && !columns.empty())) backend.download(state);
+  if (recovery || (has_stresses && !columns.empty())) backend.download(state);
   std::vector<Mat3d> recovered;
   if (recovery) recovered = recovery->gradients(state.displacement);
   Arrays arrays(values, computed, static_cast<Index>(own.size()));
-  const bool has_stresses = std::any_of(computed.begin(), computed.end(), is_stress);
   for (const Part& part : model.parts) {
     const PartLaw law(part.material);
     const PartHistory history(state, part.material, columns);
-    const std::vector<std::size_t> column = columns_of(part.material, columns);
-    std::vector<double> numbers(history.size());
+    FirstError error;  // of a caller's law
+#pragma omp parallel for schedule(dynamic, 256)
     for (Index i = part.begin; i < part.owned_end(); ++i) {
+      thread_local std::vector<double> numbers;
+      numbers.resize(history.size());
       const bool is_recovered = recovery && recovery->share(i) > 0;
-      if (!is_recovered && !needs_points) {
+      if (!is_recovered && !has_stresses) {
         set_strains(arrays, i, own[i]);
         continue;
       }
-      FieldPoint point = own_point(law, own[i], history.of(i, numbers), state.history_interval);
-      if (is_recovered) {
-        point = recovered_point(law, point, recovered[i], recovery->normal(i), recovery->share(i));
-      }
+      const std::span<const double> past = history.of(i, numbers);
+      const FieldPoint point = error.caught([&] {
+        const FieldPoint of_own = own_point(law, own[i], past, state.history_interval);
+        if (!is_recovered) return of_own;
+        return recovered_point(law, of_own, past, recovered[i], recovery->normal(i),
+                               recovery->share(i));
+      });
       set_strains(arrays, i, point.grad_u);
-      if (has_stresses) {
-        set_stresses(arrays, i, cauchy_stress(point.first_piola_stress, point.grad_u));
-      }
-      for (std::size_t k = 0; k < column.size(); ++k) {
-        const Quantity number = history_quantity(column[k]);
-        if (arrays.has(number)) arrays.set(number, i, std::array{point.history[k]});
-      }
+      if (!has_stresses) continue;
+      set_stresses(arrays, i, cauchy_stress(point.first_piola_stress, point.grad_u));
     }
+    error.rethrow();
   }
   return values;
 }

@@ -28,7 +28,7 @@ std::vector<std::string> loads_said(const std::string& plan) {
 
 /// The first line of a plan about supports that differ.
 std::string supports_said(const std::string& plan) {
-  const std::size_t begin = plan.find("supports of "), end = plan.find('\n', begin);
+  const std::size_t begin = plan.find("supports from "), end = plan.find('\n', begin);
   return begin == std::string::npos ? "" : plan.substr(begin, end - begin);
 }
 
@@ -213,7 +213,7 @@ TEST_F(Mpirun, GradedBodiesAreTheSameOnAllRanks) {
   const Outcome alone = run_on(0, {"run", "graded.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(alone.out + alone.err, Not(HasSubstr("warning")));
-  EXPECT_THAT(supports_said(alone.out), HasSubstr("the smallest limit explicit steps"));
+  EXPECT_THAT(supports_said(alone.out), HasSubstr("the time step follows from the smallest"));
   for (const int ranks : {2, 3}) {
     const std::string name = std::to_string(ranks);
     const Outcome outcome = run_on(ranks, {"run", "graded.toml", "--out", name});

@@ -58,7 +58,7 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
   }
   const std::vector<Quantity>& found = fields_.quantities();
   moment->optional.insert(moment->optional.end(), found.begin(), found.end());
-  frame.fields = fields_.find(*backend_, frame.surfels, recovery_.get());
+  frame.fields = fields_.find(*backend_, good->state, frame.surfels, recovery_.get());
   hand_over(moment,
             [this, diagnostics = good->diagnostics, readings = readings_](ChunkedSource& values) {
               const Phase writing("writing a frame");

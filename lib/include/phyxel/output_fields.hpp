@@ -23,23 +23,27 @@ class OutputFields {
 
   /// Finds the fields of phyxels (`find_fields`), and those of surfels (`on_surface`). A surfel has
   /// the value of a quadratic polynomial fitted to the phyxels around it that are of the same
-  /// material as the nearest, within the least and the largest value of theirs, so that rough
-  /// fields cannot overshoot; its von Mises and principal stresses are those of the stress so
-  /// found. The mark "boundary" is that of the nearest phyxel. The displacement of a surfel is the
-  /// way from its place at rest. Collective on a share.
+  /// material as the nearest, within the range of their values, so that rough fields cannot
+  /// overshoot; if they all lie below it, as those of a lattice of cells do, the range is wider in
+  /// proportion to their depth. Its principal stresses are those of the stress so found; so is von
+  /// Mises', within the range of the phyxels' own. The mark "boundary" is that of the nearest
+  /// phyxel. What materials remember is that of the state. The displacement of a surfel is the way
+  /// from its place at rest. Collective on a share.
+  /// @param state of the backend, for what materials remember
   /// @param surfels the present surface, or null if it is not written
   /// @param recovery as of `find_fields`
-  FieldValues find(Backend& backend, const SurfelState* surfels, const Recovery* recovery) const;
+  FieldValues find(Backend& backend, const State& state, const SurfelState* surfels,
+                   const Recovery* recovery) const;
 
  private:
   class SurfaceFit;
 
   const Model& model_;
-  std::vector<Quantity> wanted_;  // of phyxels
-  std::vector<std::string> history_;
+  std::vector<Quantity> wanted_;   // of phyxels
+  std::size_t columns_ = 0;        // of what materials remember, for surfels
   bool has_displacement_ = false;  // of surfels
   std::vector<Quantity> quantities_;
-  std::unique_ptr<const SurfaceFit> surface_;
+  mutable std::unique_ptr<const SurfaceFit> surface_;  // made when first needed
 };
 
 }  // namespace phyxel

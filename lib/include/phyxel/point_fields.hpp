@@ -31,12 +31,12 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output);
 /// Computes fields of the phyxels of a model, or of a rank's share, at the backend's present state.
 /// Stress is Cauchy's, σ = P Fᵀ / det F [Pa], strain is Green's, (FᵀF - I) / 2; both as xx, yy, zz,
 /// xy, yz, xz. Values of ghosts are 0.
-/// What materials remember (`history_quantity`) is that of the state, recovered likewise.
 /// @param recovery of the model's gradients: on the surface, fields are then those of the recovered
 ///   gradient, changed along the normal so that the traction is that of the phyxel's own stress.
-///   Plastic materials yield further, or less far, on the way there; viscous stresses stay. A
-///   phyxel whose det F would change by a factor of two, as at a kink, keeps its own gradient.
-///   Null: fields are of the gradients from which forces follow. Collective on a share, if not null
+///   Viscous stresses stay. Phyxels that have yielded, or have the history of a caller's law, keep
+///   their own gradient, and so does one whose det F that would change by a factor of two, as at a
+///   kink. Null: fields are of the gradients from which forces follow. Collective on a share, if
+///   not null
 FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,
                         const Recovery* recovery = nullptr);
 

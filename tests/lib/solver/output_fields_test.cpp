@@ -43,7 +43,7 @@ FieldValues fields_of(const Model& model, const OutputRequest& output, U&& u) {
   SurfelState surfels;
   backend->advect_surfels(surfels);
   const auto recovery = recovery_for(output, model);
-  return OutputFields(model, output).find(*backend, &surfels, recovery.get());
+  return OutputFields(model, output).find(*backend, state, &surfels, recovery.get());
 }
 
 TEST(OutputFields, OfSurfelsAreThoseThatTheOutputNames) {
@@ -139,7 +139,7 @@ TEST(OutputFields, OfSurfelsDoNotMixMaterials) {
   EXPECT_GT(std::min(of_soft, of_stiff), 500);
 }
 
-/// What a material remembers is recovered, and nowhere beyond what phyxels around have.
+/// What a material remembers is nowhere beyond what phyxels around have.
 TEST(OutputFields, OfSurfelsHoldWhatMaterialsRemember) {
   Scene scene = one_body();
   scene.bodies[0].material.viscosity = 1e-3;
@@ -156,13 +156,37 @@ TEST(OutputFields, OfSurfelsHoldWhatMaterialsRemember) {
   SurfelState surfels;
   backend->advect_surfels(surfels);
   const OutputRequest output = output_of({"history"});
-  const FieldValues found = OutputFields(model, output).find(*backend, &surfels, nullptr);
+  const FieldValues found = OutputFields(model, output).find(*backend, state, &surfels, nullptr);
   const std::vector<double>& here = found.at(on_surface(history_quantity(0)));
   for (std::size_t s = 0; s < here.size(); ++s) {
     // The highest phyxel may be half a spacing below a surfel at the pole.
     EXPECT_NEAR(here[s], 1 + model.surfels.position[s].z, 0.01);
     EXPECT_LE(here[s], 1.5);
   }
+}
+
+/// The surface of a lattice of cells is half a spacing above its phyxels: a linear strain goes on.
+TEST(OutputFields, OfSurfelsGoOnAboveLatticesOfCells) {
+  Material material = rubber();
+  material.law = "small-strain";
+  Scene scene = one_body(material);
+  scene.bodies[0].source.shape = {.name = "beam",
+                                  .size = {1, 0.4, 0.5},
+                                  .spacing = 0.05,
+                                  .placement = ShapeRequest::Placement::cells};
+  const Model model = build_model(scene);
+  const FieldValues found = fields_of(model, output_of({"strain", "von_mises"}), [](Vec3d x) {
+    return Vec3d{1e-4 * x.x * x.z, 0, -0.5e-4 * x.x * x.x};
+  });
+  const std::vector<double>& strain = found.at(on_surface(Quantity::strain));
+  int above = 0;
+  for (std::size_t s = 0; s < model.surfels.position.size(); ++s) {
+    const Vec3d x = model.surfels.position[s];
+    if (std::abs(x.x - 0.5) > 0.3 || std::abs(std::abs(x.z) - 0.25) > 1e-9) continue;
+    ++above;
+    EXPECT_NEAR(strain[6 * s], 1e-4 * x.z, 0.01 * 1e-4 * 0.25);
+  }
+  EXPECT_GT(above, 20);
 }
 
 }  // namespace

@@ -59,8 +59,7 @@ struct PointResponse {
 /// @param law its index in `Laws`
 /// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
 ///   time of viscosity [s] (`ChosenLaw`)
-/// @param history gives number k of the phyxel's history at the step's start; a reference to it is
-///   given the number at the step's end
+/// @param history gives number k of the phyxel's history at the step's start
 /// @param dt length of the step [s]
 template <class Real, class Constant, class History>
 PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* constants,
@@ -78,13 +77,6 @@ PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* const
       for (int k = 0; k < numbers; ++k) values[k] = history(k);
       memcpy(static_cast<void*>(&state), values, static_cast<std::size_t>(numbers) * sizeof(Real));
     };
-    const auto write = [&](const auto& state, int numbers) {
-      if constexpr (std::is_lvalue_reference_v<decltype(history(0))>) {
-        Real values[history_numbers<Viscous, Real>];
-        memcpy(values, &state, static_cast<std::size_t>(numbers) * sizeof(Real));
-        for (int k = 0; k < numbers; ++k) history(k) = values[k];
-      }
-    };
     PointResponse<Real> response;
     HistoryOf<Law> state{};
     if (relaxation_time > Real(0)) {
@@ -94,11 +86,9 @@ PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* const
       response.first_piola_stress = viscous.first_piola_stress(grad_u, all, dt);
       response.viscous_work = all.viscous_work;
       state = all.law;
-      write(all, history_numbers<Viscous, Real>);
     } else {
       if constexpr (has_history<Law>) read(state, history_numbers<Law, Real>);
       response.first_piola_stress = stress_after_step(own, grad_u, state, dt);
-      if constexpr (has_history<Law>) write(state, history_numbers<Law, Real>);
       if (solid.second.stiffness > Real(0)) {
         response.first_piola_stress += solid.second.first_piola_stress(grad_u);
       }
