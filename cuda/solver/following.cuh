@@ -55,7 +55,7 @@ __global__ void add_following(const __grid_constant__ Fields<Real, StateReal> f,
   const auto point = f.points.get(place);
   const Vec3<Real> x = to<Real>(point.x) + to<Real>(point.u);
   const Vec3<Real> now = following_force(load.gradient(f.points, k), load.force[k]) +
-                         balance.change(x, norm(load.force[k]));
+                         balance.change(x, sqrt(dot(load.force[k], load.force[k])));
   set_column3(force, f.places, place, column3(force, f.places, place) + factor * now);
 }
 
@@ -105,7 +105,7 @@ __global__ void sum_surface(const __grid_constant__ Fields<Real, StateReal> f,
   for (int e = 0; e < 9; ++e) grad_u(e / 3, e % 3) = gradient(e / 3, e % 3);
   const Vec3<double> at_rest = to<double>(load.force[k]), force = following_force(grad_u, at_rest),
                      torque = cross(x, force);
-  const double w = norm(at_rest);
+  const double w = sqrt(dot(at_rest, at_rest));
   const double terms[SurfaceWords::sums] = {
       dot(x, force),   force.x,         force.y,         force.z,
       torque.x,        torque.y,        torque.z,        w,

@@ -35,6 +35,7 @@ inline constexpr std::size_t first_on_surface = std::size_t{1} << 20;
 constexpr Quantity on_surface(Quantity of_phyxels) {
   return static_cast<Quantity>(first_on_surface + static_cast<std::size_t>(of_phyxels));
 }
+/// True for a quantity that surfels have from phyxels.
 constexpr bool is_on_surface(Quantity quantity) {
   return static_cast<std::size_t>(quantity) >= first_on_surface;
 }
