@@ -18,6 +18,11 @@ void SurfaceSums::add(Vec3d x, Vec3d f, double w) {
   for (int k = 0; k < 6; ++k) second[k].add(w * terms[k]);
 }
 
+void SurfaceSums::add(SurfaceSums& others) {
+  const std::vector<ExactSum*> own = all(), added = others.all();
+  for (std::size_t k = 0; k < own.size(); ++k) own[k]->add(*added[k]);
+}
+
 std::vector<ExactSum*> SurfaceSums::all() {
   std::vector<ExactSum*> sums{&flux};
   for (ExactVector* v : {&force, &torque}) sums.insert(sums.end(), {&v->x, &v->y, &v->z});

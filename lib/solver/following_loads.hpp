@@ -26,6 +26,8 @@ struct SurfaceSums {
 
   /// Adds a phyxel. @param x its place [m]. @param f its present force [N]. @param w [N]
   void add(Vec3d x, Vec3d f, double w);
+  /// Adds the sums of other phyxels.
+  void add(SurfaceSums& others);
   std::vector<ExactSum*> all();
   /// Returns the volume of a cavity in which there is the pressure p, ⅓ Σ (x - mean of x) · f / p
   /// [m³], which a shift of the body does not change. @param p at rest [Pa]
@@ -93,10 +95,17 @@ class FollowingLoads {
       const Load& load = load_of(f);
       if (!load.closed) continue;
       SurfaceSums& of_surface = sums.emplace_back();
-      for (std::size_t k = 0; k < f.entry.size(); ++k) {
-        const Followed at = followed(f, k, displacement);
-        of_surface.add(place_of(load, at.phyxel, displacement),
-                       following_force(at.gradient, at.rest_force), norm(at.rest_force));
+#pragma omp parallel
+      {
+        SurfaceSums of_thread;
+#pragma omp for schedule(static) nowait
+        for (std::size_t k = 0; k < f.entry.size(); ++k) {
+          const Followed at = followed(f, k, displacement);
+          of_thread.add(place_of(load, at.phyxel, displacement),
+                        following_force(at.gradient, at.rest_force), norm(at.rest_force));
+        }
+#pragma omp critical
+        of_surface.add(of_thread);
       }
     }
     return present_of(sums);

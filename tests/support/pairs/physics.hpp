@@ -263,6 +263,7 @@ class Physics {
     for (const Following& f : whole_.following) {
       const Load& load = whole_.loads[f.load];
       const double share = share_of(load, time);
+      std::vector<Eigen::Vector3d> acting, place;
       for (std::size_t k = 0; k < f.entry.size(); ++k) {
         Eigen::Matrix3d deformation = Eigen::Matrix3d::Identity();
         for (Offset e = f.near.offsets[k]; e < f.near.offsets[k + 1]; ++e) {
@@ -272,10 +273,48 @@ class Physics {
         // Nanson's formula, J F⁻ᵀ of the force at rest.
         const Eigen::Vector3d now = deformation.determinant() * deformation.inverse().transpose() *
                                     vector_of(share * load.force[f.entry[k]]);
-        force[load.phyxels[f.entry[k]]] += Vec3d{now[0], now[1], now[2]};
+        const Index i = load.phyxels[f.entry[k]];
+        acting.push_back(now);
+        place.push_back(vector_of(whole_.position[i] + state.displacement[i]));
+      }
+      if (load.closed) balance(acting, place, load, f, std::abs(share));
+      for (std::size_t k = 0; k < f.entry.size(); ++k) {
+        force[load.phyxels[f.entry[k]]] += Vec3d{acting[k][0], acting[k][1], acting[k][2]};
       }
     }
     return force;
+  }
+  /// Takes force and torque from forces on a closed surface: six unknowns a and b, with the change
+  /// w (a + b × x) of each force, w being the size of the force at rest.
+  static void balance(std::vector<Eigen::Vector3d>& force,
+                      const std::vector<Eigen::Vector3d>& place, const Load& load,
+                      const Following& f, double share) {
+    using Matrix = Eigen::Matrix<double, 6, 6>;
+    using Rows = Eigen::Matrix<double, 3, 6>;
+    using Vector = Eigen::Matrix<double, 6, 1>;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& x : place) mean += x / static_cast<double>(place.size());
+    const auto crossed = [](const Eigen::Vector3d& v) {
+      Eigen::Matrix3d m;
+      m << 0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0;
+      return m;
+    };
+    Matrix matrix = Matrix::Zero();
+    Vector left = Vector::Zero();
+    std::vector<Rows> change;
+    for (std::size_t k = 0; k < force.size(); ++k) {
+      const Eigen::Matrix3d arm = crossed(place[k] - mean);
+      Rows& rows = change.emplace_back();
+      rows << Eigen::Matrix3d::Identity(), -arm;
+      rows *= share * norm(load.force[f.entry[k]]);
+      Matrix both;
+      both << rows, arm * rows;
+      matrix += both;
+      left.head<3>() -= force[k];
+      left.tail<3>() -= arm * force[k];
+    }
+    const Vector unknown = matrix.fullPivLu().solve(left);
+    for (std::size_t k = 0; k < force.size(); ++k) force[k] += change[k] * unknown;
   }
   static Eigen::Vector3d vector_of(Vec3d v) { return {v.x, v.y, v.z}; }
   /// Damping of each phyxel [1/s].
