@@ -97,6 +97,16 @@ std::vector<ExactSum*> LoadSums::all() {
   return sums;
 }
 
+ForceBalance ForceBalance::adding(const LoadSums& sizes, Vec3d force, Vec3d torque) {
+  const double size = sizes.mass.value();
+  if (!(size > 0)) return {};
+  const Vec3d mean = sizes.moment.value() / size;
+  const Sym3d second = sizes.second_moment() + moment_term(mean, -size);
+  const double t = trace(second);
+  const Sym3d inertia = Sym3d{t, 0, 0, t, 0, t} + -1.0 * second;
+  return {force / size, pseudo_inverse(inertia).matrix * (torque - cross(mean, force)), mean};
+}
+
 std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,
                                                     const Surface& surface) {
   std::vector<std::optional<BodyPiece>> pieces(request.loads.size());
@@ -320,18 +330,11 @@ void follow_areas(const Model& model, Load& load, const std::vector<double>& cha
     load.force[k] = (1 + change[load.phyxels[k]]) * load.force[k];
   }
   const ForceSums now = sums_of(model, load);
-  const double size = now.sizes.mass.value();
-  if (!(size > 0)) return;
-  // Forces |f| (a + b × (x - mean)) have the total a Σ|f| and, about the mean, the torque J b.
-  const Vec3d mean = now.sizes.moment.value() / size, force = before.force - now.force;
-  const Vec3d torque = before.torque - now.torque - cross(mean, force);
-  const Sym3d second = now.sizes.second_moment() + moment_term(mean, -size);
-  const double t = trace(second);
-  const Sym3d inertia = Sym3d{t, 0, 0, t, 0, t} + -1.0 * second;
-  const Vec3d a = force / size, b = pseudo_inverse(inertia).matrix * torque;
+  const ForceBalance balance =
+      ForceBalance::adding(now.sizes, before.force - now.force, before.torque - now.torque);
   for (std::size_t k = 0; k < load.phyxels.size(); ++k) {
-    const Vec3d x = model.position[load.phyxels[k]] - load.centroid - mean;
-    load.force[k] += norm(load.force[k]) * (a + cross(b, x));
+    const Vec3d x = model.position[load.phyxels[k]] - load.centroid;
+    load.force[k] += balance.change(x, norm(load.force[k]));
   }
 }
 

@@ -31,6 +31,21 @@ struct LoadSums {
   std::vector<ExactSum*> all();
 };
 
+/// Changes of forces f on phyxels that add a total and a torque to their sums: each force changes
+/// by |f| (shift + turn × (x - mean)).
+struct ForceBalance {
+  Vec3d shift;  ///< Without unit.
+  Vec3d turn;   ///< [1/m]
+  Vec3d mean;   ///< Centroid of the sizes |f| [m].
+
+  /// Finds the changes that add a force [N] and a torque [N m]; zero if all sizes are.
+  /// @param sizes sums over the phyxels, of |f| in place of masses. @param torque about the origin
+  ///   of the sums
+  static ForceBalance adding(const LoadSums& sizes, Vec3d force, Vec3d torque);
+  /// The change of a force [N]. @param x place of its phyxel from the origin of the sums [m]
+  Vec3d change(Vec3d x, double size) const { return size * (shift + cross(turn, x - mean)); }
+};
+
 /// The parts of a body on which its loads in boxes and balls act, one for each load; unset for
 /// other loads, and for bodies of several materials or without a closed surface.
 std::vector<std::optional<BodyPiece>> loaded_pieces(const BodyRequest& request,

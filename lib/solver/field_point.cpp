@@ -25,8 +25,9 @@ Mat3d with_traction(StressAt&& stress_at, const Mat3d& grad_u, Vec3d traction, V
   constexpr double difference = 1e-7, tolerance = 1e-6;  // of the stress
   const auto traction_at = [&](const Mat3d& g) { return stress_at(g) * normal; };
   Mat3d g = grad_u;
-  Vec3d here = traction_at(g);
-  const double size = frobenius_norm(stress_at(grad_u)) + norm(traction);
+  const Mat3d first = stress_at(g);
+  Vec3d here = first * normal;
+  const double size = frobenius_norm(first) + norm(traction);
   for (int step = 0; step < most_steps; ++step) {
     const Vec3d left = traction - here;
     if (norm(left) <= tolerance * size) return g;

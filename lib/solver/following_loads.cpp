@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "model/owned_vectors.hpp"
-#include "phyxel/physics/moment.hpp"
 #include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
@@ -12,44 +11,28 @@ void SurfaceSums::add(Vec3d x, Vec3d f, double w) {
   flux.add(dot(x, f));
   force.add(f);
   torque.add(cross(x, f));
-  weight.add(w);
-  place.add(w * x);
-  const double terms[6] = {x.x * x.x, x.x * x.y, x.x * x.z, x.y * x.y, x.y * x.z, x.z * x.z};
-  for (int k = 0; k < 6; ++k) second[k].add(w * terms[k]);
+  sizes.add(w, x);
 }
 
-void SurfaceSums::add(SurfaceSums& others) {
-  const std::vector<ExactSum*> own = all(), added = others.all();
+void SurfaceSums::add(SurfaceSums& set) {
+  const std::vector<ExactSum*> own = all(), added = set.all();
   for (std::size_t k = 0; k < own.size(); ++k) own[k]->add(*added[k]);
 }
 
 std::vector<ExactSum*> SurfaceSums::all() {
-  std::vector<ExactSum*> sums{&flux};
+  std::vector<ExactSum*> sums{&flux}, of_sizes = sizes.all();
   for (ExactVector* v : {&force, &torque}) sums.insert(sums.end(), {&v->x, &v->y, &v->z});
-  sums.insert(sums.end(), {&weight, &place.x, &place.y, &place.z});
-  for (ExactSum& sum : second) sums.push_back(&sum);
+  sums.insert(sums.end(), of_sizes.begin(), of_sizes.end());
   return sums;
 }
 
 double SurfaceSums::volume(double p) const {
-  const Vec3d mean = (1 / weight.value()) * place.value();
+  const Vec3d mean = (1 / sizes.mass.value()) * sizes.moment.value();
   return (flux.value() - dot(mean, force.value())) / (3 * p);
 }
 
-ForceBalance ForceBalance::of(const SurfaceSums& sums) {
-  const double weight = sums.weight.value();
-  if (!(weight > 0)) return {};
-  ForceBalance balance;
-  balance.mean = (1 / weight) * sums.place.value();
-  const Vec3d force = sums.force.value(), torque = sums.torque.value() - cross(balance.mean, force);
-  const auto value = [&](int k) { return sums.second[k].value(); };
-  const Sym3d second = Sym3d{value(0), value(1), value(2), value(3), value(4), value(5)} +
-                       moment_term(balance.mean, -weight);
-  const double t = trace(second);
-  const Sym3d inertia = Sym3d{t, 0, 0, t, 0, t} + -1.0 * second;
-  balance.shift = (-1 / weight) * force;
-  balance.turn = -(pseudo_inverse(inertia).matrix * torque);
-  return balance;
+ForceBalance SurfaceSums::balance() const {
+  return ForceBalance::adding(sizes, -force.value(), -torque.value());
 }
 
 FollowingLoads::FollowingLoads(const Model& model) : model_(model) {
@@ -75,7 +58,7 @@ FollowingLoads::Present FollowingLoads::present_of(std::vector<SurfaceSums>& sum
     const Load& load = load_of(model_.following[f]);
     if (!load.closed) continue;
     const SurfaceSums& of_surface = sums[next++];
-    found.balances[f] = ForceBalance::of(of_surface);
+    found.balances[f] = of_surface.balance();
     if (!load.gas) continue;
     found.gases.push_back(
         {f, *load.gas, volume_at_rest_[found.gases.size()], of_surface.volume(load.pressure)});

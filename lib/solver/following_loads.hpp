@@ -1,12 +1,12 @@
 /// Loads that follow the surface: pressures on the deformed surface, and gases in cavities.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <span>
 #include <vector>
 
 #include "exact_sum.hpp"
+#include "model/loads.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/follower.hpp"
@@ -18,31 +18,20 @@ namespace phyxel {
 /// Sums over the phyxels on which a load acts that follows the surface. Places x are those of the
 /// deformed body, from some origin, and w is the size of a phyxel's force at rest.
 struct SurfaceSums {
-  ExactSum flux;                   ///< Σ x · f [N m], f being the present force at full size.
-  ExactVector force, torque;       ///< Σ f [N], Σ x × f [N m]
-  ExactSum weight;                 ///< Σ w [N]
-  ExactVector place;               ///< Σ w x [N m]
-  std::array<ExactSum, 6> second;  ///< Σ w x xᵀ [N m²]: xx, xy, xz, yy, yz, zz.
+  ExactSum flux;              ///< Σ x · f [N m], f being the present force at full size.
+  ExactVector force, torque;  ///< Σ f [N], Σ x × f [N m]
+  LoadSums sizes;             ///< Of w in place of masses.
 
   /// Adds a phyxel. @param x its place [m]. @param f its present force [N]. @param w [N]
   void add(Vec3d x, Vec3d f, double w);
-  /// Adds the sums of other phyxels.
-  void add(SurfaceSums& others);
+  /// Adds the sums over another set of phyxels.
+  void add(SurfaceSums& set);
   std::vector<ExactSum*> all();
-  /// Returns the volume of a cavity in which there is the pressure p, ⅓ Σ (x - mean of x) · f / p
+  /// Returns the volume of a cavity that a gas of pressure p fills, ⅓ Σ (x - mean of x) · f / p
   /// [m³], which a shift of the body does not change. @param p at rest [Pa]
   double volume(double p) const;
-};
-
-/// Changes of forces that take force and torque from their sums: w (shift + turn × (x - mean)).
-struct ForceBalance {
-  Vec3d shift;  ///< Without unit.
-  Vec3d turn;   ///< [1/m]
-  Vec3d mean;   ///< [m], from the origin of the sums.
-
-  /// Finds the changes of forces whose sums these are.
-  static ForceBalance of(const SurfaceSums& sums);
-  Vec3d change(Vec3d x, double w) const { return w * (shift + cross(turn, x - mean)); }
+  /// Finds the changes of the forces that take away their total and their torque.
+  ForceBalance balance() const;
 };
 
 /// A phyxel on which a load acts that follows the surface.
