@@ -192,7 +192,7 @@ std::vector<Triangle> chosen_triangles(const BodyRequest& request, const Tractio
                    [&](std::size_t k) { return surface.triangle[found->second[k]]; });
 }
 
-/// Some triangles of a surface, seen as a surface of their own.
+/// Properties of a part of a surface, as a surface of its own.
 struct Piece {
   bool closed = false, inside_out = false;
 };

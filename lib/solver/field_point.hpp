@@ -1,4 +1,4 @@
-/// What fields show of a phyxel.
+/// The gradient and the stress of a phyxel in output fields.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace phyxel {
 
-/// The gradient and the stress that fields show of a phyxel.
+/// The gradient and the stress of a phyxel in output fields.
 struct FieldPoint {
   Mat3d grad_u;
   Mat3d first_piola_stress;  ///< [Pa]
@@ -23,9 +23,9 @@ FieldPoint own_point(const PartLaw& law, const Mat3d& own, std::span<const doubl
 /// rates, stay what they are.
 ///
 /// Phyxels keep their own point if their material has yielded, or has the history of a caller's
-/// law: it belongs to the own gradient, and what part of the difference to another gradient is
-/// elastic is not known. So do those whose det F would change by a factor of two, or whose gradient
-/// would change by much more than recovery asks for, as at a kink.
+/// law: the history belongs to the own gradient, and the elastic part of the difference to another
+/// gradient is not known. A phyxel also keeps its own point if its det F would change by a factor
+/// of two, or its gradient by much more than recovery asks for, as at a kink.
 /// @param own the result of `own_point`. @param normal outward. @param share of the recovered
 ///   gradient
 FieldPoint recovered_point(const PartLaw& law, const FieldPoint& own,

@@ -8,8 +8,8 @@
 
 namespace phyxel {
 
-/// What the frames of a run show of its phyxels and of its surface, beside positions. Made once for
-/// a model, or for a rank's share.
+/// The finder of a run's computed fields, of phyxels and of surfels. It is made once for a model,
+/// or for a rank's share.
 class OutputFields {
  public:
   /// @param model must outlive this object
@@ -18,7 +18,7 @@ class OutputFields {
   OutputFields(const OutputFields&) = delete;
   OutputFields& operator=(const OutputFields&) = delete;
 
-  /// What `find` fills: on ranks, the same on all.
+  /// The quantities that `find` fills; the same on all ranks.
   const std::vector<Quantity>& quantities() const { return quantities_; }
 
   /// Finds the fields of phyxels (`find_fields`), and those of surfels (`on_surface`). A surfel has
@@ -29,7 +29,7 @@ class OutputFields {
   /// Mises', within the range of the phyxels' own. The mark "boundary" is that of the nearest
   /// phyxel. What materials remember is that of the state. The displacement of a surfel is the way
   /// from its place at rest. Collective on a share.
-  /// @param state of the backend, for what materials remember
+  /// @param state of the backend, with its history variables
   /// @param surfels the present surface, or null if it is not written
   /// @param recovery as of `find_fields`
   FieldValues find(Backend& backend, const State& state, const SurfelState* surfels,
@@ -40,7 +40,7 @@ class OutputFields {
 
   const Model& model_;
   std::vector<Quantity> wanted_;   // of phyxels
-  std::size_t columns_ = 0;        // of what materials remember, for surfels
+  std::size_t columns_ = 0;        // of history variables on surfels
   bool has_displacement_ = false;  // of surfels
   std::vector<Quantity> quantities_;
   mutable std::unique_ptr<const SurfaceFit> surface_;  // made when first needed
