@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mesh/nearest_site.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
@@ -162,6 +163,7 @@ class GradedSkin {
       : request_(request), spacing_(spacing), point_(all_sites(request.sites)) {
     first_inside_ = point_.size();
     point_.insert(point_.end(), inside.begin(), inside.end());
+    ball_.resize(point_.size());
   }
 
   /// Moves each phyxel inside by the sum of the forces at the places before the sweep.
@@ -170,7 +172,7 @@ class GradedSkin {
     std::vector<Vec3d> moved = point_;
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t k = first_inside_; k < point_.size(); ++k) {
-      moved[k] = repelled_inside(request_, repulsion, point_[k], static_cast<Index>(k));
+      moved[k] = repelled_inside(request_, repulsion, point_[k], static_cast<Index>(k), ball_[k]);
     }
     point_.swap(moved);
   }
@@ -230,6 +232,7 @@ class GradedSkin {
   const LatticeRequest& request_;
   const SpacingField& spacing_;
   std::vector<Vec3d> point_;
+  std::vector<InsideSampler::Ball> ball_;  ///< Of each point that moves.
   std::size_t first_inside_ = 0;
 };
 

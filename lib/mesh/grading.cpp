@@ -226,9 +226,9 @@ SpacingField graded_spacing(const GradedBody& body, const Grading& request) {
   // If all were as fine as can be, the finest spacing would be the uniform one.
   const double most = request.ratio * uniform, least = uniform / request.ratio;
   std::vector<SpacingSource> sources;
-  const bool finer = !request.finer.empty();
-  const double per_radius = request.per_radius.value_or(finer ? 0 : 8),
-               across = std::max(least_across, request.across.value_or(finer ? 0 : 5));
+  const bool has_finer = !request.finer.empty();
+  const double per_radius = request.per_radius.value_or(has_finer ? 0 : 8),
+               across = std::max(least_across, request.across.value_or(has_finer ? 0 : 5));
   if (per_radius > 0) add_curved(body, per_radius, least, most, sources);
   add_thin(body, across, uniform, most, sources);
   std::shared_ptr<const SpacingCone> cone;

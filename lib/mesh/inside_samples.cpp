@@ -101,6 +101,14 @@ std::size_t InsideSampler::few_for_walking() const {
   return std::max(few_triangles, static_cast<std::size_t>(work / std::max<Offset>(probed, 1) / 8));
 }
 
+bool InsideSampler::stays_inside(Vec3d before, Vec3d after, double most, Ball& ball) const {
+  constexpr double rounding = 1e-6;
+  const auto holds = [&] { return norm(after - ball.middle) < (1 - rounding) * ball.radius; };
+  if (holds()) return true;
+  ball = {before, winding_number_.distance(before, most)};
+  return holds() || inside(after);
+}
+
 /// False if a separating axis shows that the triangle misses the cube. For an open surface only
 /// the axes of the cube and the triangle's normal are tried, and a triangle may still miss the
 /// cube: `agrees_throughout` is evidence, not proof, and such cells do not rely on it.
@@ -339,6 +347,16 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, Wo
   }
   SampleBlock block;
   block.centre = grid.middle(cell);
+  // The region is the cell one level up.
+  Cell region;
+  region.level = cell.level + 1;
+  const std::int64_t side = std::int64_t{1} << region.level;
+  region.x = cell.x & -side;
+  region.y = cell.y & -side;
+  region.z = cell.z & -side;
+  block.region = grid.middle(region);
+  // Sample points are rounded to float.
+  block.region_radius = 0.5 * std::sqrt(3.0) * (static_cast<double>(side) + 1e-3) * grid.voxel;
   fill(grid, cell, block, tally);
   limit.done += tally.work - before;
   if (!block.offset.empty()) visit_block(block);

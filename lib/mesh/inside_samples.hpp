@@ -19,6 +19,8 @@ class Stage;
 struct SampleBlock {
   Vec3d centre;                     ///< [m]
   std::vector<Vec3<float>> offset;  ///< [m], shape [n].
+  Vec3d region;  ///< Middle of the cube of 8 x 8 x 8 voxels that contains the block [m].
+  double region_radius = 0;  ///< Radius of a ball that contains that cube [m]; 0: there is none.
 
   Vec3d position(std::size_t k) const {
     return centre + Vec3d{offset[k].x, offset[k].y, offset[k].z};
@@ -77,6 +79,16 @@ class InsideSampler {
                       Stage* stage = nullptr) const;
 
   bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
+  /// A ball inside the surface that no triangle reaches.
+  struct Ball {
+    Vec3d middle;       ///< [m]
+    double radius = 0;  ///< [m]
+  };
+  /// True if a point inside is inside after a step, too. Steps within a ball need no winding
+  /// number.
+  /// @param ball a ball around a former place of the same point; replaced once the point leaves it
+  /// @param most radius of the largest balls [m]
+  bool stays_inside(Vec3d before, Vec3d after, double most, Ball& ball) const;
   /// Approximate number of voxels that the surface passes through; the sampler visits each.
   double surface_voxels(double voxel) const { return (area_ / voxel + length_) / voxel; }
   double area() const { return area_; }      ///< Area of the surface [m^2].

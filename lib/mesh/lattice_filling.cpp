@@ -5,6 +5,7 @@
 #include <functional>
 #include <numbers>
 
+#include "mesh/nearest_site.hpp"
 #include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
@@ -56,7 +57,7 @@ class Clearance {
  public:
   Clearance(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
-        site_(all_sites(request.sites), spacing),
+        site_(all_sites(request.sites), 2 * spacing),
         sample_(samples(request, spacing), 0.6 * spacing) {}
 
   /// The clearance of a place, in spacings; `largest_clearance` for all that is farther.
@@ -169,6 +170,7 @@ class Skin {
       near_.push_back(i);
       point_.push_back(nodes.position[i]);
     }
+    ball_.resize(near_.size());
   }
 
   /// Moves each node by the sum of the forces at the places before the sweep.
@@ -180,7 +182,8 @@ class Skin {
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const Vec3d before = point_[sites() + k];
       moved[k] = clearance_of(k) < moving_clearance
-                     ? repelled_inside(request_, repulsion, before, static_cast<Index>(sites() + k))
+                     ? repelled_inside(request_, repulsion, before, static_cast<Index>(sites() + k),
+                                       ball_[k])
                      : before;
     }
     std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
@@ -252,6 +255,7 @@ class Skin {
   double spacing_;
   std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
   std::vector<Vec3d> point_;       ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
+  std::vector<InsideSampler::Ball> ball_;  ///< Of the nodes of `near_`, where they have moved.
 };
 
 }  // namespace
@@ -263,7 +267,7 @@ std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
 }
 
 Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
-                      Index self) {
+                      Index self, InsideSampler::Ball& ball) {
   const auto on_surface = static_cast<Index>(request.sites.position.size());
   bool beside_surface = false;
   const auto strength = [&](Index other) {
@@ -272,7 +276,9 @@ Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion,
   };
   const Vec3d after = before + repulsion.step(before, self, strength);
   // Only nodes beside phyxels on the surface can leave it.
-  return !beside_surface || request.sampler.inside(after) ? after : before;
+  const bool stays = !beside_surface || request.sampler.stays_inside(
+                                            before, after, request.sites.spacing.coarsest(), ball);
+  return stays ? after : before;
 }
 
 Mat3d turn_of_lattice() {

@@ -47,8 +47,9 @@ std::vector<Vec3d> all_sites(const SurfaceSites& sites);
 
 /// The place of a point inside after a step of repulsion; the place before it if the step would
 /// leave the surface [m]. @param self index of the point, after those of the sites
+/// @param ball see `InsideSampler::stays_inside`
 Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
-                      Index self);
+                      Index self, InsideSampler::Ball& ball);
 
 /// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
 /// that of a face that people draw, so that no layer of nodes has one clearance for all.

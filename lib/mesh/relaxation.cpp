@@ -6,7 +6,7 @@
 #include <bit>
 #include <cmath>
 
-#include "mesh/nearest_points.hpp"
+#include "mesh/nearest_site.hpp"
 #include "mesh/random_bits.hpp"
 #include "parallel_sort.hpp"
 #include "stage.hpp"
@@ -268,102 +268,6 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                           taken.points().end());
   for (Vec3d& p : site) p += origin;
   return site;
-}
-
-namespace {
-
-/// A hash with cells at least 1.2 spacings wide, and wider if the sites are sparse: in a sheet or
-/// thread thinner than a spacing, sites are many spacings apart, and a search would visit empty
-/// cells.
-SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
-  SpatialHash hash(site, 1.2 * spacing);
-  // Occupied cells have 1.9 sites on average if the sites fill space, more than 1.05 on a face.
-  while (hash.mean_occupancy() < 1.05 && site.size() > 1) {
-    hash = SpatialHash(site, 2 * hash.cell_size());
-  }
-  return hash;
-}
-
-}  // namespace
-
-NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
-    : hash_(hash_of(site, spacing)), sites_(site.size()) {}
-
-void NearestSite::find(const SampleBlock& block, Scratch& s) const {
-  const std::size_t n = block.offset.size();
-  s.x.resize(n);
-  s.y.resize(n);
-  s.z.resize(n);
-  double ball = 0;  // radius of the block about its centre
-  for (std::size_t k = 0; k < n; ++k) {
-    const Vec3<float> p = block.offset[k];
-    s.x[k] = p.x;
-    s.y[k] = p.y;
-    s.z[k] = p.z;
-    ball = std::max(ball, norm({p.x, p.y, p.z}));
-  }
-
-  const Vec3d nearest = hash_.nearest(block.centre).apart;
-  const double nearest2 = dot(nearest, nearest);
-  // A site can be nearest to some point of the ball only if the plane half-way between it and the
-  // site nearest to the centre cuts the ball; hence also only if it is within the reach below.
-  const double slack = 1 + 1e-6;
-  const double reach = (std::sqrt(nearest2) + 2 * ball) * slack;
-  s.candidate.clear();
-  s.candidate_x.clear();
-  s.candidate_y.clear();
-  s.candidate_z.clear();
-  hash_.visit_ball(block.centre, reach, [&](const SpatialHash::Entry& entry) {
-    const Vec3d d = entry.position - block.centre;
-    const Vec3d apart = d - nearest;
-    const double beyond = dot(d, d) - nearest2;
-    if (beyond > 0 && beyond * beyond > 4 * ball * ball * slack * dot(apart, apart)) {
-      return;
-    }
-    s.candidate.push_back(entry.index);
-    s.candidate_x.push_back(static_cast<float>(d.x));
-    s.candidate_y.push_back(static_cast<float>(d.y));
-    s.candidate_z.push_back(static_cast<float>(d.z));
-  });
-
-  s.best.resize(n);
-  s.slot.resize(n);
-  find_nearest(
-      {n, s.x.data(), s.y.data(), s.z.data()},
-      {s.candidate.size(), s.candidate_x.data(), s.candidate_y.data(), s.candidate_z.data()},
-      s.best.data(), s.slot.data());
-  s.owner.resize(n);
-  for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate[s.slot[k]];
-}
-
-std::vector<std::uint32_t> NearestSite::samples_of_sites(
-    const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
-    const std::function<bool(Vec3d)>& counts) const {
-  std::vector<std::uint32_t> count(sites_, 0);
-  sampler.visit(
-      sweep,
-      [&](std::size_t, const SampleBlock& block) {
-        thread_local Scratch scratch;
-        find(block, scratch);
-        for (std::size_t k = 0; k < scratch.owner.size(); ++k) {
-          if (counts && !counts(block.position(k))) continue;
-#pragma omp atomic
-          ++count[scratch.owner[k]];
-        }
-      },
-      &stage);
-  return count;
-}
-
-std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
-                                         Stage& stage,
-                                         const std::function<bool(Vec3d)>& counts) const {
-  const std::vector<std::uint32_t> count = samples_of_sites(sampler, sweep, stage, counts);
-  std::vector<double> volume(sites_);
-  for (std::size_t i = 0; i < sites_; ++i) {
-    volume[i] = std::max(0.5, double(count[i])) * std::pow(sweep.voxel, 3);
-  }
-  return volume;
 }
 
 SampledVoronoi::SampledVoronoi(std::vector<SampleBlock> blocks) : blocks_(std::move(blocks)) {

@@ -26,39 +26,6 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                                    const SpacingField& spacing, double gap, std::uint64_t seed,
                                    std::span<const Vec3d> before);
 
-/// Search for the nearest of a set of sites for each point of a block.
-class NearestSite {
- public:
-  /// @param site must outlive the search
-  /// @param spacing typical distance between sites [m]
-  NearestSite(const std::vector<Vec3d>& site, double spacing);
-
-  /// Work space that one thread reuses from block to block.
-  struct Scratch {
-    std::vector<float> x, y, z, best;
-    std::vector<std::int32_t> slot;
-    std::vector<Index> owner;  ///< Result: the nearest site of each point, shape [n].
-    std::vector<Index> candidate;
-    std::vector<float> candidate_x, candidate_y, candidate_z;
-  };
-  /// Finds the nearest site of each point of a block.
-  void find(const SampleBlock& block, Scratch& scratch) const;
-
-  /// Finds the volume [m^3] that sample points give to each site, the nearest one; a site without
-  /// sample points gets half of one's. @param stage is told the progress
-  /// @param counts tells whether a sample point counts, on many threads; null: all do
-  std::vector<double> volumes(const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
-                              const std::function<bool(Vec3d)>& counts = nullptr) const;
-  /// The number of sample points that each site gets, likewise.
-  std::vector<std::uint32_t> samples_of_sites(
-      const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
-      const std::function<bool(Vec3d)>& counts = nullptr) const;
-
- private:
-  SpatialHash hash_;
-  std::size_t sites_;
-};
-
 /// A Voronoi diagram of sites, restricted to the inside of a surface and represented by sample
 /// points, each with its nearest site.
 class SampledVoronoi {

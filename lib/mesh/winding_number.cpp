@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "mesh/face_relaxation.hpp"
 
 namespace phyxel {
 namespace {
@@ -124,6 +127,40 @@ double WindingNumber::operator()(Vec3d point, Offset* work) const {
   }
   if (work) *work += done;
   return near / (2 * std::numbers::pi) + far / (4 * std::numbers::pi);
+}
+
+double WindingNumber::distance(Vec3d point, double most) const {
+  if (nodes_.empty()) return most;
+  /// A node to visit, and the least distance of its triangles.
+  struct Waiting {
+    Index node;
+    double least;
+  };
+  const auto waiting = [&](Index index) {
+    const Node& node = nodes_[index];
+    return Waiting{index, norm(node.centre - point) - node.radius / accuracy_};
+  };
+  double nearest = most;
+  Waiting stack[64];
+  int depth = 0;
+  stack[depth++] = waiting(0);
+  while (depth > 0) {
+    const Waiting next = stack[--depth];
+    if (next.least >= nearest) continue;
+    const Node& node = nodes_[next.node];
+    if (node.child >= 0) {
+      Waiting near = waiting(node.child), far = waiting(node.child + 1);
+      if (far.least < near.least) std::swap(near, far);
+      stack[depth++] = far;
+      stack[depth++] = near;
+      continue;
+    }
+    for (Index t = node.first; t < node.first + node.count; ++t) {
+      const Corners& c = corners_[t];
+      nearest = std::min(nearest, norm(nearest_on_triangle(point, c.a, c.b, c.c) - point));
+    }
+  }
+  return nearest;
 }
 
 }  // namespace phyxel

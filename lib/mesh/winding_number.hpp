@@ -27,6 +27,8 @@ class WindingNumber {
   /// @param work if given, is raised by one for each group and by `angle_work` for each triangle
   ///   visited
   double operator()(Vec3d point, Offset* work = nullptr) const;
+  /// The distance from a point to the nearest triangle [m], or `most` where it is larger.
+  double distance(Vec3d point, double most) const;
   static constexpr Offset angle_work = 8;  ///< Cost of a solid angle, in expansions of groups.
 
  private:

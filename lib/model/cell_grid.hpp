@@ -41,12 +41,16 @@ struct CellGrid {
            (static_cast<std::uint64_t>(c.y) & mask) << 21 |
            (static_cast<std::uint64_t>(c.z) & mask) << 42;
   }
-  /// hash(x, y, z) = (x p1 xor y p2 xor z p3) mod table size, with the paper's primes.
+  /// Buckets of cells that are near each other are near each other, too: a block of 4 x 4 x 4 cells
+  /// takes 64 buckets in a row, the stretch number (x p1 xor y p2 xor z p3) mod the number of
+  /// stretches, with the paper's primes and x, y, z counted in blocks.
   PHYXEL_HD std::uint64_t bucket_of(std::uint64_t cell) const {
-    constexpr std::uint64_t mask = 0x1fffff;
-    const std::uint64_t h = ((cell & mask) * 73856093u) ^ ((cell >> 21 & mask) * 19349663u) ^
-                            ((cell >> 42 & mask) * 83492791u);
-    return h & table_mask;
+    constexpr std::uint64_t block = 0x7ffff;
+    const std::uint64_t h = ((cell >> 2 & block) * 73856093u) ^ ((cell >> 23 & block) * 19349663u) ^
+                            ((cell >> 44 & block) * 83492791u);
+    const std::uint64_t within = (cell & 3) | (cell >> 19 & 12) | (cell >> 38 & 48);
+    // A sheet along an axis would use a quarter of the buckets, the same ones in each block.
+    return (h << 6 | (within ^ (h >> 20 & 63))) & table_mask;
   }
   /// Rings of cells around `place` beyond which there is no point of a cloud from `low` to `high`.
   PHYXEL_HD int farthest_ring(Vec3d place, Vec3d high) const {

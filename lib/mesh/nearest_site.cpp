@@ -1,0 +1,152 @@
+#include "mesh/nearest_site.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+
+#include "mesh/nearest_points.hpp"
+#include "stage.hpp"
+
+namespace phyxel {
+namespace {
+
+/// A hash with cells at least 1.2 spacings wide, and wider if the sites are sparse: in a sheet or
+/// thread thinner than a spacing, sites are many spacings apart, and a search would visit empty
+/// cells.
+SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
+  SpatialHash hash(site, 1.2 * spacing);
+  // Occupied cells have 1.9 sites on average if the sites fill space, more than 1.05 on a face.
+  while (hash.mean_occupancy() < 1.05 && site.size() > 1) {
+    hash = SpatialHash(site, 2 * hash.cell_size());
+  }
+  return hash;
+}
+
+}  // namespace
+
+NearestSite::NearestSite(const std::vector<Vec3d>& site, double spacing)
+    : hash_(hash_of(site, spacing)), sites_(site.size()) {}
+
+template <class Real>
+void NearestSite::Sites<Real>::clear() {
+  index.clear();
+  x.clear();
+  y.clear();
+  z.clear();
+}
+
+template <class Real>
+void NearestSite::Sites<Real>::add(Index site, Vec3d place) {
+  index.push_back(site);
+  x.push_back(static_cast<Real>(place.x));
+  y.push_back(static_cast<Real>(place.y));
+  z.push_back(static_cast<Real>(place.z));
+}
+
+namespace {
+
+constexpr double slack = 1 + 1e-6;
+
+/// False if a site cannot be nearest to any point of a ball: if the plane half-way between it and
+/// the site nearest to the middle does not cut the ball.
+/// @param apart vector from the middle to the site, and @param nearest to the nearest site [m]
+bool may_be_nearest(Vec3d apart, Vec3d nearest, double radius) {
+  const double beyond = dot(apart, apart) - dot(nearest, nearest);
+  const Vec3d between = apart - nearest;
+  return !(beyond > 0 && beyond * beyond > 4 * radius * radius * slack * dot(between, between));
+}
+
+}  // namespace
+
+/// Finds the sites that may be nearest to a point of a ball; nothing if those are known.
+void NearestSite::find_region(Vec3d middle, double radius, Scratch& s) const {
+  if (s.region.x == middle.x && s.region.y == middle.y && s.region.z == middle.z) return;
+  s.region = middle;
+  s.of_region.clear();
+  const Vec3d nearest = hash_.nearest(middle).apart;
+  // Sites farther away are beyond the planes, too.
+  const double reach = (norm(nearest) + 2 * radius) * slack;
+  hash_.visit_ball(middle, reach, [&](const SpatialHash::Entry& entry) {
+    if (may_be_nearest(entry.position - middle, nearest, radius)) {
+      s.of_region.add(entry.index, entry.position);
+    }
+  });
+}
+
+void NearestSite::find(const SampleBlock& block, Scratch& s) const {
+  const std::size_t n = block.offset.size();
+  s.x.resize(n);
+  s.y.resize(n);
+  s.z.resize(n);
+  float ball2 = 0;  // squared radius of the block about its centre
+  for (std::size_t k = 0; k < n; ++k) {
+    const Vec3<float> p = block.offset[k];
+    s.x[k] = p.x;
+    s.y[k] = p.y;
+    s.z[k] = p.z;
+    ball2 = std::max(ball2, dot(p, p));
+  }
+  const double ball = std::sqrt(static_cast<double>(ball2)) * slack;
+
+  if (block.region_radius > 0) {
+    find_region(block.region, block.region_radius, s);
+  } else {
+    find_region(block.centre, ball, s);
+  }
+  const Sites<double>& near = s.of_region;
+  s.distance2.resize(near.size());
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const Vec3d d = near.at(k) - block.centre;
+    s.distance2[k] = dot(d, d);
+  }
+  const auto first = std::min_element(s.distance2.begin(), s.distance2.end());
+  const Vec3d nearest =
+      near.at(static_cast<std::size_t>(first - s.distance2.begin())) - block.centre;
+  s.candidate.clear();
+  for (std::size_t k = 0; k < near.size(); ++k) {
+    const Vec3d d = near.at(k) - block.centre;
+    if (may_be_nearest(d, nearest, ball)) s.candidate.add(near.index[k], d);
+  }
+
+  s.best.resize(n);
+  s.slot.resize(n);
+  find_nearest(
+      {n, s.x.data(), s.y.data(), s.z.data()},
+      {s.candidate.size(), s.candidate.x.data(), s.candidate.y.data(), s.candidate.z.data()},
+      s.best.data(), s.slot.data());
+  s.owner.resize(n);
+  for (std::size_t k = 0; k < n; ++k) s.owner[k] = s.candidate.index[s.slot[k]];
+}
+
+std::vector<std::uint32_t> NearestSite::samples_of_sites(
+    const InsideSampler& sampler, const SampleSweep& sweep, Stage& stage,
+    const std::function<bool(Vec3d)>& counts) const {
+  std::vector<std::uint32_t> count(sites_, 0);
+  std::vector<Scratch> of_thread(static_cast<std::size_t>(omp_get_max_threads()));
+  sampler.visit(
+      sweep,
+      [&](std::size_t, const SampleBlock& block) {
+        Scratch& scratch = of_thread[static_cast<std::size_t>(omp_get_thread_num())];
+        find(block, scratch);
+        for (std::size_t k = 0; k < scratch.owner.size(); ++k) {
+          if (counts && !counts(block.position(k))) continue;
+#pragma omp atomic
+          ++count[scratch.owner[k]];
+        }
+      },
+      &stage);
+  return count;
+}
+
+std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
+                                         Stage& stage,
+                                         const std::function<bool(Vec3d)>& counts) const {
+  const std::vector<std::uint32_t> count = samples_of_sites(sampler, sweep, stage, counts);
+  std::vector<double> volume(sites_);
+  for (std::size_t i = 0; i < sites_; ++i) {
+    volume[i] = std::max(0.5, double(count[i])) * std::pow(sweep.voxel, 3);
+  }
+  return volume;
+}
+
+}  // namespace phyxel
