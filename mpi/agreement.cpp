@@ -4,6 +4,7 @@
 #include <new>
 
 #include "mpi/communicator.hpp"
+#include "mpi/host_threads.hpp"
 
 namespace phyxel {
 
@@ -14,7 +15,16 @@ bool launched_as_rank() {
   return false;
 }
 
-void MpiCommunicator::collectively(const std::function<void()>& work) const {
+void MpiCommunicator::divided(bool works, const std::function<void()>& work) const {
+  const HostThreads threads(*this, works);
+  run(
+      [&] {
+        if (works) work();
+      },
+      true);
+}
+
+void MpiCommunicator::run(const std::function<void()>& work, bool divided) const {
   if (size_ == 1) {
     work();
     return;
@@ -33,6 +43,7 @@ void MpiCommunicator::collectively(const std::function<void()>& work) const {
     message = error.what();
     code = static_cast<int>(ExitCode::bad_input);
   }
+  if (divided) wait_asleep();
   const bool failed = code != static_cast<int>(ExitCode::success);
   const std::int64_t first = smallest(static_cast<std::int64_t>(failed ? rank_ : size_));
   if (first == size_) return;
@@ -43,7 +54,8 @@ void MpiCommunicator::collectively(const std::function<void()>& work) const {
   const int agreed = broadcast(std::vector<int>{code}, from).front();
   message.assign(words.begin(), words.end());
   // An error of all ranks needs no rank number.
-  if (failures < size_) message = fmt::format("rank {} of {}: {}", from, size_, message);
+  if (!divided && failures < size_)
+    message = fmt::format("rank {} of {}: {}", from, size_, message);
   throw AgreedError(static_cast<ExitCode>(agreed), message);
 }
 

@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <optional>
+#include <algorithm>
 #include <utility>
 
 #include "model/assembly.hpp"
 #include "model/closing_areas.hpp"
+#include "mpi/dealt_cloud.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "scene/scene_error.hpp"
 #include "shapes/lattice_shapes.hpp"
@@ -59,42 +60,78 @@ ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   return own;
 }
 
-/// Returns this rank's piece of a body. The first piece of each body goes to another rank, so that
+/// Returns a rank's piece of a body. The first piece of each body goes to another rank, so that
 /// small bodies do not all end on the first.
-Piece piece_of(const MpiCommunicator& ranks, std::size_t body) {
-  const auto size = static_cast<std::size_t>(ranks.size());
-  return {static_cast<int>((static_cast<std::size_t>(ranks.rank()) + body) % size), ranks.size()};
+Piece piece_of(int ranks, int rank, std::size_t body) {
+  const auto size = static_cast<std::size_t>(ranks);
+  return {static_cast<int>((static_cast<std::size_t>(rank) + body) % size), ranks};
+}
+
+/// A source of clouds that one rank makes, and the bodies that are copies of it, which follow one
+/// another.
+struct SharedSource {
+  CutSource from;
+  std::vector<std::size_t> bodies;
+};
+
+/// The sources of all bodies but lattices, which are made piece by piece.
+std::vector<SharedSource> shared_sources(const Scene& scene) {
+  std::vector<SharedSource> sources;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    if (lattice_of(scene.bodies[b].source, {})) continue;
+    CutSource source = source_of(scene.bodies[b]);
+    const bool is_copy = !sources.empty() && is_same(sources.back().from, source);
+    if (!is_copy) sources.emplace_back();
+    sources.back().from = std::move(source);  // of the copy before
+    sources.back().bodies.push_back(b);
+  }
+  return sources;
+}
+
+/// Makes this rank's piece of each body. Each rank makes clouds of its own, one at a time, and
+/// deals them out.
+std::vector<CloudPiece> pieces_of(const MpiCommunicator& ranks, const Scene& scene) {
+  std::vector<CloudPiece> pieces(scene.bodies.size());
+  const std::vector<SharedSource> sources = ranks.agreed([&] {
+    validate(scene);
+    return shared_sources(scene);
+  });
+  const auto at_once = static_cast<std::size_t>(ranks.size());
+  for (std::size_t begin = 0; begin < sources.size(); begin += at_once) {
+    const std::size_t end = std::min(begin + at_once, sources.size()),
+                      mine = begin + static_cast<std::size_t>(ranks.rank());
+    Cloud made;
+    ranks.divided(mine < end, [&] {
+      naming(scene.bodies[sources[mine].bodies.front()],
+             [&] { made = rest_cloud(sources[mine].from); });
+    });
+    for (std::size_t k = begin; k < end; ++k) {
+      DealtCloud dealt(ranks, k == mine ? std::move(made) : Cloud{}, static_cast<int>(k - begin));
+      for (const std::size_t b : sources[k].bodies) {
+        pieces[b] = dealt.piece([&](int rank) { return piece_of(ranks.size(), rank, b).number; });
+      }
+    }
+  }
+  return pieces;
 }
 
 }  // namespace
 
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
-  // Copies of a body follow one another and share one cloud.
-  std::optional<CutSource> made;
-  Cloud rest;
-  const auto piece_of_source = [&](const BodyRequest& request, Piece piece, std::uint64_t& digest) {
-    CloudPiece cut;
-    if (const auto lattice = lattice_of(request.source, piece)) {
-      cut = make_lattice_shape(*lattice, piece);
-    } else {
-      CutSource source = source_of(request);
-      if (!made || !is_same(*made, source)) {
-        rest = rest_cloud(source);
-        digest = 31 * digest + cloud_digest(rest);
-      }
-      made = std::move(source);
-      cut = cut_piece(rest, piece);
-      cut.cloud.warnings = std::exchange(rest.warnings, {});  // once for all copies
-    }
-    place(cut.cloud, request);
-    return cut;
-  };
   const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
-    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t& digest) {
+    std::vector<CloudPiece> pieces =
+        in_stage("making phyxels", [&] { return pieces_of(ranks, scene); });
+    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t&) {
       const BodyRequest& request = scene.bodies[b];
-      return naming(request, [&] { return piece_of_source(request, piece_of(ranks, b), digest); });
+      const Piece number = piece_of(ranks.size(), ranks.rank(), b);
+      return naming(request, [&] {
+        const auto lattice = lattice_of(request.source, number);
+        CloudPiece piece = lattice ? make_lattice_shape(*lattice, number) : std::move(pieces[b]);
+        place(piece.cloud, request);
+        return piece;
+      });
     });
   });
 }
@@ -114,7 +151,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
     return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t& digest) {
       digest = 31 * digest + cloud_digest(clouds[b]);
       naming(scene.bodies[b], [&] { check_cloud(scene.bodies[b], clouds[b]); });
-      CloudPiece cut = cut_piece(clouds[b], piece_of(ranks, b));
+      CloudPiece cut = cut_piece(clouds[b], piece_of(ranks.size(), ranks.rank(), b));
       cut.cloud.warnings = clouds[b].warnings;
       return cut;
     });

@@ -38,9 +38,10 @@ struct BuiltShare {
 
 /// Builds this rank's share of `build_model(scene)`. Its bits are those that `share_of` takes out
 /// of the whole model, but for moments of ghosts that only carry surfels, which no step reads.
-/// Lattices are made piece by piece; every rank makes or reads other bodies and surfaces whole and
-/// cuts out its piece. Phyxels are sorted along Hilbert's curve, partitioned as a graph of groups
-/// and sent to their owners, which fetch the phyxels around. Collective.
+/// Lattices are made piece by piece. Any other body is made or read by one rank, which deals out
+/// its phyxels; every rank has whole surfaces. Phyxels are sorted along Hilbert's curve,
+/// partitioned as a graph of groups and sent to their owners, which fetch the phyxels around.
+/// Collective.
 /// @throws AgreedError on all ranks for what `build_model` refuses
 BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options);

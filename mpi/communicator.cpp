@@ -7,8 +7,10 @@
 #endif
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <numeric>
+#include <thread>
 
 #include "mpi/copy_bytes.hpp"
 #include "mpi/heartbeat.hpp"
@@ -152,6 +154,18 @@ void MpiCommunicator::close() {
 void MpiCommunicator::barrier() const {
   const Waiting waiting;
   if (size_ > 1) PHYXEL_MPI_CALL(MPI_Barrier(native_->all));
+}
+
+void MpiCommunicator::wait_asleep() const {
+  if (size_ == 1) return;
+  const Waiting waiting;
+  MPI_Request request;
+  PHYXEL_MPI_CALL(MPI_Ibarrier(native_->all, &request));
+  for (int done = 0;;) {
+    PHYXEL_MPI_CALL(MPI_Test(&request, &done, MPI_STATUS_IGNORE));
+    if (done) return;
+    std::this_thread::sleep_for(std::chrono::microseconds(500));
+  }
 }
 
 // MPI may add in any order; gathered numbers are summed in the order of ranks.

@@ -71,6 +71,8 @@ class MpiCommunicator final : public Communicator {
   int host_of(int rank) const { return hosts_[rank]; }
 
   void barrier() const;
+  /// A barrier at which ranks sleep, and leave their cores to those for which they wait.
+  void wait_asleep() const;
 
   /// Sum over the ranks, in their order, so that each run gets the same bits.
   double sum(double value) const;
@@ -147,7 +149,10 @@ class MpiCommunicator final : public Communicator {
   /// Runs `work`, which must not communicate, on each rank, and then agrees on the outcome.
   /// @throws AgreedError on each rank if `work` threw on any, with the message and the exit code of
   ///   the first rank that failed; with one rank, what `work` threw
-  void collectively(const std::function<void()>& work) const;
+  void collectively(const std::function<void()>& work) const { run(work, false); }
+  /// Runs `work` likewise on the ranks where `works` is true; they have the cores of the ranks of
+  /// their host that wait. It does not matter to a user which rank failed: messages name none.
+  void divided(bool works, const std::function<void()>& work) const;
 
   /// Returns `make()`, which must not communicate. @throws AgreedError as `collectively`
   template <class Make>
@@ -173,6 +178,7 @@ class MpiCommunicator final : public Communicator {
     if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
     return values;
   }
+  void run(const std::function<void()>& work, bool divided) const;
   std::vector<std::byte> gathered_bytes(std::span<const std::byte> bytes) const;
   void broadcast_bytes(std::span<std::byte> bytes, int from) const;
   /// Sends numbers[r] to rank r, and returns the number received from each rank.

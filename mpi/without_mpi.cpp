@@ -27,6 +27,7 @@ MpiCommunicator::~MpiCommunicator() = default;
 void MpiCommunicator::close() {}
 
 void MpiCommunicator::barrier() const {}
+void MpiCommunicator::wait_asleep() const {}
 double MpiCommunicator::sum(double value) const { return value; }
 std::int64_t MpiCommunicator::sum(std::int64_t value) const { return value; }
 double MpiCommunicator::largest(double value) const { return value; }

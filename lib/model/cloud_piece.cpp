@@ -7,25 +7,34 @@
 
 namespace phyxel {
 
+std::pair<Offset, Offset> range_of(Piece piece, Index size) {
+  return {Offset{size} * piece.number / piece.of, Offset{size} * (piece.number + 1) / piece.of};
+}
+
+std::vector<Index> members_within(const std::vector<Index>& members, Offset first, Offset last) {
+  const auto begin = std::lower_bound(members.begin(), members.end(), first),
+             end = std::lower_bound(begin, members.end(), last);
+  std::vector<Index> here;
+  for (auto i = begin; i != end; ++i) here.push_back(*i - static_cast<Index>(first));
+  return here;
+}
+
 CloudPiece cut_piece(const Cloud& cloud, Piece piece) {
-  const auto whole = static_cast<Offset>(cloud.position.size());
-  const Offset first = whole * piece.number / piece.of,
-               last = whole * (piece.number + 1) / piece.of;
-  const auto cut = [&](const auto& values) -> std::decay_t<decltype(values)> {
+  const auto whole = static_cast<Index>(cloud.position.size());
+  const auto [first, last] = range_of(piece, whole);
+  const auto cut = [&, begin = first,
+                    end = last](const auto& values) -> std::decay_t<decltype(values)> {
     if (values.empty()) return {};
-    return {values.begin() + first, values.begin() + last};
+    return {values.begin() + begin, values.begin() + end};
   };
   CloudPiece made{{cut(cloud.position), cut(cloud.volume), cloud.surface, {}},
                   static_cast<Index>(first),
-                  static_cast<Index>(whole)};
+                  whole};
   made.cloud.lattice = cloud.lattice;
   made.cloud.spacing = cut(cloud.spacing);
   made.cloud.cuts = cloud.cuts;
   for (const auto& [name, members] : cloud.regions) {
-    std::vector<Index>& here = made.cloud.regions[name];
-    const auto begin = std::lower_bound(members.begin(), members.end(), first),
-               end = std::lower_bound(begin, members.end(), last);
-    for (auto i = begin; i != end; ++i) here.push_back(*i - static_cast<Index>(first));
+    made.cloud.regions[name] = members_within(members, first, last);
   }
   return made;
 }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "phyxel/cloud.hpp"
 
@@ -16,6 +18,11 @@ struct CloudPiece {
   Cloud cloud;  ///< Regions count from the first phyxel of the piece.
   Index first = 0, whole = 0;
 };
+
+/// The phyxels [first, second) of a piece. @param size number of phyxels of the whole cloud
+std::pair<Offset, Offset> range_of(Piece piece, Index size);
+/// The members of a region among the phyxels [first, last), counted from `first`.
+std::vector<Index> members_within(const std::vector<Index>& members, Offset first, Offset last);
 
 /// A piece of a cloud that there is.
 CloudPiece cut_piece(const Cloud& cloud, Piece piece);
