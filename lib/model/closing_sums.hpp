@@ -50,6 +50,8 @@ struct Body {
   double areas = 0;             ///< Σ S², per s⁴ ρ⁴.
   double residual_squared = 0, gradient_squared = 0, next_gradient_squared = 0, image_squared = 0;
   double sum = 0, mean = 0;  ///< Sum and mean of the changes of volumes.
+  double sought_volume = 0;  ///< Volume of the phyxels that have unknowns [m³].
+  bool is_limited = false;   ///< True if some phyxels have none.
   double left = 0;           ///< Root mean square of the sums over that of the areas.
   double left_first = 0, left_before = HUGE_VAL;
   int iterations = 0;
@@ -163,6 +165,7 @@ class Sums {
         tilt_(areas_.size()),
         weight_(areas_.size()),
         relative_size_(areas_.size(), 1),
+        role_(areas_.size(), Role::sought),
         gathers_(areas_.size()),
         supported_(supported_phyxels(model)) {
     for (Body* body : bodies) {
@@ -202,23 +205,72 @@ class Sums {
   void open(const Bodies& bodies, Take&& take) {
     for (Body* body : bodies) body->mean = 0;
     const Unknown ones{{}, 1 / ease_area, 1 / ease_volume};
-    set_terms(bodies, [&](Index) { return ones; });
+    set_terms(bodies, Role::none, [&](Index) { return ones; });
     bodies.for_each([&](const Body& body, Index j) { take(j, sum_at(body, j, ones)); });
   }
-  /// Sets a member of each body to Σ take(i, sum), which is given the sum of each phyxel of the
-  /// body, on many threads. Collective.
+  /// Limits the unknowns to where sums are to change: the rest is a regular lattice.
+  /// Collective.
+  /// @param sums of all phyxels; their ghosts receive their owners' values
+  void limit_to_irregular(const Bodies& bodies, std::vector<Vec3d>& sums) {
+    bodies.refresh_ghosts(sums);
+    bodies.for_each_with_ghosts([&](const Body& body, Index i) {
+      const double least = regular * body.tolerance;
+      role_[i] = dot(sums[i], sums[i]) > least * least ? Role::irregular : Role::none;
+    });
+    std::vector<Role> next = role_;
+    for (const Role role : {Role::sought, Role::changed, Role::beside}) {
+      bodies.for_each([&](const Body&, Index i) {
+        // Sums of supported phyxels may be anything, but their unknowns change those beside.
+        if (role_[i] != Role::none || (role == Role::sought && !supported_[i])) return;
+        const auto is_inner = [&](Index k) { return role_[k] > role; };
+        if (std::ranges::any_of(model_.neighbourhood.neighbours.row(i), is_inner)) next[i] = role;
+      });
+      bodies.refresh_ghosts(next);
+      role_ = next;
+    }
+    bodies.sum(&Body::sought_volume,
+               [&](const Body&, Index i) { return is_sought(i) ? model_.volume[i] : 0; });
+    for (Body* body : bodies) body->is_limited = body->sought_volume < body->volume;
+  }
+  /// Makes all phyxels of bodies have unknowns. @param x stays what it means
+  void widen(const Bodies& bodies, std::vector<Unknown>& x) {
+    bodies.for_each_with_ghosts([&](const Body& body, Index i) {
+      if (is_sought(i)) x[i].volume -= body.mean;
+      role_[i] = Role::sought;
+    });
+    for (Body* body : bodies) {
+      body->mean = 0;
+      body->sought_volume = body->volume;
+      body->is_limited = false;
+    }
+  }
+  /// True if phyxel i has unknowns; those of the others are 0.
+  bool is_sought(Index i) const { return role_[i] >= Role::sought; }
+  /// True if unknowns change the sum of phyxel i.
+  bool is_changed(Index i) const { return role_[i] >= Role::changed; }
+
+  /// Sets a member of each body to Σ take(i, sum), which is given the sum of each phyxel that
+  /// unknowns change, on many threads. Collective.
   /// @param x its ghosts receive their owners' values
   template <class Take>
   void apply(const Bodies& bodies, std::vector<Unknown>& x, double Body::*into, Take&& take) {
     bodies.refresh_ghosts(x);
     find_means(bodies, x);
-    set_terms(bodies, [&](Index k) { return x[k]; });
-    bodies.sum(into, [&](const Body& body, Index j) { return take(j, sum_at(body, j, x[j])); });
+    set_terms(bodies, Role::beside, [&](Index k) { return x[k]; });
+    bodies.sum(into, [&](const Body& body, Index j) {
+      return is_changed(j) ? take(j, sum_at(body, j, x[j])) : 0;
+    });
   }
   /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
   void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
     bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
-    for (Body* body : bodies) body->mean /= body->volume;
+    for (Body* body : bodies) {
+      if (body->sought_volume > 0) body->mean /= body->sought_volume;
+    }
+  }
+  /// The relative change of the volume of phyxel i, once means are found.
+  double change_of_volume(const Body& body, Index i, const Unknown& x) const {
+    return is_sought(i) ? ease_volume * (x.volume - body.mean) : 0;
   }
   /// The closing vector ĉ that the unknowns of phyxel i mean [1/m].
   Vec3d closing_vector(const Body& body, Index i, const Unknown& x) const {
@@ -231,9 +283,10 @@ class Sums {
                        double Body::*square) {
     bodies.refresh_ghosts(sums);
     bodies.for_each_with_ghosts([&](const Body&, Index i) {
-      gathers_.set_value(i, model_.position[i], per_size(i, sums[i]));
+      if (is_changed(i)) gathers_.set_value(i, model_.position[i], per_size(i, sums[i]));
     });
     bodies.sum(&Body::sum, [&](const Body& body, Index i) {
+      if (!is_sought(i)) return 0.0;
       const auto [total, moment] =
           gathers_.differences(i, model_.neighbourhood.neighbours.row(i), weights_of(body, i));
       x[i] = {.closing = relative_size_[i] * (total - moment * tilt_[i]),
@@ -243,18 +296,29 @@ class Sums {
       return x[i].volume;
     });
     bodies.sum(square, [&](const Body& body, Index i) {
-      x[i].volume -= model_.volume[i] / body.volume * body.sum;
+      if (!is_sought(i)) return 0.0;
+      x[i].volume -= model_.volume[i] / body.sought_volume * body.sum;
       return dot(x[i], x[i]);
     });
   }
 
  private:
+  /// What a phyxel has to do with the unknowns: it has some, since its sum is to change
+  /// (`irregular`) or it is supported and beside one of these (`sought`); it is a neighbour of one
+  /// that has (`changed`), or of one of these (`beside`).
+  enum class Role : char { none, beside, changed, sought, irregular };
+  /// A sum counts as that of a regular lattice if it is below this much of the tolerance.
+  static constexpr double regular = 0.1;
+
   /// Sets the terms that phyxels give to the sums of their neighbours. @param x x(k): unknowns
+  /// @param least role of the phyxels
   template <class X>
-  void set_terms(const Bodies& bodies, X&& x) {
+  void set_terms(const Bodies& bodies, Role least, X&& x) {
     bodies.for_each_with_ghosts([&](const Body& body, Index k) {
+      if (role_[k] < least) return;
       const Unknown of_k = x(k);
-      const double change = ease_volume * (of_k.volume - body.mean) * model_.volume[k] / body.unit;
+      const double mean = is_sought(k) || least == Role::none ? body.mean : 0;
+      const double change = ease_volume * (of_k.volume - mean) * model_.volume[k] / body.unit;
       const Vec3d closing = relative_size_[k] * of_k.closing;
       gathers_.set_term(k, model_.position[k], closing,
                         outer(closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
@@ -285,8 +349,9 @@ class Sums {
   std::vector<Vec3d> tilt_;            ///< a
   std::vector<double> weight_;         ///< Σ_k w_jk (1 - a_j x_jk)
   std::vector<double> relative_size_;  ///< ρ
-  Gathers gathers_;                    ///< What phyxels give to the sums of their neighbours.
-  std::vector<char> supported_;        ///< `supported_phyxels`.
+  std::vector<Role> role_;
+  Gathers gathers_;              ///< What phyxels give to the sums of their neighbours.
+  std::vector<char> supported_;  ///< `supported_phyxels`.
 };
 
 }  // namespace phyxel::closing

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "model/closing_areas.hpp"
 #include "model/closing_sums.hpp"
@@ -18,7 +20,6 @@ namespace {
 using closing::Bodies;
 using closing::Body;
 using closing::ease_area;
-using closing::ease_volume;
 using closing::Sums;
 using closing::Unknown;
 
@@ -26,6 +27,8 @@ using closing::Unknown;
 constexpr int most_iterations = 10'000;
 /// Iterations that have to take a tenth of what is left.
 constexpr int patience = 500;
+/// The same before all phyxels have unknowns.
+constexpr int limited_patience = 50;
 
 /// What is left of a body's sums, by their areas; nothing if all phyxels are supported.
 double left_of(const Body& body) {
@@ -41,7 +44,7 @@ bool update_and_check(Body& body) {
       body.iterations == most_iterations) {
     return true;
   }
-  if (body.iterations % patience != 0) return false;
+  if (body.iterations % (body.is_limited ? limited_patience : patience) != 0) return false;
   const bool slow = !(body.left < 0.9 * body.left_before);
   body.left_before = body.left;
   return slow;
@@ -52,60 +55,96 @@ double way_of(const Body& body) {
   return std::log(body.left_first / body.left) / std::log(body.left_first / body.tolerance);
 }
 
-/// The smallest unknowns that close the sums: conjugate gradients for least squares (Björck 1996,
-/// algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns, which take
-/// the most of them, matter the least: a few iterations do most of what can be done. What is left
-/// of each body's sums is summed anew at the end.
-/// @param n number of phyxels of the model
-std::vector<Unknown> close(Sums& sums, const Bodies& all, std::size_t n) {
-  Stage stage("closed gradients");
-  std::vector<Unknown> x(n), gradient(n), direction(n);
-  std::vector<Vec3d> residual(n);
-  const auto residual_squares = [&](const Body&, Index i) { return dot(residual[i], residual[i]); };
-  sums.open(all, [&](Index i, Vec3d sum) { residual[i] = -sum; });
-  all.sum(&Body::residual_squared, residual_squares);
-  sums.apply_transpose(all, residual, gradient, &Body::gradient_squared);
-  all.for_each([&](const Body&, Index i) { direction[i] = gradient[i]; });
-  Bodies active = all;
-  for (;;) {
-    active.erase_if(update_and_check);
-    if (active.empty()) break;
-    double way = 1;
-    for (const Body* body : active) way = std::min(way, way_of(*body));
-    stage.reach(way);
-    // The gradient is used up, and its memory takes the image of the direction.
-    sums.apply(active, direction, &Body::image_squared, [&](Index i, Vec3d image) {
-      gradient[i].closing = image;
-      return dot(image, image);
+/// The search for the smallest unknowns that close the sums: conjugate gradients for least squares
+/// (Björck 1996, algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns,
+/// which take the most of them, matter the least: a few iterations do most of what can be done.
+class Search {
+ public:
+  /// @param n number of phyxels of the model
+  Search(Sums& sums, const Bodies& all, std::size_t n)
+      : sums_(sums), all_(all), x_(n), gradient_(n), direction_(n), residual_(n) {}
+
+  /// Returns the unknowns. What is left of each body's sums is summed anew at the end.
+  std::vector<Unknown> run() {
+    Stage stage("closed gradients");
+    sums_.open(all_, [&](Index i, Vec3d sum) { residual_[i] = -sum; });
+    sums_.limit_to_irregular(all_, residual_);
+    iterate(all_, stage);
+    // A regular lattice beside others may have to take part, to small tolerances.
+    Bodies open = all_;
+    open.erase_if(
+        [](const Body& body) { return !body.is_limited || !(body.left > body.tolerance); });
+    if (!open.empty()) {
+      sums_.find_means(open, x_);
+      sums_.widen(open, x_);
+      find_residual(open);
+      iterate(open, stage);
+    }
+    find_residual(all_);
+    all_.sum(&Body::residual_squared, [&](const Body&, Index i) { return square_of(i); });
+    for (Body* body : all_) body->left = left_of(*body);
+    stage.finish();
+    return std::move(x_);
+  }
+
+ private:
+  double square_of(Index i) const { return dot(residual_[i], residual_[i]); }
+
+  /// Finds the residual of unknowns. @param bodies stay as they are, but for their means
+  void find_residual(const Bodies& bodies) {
+    bodies.for_each([&](const Body&, Index i) { residual_[i] = {}; });
+    sums_.apply(bodies, x_, &Body::image_squared, [&](Index i, Vec3d image) {
+      residual_[i] = -image;
+      return 0.0;
     });
-    active.erase_if([](const Body& body) { return !(body.image_squared > 0); });
-    active.sum(&Body::residual_squared, [&](const Body& body, Index i) {
-      const double step = body.gradient_squared / body.image_squared;
-      add(x[i], step, direction[i]);
-      residual[i] -= step * gradient[i].closing;
-      return dot(residual[i], residual[i]);
+    sums_.open(bodies, [&](Index i, Vec3d sum) { residual_[i] -= sum; });
+    sums_.find_means(bodies, x_);
+  }
+
+  /// Iterates from the present unknowns and their residual.
+  void iterate(Bodies active, Stage& stage) {
+    active.sum(&Body::residual_squared, [&](const Body&, Index i) { return square_of(i); });
+    sums_.apply_transpose(active, residual_, gradient_, &Body::gradient_squared);
+    active.for_each([&](const Body&, Index i) {
+      if (sums_.is_sought(i)) direction_[i] = gradient_[i];
     });
-    sums.apply_transpose(active, residual, gradient, &Body::next_gradient_squared);
-    active.for_each([&](const Body& body, Index i) {
-      Unknown turned = gradient[i];
-      add(turned, body.next_gradient_squared / body.gradient_squared, direction[i]);
-      direction[i] = turned;
-    });
-    for (Body* body : active) {
-      body->gradient_squared = body->next_gradient_squared;
-      ++body->iterations;
+    for (;;) {
+      active.erase_if(update_and_check);
+      if (active.empty()) return;
+      double way = 1;
+      for (const Body* body : active) way = std::min(way, way_of(*body));
+      stage.reach(way);
+      // The gradient is used up, and its memory takes the image of the direction.
+      sums_.apply(active, direction_, &Body::image_squared, [&](Index i, Vec3d image) {
+        gradient_[i].closing = image;
+        return dot(image, image);
+      });
+      active.erase_if([](const Body& body) { return !(body.image_squared > 0); });
+      active.sum(&Body::residual_squared, [&](const Body& body, Index i) {
+        const double step = body.gradient_squared / body.image_squared;
+        if (sums_.is_sought(i)) add(x_[i], step, direction_[i]);
+        if (sums_.is_changed(i)) residual_[i] -= step * gradient_[i].closing;
+        return square_of(i);
+      });
+      sums_.apply_transpose(active, residual_, gradient_, &Body::next_gradient_squared);
+      active.for_each([&](const Body& body, Index i) {
+        if (!sums_.is_sought(i)) return;
+        Unknown turned = gradient_[i];
+        add(turned, body.next_gradient_squared / body.gradient_squared, direction_[i]);
+        direction_[i] = turned;
+      });
+      for (Body* body : active) {
+        body->gradient_squared = body->next_gradient_squared;
+        ++body->iterations;
+      }
     }
   }
-  sums.apply(all, x, &Body::image_squared, [&](Index i, Vec3d image) {
-    residual[i] = image;
-    return 0.0;
-  });
-  sums.open(all, [&](Index i, Vec3d sum) { residual[i] += sum; });
-  all.sum(&Body::residual_squared, residual_squares);
-  for (Body* body : all) body->left = left_of(*body);
-  stage.finish();
-  return x;
-}
+
+  Sums& sums_;
+  const Bodies& all_;
+  std::vector<Unknown> x_, gradient_, direction_;
+  std::vector<Vec3d> residual_;
+};
 
 /// The first phyxel of all ranks whose volume would have to change too far, and how far.
 struct Excess {
@@ -221,10 +260,9 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
   }
   Bodies bodies(model, list);
   Sums sums(model, bodies, std::move(areas));
-  const std::vector<Unknown> found = close(sums, bodies, model.volume.size());
-  sums.find_means(bodies, found);
+  const std::vector<Unknown> found = Search(sums, bodies, model.volume.size()).run();
   const auto change = [&](const Body& body, Index i) {
-    return ease_volume * (found[i].volume - body.mean);
+    return sums.change_of_volume(body, i, found[i]);
   };
   for (;;) {
     const Excess excess = first_excess(model, bodies, change);

@@ -3,6 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <omp.h>
+#include <sched.h>
+
+#include <span>
+#include <vector>
 
 #include "phyxel/types.hpp"
 #include "ranks.hpp"
@@ -98,6 +103,73 @@ TEST(Communicator, AFailureOfOneIsThatOfAll) {
   int done = 0;
   world().collectively([&] { ++done; });
   EXPECT_EQ(done, 1);
+}
+
+/// The cores on which this thread may run.
+cpu_set_t own_cores() {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  sched_getaffinity(0, sizeof cores, &cores);
+  return cores;
+}
+
+/// Leaves this thread one core only, as mpirun does with --bind-to core.
+void bind_to_one(const cpu_set_t& allowed, int which) {
+  std::vector<int> cores;
+  for (int core = 0; core < CPU_SETSIZE; ++core) {
+    if (CPU_ISSET(core, &allowed)) cores.push_back(core);
+  }
+  cpu_set_t one;
+  CPU_ZERO(&one);
+  CPU_SET(cores[static_cast<std::size_t>(which) % cores.size()], &one);
+  sched_setaffinity(0, sizeof one, &one);
+}
+
+TEST(Communicator, RanksThatWorkHaveTheCoresOfThoseThatWait) {
+  const int before = omp_get_max_threads(), last = world().size() - 1;
+  const cpu_set_t allowed = own_cores();
+  bind_to_one(allowed, world().rank());
+  const cpu_set_t bound = own_cores();
+  omp_set_num_threads(1);
+  cpu_set_t of_all;
+  CPU_ZERO(&of_all);
+  for (const cpu_set_t& one : world().gathered(std::span(&bound, 1)))
+    CPU_OR(&of_all, &of_all, &one);
+  const int cores = CPU_COUNT(&of_all);
+  int works = 0, threads = 0, reached = 0;
+  world().divided(world().rank() == last, [&] {
+    works = 1;
+    threads = omp_get_max_threads();
+#pragma omp parallel reduction(max : reached)
+    {
+      const cpu_set_t here = own_cores();
+      reached = CPU_COUNT(&here);
+    }
+  });
+  EXPECT_EQ(works, world().rank() == last);
+  if (works) {
+    EXPECT_EQ(threads, cores);
+    EXPECT_EQ(reached, cores);
+  }
+  EXPECT_EQ(omp_get_max_threads(), 1);
+  const cpu_set_t after = own_cores();
+  EXPECT_TRUE(CPU_EQUAL(&after, &bound));
+  // Where all work, each has its own.
+  world().divided(true, [&] { threads = omp_get_max_threads(); });
+  EXPECT_EQ(threads, 1);
+  sched_setaffinity(0, sizeof allowed, &allowed);
+  omp_set_num_threads(before);
+}
+
+TEST(Communicator, AFailureOfDividedWorkNamesNoRank) {
+  try {
+    world().divided(world().rank() == world().size() - 1,
+                    [] { throw InputError("scene.toml:3: no volume"); });
+    FAIL() << "nobody was told";
+  } catch (const Error& error) {
+    EXPECT_EQ(is_agreed(error), world().size() > 1);
+    EXPECT_STREQ(error.what(), "scene.toml:3: no volume");
+  }
 }
 
 }  // namespace
