@@ -18,6 +18,7 @@
 #include "parallel_sort.hpp"
 #include "phyxel/error.hpp"
 #include "tabulated.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -167,9 +168,13 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const Spacin
                   std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
   const Bulk<PointOn> sample = points_over(surface, spacing, samples_on_faces, seed);
-  const std::vector<Vec3d> more =
-      fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing, gap_on_faces, seed + 1, site);
-  site.insert(site.end(), more.begin(), more.end());
+  {
+    const Phase phase("darts on the surface");
+    const std::vector<Vec3d> more = fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing,
+                                                    gap_on_faces, seed + 1, site);
+    site.insert(site.end(), more.begin(), more.end());
+  }
+  const Phase phase("evening out the surface");
   relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
 }
 

@@ -38,8 +38,9 @@ std::vector<SceneSection> boundary_sections() {
        "phyxels there are not in one plane; the plan of a run says where each load acts."},
       {"body.traction", "[[body.traction]]", "selection",
        "A force on the surface, with exactly one of `traction` and `pressure`, where the triangles of the "
-       "body's surface lie in a `box` or a `ball`, on those of the group of the mesh that `region` names, or on "
-       "`all`. The force keeps its size and "
+       "body's surface lie in a `box` or a `ball`, on those of the group that `region` names, or on "
+       "`all`. Groups are those of a mesh, the sides \"x-\" to \"z+\" of a beam or block, the ends \"z-\" and \"z+\" "
+       "and the \"side\" of a cylinder. The force keeps its size and "
        "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
        "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
        "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},

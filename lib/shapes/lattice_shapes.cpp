@@ -139,10 +139,9 @@ class Filling {
   /// Adds a region for each flat side: the outermost layer of phyxels there.
   void add_regions(Cloud& cloud, std::ptrdiff_t begin, std::ptrdiff_t end) const {
     if (lattice_.solid == Lattice::Solid::sphere) return;
-    static constexpr const char* names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
     for (int axis = lattice_.solid == Lattice::Solid::box ? 0 : 2; axis < 3; ++axis) {
-      std::vector<Index>& low = cloud.regions[names[axis][0]];
-      std::vector<Index>& high = cloud.regions[names[axis][1]];
+      std::vector<Index>& low = cloud.regions[side_names[axis][0]];
+      std::vector<Index>& high = cloud.regions[side_names[axis][1]];
       for (std::ptrdiff_t b = begin; b < end; ++b) {
         const std::int64_t layer = block_[b][axis];
         if (layer != 0 && layer != block_end_[axis] - 1) continue;

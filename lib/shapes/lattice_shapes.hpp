@@ -9,6 +9,9 @@
 
 namespace phyxel {
 
+/// Names of the sides along each axis: of regions of phyxels and of groups of triangles.
+inline constexpr const char* side_names[3][2] = {{"x-", "x+"}, {"y-", "y+"}, {"z-", "z+"}};
+
 /// A solid and a lattice of cells over its bounding box. The axis of a cylinder is the z axis.
 struct Lattice {
   enum class Solid { box, cylinder, sphere };

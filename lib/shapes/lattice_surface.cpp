@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include "shapes/lattice_shapes.hpp"
 
@@ -56,6 +58,13 @@ class SolidSurface {
   }
 
  private:
+  /// The name of the group of a face's triangles; none for a sphere.
+  std::string group_of(int axis, bool high) const {
+    if (lattice_.solid == Lattice::Solid::sphere) return {};
+    if (lattice_.solid == Lattice::Solid::cylinder && axis < 2) return "side";
+    return side_names[axis][high];
+  }
+
   void add_face(int axis, bool high) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     const Index mu = points_.m[u], mv = points_.m[v];
@@ -68,7 +77,10 @@ class SolidSurface {
       surface_.position[number] = place(at);
       return number;
     };
+    const std::string name = group_of(axis, high);
+    std::vector<Index>* const group = name.empty() ? nullptr : &surface_.groups[name];
     const auto add = [&](Index a, Index b, Index c) {
+      if (group) group->push_back(static_cast<Index>(surface_.triangle.size()));
       surface_.triangle.push_back(high ? Triangle{a, b, c} : Triangle{a, c, b});
     };
     for (Index b = 0; b < mv; ++b) {

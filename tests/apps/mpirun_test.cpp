@@ -221,6 +221,15 @@ TEST_F(Mpirun, DoctorListsTheRanksOnce) {
   EXPECT_EQ(alone["memory_bytes"].get<double>(), 2 * found["memory_bytes"].get<double>());
 }
 
+/// A plan has the spans of its set-up, and no trajectory.
+TEST_F(Mpirun, ProfileOfAPlanHasTheSetUp) {
+  write_scene("0.03");
+  const Outcome outcome = run_on(0, {"run", "scene.toml", "--dry-run", "--profile", "trace.json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(text_of(folder_ / "trace.json"),
+              AllOf(HasSubstr("neighbours"), Not(HasSubstr("writing"))));
+}
+
 /// Each rank's spans lie within its own time and include steps; files belong to another thread.
 TEST_F(Mpirun, ProfileTellsWhatEachRankDoesWhen) {
   write_scene("0.03");

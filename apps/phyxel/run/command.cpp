@@ -14,18 +14,20 @@ std::unique_ptr<Run> set_up(const RunOptions& options) {
   return std::make_unique<Run>(options);
 }
 
+/// Runs the scene, or only tells what a run would do.
+void run_or_rehearse(const RunOptions& options) {
+  const std::unique_ptr<Run> run = set_up(options);
+  options.dry_run ? run->rehearse() : run->execute();
+}
+
 void run(const RunOptions& options) {
-  if (options.dry_run) {
-    set_up(options)->rehearse();
-    return;
-  }
   if (options.profile.empty()) {
-    set_up(options)->execute();
+    run_or_rehearse(options);
     return;
   }
   start_profile(options.profile, options.force);
   try {
-    set_up(options)->execute();
+    run_or_rehearse(options);
   } catch (const AgreedError&) {  // on all ranks, e.g. after a signal
     write_profile(options.profile);
     throw;
@@ -59,9 +61,9 @@ void add_run(CLI::App& program) {
                     "Do not draw the pictures that the scene requests");
   command->add_flag("--quiet", options->quiet, "Print the summary only, no plan and no progress");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
-  command->add_flag(
-      "--dry-run", options->dry_run,
-      "Print the plan only: time step, memory, device, ranks, forecast; write nothing");
+  command->add_flag("--dry-run", options->dry_run,
+                    "Print the plan only: time step, memory, device, ranks, forecast; write "
+                    "nothing but the profile");
   command->add_option("--profile", options->profile,
                       "Write a timeline of all ranks to this file, for a trace viewer "
                       "(chrome://tracing, ui.perfetto.dev)");

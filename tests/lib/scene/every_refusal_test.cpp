@@ -126,8 +126,8 @@ struct Late {
 std::vector<Late> refused_loads() {
   const std::string step = "[time]\nend = 1.0\nstep = 1e-4\n";
   return {
-      {with_bar("[[body.traction]]\nregion = 'x+'\npressure = 1\n"),
-       {":14:", "the surface of body \"beam\" has no group \"x+\"; it has: none"}},
+      {with_bar("[[body.traction]]\nregion = 'end'\npressure = 1\n"),
+       {":14:", "the surface of body \"beam\" has no group \"end\"; it has: x+, x-"}},
       {with_bar("[[body.traction]]\nall = true\n"), {":13:", "traction, pressure"}},
       {with_bar("[[body.traction]]\nall = true\npressure = 1\ntraction = [1, 0, 0]\n"),
        {"found together with", "exactly one of: traction, pressure"}},

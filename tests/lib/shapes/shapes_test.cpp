@@ -206,6 +206,52 @@ TEST(Shapes, SurfacesOfBoxesAreExact) {
   EXPECT_EQ(bar.position.size(), 2u * (40 * 6 + 40 * 8 + 6 * 8) + 2);  // quads + 2, by Euler
 }
 
+/// The sum of the area vectors of triangles, and of their areas [m²].
+std::pair<Vec3d, double> area_of(const Surface& surface, const std::vector<Index>& triangles) {
+  Vec3d sum;
+  double area = 0;
+  for (const Index t : triangles) {
+    const auto [a, b, c] = surface.triangle[t];
+    const Vec3d one = 0.5 * cross(surface.position[b] - surface.position[a],
+                                  surface.position[c] - surface.position[a]);
+    sum += one;
+    area += norm(one);
+  }
+  return {sum, area};
+}
+
+TEST(Shapes, SidesAreGroupsOfTriangles) {
+  const Surface box = make_shape({.name = "beam", .size = {1, 0.2, 0.3}, .spacing = 0.05}).surface;
+  ASSERT_EQ(box.groups.size(), 6U);
+  const Vec3d areas{0.2 * 0.3, 0.3 * 1, 1 * 0.2};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      const std::string name = std::string(1, "xyz"[axis]) + (sign < 0 ? "-" : "+");
+      const auto [sum, area] = area_of(box, box.groups.at(name));
+      Vec3d expected;
+      (axis == 0   ? expected.x
+       : axis == 1 ? expected.y
+                   : expected.z) = sign * (axis == 0   ? areas.x
+                                           : axis == 1 ? areas.y
+                                                       : areas.z);
+      EXPECT_LT(norm(sum - expected), 1e-12) << name;
+      EXPECT_NEAR(area, norm(expected), 1e-12) << name;
+    }
+  }
+  const Surface can =
+      make_shape({.name = "cylinder", .radius = 0.5, .length = 2, .spacing = 0.05}).surface;
+  ASSERT_EQ(can.groups.size(), 3U);
+  std::size_t triangles = 0;
+  for (const auto& [name, group] : can.groups) triangles += group.size();
+  EXPECT_EQ(triangles, can.triangle.size());
+  // Polygons of 64 corners or so in place of circles.
+  EXPECT_NEAR(area_of(can, can.groups.at("z+")).first.z, std::numbers::pi / 4, 2e-3);
+  EXPECT_NEAR(area_of(can, can.groups.at("z-")).first.z, -std::numbers::pi / 4, 2e-3);
+  EXPECT_NEAR(area_of(can, can.groups.at("side")).second, 2 * std::numbers::pi, 1e-2);
+  EXPECT_LT(norm(area_of(can, can.groups.at("side")).first), 1e-12);
+  EXPECT_TRUE(make_shape({.name = "sphere", .radius = 1, .spacing = 0.2}).surface.groups.empty());
+}
+
 TEST(Shapes, SurfacesOfRoundSolidsHaveTheirVerticesOnThem) {
   const Surface ball = make_shape(sphere()).surface;
   expect_closed_ball(ball);
