@@ -121,8 +121,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
   const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
-    std::vector<CloudPiece> pieces =
-        in_stage("making phyxels", [&] { return pieces_of(ranks, scene); });
+    std::vector<CloudPiece> pieces = pieces_of(ranks, scene);
     return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t&) {
       const BodyRequest& request = scene.bodies[b];
       const Piece number = piece_of(ranks.size(), ranks.rank(), b);

@@ -277,25 +277,57 @@ void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
   }
 }
 
+namespace {
+
+/// The position of a sample point in its voxel, in sides of the voxel. @param row bits of the
+/// voxel's x and y. @param z its z, mixed
+Vec3d random_in(std::uint64_t row, std::uint64_t z) {
+  const std::uint64_t bits = mix_bits(row ^ z);
+  return {unit_fraction(bits), unit_fraction(bits >> 21), unit_fraction(bits >> 42)};
+}
+std::uint64_t bits_of_row(std::uint64_t seed, std::uint64_t x, std::uint64_t y) {
+  return mix_bits(mix_bits(seed ^ x) ^ y);
+}
+
+}  // namespace
+
 /// Adds a sample for each voxel of a cell inside the surface, in the order of `split`.
 void InsideSampler::fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
                                SampleTally& tally) {
-  const Offset before = tally.samples;
-  for (std::int64_t m = 0; m < std::int64_t{1} << 3 * cell.level; ++m) {
-    std::int64_t x = cell.x, y = cell.y, z = cell.z;
-    for (int bit = 0; bit < cell.level; ++bit) {
-      const std::int64_t octant = m >> 3 * bit;
-      x += (octant & 1) << bit;
-      y += (octant >> 1 & 1) << bit;
-      z += (octant >> 2 & 1) << bit;
+  constexpr int most = 1 << block_level;
+  const int side = 1 << cell.level;
+  // Bits of the voxels' coordinates, and of their rows along z.
+  std::uint64_t z_bits[most], row_bits[most][most];
+  if (grid.sweep.at_random) {
+    std::uint64_t x_bits[most], y_bits[most];
+    for (int k = 0; k < side; ++k) {
+      x_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.x + k));
+      y_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.y + k));
+      z_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.z + k));
     }
-    block.offset.push_back(sample_in(grid, x, y, z, block.centre));
-    ++tally.samples;
+    for (int x = 0; x < side; ++x) {
+      for (int y = 0; y < side; ++y) {
+        row_bits[x][y] = bits_of_row(grid.sweep.seed, x_bits[x], y_bits[y]);
+      }
+    }
   }
-  const Offset added = tally.samples - before;
-  tally.work += added;
-  if (is_doubtful(cell.winding)) tally.doubtful += added;
-  if (cell.winding > 1.5) tally.repeated += added;
+  const int voxels = side * side * side;
+  for (int m = 0; m < voxels; ++m) {
+    int x = 0, y = 0, z = 0;
+    for (int bit = 0; bit < cell.level; ++bit) {
+      const int octant = m >> 3 * bit;
+      x |= (octant & 1) << bit;
+      y |= (octant >> 1 & 1) << bit;
+      z |= (octant >> 2 & 1) << bit;
+    }
+    Vec3d within{0.5, 0.5, 0.5};
+    if (grid.sweep.at_random) within = random_in(row_bits[x][y], z_bits[z]);
+    block.offset.push_back(grid.offset({cell.x + x, cell.y + y, cell.z + z}, within, block.centre));
+  }
+  tally.samples += voxels;
+  tally.work += voxels;
+  if (is_doubtful(cell.winding)) tally.doubtful += voxels;
+  if (cell.winding > 1.5) tally.repeated += voxels;
 }
 
 /// The sample point of a voxel, as an offset from a block's centre.
@@ -303,14 +335,10 @@ Vec3<float> InsideSampler::sample_in(const Grid& grid, std::int64_t x, std::int6
                                      std::int64_t z, Vec3d centre) {
   Vec3d within{0.5, 0.5, 0.5};
   if (grid.sweep.at_random) {
-    std::uint64_t bits = mix_bits(grid.sweep.seed ^ mix_bits(static_cast<std::uint64_t>(x)));
-    bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(y)));
-    bits = mix_bits(bits ^ mix_bits(static_cast<std::uint64_t>(z)));
-    within = {unit_fraction(bits), unit_fraction(bits >> 21), unit_fraction(bits >> 42)};
+    const auto bits = [](std::int64_t k) { return mix_bits(static_cast<std::uint64_t>(k)); };
+    within = random_in(bits_of_row(grid.sweep.seed, bits(x), bits(y)), bits(z));
   }
-  return to<float>(grid.place(static_cast<double>(x) + within.x, static_cast<double>(y) + within.y,
-                              static_cast<double>(z) + within.z) -
-                   centre);
+  return grid.offset({x, y, z}, within, centre);
 }
 
 void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell& cell,

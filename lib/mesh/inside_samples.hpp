@@ -1,6 +1,7 @@
 /// Sample points that fill the inside of a surface evenly.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -121,6 +122,14 @@ class InsideSampler {
     Vec3d place(double x, double y, double z) const {
       const Vec3d from_origin = voxel * Vec3d{x, y, z};
       return origin + (sweep.at_random ? from_origin : sweep.turn * from_origin);
+    }
+    /// A point of a voxel, as an offset from a block's centre. @param within in sides of the voxel
+    Vec3<float> offset(const std::array<std::int64_t, 3>& voxel_at, Vec3d within,
+                       Vec3d centre) const {
+      return to<float>(place(static_cast<double>(voxel_at[0]) + within.x,
+                             static_cast<double>(voxel_at[1]) + within.y,
+                             static_cast<double>(voxel_at[2]) + within.z) -
+                       centre);
     }
     /// A vector's components along the edges of the voxels.
     Vec3d along_edges(Vec3d v) const { return sweep.at_random ? v : back * v; }

@@ -128,10 +128,17 @@ std::vector<std::uint32_t> NearestSite::samples_of_sites(
       [&](std::size_t, const SampleBlock& block) {
         Scratch& scratch = of_thread[static_cast<std::size_t>(omp_get_thread_num())];
         find(block, scratch);
-        for (std::size_t k = 0; k < scratch.owner.size(); ++k) {
-          if (counts && !counts(block.position(k))) continue;
+        // Samples of a site mostly follow one another.
+        const std::vector<Index>& owner = scratch.owner;
+        for (std::size_t k = 0; k < owner.size();) {
+          const Index site = owner[k];
+          std::uint32_t samples = 0;
+          for (; k < owner.size() && owner[k] == site; ++k) {
+            samples += !counts || counts(block.position(k)) ? 1 : 0;
+          }
+          if (samples == 0) continue;
 #pragma omp atomic
-          ++count[scratch.owner[k]];
+          count[site] += samples;
         }
       },
       &stage);

@@ -104,9 +104,10 @@ void check_request(const Surface& surface, const SampleRequest& request) {
 
 /// Multiplies positions by 2^exponent, without rounding.
 void scale(std::vector<Vec3d>& position, int exponent) {
-  for (Vec3d& p : position) {
-    p = {std::ldexp(p.x, exponent), std::ldexp(p.y, exponent), std::ldexp(p.z, exponent)};
-  }
+  const double factor = std::ldexp(1.0, exponent);
+  const auto n = static_cast<std::ptrdiff_t>(position.size());
+#pragma omp parallel for schedule(static)
+  for (std::ptrdiff_t i = 0; i < n; ++i) position[i] = factor * position[i];
 }
 
 void drop_unused_vertices(Surface& surface) {

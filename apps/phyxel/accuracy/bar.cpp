@@ -55,24 +55,10 @@ Cloud cloud_of(const Scene& scene, const Discretisation& d) {
   if (d.filling != Filling::mesh) return make_cloud(body);
   body.source.shape.surface = true;
   const Cloud lattice = make_cloud(body);
+  // Regions are the groups of the bar's sides.
   Cloud cloud =
       sample_surface(lattice.surface,
                      {.phyxels = static_cast<Index>(lattice.position.size()), .on_surface = true});
-  Vec3d low = cloud.surface.position.front(), high = low;
-  for (const Vec3d& p : cloud.surface.position) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  const double near = 1e-9 * body.source.shape.spacing;
-  for (Index i = 0; i < static_cast<Index>(cloud.position.size()); ++i) {
-    const Vec3d& p = cloud.position[i];
-    const std::pair<const char*, double> faces[] = {{"x-", p.x - low.x}, {"x+", high.x - p.x},
-                                                    {"y-", p.y - low.y}, {"y+", high.y - p.y},
-                                                    {"z-", p.z - low.z}, {"z+", high.z - p.z}};
-    for (const auto& [name, depth] : faces) {
-      if (depth < near) cloud.regions[name].push_back(i);
-    }
-  }
   if (d.closure == 0) cloud.surface = {};
   return cloud;
 }

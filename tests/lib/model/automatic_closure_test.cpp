@@ -51,6 +51,7 @@ TEST(AutomaticClosure, IsForIrregularBodiesWithAClosedSurface) {
   bare.surface = {};
   EXPECT_EQ(closure_of(bare), 0);
   Cloud open = irregular;
+  open.surface.groups.clear();
   open.surface.triangle.pop_back();
   EXPECT_EQ(closure_of(open, {}, VolumeRule::automatic, 1), 0);
   NeighbourhoodRule adaptive;
