@@ -64,7 +64,7 @@ def neighbours_section(page, table):
 
 def sample_section(page, results):
     """Adds how fast a mesh is filled with phyxels."""
-    tables = [table for table in (read_if_there(results / f"cpu_sample{more}.csv") for more in ("", "_16", "_16_large")) if table]
+    tables = [table for table in (read_if_there(results / f"cpu_sample{more}.csv") for more in ("", "_16")) if table]
     if not tables:
         return
     page.paragraph("## Filling a mesh with phyxels")
