@@ -242,6 +242,7 @@ class Sums {
       body->mean = 0;
       body->sought_volume = body->volume;
       body->is_limited = false;
+      body->left_before = HUGE_VAL;  // the search starts anew
     }
   }
   /// True if phyxel i has unknowns; those of the others are 0.

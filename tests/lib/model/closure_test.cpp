@@ -142,6 +142,14 @@ TEST(Closure, LeavesARegularLatticeAlone) {
   }
 }
 
+/// A search that is slow without the regular phyxels goes on with them, even where it is due for
+/// its next check at once, after 500 iterations.
+TEST(Closure, GoesOnWithAllPhyxelsWhereTheIrregularOnesAreSlow) {
+  const Cloud cube = sample_surface(unit_cube(), {.phyxels = 6000});
+  const Model model = model_of_cloud(cube, 1e-4);
+  EXPECT_TRUE(model.warnings.empty()) << model.warnings.at(0);
+}
+
 /// On any cloud with a surface: phyxels on cells lie inside the surface, and share its area.
 TEST(Closure, HoldsForPhyxelsBelowTheSurface) {
   ShapeRequest request = block();
