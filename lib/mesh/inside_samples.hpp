@@ -85,8 +85,8 @@ class InsideSampler {
     Vec3d middle;       ///< [m]
     double radius = 0;  ///< [m]
   };
-  /// True if a point inside a closed surface is inside after a step, too. Steps within a ball need no winding
-  /// number.
+  /// True if a point inside a closed surface is inside after a step, too. Steps within a ball need
+  /// no winding number.
   /// @param ball a ball around a former place of the same point; replaced once the point leaves it
   /// @param most radius of the largest balls [m]
   bool stays_inside(Vec3d before, Vec3d after, double most, Ball& ball) const;

@@ -145,7 +145,7 @@ TEST(Closure, LeavesARegularLatticeAlone) {
 /// A search that is slow without the regular phyxels goes on with them, even where it is due for
 /// its next check at once, after 500 iterations.
 TEST(Closure, GoesOnWithAllPhyxelsWhereTheIrregularOnesAreSlow) {
-  const Cloud cube = sample_surface(unit_cube(), {.phyxels = 6000});
+  const Cloud cube = sample_surface(test::unit_cube(), {.phyxels = 6000});
   const Model model = model_of_cloud(cube, 1e-4);
   EXPECT_TRUE(model.warnings.empty()) << model.warnings.at(0);
 }
