@@ -122,7 +122,7 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
   const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
     std::vector<CloudPiece> pieces = pieces_of(ranks, scene);
-    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t&) {
+    return built({ranks, scene, own}, [&](std::size_t b) {
       const BodyRequest& request = scene.bodies[b];
       const Piece number = piece_of(ranks.size(), ranks.rank(), b);
       return naming(request, [&] {
@@ -147,9 +147,16 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                         fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
                                     clouds.size(), scene.bodies.size()));
     }
-    return built({ranks, scene, own}, [&](std::size_t b, std::uint64_t& digest) {
-      digest = 31 * digest + cloud_digest(clouds[b]);
-      naming(scene.bodies[b], [&] { check_cloud(scene.bodies[b], clouds[b]); });
+    check_alike(ranks, ranks.agreed([&] {
+      validate(scene);
+      std::uint64_t digest = 0;
+      for (std::size_t b = 0; b < clouds.size(); ++b) {
+        naming(scene.bodies[b], [&] { check_cloud(scene.bodies[b], clouds[b]); });
+        digest = 31 * digest + cloud_digest(clouds[b]);
+      }
+      return digest;
+    }));
+    return built({ranks, scene, own}, [&](std::size_t b) {
       CloudPiece cut = cut_piece(clouds[b], piece_of(ranks.size(), ranks.rank(), b));
       cut.cloud.warnings = clouds[b].warnings;
       return cut;

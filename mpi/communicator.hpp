@@ -71,7 +71,7 @@ class MpiCommunicator final : public Communicator {
   int host_of(int rank) const { return hosts_[rank]; }
 
   void barrier() const;
-  /// A barrier at which ranks sleep, and leave their cores to those for which they wait.
+  /// A barrier at which ranks sleep, and leave their cores to the ranks that still work.
   void wait_asleep() const;
 
   /// Sum over the ranks, in their order, so that each run gets the same bits.
@@ -178,6 +178,8 @@ class MpiCommunicator final : public Communicator {
     if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
     return values;
   }
+  /// Runs `work` and agrees on the outcome. @param divided true if messages name no rank, and ranks
+  /// wait asleep
   void run(const std::function<void()>& work, bool divided) const;
   std::vector<std::byte> gathered_bytes(std::span<const std::byte> bytes) const;
   void broadcast_bytes(std::span<std::byte> bytes, int from) const;

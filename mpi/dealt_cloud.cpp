@@ -1,8 +1,6 @@
 #include "mpi/dealt_cloud.hpp"
 
-#include <algorithm>
-#include <numeric>
-#include <span>
+#include <map>
 #include <utility>
 
 namespace phyxel {
@@ -29,25 +27,23 @@ std::vector<std::string> broadcast_texts(const MpiCommunicator& ranks,
   return received;
 }
 
+/// The names of regions or groups, in their order.
+std::vector<std::string> names_of(const std::map<std::string, std::vector<Index>>& lists) {
+  std::vector<std::string> names;
+  for (const auto& [name, members] : lists) names.push_back(name);
+  return names;
+}
+
 /// The surface of rank `from`, on each rank.
 Surface broadcast_surface(const MpiCommunicator& ranks, Surface surface, int from) {
   Surface received;
   received.position = ranks.broadcast(std::move(surface.position), from);
   received.normal = ranks.broadcast(std::move(surface.normal), from);
   received.triangle = ranks.broadcast(std::move(surface.triangle), from);
-  std::vector<std::string> names;
-  for (const auto& [name, triangles] : surface.groups) names.push_back(name);
-  for (const std::string& name : broadcast_texts(ranks, names, from)) {
+  for (const std::string& name : broadcast_texts(ranks, names_of(surface.groups), from)) {
     received.groups[name] = ranks.broadcast(std::move(surface.groups[name]), from);
   }
   return received;
-}
-
-/// The names of regions, in their order.
-std::vector<std::string> names_of(const Cloud& cloud) {
-  std::vector<std::string> names;
-  for (const auto& [name, members] : cloud.regions) names.push_back(name);
-  return names;
 }
 
 }  // namespace
@@ -67,14 +63,14 @@ DealtCloud::DealtCloud(const MpiCommunicator& ranks, Cloud cloud, int maker)
       std::vector{static_cast<Index>(cloud.position.size()), Index{cloud.lattice}}, maker);
   size_ = numbers[0];
   common_.lattice = numbers[1] != 0;
-  regions_ = broadcast_texts(ranks, names_of(cloud), maker);
+  regions_ = broadcast_texts(ranks, names_of(cloud.regions), maker);
   phyxels_.position = std::move(cloud.position);
   phyxels_.volume = std::move(cloud.volume);
   phyxels_.spacing = std::move(cloud.spacing);
   phyxels_.regions = std::move(cloud.regions);
 }
 
-/// Deals out the values of phyxels; none if there are none.
+/// Deals out the values of phyxels, if the cloud has such values.
 template <class T>
 std::vector<T> DealtCloud::dealt(const std::vector<T>& values,
                                  const std::function<int(int)>& number) const {

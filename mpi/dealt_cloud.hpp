@@ -29,8 +29,8 @@ class DealtCloud {
   const MpiCommunicator& ranks_;
   int maker_;
   Cloud phyxels_;  ///< On the maker: positions, volumes, spacings and members of regions.
-  Cloud common_;   ///< The surface and all else that is no phyxel's.
-  std::vector<std::string> regions_;  ///< Their names.
+  Cloud common_;   ///< The surface, cuts and warnings, which have no values for each phyxel.
+  std::vector<std::string> regions_;  ///< Names of the regions.
   Index size_ = 0;                    ///< Number of phyxels.
 };
 

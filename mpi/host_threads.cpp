@@ -11,7 +11,7 @@
 namespace phyxel {
 namespace {
 
-/// What ranks tell each other.
+/// The threads and cores of a rank, as ranks tell each other.
 struct RankThreads {
   std::int64_t works, threads;
   cpu_set_t cores;  ///< On which the rank may run.

@@ -190,11 +190,10 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
   std::vector<std::int64_t> with_volumes(whole.bodies.size()), lattices(whole.bodies.size()),
       with_spacings(whole.bodies.size());
   std::vector<PieceMaterials> materials;
-  std::uint64_t digest = 0;  // of what each rank has made or read for itself
   setup.ranks.collectively([&] {
     validate(setup.scene);
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
-      CloudPiece made = piece(b, digest);
+      CloudPiece made = piece(b);
       Cloud& cloud = made.cloud;
       if (!cloud.position.empty()) {
         naming(setup.scene.bodies[b], [&] { check_cloud(setup.scene.bodies[b], cloud); });
@@ -230,7 +229,6 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       for (std::string& warning : cloud.warnings) whole.warnings.push_back(std::move(warning));
     }
   });
-  check_alike(setup.ranks, digest);
   setup.ranks.add(with_volumes);
   setup.ranks.add(with_spacings);
   setup.ranks.add(lattices);

@@ -120,13 +120,12 @@ inline Index global_id_of(const WholeBodies& whole, const LocalModel& local, Ind
   return whole.bodies[local.phyxels[i].body].base + local.phyxels[i].number;
 }
 
-/// A function that makes this rank's piece of a body. @param digest updated by that of the whole
-/// cloud, if this rank has it
-using Pieces = std::function<CloudPiece(std::size_t body, std::uint64_t& digest)>;
+/// A function that makes this rank's piece of a body.
+using Pieces = std::function<CloudPiece(std::size_t body)>;
 
 /// Returns the phyxels of this rank's pieces, in the order of the clouds. Sets bodies, parts,
 /// boxes, surfaces and warnings of `whole`.
-/// @throws AgreedError for what `build_model` refuses, and for bodies that differ between ranks
+/// @throws AgreedError for what `build_model` refuses
 MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, WholeBodies& whole);
 /// Numbers the phyxels, groups and tiles of bodies and parts.
 void count_bodies(const ShareSetup& setup, WholeBodies& whole);
@@ -173,7 +172,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
                         LocalModel& local);
 
 /// Refuses digests that differ between ranks. Collective.
-/// @param digest of what each rank has made or read for itself
+/// @param digest of what each rank was given or has made for itself
 /// @throws AgreedError
 void check_alike(const MpiCommunicator& ranks, std::uint64_t digest);
 

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "mesh/nearest_site.hpp"
-#include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
 #include "mesh/surface_points.hpp"
@@ -232,7 +231,7 @@ class GradedSkin {
   const LatticeRequest& request_;
   const SpacingField& spacing_;
   std::vector<Vec3d> point_;
-  std::vector<InsideSampler::Ball> ball_;  ///< Of each point that moves.
+  std::vector<InsideSampler::Ball> ball_;  ///< Ball of each point (`repelled_inside`).
   std::size_t first_inside_ = 0;
 };
 

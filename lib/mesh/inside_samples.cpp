@@ -279,14 +279,19 @@ void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
 
 namespace {
 
+/// Random bits of a voxel's coordinate.
+std::uint64_t bits_of(std::int64_t coordinate) {
+  return mix_bits(static_cast<std::uint64_t>(coordinate));
+}
+/// Random bits of a row of voxels along z. @param x,y bits of its coordinates
+std::uint64_t bits_of_row(std::uint64_t seed, std::uint64_t x, std::uint64_t y) {
+  return mix_bits(mix_bits(seed ^ x) ^ y);
+}
 /// The position of a sample point in its voxel, in sides of the voxel. @param row bits of the
-/// voxel's x and y. @param z its z, mixed
+/// voxel's row. @param z bits of its coordinate
 Vec3d random_in(std::uint64_t row, std::uint64_t z) {
   const std::uint64_t bits = mix_bits(row ^ z);
   return {unit_fraction(bits), unit_fraction(bits >> 21), unit_fraction(bits >> 42)};
-}
-std::uint64_t bits_of_row(std::uint64_t seed, std::uint64_t x, std::uint64_t y) {
-  return mix_bits(mix_bits(seed ^ x) ^ y);
 }
 
 }  // namespace
@@ -301,9 +306,9 @@ void InsideSampler::fill_known(const Grid& grid, const Cell& cell, SampleBlock& 
   if (grid.sweep.at_random) {
     std::uint64_t x_bits[most], y_bits[most];
     for (int k = 0; k < side; ++k) {
-      x_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.x + k));
-      y_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.y + k));
-      z_bits[k] = mix_bits(static_cast<std::uint64_t>(cell.z + k));
+      x_bits[k] = bits_of(cell.x + k);
+      y_bits[k] = bits_of(cell.y + k);
+      z_bits[k] = bits_of(cell.z + k);
     }
     for (int x = 0; x < side; ++x) {
       for (int y = 0; y < side; ++y) {
@@ -335,8 +340,7 @@ Vec3<float> InsideSampler::sample_in(const Grid& grid, std::int64_t x, std::int6
                                      std::int64_t z, Vec3d centre) {
   Vec3d within{0.5, 0.5, 0.5};
   if (grid.sweep.at_random) {
-    const auto bits = [](std::int64_t k) { return mix_bits(static_cast<std::uint64_t>(k)); };
-    within = random_in(bits_of_row(grid.sweep.seed, bits(x), bits(y)), bits(z));
+    within = random_in(bits_of_row(grid.sweep.seed, bits_of(x), bits_of(y)), bits_of(z));
   }
   return grid.offset({x, y, z}, within, centre);
 }

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "mesh/nearest_site.hpp"
-#include "mesh/relaxation.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
 #include "mesh/surface_points.hpp"
@@ -255,7 +254,7 @@ class Skin {
   double spacing_;
   std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
   std::vector<Vec3d> point_;       ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
-  std::vector<InsideSampler::Ball> ball_;  ///< Of the nodes of `near_`, where they have moved.
+  std::vector<InsideSampler::Ball> ball_;  ///< Ball of each node of `near_` (`repelled_inside`).
 };
 
 }  // namespace

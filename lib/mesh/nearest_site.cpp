@@ -58,7 +58,7 @@ bool may_be_nearest(Vec3d apart, Vec3d nearest, double radius) {
 
 }  // namespace
 
-/// Finds the sites that may be nearest to a point of a ball; nothing if those are known.
+/// Finds the sites that may be nearest to a point of a ball, unless they were found last.
 void NearestSite::find_region(Vec3d middle, double radius, Scratch& s) const {
   if (s.region.x == middle.x && s.region.y == middle.y && s.region.z == middle.z) return;
   s.region = middle;
@@ -94,14 +94,11 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
     find_region(block.centre, ball, s);
   }
   const Sites<double>& near = s.of_region;
-  s.distance2.resize(near.size());
-  for (std::size_t k = 0; k < near.size(); ++k) {
+  Vec3d nearest = near.at(0) - block.centre;
+  for (std::size_t k = 1; k < near.size(); ++k) {
     const Vec3d d = near.at(k) - block.centre;
-    s.distance2[k] = dot(d, d);
+    if (dot(d, d) < dot(nearest, nearest)) nearest = d;
   }
-  const auto first = std::min_element(s.distance2.begin(), s.distance2.end());
-  const Vec3d nearest =
-      near.at(static_cast<std::size_t>(first - s.distance2.begin())) - block.centre;
   s.candidate.clear();
   for (std::size_t k = 0; k < near.size(); ++k) {
     const Vec3d d = near.at(k) - block.centre;

@@ -36,8 +36,7 @@ class NearestSite {
     /// Middle of the region whose sites were found last [m].
     Vec3d region{NAN, NAN, NAN};
     Sites<double> of_region;  ///< Sites that may be nearest to a point of the region.
-    Sites<float> candidate;   ///< Those of them that may be nearest to one of the block.
-    std::vector<double> distance2;
+    Sites<float> candidate;   ///< Sites of the region that may be nearest to a point of the block.
     std::vector<float> x, y, z, best;
     std::vector<std::int32_t> slot;
   };

@@ -210,13 +210,13 @@ class Sums {
   }
   /// Limits the unknowns to where sums are to change: the rest is a regular lattice.
   /// Collective.
-  /// @param sums of all phyxels; their ghosts receive their owners' values
-  void limit_to_irregular(const Bodies& bodies, std::vector<Vec3d>& sums) {
-    bodies.refresh_ghosts(sums);
-    bodies.for_each_with_ghosts([&](const Body& body, Index i) {
+  /// @param sums of all phyxels but ghosts
+  void limit_to_irregular(const Bodies& bodies, const std::vector<Vec3d>& sums) {
+    bodies.for_each([&](const Body& body, Index i) {
       const double least = regular * body.tolerance;
       role_[i] = dot(sums[i], sums[i]) > least * least ? Role::irregular : Role::none;
     });
+    bodies.refresh_ghosts(role_);
     std::vector<Role> next = role_;
     for (const Role role : {Role::sought, Role::changed, Role::beside}) {
       bodies.for_each([&](const Body&, Index i) {
@@ -232,7 +232,8 @@ class Sums {
                [&](const Body&, Index i) { return is_sought(i) ? model_.volume[i] : 0; });
     for (Body* body : bodies) body->is_limited = body->sought_volume < body->volume;
   }
-  /// Makes all phyxels of bodies have unknowns. @param x stays what it means
+  /// Gives all phyxels of bodies unknowns.
+  /// @param x the unknowns so far, which are rewritten to mean the same changes of volumes
   void widen(const Bodies& bodies, std::vector<Unknown>& x) {
     bodies.for_each_with_ghosts([&](const Body& body, Index i) {
       if (is_sought(i)) x[i].volume -= body.mean;
@@ -269,9 +270,9 @@ class Sums {
       if (body->sought_volume > 0) body->mean /= body->sought_volume;
     }
   }
-  /// The relative change of the volume of phyxel i, once means are found.
+  /// The relative change of the volume of phyxel i, once means are found; 0 without unknowns.
   double change_of_volume(const Body& body, Index i, const Unknown& x) const {
-    return is_sought(i) ? ease_volume * (x.volume - body.mean) : 0;
+    return ease_volume * (x.volume - (is_sought(i) ? body.mean : 0));
   }
   /// The closing vector ĉ that the unknowns of phyxel i mean [1/m].
   Vec3d closing_vector(const Body& body, Index i, const Unknown& x) const {
@@ -304,10 +305,14 @@ class Sums {
   }
 
  private:
-  /// What a phyxel has to do with the unknowns: it has some, since its sum is to change
-  /// (`irregular`) or it is supported and beside one of these (`sought`); it is a neighbour of one
-  /// that has (`changed`), or of one of these (`beside`).
-  enum class Role : char { none, beside, changed, sought, irregular };
+  /// The part of a phyxel in the search.
+  enum class Role : char {
+    none,
+    beside,    ///< It is a neighbour of a `changed` one, whose sum reads its record.
+    changed,   ///< It is a neighbour of one with unknowns, which change its sum.
+    sought,    ///< It has unknowns, since it is supported and beside an irregular one.
+    irregular  ///< It has unknowns, since its sum is to change.
+  };
   /// A sum counts as that of a regular lattice if it is below this much of the tolerance.
   static constexpr double regular = 0.1;
 
@@ -318,8 +323,7 @@ class Sums {
     bodies.for_each_with_ghosts([&](const Body& body, Index k) {
       if (role_[k] < least) return;
       const Unknown of_k = x(k);
-      const double mean = is_sought(k) || least == Role::none ? body.mean : 0;
-      const double change = ease_volume * (of_k.volume - mean) * model_.volume[k] / body.unit;
+      const double change = change_of_volume(body, k, of_k) * model_.volume[k] / body.unit;
       const Vec3d closing = relative_size_[k] * of_k.closing;
       gathers_.set_term(k, model_.position[k], closing,
                         outer(closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
@@ -350,9 +354,9 @@ class Sums {
   std::vector<Vec3d> tilt_;            ///< a
   std::vector<double> weight_;         ///< Σ_k w_jk (1 - a_j x_jk)
   std::vector<double> relative_size_;  ///< ρ
-  std::vector<Role> role_;
-  Gathers gathers_;              ///< What phyxels give to the sums of their neighbours.
-  std::vector<char> supported_;  ///< `supported_phyxels`.
+  std::vector<Role> role_;             ///< The role of each phyxel.
+  Gathers gathers_;                    ///< What phyxels give to the sums of their neighbours.
+  std::vector<char> supported_;        ///< `supported_phyxels`.
 };
 
 }  // namespace phyxel::closing

@@ -70,7 +70,7 @@ class Search {
     sums_.open(all_, [&](Index i, Vec3d sum) { residual_[i] = -sum; });
     sums_.limit_to_irregular(all_, residual_);
     iterate(all_, stage);
-    // A regular lattice beside others may have to take part, to small tolerances.
+    // For a small tolerance the regular phyxels of a body may have to take part.
     Bodies open = all_;
     open.erase_if(
         [](const Body& body) { return !body.is_limited || !(body.left > body.tolerance); });
@@ -90,7 +90,7 @@ class Search {
  private:
   double square_of(Index i) const { return dot(residual_[i], residual_[i]); }
 
-  /// Finds the residual of unknowns. @param bodies stay as they are, but for their means
+  /// Finds the residual of the present unknowns, and the mean change of volume of each body.
   void find_residual(const Bodies& bodies) {
     bodies.for_each([&](const Body&, Index i) { residual_[i] = {}; });
     sums_.apply(bodies, x_, &Body::image_squared, [&](Index i, Vec3d image) {

@@ -1,8 +1,5 @@
 #include "accuracy/bar.hpp"
 
-#include <algorithm>
-#include <utility>
-
 #include "phyxel/mesh.hpp"
 
 namespace phyxel::app {
@@ -55,7 +52,7 @@ Cloud cloud_of(const Scene& scene, const Discretisation& d) {
   if (d.filling != Filling::mesh) return make_cloud(body);
   body.source.shape.surface = true;
   const Cloud lattice = make_cloud(body);
-  // Regions are the groups of the bar's sides.
+  // The groups of the sides become regions.
   Cloud cloud =
       sample_surface(lattice.surface,
                      {.phyxels = static_cast<Index>(lattice.position.size()), .on_surface = true});

@@ -14,7 +14,7 @@ std::unique_ptr<Run> set_up(const RunOptions& options) {
   return std::make_unique<Run>(options);
 }
 
-/// Runs the scene, or only tells what a run would do.
+/// Runs the scene, or prints the plan of the run.
 void run_or_rehearse(const RunOptions& options) {
   const std::unique_ptr<Run> run = set_up(options);
   options.dry_run ? run->rehearse() : run->execute();

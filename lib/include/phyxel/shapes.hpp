@@ -45,7 +45,7 @@ double spacing_for(const ShapeRequest& request, Index phyxels);
 /// Makes a built-in body: phyxels with volumes, surfels, and named regions ("x-", "x+", "y-", ...
 /// for the outermost layer of phyxels on that side of a box; "z-", "z+" for a cylinder; "mouth"
 /// for the dino, "neck" for the alien head, "leg" for the horn bug). The triangles of the flat
-/// sides are groups of the surface by the same names, those around a cylinder are its "side".
+/// sides are groups of the surface by the same names; the group "side" goes around a cylinder.
 /// @throws InputError for an unknown name, or sizes, spacing or jitter out of range.
 Cloud make_shape(const ShapeRequest& request);
 
