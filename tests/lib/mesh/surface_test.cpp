@@ -5,6 +5,8 @@
 #include <numbers>
 #include <random>
 
+#include "mesh/face_relaxation.hpp"
+#include "mesh/inside_samples.hpp"
 #include "mesh/winding_number.hpp"
 #include "phyxel/mesh.hpp"
 #include "support/surfaces.hpp"
@@ -24,6 +26,54 @@ Vec3d random_point(std::mt19937_64& engine, double low, double high) {
 
 double direct(const Surface& s, Vec3d p) {
   return direct_winding_number(s.position, s.triangle, p);
+}
+
+/// The distance of a point from the surface of the unit cube [m].
+double distance_from_cube(Vec3d p) {
+  const double inside = std::min({p.x, 1 - p.x, p.y, 1 - p.y, p.z, 1 - p.z});
+  if (inside >= 0) return inside;
+  const auto beyond = [](double x) { return std::max({0.0, -x, x - 1}); };
+  return norm(Vec3d{beyond(p.x), beyond(p.y), beyond(p.z)});
+}
+
+TEST(WindingNumber, KnowsTheDistanceToTheNearestTriangle) {
+  const Surface cube = test::unit_cube(), ball = test::sphere({0.5, 0.5, 0.5}, 0.4, 3);
+  const WindingNumber of_cube(cube), of_ball(ball);
+  std::mt19937_64 engine(4);
+  for (int k = 0; k < 1000; ++k) {
+    const Vec3d p = random_point(engine, -0.5, 1.5);
+    EXPECT_NEAR(of_cube.distance(p, 10), distance_from_cube(p), 1e-12);
+    EXPECT_NEAR(of_cube.distance(p, 0.1), std::min(0.1, distance_from_cube(p)), 1e-12);
+    double nearest = 10;
+    for (const auto [a, b, c] : ball.triangle) {
+      const Vec3d at = nearest_on_triangle(p, ball.position[a], ball.position[b], ball.position[c]);
+      nearest = std::min(nearest, norm(at - p));
+    }
+    EXPECT_EQ(of_ball.distance(p, 10), nearest);
+  }
+}
+
+/// Points that wander, and stay where a step would lead out, are inside whatever ball they have.
+TEST(InsideSampler, TellsWhichStepsStayInside) {
+  const Surface cube = test::unit_cube();
+  const InsideSampler sampler(cube, true);
+  std::mt19937_64 engine(5);
+  int stayed = 0, left = 0;
+  for (int point = 0; point < 20; ++point) {
+    Vec3d at = random_point(engine, 0.05, 0.95);
+    InsideSampler::Ball ball;
+    for (int step = 0; step < 200; ++step) {
+      const Vec3d after = at + random_point(engine, -0.1, 0.1);
+      const double low = std::min({after.x, after.y, after.z}),
+                   high = std::max({after.x, after.y, after.z});
+      const bool is_inside = low > 0 && high < 1;
+      ASSERT_EQ(sampler.stays_inside(at, after, 0.3, ball), is_inside);
+      ++(is_inside ? stayed : left);
+      if (is_inside) at = after;
+    }
+  }
+  EXPECT_GT(stayed, 1000);
+  EXPECT_GT(left, 100);
 }
 
 TEST(WindingNumber, IsOneInsideAndZeroOutside) {
