@@ -106,7 +106,8 @@ std::vector<CloudPiece> pieces_of(const MpiCommunicator& ranks, const Scene& sce
              [&] { made = rest_cloud(sources[mine].from); });
     });
     for (std::size_t k = begin; k < end; ++k) {
-      DealtCloud dealt(ranks, k == mine ? std::move(made) : Cloud{}, static_cast<int>(k - begin));
+      DealtCloud dealt(ranks, k == mine ? std::exchange(made, {}) : Cloud{},
+                       static_cast<int>(k - begin));
       for (const std::size_t b : sources[k].bodies) {
         pieces[b] = dealt.piece([&](int rank) { return piece_of(ranks.size(), rank, b).number; });
       }
