@@ -10,7 +10,6 @@
 #include "mpi/dealt_cloud.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "scene/scene_error.hpp"
-#include "shapes/lattice_shapes.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -78,7 +77,7 @@ struct SharedSource {
 std::vector<SharedSource> shared_sources(const Scene& scene) {
   std::vector<SharedSource> sources;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    if (lattice_of(scene.bodies[b].source, {})) continue;
+    if (is_lattice(scene.bodies[b].source)) continue;
     CutSource source = source_of(scene.bodies[b]);
     const bool is_copy = !sources.empty() && is_same(sources.back().from, source);
     if (!is_copy) sources.emplace_back();
@@ -127,8 +126,8 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
       const BodyRequest& request = scene.bodies[b];
       const Piece number = piece_of(ranks.size(), ranks.rank(), b);
       return naming(request, [&] {
-        const auto lattice = lattice_of(request.source, number);
-        CloudPiece piece = lattice ? make_lattice_shape(*lattice, number) : std::move(pieces[b]);
+        CloudPiece piece = is_lattice(request.source) ? lattice_piece(source_of(request), number)
+                                                      : std::move(pieces[b]);
         place(piece.cloud, request);
         return piece;
       });

@@ -105,8 +105,8 @@ Cloud make(const std::string& name, Vec3d size, double radius, double length, do
   if (lattice != "nodes" && lattice != "cells" && lattice != "auto") {
     throw InputError(fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes", lattice));
   }
-  const bool box = name == "beam" || name == "block";
-  if (lattice == "nodes" || (lattice == "auto" && box)) {
+  const bool flat = name == "beam" || name == "block" || name == "cylinder";
+  if (lattice == "nodes" || (lattice == "auto" && flat)) {
     request.placement = ShapeRequest::Placement::nodes;
   }
   if (!is_paper_shape(name)) {

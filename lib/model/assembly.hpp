@@ -22,11 +22,15 @@ bool needs_lists_on_host(const BodyRequest& request);
 /// True likewise, for a body whose cloud the caller has made.
 bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud);
 
-/// The rest cloud of a source, before it is scaled and moved. Only meshes have phyxels where they
-/// are cut.
+/// The rest cloud of a source, before it is scaled and moved. Only meshes and lattices have phyxels
+/// where they are cut.
 Cloud rest_cloud(const CutSource& from);
-/// The lattice that a source is, with its spacing, if it is one. @param piece that is to be made
-std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece);
+/// True if a source is a lattice: a shape, but not one of the paper's bodies.
+bool is_lattice(const BodySource& source);
+/// True if a source is a lattice, with phyxels on the boundary of a support and inside it.
+bool has_rooms(const CutSource& from);
+/// A piece of a lattice, before it is scaled and moved.
+CloudPiece lattice_piece(const CutSource& from, Piece piece = {});
 
 /// Rotation by |r| about r (Rodrigues).
 Mat3d rotation_by(Vec3d radians);

@@ -43,17 +43,36 @@ Cloud rest_cloud(const CutSource& from) {
     }
   }
   return in_stage("making the shape", [&] {
-    const std::optional<ShapeRequest> lattice = lattice_of(source, {});
-    return make_shape(lattice ? *lattice : source.shape);
+    return is_lattice(source) ? lattice_piece(from).cloud : make_shape(source.shape);
   });
 }
 
-std::optional<ShapeRequest> lattice_of(const BodySource& source, Piece piece) {
-  if (source.shape.name.empty() || is_paper_shape(source.shape.name)) return {};
-  ShapeRequest shape = source.shape;
-  shape.seed = source.seed;
-  if (shape.spacing == 0) shape.spacing = spacing_for(shape, source.phyxels, piece);
+namespace {
+
+ShapeRequest lattice_of(const CutSource& from, Piece piece) {
+  ShapeRequest shape = from.source.shape;
+  shape.seed = from.source.seed;
+  shape.supports = from.cuts;
+  if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
   return shape;
+}
+
+}  // namespace
+
+bool is_lattice(const BodySource& source) {
+  return !source.shape.name.empty() && !is_paper_shape(source.shape.name);
+}
+
+bool has_rooms(const CutSource& from) {
+  if (!is_lattice(from.source) || from.cuts.empty()) return false;
+  const ShapeRequest shape = lattice_of(from, {});
+  return !make_lattice(shape, shape.spacing).rooms.empty();
+}
+
+CloudPiece lattice_piece(const CutSource& from, Piece piece) {
+  CloudPiece made = make_lattice_shape(lattice_of(from, piece), piece);
+  made.cloud.cuts.shift = from.shift;
+  return made;
 }
 
 Cloud make_cloud(const BodyRequest& request) {

@@ -147,8 +147,9 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   ShapeRequest& shape = body.source.shape;
   const bool kernel = body.volume_rule == VolumeRule::kernel;
   if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
-  if (table.has("lattice") || kernel || (shape.name != "beam" && shape.name != "block")) return;
-  const double thinnest = std::min({shape.size.x, shape.size.y, shape.size.z});
+  const bool box = shape.name == "beam" || shape.name == "block";
+  if (table.has("lattice") || kernel || (!box && shape.name != "cylinder")) return;
+  const double thinnest = box ? std::min({shape.size.x, shape.size.y, shape.size.z}) : shape.length;
   if (!(thinnest > 0)) return;  // refused later
   const double spacing =
       shape.spacing > 0 ? shape.spacing : spacing_for(shape, std::max(1, body.source.phyxels));

@@ -208,8 +208,8 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Of a cylinder."},
       {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells where those cannot be, in what is thinner than a spacing, and with `volumes = \"kernel\"`",
        .words = {"cells", "nodes"},
-       .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", at the "
-           "cells' corners, on faces too (beam and block): far more accurate in bending."},
+       .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", on flat faces "
+           "too, in a beam and block at the cells' corners: far more accurate. Not in a sphere."},
       {.section = "body", .name = "jitter", .fallback = "0", .range = between(0, 0.5),
        .meaning = "Each phyxel of a lattice is moved at random by up to this many spacings."},
       {.section = "body", .name = "seed", .type = KeyType::integer, .fallback = "1",

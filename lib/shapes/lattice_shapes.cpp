@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "mesh/random_bits.hpp"
+#include "shapes/lattice_cuts.hpp"
 
 namespace phyxel {
 namespace {
 
-using Cell = std::array<std::int64_t, 3>;
+using Cell = Lattice::Site;
 
 /// Calls visit(cell) in Morton order (x fastest) for the cells below `end` of a cube at `corner`
 /// with 2^level cells a side.
@@ -33,9 +35,9 @@ void visit_cells(const Cell& corner, int level, const Cell& end, Visit& visit) {
 class Filling {
  public:
   Filling(const Lattice& lattice, double jitter, std::uint64_t seed)
-      : lattice_(lattice), cell_(lattice.cell()), jitter_(jitter), salt_(mix_bits(seed)) {
+      : lattice_(lattice), jitter_(jitter), salt_(mix_bits(seed)) {
     for (int axis = 0; axis < 3; ++axis) {
-      end_[axis] = static_cast<std::int64_t>(lattice.places(axis));
+      end_[axis] = static_cast<std::int64_t>(lattice.layers[axis].count());
       block_end_[axis] = (end_[axis] + block_side - 1) / block_side;
     }
   }
@@ -52,18 +54,14 @@ class Filling {
     Cloud& cloud = made.cloud;
     const auto phyxels = static_cast<std::size_t>(first_[end] - first_[begin]);
     cloud.position.resize(phyxels);
-    const double inner = lattice_.nodes ? cell_.x * cell_.y * cell_.z
-                                        : lattice_.volume() / static_cast<double>(whole);
-    cloud.volume.assign(phyxels, inner);
+    cloud.volume.resize(phyxels);
+    const double factor = volume_over_share(static_cast<double>(whole));
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::ptrdiff_t b = begin; b < end; ++b) {
       auto next = static_cast<std::size_t>(first_[b] - first_[begin]);
-      visit_inside(b, [&](const Cell& c, Vec3d centre) {
-        cloud.position[next] = jittered(c, centre);
-        for (int axis = 0; axis < 3; ++axis) {
-          if (on_face(c, axis)) cloud.volume[next] *= 0.5;
-        }
-        ++next;
+      visit_inside(b, [&](const Cell& c) {
+        cloud.position[next] = jittered(c);
+        cloud.volume[next++] = factor * lattice_.share(c);
       });
     }
     add_regions(cloud, begin, end);
@@ -92,7 +90,7 @@ class Filling {
         }
         first_[b + 1] = count;
       } else {
-        visit_inside(b, [&](const Cell&, Vec3d) { ++first_[b + 1]; });
+        visit_inside(b, [&](const Cell&) { ++first_[b + 1]; });
       }
     }
     for (std::size_t b = 0; b < block_.size(); ++b) first_[b + 1] += first_[b];
@@ -103,37 +101,42 @@ class Filling {
     const Cell& at = block_[b];
     const Cell corner{at[0] * block_side, at[1] * block_side, at[2] * block_side};
     const auto visit_cell = [&](const Cell& c) {
-      if (!lattice_.holds(c)) return;
-      const double within = lattice_.nodes ? 0 : 0.5;
-      const Vec3d centre = lattice_.low + Vec3d{(static_cast<double>(c[0]) + within) * cell_.x,
-                                                (static_cast<double>(c[1]) + within) * cell_.y,
-                                                (static_cast<double>(c[2]) + within) * cell_.z};
-      visit(c, centre);
+      if (lattice_.holds(c)) visit(c);
     };
     visit_cells(corner, block_level, end_, visit_cell);
   }
 
-  /// True if a node lies on a face perpendicular to `axis`; false for cells.
-  bool on_face(const Cell& c, int axis) const {
-    return lattice_.nodes && (c[axis] == 0 || c[axis] == end_[axis] - 1);
+  /// The volume of a phyxel over its share of the bounding box, if there are `whole` phyxels.
+  double volume_over_share(double whole) const {
+    if (lattice_.solid == Lattice::Solid::box) return 1;
+    const Vec3d& extent = lattice_.extent;
+    const double cell = extent.x * extent.y / (lattice_.cells * lattice_.cells);
+    if (lattice_.solid == Lattice::Solid::sphere) {
+      return lattice_.volume() / (whole * cell * extent.z / lattice_.cells);
+    }
+    return lattice_.volume() / (whole / lattice_.layers[2].count() * cell * extent.z);
   }
 
-  Vec3d jittered(const Cell& c, Vec3d centre) const {
-    if (jitter_ == 0) return centre;
+  Vec3d jittered(const Cell& c) const {
+    const Vec3d site = lattice_.place(c);
+    if (jitter_ == 0) return site;
     const auto number = static_cast<std::uint64_t>(c[0] + end_[0] * (c[1] + end_[1] * c[2]));
     const std::uint64_t bits = mix_bits(number ^ salt_);
-    const auto signed_fraction = [](std::uint64_t part) { return 2 * unit_fraction(part) - 1; };
-    Vec3d move{jitter_ * cell_.x * signed_fraction(bits),
-               jitter_ * cell_.y * signed_fraction(bits >> 21),
-               jitter_ * cell_.z * signed_fraction(bits >> 42)};
-    if (lattice_.nodes) {  // interior nodes cannot reach a face
-      return centre + Vec3d{on_face(c, 0) ? 0 : move.x, on_face(c, 1) ? 0 : move.y,
-                            on_face(c, 2) ? 0 : move.z};
+    double move[3], inside[3];  // sites laid on a face are in its middle plane to `contains`
+    for (int axis = 0; axis < 3; ++axis) {
+      const Layers& layers = lattice_.layers[axis];
+      const auto layer = static_cast<double>(c[axis]);
+      const bool laid = layers.is_laid(layer);
+      const double fraction = 2 * unit_fraction(bits >> (21 * axis)) - 1;
+      move[axis] = laid ? 0 : jitter_ * layers.spacing(layer) * fraction;
+      inside[axis] = laid ? 0.5 * component(lattice_.extent, axis) + component(lattice_.low, axis)
+                          : component(site, axis);
     }
-    for (int attempt = 0; attempt < 4; ++attempt, move = 0.5 * move) {
-      if (lattice_.contains(centre + move)) return centre + move;
+    for (double part = 1; part > 0.1; part *= 0.5) {
+      const Vec3d by{part * move[0], part * move[1], part * move[2]};
+      if (lattice_.contains(Vec3d{inside[0], inside[1], inside[2]} + by)) return site + by;
     }
-    return centre;
+    return site;
   }
 
   /// Adds a region for each flat side: the outermost layer of phyxels there.
@@ -146,7 +149,7 @@ class Filling {
         const std::int64_t layer = block_[b][axis];
         if (layer != 0 && layer != block_end_[axis] - 1) continue;
         Offset i = first_[b] - first_[begin];
-        visit_inside(b, [&](const Cell& c, Vec3d) {
+        visit_inside(b, [&](const Cell& c) {
           if (c[axis] == 0) low.push_back(static_cast<Index>(i));
           if (c[axis] == end_[axis] - 1) high.push_back(static_cast<Index>(i));
           ++i;
@@ -156,7 +159,6 @@ class Filling {
   }
 
   const Lattice& lattice_;
-  Vec3d cell_;
   double jitter_;
   std::uint64_t salt_;
   Cell end_{}, block_end_{};
@@ -181,21 +183,68 @@ bool Lattice::contains(Vec3d p) const {
   return std::abs(d.x) < half.x && std::abs(d.y) < half.y;
 }
 
-bool Lattice::holds(const std::array<std::int64_t, 3>& cell) const {
+bool Lattice::holds(const Site& site) const {
   if (solid == Solid::box) return true;
   // Distances from the axis or the centre in half cells, in which the radius is the cell count.
-  const auto n = static_cast<std::int64_t>(cells[0]);
-  const std::int64_t x = 2 * cell[0] + 1 - n, y = 2 * cell[1] + 1 - n, z = 2 * cell[2] + 1 - n;
+  const auto n = static_cast<std::int64_t>(cells);
+  const std::int64_t x = 2 * site[0] + 1 - n, y = 2 * site[1] + 1 - n, z = 2 * site[2] + 1 - n;
   return x * x + y * y + (solid == Solid::sphere ? z * z : 0) < n * n;
 }
 
+Vec3d Lattice::place(const Site& site) const {
+  const auto along = [&](int axis) { return layers[axis].place(static_cast<double>(site[axis])); };
+  return {along(0), along(1), along(2)};
+}
+
+double Lattice::share(const Site& site) const {
+  std::array<double, 3> at;
+  std::array<std::array<double, 2>, 3> part;
+  for (int axis = 0; axis < 3; ++axis) {
+    at[axis] = static_cast<double>(site[axis]);
+    part[axis] = layers[axis].shares(at[axis]);
+  }
+  if (rooms.empty()) {
+    const auto whole = [&](int axis) { return part[axis][0] + part[axis][1]; };
+    return whole(0) * whole(1) * whole(2);
+  }
+  // The room of the site. A cell is in the first room between whose layers it lies, those on the
+  // room's boundary included.
+  const auto is_inside = [&](const LatticeRoom& room, int axis) {
+    return at[axis] >= room.layers[axis][0] && at[axis] < room.layers[axis][1];
+  };
+  const auto own = std::find_if(rooms.begin(), rooms.end(), [&](const LatticeRoom& room) {
+    return is_inside(room, 0) && is_inside(room, 1) && is_inside(room, 2);
+  });
+  const auto between = [&](const LatticeRoom& room, int axis, int above) {
+    const double lower = at[axis] - 1 + above;  // the layer below the cell
+    return lower >= room.layers[axis][0] - 1 && lower + 1 <= room.layers[axis][1];
+  };
+  if (own != rooms.end()) {  // cells that reach the boundary belong to the layers inside
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [first, end] = own->layers[axis];
+      if (at[axis] == first && first > 0) part[axis][0] *= 2;
+      if (at[axis] == end - 1 && end < layers[axis].count()) part[axis][1] *= 2;
+    }
+  }
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int above[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
+    const auto room = std::find_if(rooms.begin(), rooms.end(), [&](const LatticeRoom& r) {
+      return between(r, 0, above[0]) && between(r, 1, above[1]) && between(r, 2, above[2]);
+    });
+    if (room == own) sum += part[0][above[0]] * part[1][above[1]] * part[2][above[2]];
+  }
+  return sum;
+}
+
 double Lattice::phyxels() const {
-  const double box_cells = places(0) * places(1) * places(2);
-  if (solid == Solid::box) return box_cells;
-  if (box_cells > 1e11) return box_cells * (volume() / (extent.x * extent.y * extent.z));
+  const auto count = [&](int axis) { return layers[axis].count(); };
+  const double box_sites = count(0) * count(1) * count(2);
+  if (solid == Solid::box) return box_sites;
+  if (box_sites > 1e11) return box_sites * (volume() / (extent.x * extent.y * extent.z));
   // Row by row in half cells: coordinates of cell centres are odd if n is even, and even if n is
   // odd.
-  const double n = cells[0];
+  const double n = cells;
   const bool odd = std::fmod(n, 2) == 0;
   const auto numbers_within = [&](double square) {
     if (!(square > 0)) return 0.0;
@@ -205,7 +254,7 @@ double Lattice::phyxels() const {
   double sum = 0;
   for (double y = 1 - n; y < n; y += 2) {
     if (solid == Solid::cylinder) {
-      sum += cells[2] * numbers_within(n * n - y * y);
+      sum += count(2) * numbers_within(n * n - y * y);
     } else {
       for (double z = 1 - n; z < n; z += 2) sum += numbers_within(n * n - y * y - z * z);
     }
@@ -224,11 +273,36 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
   } else {
     lattice.extent = request.size;
   }
-  lattice.nodes = request.placement == ShapeRequest::Placement::nodes;
   lattice.low = -0.5 * lattice.extent;
   if (request.name == "beam") lattice.low.x = 0;
-  const auto count = [&](double extent) { return std::max(1.0, std::round(extent / spacing)); };
-  lattice.cells = {count(lattice.extent.x), count(lattice.extent.y), count(lattice.extent.z)};
+  const Vec3d &low = lattice.low, &extent = lattice.extent;
+  lattice.cells = std::max(1.0, std::round(extent.x / spacing));
+  lattice.depth = 1e-7 * spacing + 16 * std::numeric_limits<double>::epsilon() *
+                                       std::max({extent.x, extent.y, extent.z});
+  const bool nodes = request.placement == ShapeRequest::Placement::nodes;
+  LatticeBox box{.low = low, .extent = extent, .spacing = spacing, .depth = lattice.depth};
+  for (int axis = 0; axis < 3; ++axis) {
+    box.flat[axis] = lattice.solid == Lattice::Solid::box ||
+                     (lattice.solid == Lattice::Solid::cylinder && axis == 2);
+    box.on_end[axis] = nodes && box.flat[axis];
+  }
+  const LayerPlan plan = plan_layers(box, request.supports);
+  for (int axis = 0; axis < 3; ++axis) {
+    lattice.layers[axis] = Layers(component(low, axis), component(extent, axis), spacing,
+                                  plan.on_end[axis], plan.planes[axis]);
+  }
+  for (const SupportCut& cut : plan.cuts) {
+    LatticeRoom room{.cut = cut, .layers = {}};
+    bool has_layers = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      const SpaceRegion inside = cut.wall.shrunk(4 * lattice.depth);
+      const Layers& of = lattice.layers[axis];
+      room.layers[axis] = {of.first_above(component(inside.low, axis)),
+                           of.first_above(component(inside.high, axis))};
+      has_layers = has_layers && room.layers[axis][0] < room.layers[axis][1];
+    }
+    if (has_layers) lattice.rooms.push_back(room);
+  }
   return lattice;
 }
 

@@ -33,11 +33,10 @@ void check_size(const ShapeRequest& request) {
     check_positive(request.name, "size.y", request.size.y);
     check_positive(request.name, "size.z", request.size.z);
   } else {
-    if (request.placement == ShapeRequest::Placement::nodes) {
-      throw InputError(fmt::format(
-          "shape \"{}\": lattice \"nodes\": its outer layer would not lie on a round surface; "
-          "allowed: \"cells\", or the shapes beam and block",
-          request.name));
+    if (request.placement == ShapeRequest::Placement::nodes && request.name == "sphere") {
+      throw InputError(
+          "shape \"sphere\": lattice \"nodes\": its outer layer would not lie on a round surface; "
+          "allowed: \"cells\", or the shapes beam, block and cylinder");
     }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
@@ -130,6 +129,9 @@ CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
   CloudPiece made = fill_lattice(lattice, request.jitter, request.seed, piece);
   if (request.surface) made.cloud.surface = lattice_surface(lattice, request.spacing);
   made.cloud.lattice = request.jitter == 0;
+  made.cloud.cuts.depth = lattice.depth;
+  made.cloud.cuts.spacing = request.spacing;
+  for (const LatticeRoom& room : lattice.rooms) made.cloud.cuts.list.push_back(room.cut);
   return made;
 }
 

@@ -252,15 +252,31 @@ inline BuildCase graded_clouds() {
   return c;
 }
 
+/// Lattices with layers on the faces of boxes that hold and move parts of them.
+inline BuildCase supported() {
+  BuildCase c{"Supported", {.bodies = {shape("beam", 0.12), shape("cylinder", 0.17)}}, {}};
+  BodyRequest &beam = c.scene.bodies[0], &column = c.scene.bodies[1];
+  beam.source.shape.placement = ShapeRequest::Placement::nodes;
+  beam.source.shape.jitter = 0;
+  beam.rotation = {0, 0, 90};
+  beam.scale = 1.5;
+  beam.fixed.push_back({.select = {.box = Selection::Box{{-9, -9, -9}, {9, 0.71, 9}}}});
+  beam.motions.push_back(
+      {.select = {.box = Selection::Box{{-9, 3.6, -9}, {9, 9, 0.11}}}, .velocity = {0.1, 0, 0}});
+  column.source.shape.length = 2;
+  column.fixed.push_back({.select = {.box = Selection::Box{{-9, -9, -9}, {9, 9, -0.37}}}});
+  return c;
+}
+
 inline const std::vector<BuildCase>& build_cases() {
-  static const std::vector<BuildCase> cases{beam(),         rules(),
-                                            nearest(),      small(),
-                                            degenerate(),   lumps(),
-                                            astray(),       lattice(),
-                                            included(),     closed(),
-                                            mixed(),        closed_alone(),
-                                            many_regions(), closed_by_default(),
-                                            graded_clouds()};
+  static const std::vector<BuildCase> cases{beam(),          rules(),
+                                            nearest(),       small(),
+                                            degenerate(),    lumps(),
+                                            astray(),        lattice(),
+                                            included(),      closed(),
+                                            mixed(),         closed_alone(),
+                                            many_regions(),  closed_by_default(),
+                                            graded_clouds(), supported()};
   return cases;
 }
 

@@ -32,9 +32,9 @@ struct SupportCut {
   bool operator==(const SupportCut&) const = default;
 };
 
-/// The cuts of a body made from a mesh. Inside a region in which all phyxels are held, none is a
-/// neighbour of one on the boundary or outside: the clamp then acts at the boundary, instead of
-/// being smeared over a support of its phyxels.
+/// The cuts of a body made from a mesh or a lattice. Inside a region in which all phyxels are held,
+/// none is a neighbour of one on the boundary or outside: the clamp then acts at the boundary,
+/// instead of being smeared over a support of its phyxels.
 struct SupportCuts {
   std::vector<SupportCut> list;
   double depth = 0;    ///< Largest depth of phyxels below their boundary, a rounding error [m].

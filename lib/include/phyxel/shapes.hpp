@@ -16,9 +16,9 @@ namespace phyxel {
 /// phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
 /// et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
-  /// Placement of phyxels in a lattice. `cells`: in the middle of each cell. `nodes` (beam and
-  /// block only): at the corners of cells, also on faces, edges and corners of the body, each with
-  /// its share of the adjacent cells' volume, which is more accurate at the surface.
+  /// Placement of phyxels in a lattice. `cells`: in the middle of each cell. `nodes` (not in a
+  /// sphere): on flat faces too, in a beam or block on all edges and corners, each with its share
+  /// of the adjacent cells' volume, which is more accurate at the surface.
   enum class Placement { cells, nodes };
 
   std::string name;
@@ -30,6 +30,9 @@ struct ShapeRequest {
   Placement placement = Placement::cells;
   std::uint64_t seed = 1;  ///< Seed of the jitter, which does not depend on the number of threads.
   bool surface = true;     ///< True to make surfels.
+  /// Regions in which the body will be held or moved. Layers of phyxels lie on faces of boxes along
+  /// the axes, so that supports act where these end: `Cloud::cuts`.
+  std::vector<SpaceRegion> supports = {};
   bool operator==(const ShapeRequest&) const = default;
 };
 

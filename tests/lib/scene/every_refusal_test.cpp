@@ -275,7 +275,7 @@ std::vector<Late> late_refusals() {
        {":5:1", "a single phyxel"}},
       // Bodies
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
-      {with_body("shape = 'cylinder'\nradius = 1\nlength = 1\nspacing = 0.2\nlattice = 'nodes'"),
+      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
        {":5:1", "lattice \"nodes\""}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 2147483647"), {":5:1", "GiB"}},
