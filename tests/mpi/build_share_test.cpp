@@ -59,6 +59,8 @@ class BuiltShares : public ::testing::TestWithParam<std::tuple<BuildCase, Cut>> 
       }
       needs_host_ |= may_close(body) || !body.inclusions.empty();
     }
+    for (const Walls& walls : whole_.walls) has_walls_ |= !walls.regions.empty();
+    needs_host_ |= has_walls_;
   }
   const BuildCase& case_ = std::get<0>(GetParam());
   const Cut& cut_ = std::get<1>(GetParam());
@@ -66,6 +68,7 @@ class BuiltShares : public ::testing::TestWithParam<std::tuple<BuildCase, Cut>> 
   const Model& here_ = built_of(case_, cut_).model;
   /// Whether lists are made on the host, whoever is to search.
   bool needs_host_ = false;
+  bool has_walls_ = false;
 };
 
 template <class T>
@@ -166,8 +169,9 @@ TEST_P(BuiltShares, TellTheQualityOfTheirCut) {
   const bool chosen = std::any_of(
       case_.scene.bodies.begin(), case_.scene.bodies.end(),
       [](const BodyRequest& body) { return body.neighbourhood.max_neighbours.has_value(); });
-  // Where a phyxel chooses the nearest of all, or some phyxels speak for all, it is an estimate.
-  if (chosen || whole_.size() > cut_.options.most_samples) return;
+  // Where a phyxel chooses the nearest of all, where walls part neighbours, or where some phyxels
+  // speak for all, it is an estimate.
+  if (chosen || has_walls_ || whole_.size() > cut_.options.most_samples) return;
   const PartitionQuality told = built_of(case_, cut_).quality;
   const PartitionQuality expected = quality_of(
       phyxel_graph(whole_), std::vector<int>(part_of.begin(), part_of.end()), world().size());
