@@ -12,20 +12,6 @@
 
 namespace phyxel {
 
-/// Selects exactly n sample points that are far from each other. Random candidates are accepted if
-/// no point accepted before is within a radius, and the radius shrinks until n are found.
-/// Source: McCool and Fiume 1992 (dart throwing with a shrinking radius).
-/// @param spacing cube root of the volume of one point [m]
-/// @param before points accepted in advance, which are not returned
-std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,
-                               std::uint64_t seed, std::span<const Vec3d> before = {});
-
-/// A maximal set of sample points at least `gap` spacings from each other and from those in
-/// `before`.
-std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
-                                   const SpacingField& spacing, double gap, std::uint64_t seed,
-                                   std::span<const Vec3d> before);
-
 /// A Voronoi diagram of sites, restricted to the inside of a surface and represented by sample
 /// points, each with its nearest site.
 class SampledVoronoi {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mesh/darts.hpp"
 #include "mesh/nearest_site.hpp"
 #include "mesh/relaxation.hpp"
 #include "stage.hpp"

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "mesh/cuts.hpp"
+#include "mesh/darts.hpp"
 #include "mesh/face_relaxation.hpp"
 #include "mesh/grading.hpp"
 #include "mesh/relaxation.hpp"
