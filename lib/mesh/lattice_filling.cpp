@@ -28,8 +28,9 @@ constexpr double most_clearance = 0.8;
 /// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
 /// which closed bars bend right.
 constexpr double surface_strength = 0.85;
-/// Sample points for a volume along a lattice constant.
-constexpr double samples_along = 6;
+/// Sample points for a volume along a lattice constant. Errors of bodies of 2,000 to 40,000 phyxels
+/// are the same with 4; in small bodies, 6 take no time.
+double samples_along(Index phyxels) { return phyxels > 100'000 ? 4 : 6; }
 
 /// A test that tells places deep inside a surface and far from cuts.
 class Depth {
@@ -241,10 +242,11 @@ class Skin {
       if (rooms.size() > 1) counts = [&](Vec3d p) { return rooms.room_of(p) == room; };
       const std::vector<double> shares =
           NearestSite(site, spacing_)
-              .volumes(
-                  request_.sampler,
-                  {.voxel = spacing_ / samples_along, .seed = request_.seed + 2, .wanted = wanted},
-                  stage, counts);
+              .volumes(request_.sampler,
+                       {.voxel = spacing_ / samples_along(request_.phyxels),
+                        .seed = request_.seed + 2,
+                        .wanted = wanted},
+                       stage, counts);
       for (std::size_t k = 0; k < site.size(); ++k) volume[here[k]] = shares[k];
     }
     return volume;
