@@ -102,18 +102,19 @@ Cloud make(const std::string& name, Vec3d size, double radius, double length, do
   request.jitter = jitter;
   request.seed = seed;
   request.surface = surfels;
-  if (lattice != "nodes" && lattice != "cells" && lattice != "auto") {
-    throw InputError(fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes", lattice));
+  if (lattice != "nodes" && lattice != "cells" && lattice != "fitted" && lattice != "auto") {
+    throw InputError(
+        fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes, fitted", lattice));
   }
-  const bool flat = name == "beam" || name == "block" || name == "cylinder";
-  if (lattice == "nodes" || (lattice == "auto" && flat)) {
-    request.placement = ShapeRequest::Placement::nodes;
-  }
+  if (lattice == "nodes") request.placement = ShapeRequest::Placement::nodes;
+  if (lattice == "fitted") request.placement = ShapeRequest::Placement::fitted;
   if (!is_paper_shape(name)) {
     if ((spacing > 0) == (phyxels > 0)) {
       throw InputError(
           fmt::format("shape \"{}\": exactly one of spacing and phyxels is needed", name));
     }
+    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
+    if (lattice == "auto") request.placement = best_placement(request);
     if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
   }
   return make_shape(request);
@@ -207,7 +208,8 @@ void add_functions(py::module_& module) {
              "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
              "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,
              "A built-in shape, as scenes have it: beam, block (size), cylinder (radius, length),\n"
-             "sphere (radius), each with `spacing` or `phyxels`; alien_head, horn_bug, dino.");
+             "sphere (radius), each with `spacing` [m] or `phyxels`; alien_head, horn_bug, dino.\n"
+             "`lattice` is \"cells\", \"nodes\", \"fitted\" or \"auto\", the most accurate.");
   module.def(
       "read_mesh",
       [](const std::filesystem::path& file) {

@@ -51,8 +51,7 @@ void place(Cloud& cloud, const BodyRequest& request) {
 }
 
 bool needs_lists_on_host(const BodyRequest& request) {
-  const bool may_be_cut = request.source.mesh.empty() ? has_rooms(source_of(request))
-                                                      : !support_regions(request).empty();
+  const bool may_be_cut = has_rooms(source_of(request));
   const NeighbourhoodRule& rule = request.neighbourhood;
   // A cloud of the caller's is not known here.
   const bool may_have_spacing = request.source.grading || !request.source.cloud.empty() ||

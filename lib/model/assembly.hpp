@@ -25,9 +25,9 @@ bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud);
 /// The rest cloud of a source, before it is scaled and moved. Only meshes and lattices have phyxels
 /// where they are cut.
 Cloud rest_cloud(const CutSource& from);
-/// True if a source is a lattice: a shape, but not one of the paper's bodies.
+/// True if a source is a lattice: a shape, but neither fitted nor one of the paper's bodies.
 bool is_lattice(const BodySource& source);
-/// True if a source is a lattice, with phyxels on the boundary of a support and inside it.
+/// True if there may be phyxels on the boundary of a support and inside it.
 bool has_rooms(const CutSource& from);
 /// A piece of a lattice, before it is scaled and moved.
 CloudPiece lattice_piece(const CutSource& from, Piece piece = {});

@@ -167,7 +167,9 @@ bool encloses_volume(const Surface& surface) {
 
 bool may_close(const BodyRequest& request) {
   if (request.closure) return *request.closure > 0;
-  const bool regular = !request.source.shape.name.empty() && !(request.source.shape.jitter > 0);
+  const ShapeRequest& shape = request.source.shape;
+  const bool regular = !shape.name.empty() && !(shape.jitter > 0) &&
+                       shape.placement != ShapeRequest::Placement::fitted;
   return !regular && request.volume_rule != VolumeRule::kernel &&
          !request.neighbourhood.one_sided();
 }

@@ -9,6 +9,18 @@
 #include "stage.hpp"
 
 namespace phyxel {
+namespace {
+
+/// The request of a shape that is no body of the paper's. @param piece that is to be made
+ShapeRequest shape_of(const CutSource& from, Piece piece) {
+  ShapeRequest shape = from.source.shape;
+  shape.seed = from.source.seed;
+  shape.supports = from.cuts;
+  if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
+  return shape;
+}
+
+}  // namespace
 
 Cloud rest_cloud(const CutSource& from) {
   const BodySource& source = from.source;
@@ -42,35 +54,30 @@ Cloud rest_cloud(const CutSource& from) {
       throw InputError(fmt::format("{}: {}", source.mesh.string(), error.what()));
     }
   }
+  if (source.shape.placement == ShapeRequest::Placement::fitted) {  // it has stages of its own
+    Cloud cloud = make_shape(shape_of(from, {}));
+    cloud.cuts.shift = from.shift;
+    return cloud;
+  }
   return in_stage("making the shape", [&] {
     return is_lattice(source) ? lattice_piece(from).cloud : make_shape(source.shape);
   });
 }
 
-namespace {
-
-ShapeRequest lattice_of(const CutSource& from, Piece piece) {
-  ShapeRequest shape = from.source.shape;
-  shape.seed = from.source.seed;
-  shape.supports = from.cuts;
-  if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
-  return shape;
-}
-
-}  // namespace
-
 bool is_lattice(const BodySource& source) {
-  return !source.shape.name.empty() && !is_paper_shape(source.shape.name);
+  return !source.shape.name.empty() && !is_paper_shape(source.shape.name) &&
+         source.shape.placement != ShapeRequest::Placement::fitted;
 }
 
 bool has_rooms(const CutSource& from) {
-  if (!is_lattice(from.source) || from.cuts.empty()) return false;
-  const ShapeRequest shape = lattice_of(from, {});
+  if (from.cuts.empty()) return false;
+  if (!is_lattice(from.source)) return true;
+  const ShapeRequest shape = shape_of(from, {});
   return !make_lattice(shape, shape.spacing).rooms.empty();
 }
 
 CloudPiece lattice_piece(const CutSource& from, Piece piece) {
-  CloudPiece made = make_lattice_shape(lattice_of(from, piece), piece);
+  CloudPiece made = make_lattice_shape(shape_of(from, piece), piece);
   made.cloud.cuts.shift = from.shift;
   return made;
 }

@@ -167,8 +167,10 @@ std::vector<SpaceRegion> support_regions(const BodyRequest& request) {
 
 CutSource source_of(const BodyRequest& request) {
   CutSource made{request.source, {}, {}, 0};
-  const bool lattice = is_lattice(request.source) && request.volume_rule != VolumeRule::kernel;
-  if (request.source.mesh.empty() && !lattice) return made;
+  const std::string& shape = request.source.shape.name;
+  const bool is_shape =
+      !shape.empty() && !is_paper_shape(shape) && request.volume_rule != VolumeRule::kernel;
+  if (request.source.mesh.empty() && !is_shape) return made;
   const Mat3d rotation = rotation_of(request);
   for (const SpaceRegion& region : support_regions(request)) {
     made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));

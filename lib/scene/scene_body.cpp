@@ -9,152 +9,10 @@
 #include "phyxel/law_table.hpp"
 #include "phyxel/shapes.hpp"
 #include "scene/scene_error.hpp"
+#include "scene/scene_source.hpp"
 
 namespace phyxel {
 namespace {
-
-/// Which keys a source of bodies uses, apart from the one that names it.
-struct SourceKeys {
-  std::vector<const char*> needed, optional;
-  bool one_of_spacing_and_phyxels = false;
-};
-
-SourceKeys lattice_keys(std::vector<const char*> needed) {
-  return {std::move(needed), {"spacing", "phyxels", "lattice", "jitter", "seed", "surfels"}, true};
-}
-
-SourceKeys keys_of_source(const char* kind, const std::string& shape) {
-  if (std::string(kind) == "mesh")
-    return {{"phyxels"}, {"seed", "relaxations", "on_surface", "grading"}};
-  if (std::string(kind) == "file" || std::string(kind) == "cloud") return {};
-  if (is_paper_shape(shape)) return {{}, {"surfels"}};
-  if (shape == "cylinder") return lattice_keys({"radius", "length"});
-  if (shape == "sphere") return lattice_keys({"radius"});
-  return lattice_keys({"size"});
-}
-
-/// Refuses keys that would have no effect, and asks for those that are needed.
-void check_source_keys(const SceneTable& body, const char* kind, const std::string& shape) {
-  const SourceKeys keys = keys_of_source(kind, shape);
-  const std::string source = shape.empty() ? kind : fmt::format("shape = \"{}\"", shape);
-  std::vector<std::string> used(keys.needed.begin(), keys.needed.end());
-  used.insert(used.end(), keys.optional.begin(), keys.optional.end());
-  for (const char* name : {"phyxels", "spacing", "size", "radius", "length", "lattice", "jitter",
-                           "seed", "relaxations", "on_surface", "grading", "surfels"}) {
-    if (!body.has(name) || std::find(used.begin(), used.end(), name) != used.end()) continue;
-    body.refuse(name,
-                fmt::format("found, but {} does not use it; allowed with {}: {}", source, source,
-                            used.empty() ? "none" : fmt::format("{}", fmt::join(used, ", "))));
-  }
-  for (const char* name : keys.needed) {
-    if (!body.has(name)) {
-      throw InputError(
-          fmt::format("{}: key body.{}: missing; {} needs it", body.where(kind), name, source));
-    }
-  }
-  if (keys.one_of_spacing_and_phyxels) {
-    body.expect_one_of({"spacing", "phyxels"});
-    if (body.has("seed") && !body.has("jitter")) {
-      body.refuse("seed",
-                  "found without jitter, the only thing random here; allowed: both or neither");
-    }
-  }
-}
-
-void check_file_exists(const SceneTable& body, const char* kind,
-                       const std::filesystem::path& file) {
-  std::error_code unknown;
-  if (std::filesystem::is_directory(file, unknown)) {
-    body.refuse(kind, fmt::format("{} found, which is a folder; allowed: a file", file.string()));
-  }
-  if (!std::filesystem::exists(file, unknown)) {
-    body.refuse(kind, fmt::format("{} found, but there is no such file; allowed: a file, relative "
-                                  "to the scene file's folder",
-                                  file.string()));
-  }
-}
-
-Grading read_grading(const SceneTable& table) {
-  Grading grading;
-  table.read("ratio", grading.ratio);
-  table.read("growth", grading.growth);
-  table.read("per_radius", grading.per_radius);
-  table.read("across", grading.across);
-  return grading;
-}
-
-std::vector<FinerRequest> read_finer(const SceneTable& table, double ratio) {
-  std::vector<FinerRequest> all;
-  for (const SceneTable& finer : table.tables("finer")) {
-    finer.expect_one_of({"box", "ball"});
-    FinerRequest request{read_selection(finer), ratio};
-    finer.read("by", request.by);
-    if (request.by > ratio) {
-      finer.refuse("by", fmt::format("{:g} found; allowed: 1 to the ratio of the grading, {:g}",
-                                     request.by, ratio));
-    }
-    all.push_back(request);
-  }
-  return all;
-}
-
-BodySource read_source(const SceneTable& body) {
-  body.expect_one_of({"shape", "mesh", "file", "cloud"});
-  BodySource source;
-  ShapeRequest& shape = source.shape;
-  body.read("shape", shape.name);
-  if (body.has("shape")) {
-    const std::vector<std::string>& known = shape_names();
-    if (std::find(known.begin(), known.end(), shape.name) == known.end()) {
-      body.refuse("shape", fmt::format("{} found{}; allowed: {}", in_quotes(shape.name),
-                                       did_you_mean(shape.name, known), fmt::join(known, ", ")));
-    }
-  }
-  const char* kind = "cloud";
-  for (const char* other : {"shape", "mesh", "file"}) {
-    if (body.has(other)) kind = other;
-  }
-  check_source_keys(body, kind, shape.name);
-  body.read("mesh", source.mesh);
-  body.read("file", source.file);
-  body.read("cloud", source.cloud);
-  if (body.has("mesh")) check_file_exists(body, kind, source.mesh);
-  if (body.has("file")) check_file_exists(body, kind, source.file);
-  body.read("phyxels", source.phyxels);
-  body.read("spacing", shape.spacing);
-  body.read("size", shape.size);
-  body.read("radius", shape.radius);
-  body.read("length", shape.length);
-  body.read_choice("lattice", shape.placement);
-  body.read("jitter", shape.jitter);
-  body.read("surfels", shape.surface);
-  body.read("seed", source.seed);
-  body.read("relaxations", source.relaxations);
-  body.read("on_surface", source.on_surface);
-  if (body.has("grading") && source.on_surface == false) {
-    body.refuse("on_surface",
-                "false found, but a graded body has phyxels on its surface; allowed: true, or no "
-                "grading");
-  }
-  shape.seed = source.seed;
-  return source;
-}
-
-/// Phyxels on the body's surface where a scene says nothing of it: most accurate. Not in what is
-/// thinner than a spacing, where those on opposite faces would be nearest to each other; nor where
-/// the kernel rule tells volumes, which takes them for phyxels with others all around.
-void choose_placement(const SceneTable& table, BodyRequest& body) {
-  ShapeRequest& shape = body.source.shape;
-  const bool kernel = body.volume_rule == VolumeRule::kernel;
-  if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
-  const bool box = shape.name == "beam" || shape.name == "block";
-  if (table.has("lattice") || kernel || (!box && shape.name != "cylinder")) return;
-  const double thinnest = box ? std::min({shape.size.x, shape.size.y, shape.size.z}) : shape.length;
-  if (!(thinnest > 0)) return;  // refused later
-  const double spacing =
-      shape.spacing > 0 ? shape.spacing : spacing_for(shape, std::max(1, body.source.phyxels));
-  if (thinnest > 0.999 * spacing) shape.placement = ShapeRequest::Placement::nodes;
-}
 
 /// Reads the law and its parameters. A parameter that is not said is that of `material`, which has
 /// the body's where the table is an inclusion's; `inherits` says whether it is.
@@ -331,12 +189,6 @@ TractionRequest read_traction(const SceneTable& table) {
   return traction;
 }
 
-std::string name_of_source(const BodySource& source) {
-  if (!source.shape.name.empty()) return source.shape.name;
-  if (!source.cloud.empty()) return source.cloud;
-  return (source.mesh.empty() ? source.file : source.mesh).stem().string();
-}
-
 BodyRequest read_body_request(const SceneTable& table) {
   BodyRequest body;
   body.where = table.where();
@@ -356,7 +208,6 @@ BodyRequest read_body_request(const SceneTable& table) {
   table.read("velocity", body.velocity);
   table.read("spin", body.spin);
   table.read_choice("volumes", body.volume_rule);
-  naming(body, [&] { choose_placement(table, body); });
   if (table.is_number("closure")) table.read("closure", body.closure);
   if (table.has("neighbours")) body.neighbourhood = read_neighbours(table.table("neighbours"));
   body.material = read_material(table.table("material"), body);
@@ -376,6 +227,7 @@ BodyRequest read_body_request(const SceneTable& table) {
   for (const SceneTable& motion : table.tables("motion")) {
     body.motions.push_back(read_motion(motion));
   }
+  naming(body, [&] { choose_placement(table, body); });
   for (const SceneTable& load : table.tables("load")) body.loads.push_back(read_load(load));
   for (const SceneTable& traction : table.tables("traction")) {
     body.tractions.push_back(read_traction(traction));

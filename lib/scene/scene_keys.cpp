@@ -196,9 +196,9 @@ std::vector<SceneKey> body_keys() {
        .meaning = "The name of a cloud that a program passes; not for `phyxel run`."},
       {.section = "body", .name = "phyxels", .type = KeyType::integer, .otherwise = "none",
        .range = between(1, largest_index),
-       .meaning = "How many: exactly for a mesh, about for a shape."},
+       .meaning = "How many: exactly for a mesh or a fitted shape, about for a lattice."},
       {.section = "body", .name = "spacing", .unit = "m", .otherwise = "from `phyxels`",
-       .range = length(), .meaning = "Distance between the phyxels of a shape's lattice."},
+       .range = length(), .meaning = "Distance between the phyxels of a shape."},
       {.section = "body", .name = "size", .type = KeyType::vector, .unit = "m",
        .otherwise = "none", .range = length(),
        .meaning = "Extents along x, y and z of a beam or block."},
@@ -206,10 +206,13 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Of a cylinder or sphere."},
       {.section = "body", .name = "length", .unit = "m", .otherwise = "none", .range = length(),
        .meaning = "Of a cylinder."},
-      {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "nodes; cells where those cannot be, in what is thinner than a spacing, and with `volumes = \"kernel\"`",
-       .words = {"cells", "nodes"},
-       .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell; \"nodes\", on flat faces "
-           "too, in a beam and block at the cells' corners: far more accurate. Not in a sphere."},
+      {.section = "body", .name = "lattice", .type = KeyType::choice, .otherwise = "the most accurate: nodes in beams and blocks; fitted in cylinders and spheres, "
+           "and where a ball, or a box turned against the body, holds or moves a part; cells in what is "
+           "thinner than a spacing, and with `volumes = \"kernel\"`",
+       .words = {"cells", "nodes", "fitted"},
+       .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell of a lattice; \"nodes\", on flat faces "
+           "too, in a beam and block at the cells' corners (not in a sphere); \"fitted\", on all faces, as in "
+           "a body from a mesh, not in a lattice: exactly `phyxels` of them, or one for each cube of `spacing`."},
       {.section = "body", .name = "jitter", .fallback = "0", .range = between(0, 0.5),
        .meaning = "Each phyxel of a lattice is moved at random by up to this many spacings."},
       {.section = "body", .name = "seed", .type = KeyType::integer, .fallback = "1",

@@ -143,6 +143,8 @@ class Planner {
 
 }  // namespace
 
+bool is_along_axes(const SpaceRegion& region) { return along_axes(region).has_value(); }
+
 LayerPlan plan_layers(const LatticeBox& lattice, std::span<const SpaceRegion> regions) {
   Planner planner(lattice);
   for (const SpaceRegion& region : regions) planner.add(region);

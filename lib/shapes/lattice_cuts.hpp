@@ -25,6 +25,9 @@ struct LatticeBox {
   double depth = 0;              ///< How deep layers lie below a region's boundary [m].
 };
 
+/// True if a region is a box whose edges are parallel to the axes.
+bool is_along_axes(const SpaceRegion& region);
+
 /// Plans layers on those faces of boxes along the axes that are inside a lattice, so that a support
 /// acts where its box ends. A box thinner than 0.8 spacings has
 /// one layer, in its middle. Balls, turned boxes and boxes whose layers would be less than half a

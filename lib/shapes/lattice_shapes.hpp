@@ -55,8 +55,8 @@ CloudPiece fill_lattice(const Lattice& lattice, double jitter, std::uint64_t see
                         Piece piece = {});
 
 /// The closed surface of the solid with vertices about `spacing` [m] apart, or farther apart if
-/// there would be more than a million.
-Surface lattice_surface(const Lattice& lattice, double spacing);
+/// there would be more than a million. @param corners a circle has this number at least
+Surface lattice_surface(const Lattice& lattice, double spacing, int corners = 16);
 
 /// The spacing [m] at which a shape has about `phyxels` phyxels; `piece` is the part of the shape
 /// that this process will make. @throws InputError

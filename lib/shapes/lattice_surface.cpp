@@ -114,7 +114,7 @@ class SolidSurface {
 
 }  // namespace
 
-Surface lattice_surface(const Lattice& lattice, double spacing) {
+Surface lattice_surface(const Lattice& lattice, double spacing, int corners) {
   constexpr double most_surfels = 1e6;
   // A side of the cube is mapped to a quarter of a circle.
   const double quarter = std::numbers::pi / 4;
@@ -128,9 +128,9 @@ Surface lattice_surface(const Lattice& lattice, double spacing) {
   std::array<Index, 3> cells;
   for (int axis = 0; axis < 3; ++axis) {
     const bool round = !box && (sphere || axis < 2);
-    // A circle has at least 16 corners; the length of a needle limits the number of steps.
-    cells[axis] = static_cast<Index>(
-        std::clamp(std::round(length[axis] / step), round ? 4.0 : 1.0, most_surfels / 16));
+    // The length of a needle limits the number of steps.
+    cells[axis] = static_cast<Index>(std::clamp(std::round(length[axis] / step),
+                                                round ? 0.25 * corners : 1.0, most_surfels / 16));
   }
   return SolidSurface(lattice, cells).run();
 }

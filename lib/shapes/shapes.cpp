@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
+#include "shapes/lattice_cuts.hpp"
 #include "shapes/lattice_shapes.hpp"
 #include "shapes/paper_bodies.hpp"
 
@@ -36,7 +39,7 @@ void check_size(const ShapeRequest& request) {
     if (request.placement == ShapeRequest::Placement::nodes && request.name == "sphere") {
       throw InputError(
           "shape \"sphere\": lattice \"nodes\": its outer layer would not lie on a round surface; "
-          "allowed: \"cells\", or the shapes beam, block and cylinder");
+          "allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
     }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
@@ -55,7 +58,7 @@ void require_memory_for_cloud(const std::string& shape, double phyxels, Piece pi
   require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel / piece.of);
 }
 
-void check_lattice(const ShapeRequest& request) {
+void check_request(const ShapeRequest& request) {
   check_size(request);
   check_positive(request.name, "spacing", request.spacing);
   const Vec3d extent = make_lattice(request, 1).extent;
@@ -69,6 +72,49 @@ void check_lattice(const ShapeRequest& request) {
     throw InputError(fmt::format("shape \"{}\": jitter = {}: 0 to 0.5 spacings are allowed",
                                  request.name, request.jitter));
   }
+  if (request.placement != ShapeRequest::Placement::fitted) return;
+  if (request.jitter > 0) {
+    throw InputError(fmt::format(
+        "shape \"{}\": jitter = {} with lattice \"fitted\", which is no lattice: allowed is 0",
+        request.name, request.jitter));
+  }
+  if (!request.surface) {
+    throw InputError(fmt::format(
+        "shape \"{}\": lattice \"fitted\" without surfels: allowed is \"cells\" or \"nodes\"",
+        request.name));
+  }
+}
+
+/// The number of phyxels of a fitted shape.
+double fitted_phyxels(const ShapeRequest& request) {
+  const double volume = make_lattice(request, request.spacing).volume();
+  return std::max(1.0, std::round(volume / std::pow(request.spacing, 3)));
+}
+
+/// Fills a shape as a mesh is filled.
+Cloud make_fitted_shape(const ShapeRequest& request) {
+  check_request(request);
+  const double phyxels = fitted_phyxels(request);
+  if (phyxels > std::numeric_limits<Index>::max()) {
+    throw InputError(fmt::format("shape \"{}\": {:.4g} phyxels; allowed are at most {}",
+                                 request.name, phyxels, std::numeric_limits<Index>::max()));
+  }
+  // The polygon of a circle then has 0.04% less area.
+  constexpr int corners = 128;
+  const Surface surface =
+      lattice_surface(make_lattice(request, request.spacing), request.spacing, corners);
+  SampleReport report;
+  Cloud cloud = sample_surface(surface,
+                               {.phyxels = static_cast<Index>(phyxels),
+                                .seed = request.seed,
+                                .on_surface = {},
+                                .cuts = request.supports,
+                                .grading = {}},
+                               &report);
+  for (const std::string& warning : report.warnings) {
+    cloud.warnings.push_back(fmt::format("shape \"{}\": {}", request.name, warning));
+  }
+  return cloud;
 }
 
 }  // namespace
@@ -97,6 +143,9 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
   }
   require_memory_for_cloud(request.name, phyxels, piece);
   const Lattice unit = make_lattice(request, 1);
+  if (request.placement == ShapeRequest::Placement::fitted) {
+    return std::cbrt(unit.volume() / phyxels);
+  }
   const double longest = std::max({unit.extent.x, unit.extent.y, unit.extent.z});
   const auto count = [&](double spacing) { return make_lattice(request, spacing).phyxels(); };
   const double guess = std::min(std::cbrt(unit.volume() / phyxels), longest);
@@ -112,6 +161,24 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
   return phyxels - count(few) < count(many) - phyxels ? few : many;
 }
 
+ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed) {
+  using Placement = ShapeRequest::Placement;
+  check_request(request);
+  const Lattice lattice = make_lattice(request, request.spacing);
+  const Vec3d& size = lattice.extent;
+  const double thinnest = std::min({size.x, size.y, size.z});
+  const bool is_box = lattice.solid == Lattice::Solid::box;
+  const bool layers_do = is_box && std::ranges::all_of(request.supports, is_along_axes);
+  if (closed && !layers_do && request.surface && request.jitter == 0 &&
+      thinnest > 3 * request.spacing) {
+    return Placement::fitted;
+  }
+  const double between_faces = is_box ? thinnest : size.z;
+  return lattice.solid != Lattice::Solid::sphere && between_faces > 0.999 * request.spacing
+             ? Placement::nodes
+             : Placement::cells;
+}
+
 Cloud make_shape(const ShapeRequest& request) {
   check_name(request.name);
   if (const PaperBody* body = find_paper_body(request.name)) {
@@ -119,11 +186,12 @@ Cloud make_shape(const ShapeRequest& request) {
     cloud.lattice = true;
     return cloud;
   }
+  if (request.placement == ShapeRequest::Placement::fitted) return make_fitted_shape(request);
   return make_lattice_shape(request).cloud;
 }
 
 CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
-  check_lattice(request);
+  check_request(request);
   const Lattice lattice = make_lattice(request, request.spacing);
   require_memory_for_cloud(request.name, lattice.phyxels(), piece);
   CloudPiece made = fill_lattice(lattice, request.jitter, request.seed, piece);

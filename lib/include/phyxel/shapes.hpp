@@ -12,14 +12,17 @@ namespace phyxel {
 /// "beam", "block": `size` (beam lies along x, its end x = 0 at the origin and its axis on the
 /// x axis; the block is centred on the origin); "cylinder": `radius`, `length` (along z, centred);
 /// "sphere": `radius` (centred). These are filled by a lattice of `spacing`, each phyxel moved by
-/// up to `jitter` spacings in each direction, but not off a face that it lies on. "alien_head" (238
+/// up to `jitter` spacings in each direction, but not off a face that it lies on; or, if `fitted`,
+/// by as many phyxels as have its cube for a volume. "alien_head" (238
 /// phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
 /// et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
   /// Placement of phyxels in a lattice. `cells`: in the middle of each cell. `nodes` (not in a
   /// sphere): on flat faces too, in a beam or block on all edges and corners, each with its share
-  /// of the adjacent cells' volume, which is more accurate at the surface.
-  enum class Placement { cells, nodes };
+  /// of the adjacent cells' volume, which is more accurate at the surface. `fitted`: no lattice,
+  /// but phyxels on and inside the surface as `sample_surface` lays them, also on round faces and
+  /// along supports of any shape.
+  enum class Placement { cells, nodes, fitted };
 
   std::string name;
   Vec3d size;          ///< Extents [m].
@@ -31,7 +34,8 @@ struct ShapeRequest {
   std::uint64_t seed = 1;  ///< Seed of the jitter, which does not depend on the number of threads.
   bool surface = true;     ///< True to make surfels.
   /// Regions in which the body will be held or moved. Layers of phyxels lie on faces of boxes along
-  /// the axes, so that supports act where these end: `Cloud::cuts`.
+  /// the axes, or on all boundaries if `fitted`, so that supports act where these end:
+  /// `Cloud::cuts`.
   std::vector<SpaceRegion> supports = {};
   bool operator==(const ShapeRequest&) const = default;
 };
@@ -44,6 +48,15 @@ bool is_paper_shape(const std::string& name);
 
 /// Lattice spacing [m] that fills the shape with about `phyxels` phyxels.
 double spacing_for(const ShapeRequest& request, Index phyxels);
+
+/// Where the phyxels of a lattice shape are most accurate: on its surface, but not in what is
+/// thinner than a spacing, where those on opposite faces would be nearest to each other. In a
+/// lattice, unless its layers would not lie on the surface, or where supports end; closed gradients
+/// are as accurate without one.
+/// @param request with its spacing and supports
+/// @param closed whether gradients will be closed
+/// @throws InputError as `make_shape`
+ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed = true);
 
 /// Makes a built-in body: phyxels with volumes, surfels, and named regions ("x-", "x+", "y-", ...
 /// for the outermost layer of phyxels on that side of a box; "z-", "z+" for a cylinder; "mouth"

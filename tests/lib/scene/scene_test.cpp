@@ -257,8 +257,35 @@ TEST(Scene, WhatIsLeftOutIsWhatIsMostAccurate) {
             Placement::cells);
   EXPECT_EQ(body(beam + "spacing = 0.05\nlattice = \"cells\"").source.shape.placement,
             Placement::cells);
-  EXPECT_EQ(body("shape = \"sphere\"\nradius = 1\nspacing = 0.1").source.shape.placement,
-            Placement::cells);
+  for (const std::string round :
+       {"shape = \"sphere\"\nradius = 1\n", "shape = \"cylinder\"\nradius = 1\nlength = 2\n"}) {
+    const auto placement = [&](const std::string& keys) {
+      return body(round + keys).source.shape.placement;
+    };
+    const bool sphere = round.find("sphere") != round.npos;
+    const auto lattice = sphere ? Placement::cells : Placement::nodes;
+    EXPECT_EQ(placement("spacing = 0.1"), Placement::fitted);
+    EXPECT_EQ(placement("phyxels = 5000"), Placement::fitted);
+    EXPECT_EQ(placement("spacing = 0.7"), lattice);  // too few
+    EXPECT_EQ(placement("spacing = 0.1\njitter = 0.1"), lattice);
+    EXPECT_EQ(placement("spacing = 0.1\nsurfels = false"), lattice);
+    EXPECT_EQ(placement("spacing = 0.1\nclosure = 0"), lattice);
+    EXPECT_EQ(placement("spacing = 0.1\nvolumes = \"kernel\""), Placement::cells);
+    EXPECT_EQ(placement("spacing = 0.1\n[body.neighbours]\nsupport = \"adaptive\""), lattice);
+  }
+  // Supports that end across the layers of a lattice.
+  const auto held = [&](const std::string& keys, const std::string& support) {
+    return body(beam + "spacing = 0.02\n" + keys, "[[body.fixed]]\n" + support + "\n")
+        .source.shape.placement;
+  };
+  const std::string box = "box = [[-9, -9, -9], [0.33, 9, 9]]",
+                    ball = "ball = { centre = [0, 0, 0], radius = 0.33 }";
+  EXPECT_EQ(held("", box), Placement::nodes);
+  EXPECT_EQ(held("rotation = [0, 0, 90]", box), Placement::nodes);
+  EXPECT_EQ(held("rotation = [0, 0, 45]", box), Placement::fitted);
+  EXPECT_EQ(held("", ball), Placement::fitted);
+  EXPECT_EQ(held("closure = 0", ball), Placement::nodes);
+  EXPECT_EQ(held("lattice = \"nodes\"", ball), Placement::nodes);
 
   EXPECT_EQ(body(beam + "spacing = 0.05").material.hourglass, 0.1);
   EXPECT_EQ(body(beam + "spacing = 0.05", "hourglass = 0").material.hourglass, 0);

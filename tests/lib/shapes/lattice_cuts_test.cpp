@@ -11,6 +11,7 @@
 
 #include "model/assembly.hpp"
 #include "phyxel/equilibrium.hpp"
+#include "phyxel/error.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/laws.hpp"
 #include "phyxel/shapes.hpp"
@@ -216,7 +217,8 @@ double clamp_error(const Clamped& held) {
 }
 
 TEST(LatticeCuts, HoldBodiesWhereBoxesEnd) {
-  const auto nodes = ShapeRequest::Placement::nodes, cells = ShapeRequest::Placement::cells;
+  const auto nodes = ShapeRequest::Placement::nodes, cells = ShapeRequest::Placement::cells,
+             fitted = ShapeRequest::Placement::fitted;
   for (const Clamped& held : std::initializer_list<Clamped>{{"beam", nodes, 0.30},
                                                             {"beam", nodes, 0.311},
                                                             {"beam", nodes, 0.33},
@@ -229,10 +231,72 @@ TEST(LatticeCuts, HoldBodiesWhereBoxesEnd) {
                                                             {"beam", nodes, 0.33, {0, 90, 0}, 3},
                                                             {"cylinder", nodes, 0.33},
                                                             {"cylinder", nodes, 0.33, {0, 90, 0}},
-                                                            {"cylinder", cells, 0.33}}) {
+                                                            {"cylinder", cells, 0.33},
+                                                            {"cylinder", fitted, 0.33},
+                                                            {"beam", fitted, 0.33}}) {
     EXPECT_LT(std::abs(clamp_error(held)), 0.1)  // without layers on faces: up to 0.9
-        << held.shape << (held.placement == nodes ? ", nodes, " : ", cells, ") << held.clamp;
+        << held.shape << ", placement " << static_cast<int>(held.placement) << ", " << held.clamp;
   }
+}
+
+/// A rod, ν = 0, clamped at one end, bends under its weight as Timoshenko's beam does. Its phyxels
+/// lie on its round side: those of a lattice, whose outermost lie below it, bend by 7% more.
+TEST(FittedShapes, BendAsBeamsDo) {
+  constexpr double young = 1e6, density = 1000, weight = 0.01, radius = 0.1;
+  Scene scene = one_body(
+      {.young = young, .poisson = 0, .density = density, .law = SmallStrain<double>::name});
+  BodyRequest& body = scene.bodies[0];
+  body.source.shape = {.name = "cylinder",
+                       .radius = radius,
+                       .length = 1,
+                       .placement = ShapeRequest::Placement::fitted};
+  body.source.phyxels = 2000;
+  body.material.hourglass = 0.1;
+  body.fixed = {{.select = {.region = "z-"}}};
+  scene.gravity = {weight, 0, 0};
+  const Model model = build_model(scene);
+  ASSERT_EQ(model.size(), 2000);
+  const auto backend = make_test_backend(model, Precision::double_);
+  const State rest = find_equilibrium(model, *backend).state;
+  double sum = 0, volume = 0;
+  for (Index i = 0; i < model.size(); ++i) {
+    if (model.position[i].z < 0.5 - 1e-6) continue;
+    sum += model.volume[i] * rest.displacement[i].x;
+    volume += model.volume[i];
+  }
+  // w L⁴ / (8 E I) + w L² / (2 k G A), with I = A R² / 4 and k = 6/7 (Cowper 1966, ν = 0).
+  const double expected = density * weight / young * (4 / (8 * radius * radius) + 2.0 / 2 * 7 / 6);
+  EXPECT_NEAR(sum / volume, expected, 0.005 * expected);
+}
+
+/// Phyxels of fitted shapes are as many as asked, fill the body, and lie on its faces.
+TEST(FittedShapes, HavePhyxelsOnTheirFaces) {
+  ShapeRequest rod{
+      .name = "cylinder", .radius = 0.5, .length = 2, .placement = ShapeRequest::Placement::fitted};
+  rod.spacing = spacing_for(rod, 3000);
+  const Cloud cloud = make_shape(rod);
+  ASSERT_EQ(cloud.position.size(), 3000u);
+  EXPECT_FALSE(cloud.lattice);
+  // A polygon of 128 corners has 0.04% less area than its circle.
+  EXPECT_NEAR(volume_if(cloud, [](Vec3d) { return true; }) / (std::numbers::pi / 2), 1 - 4e-4,
+              1e-5);
+  const auto count = [&](auto&& counts) {
+    return static_cast<double>(std::count_if(cloud.position.begin(), cloud.position.end(), counts));
+  };
+  const double a = rod.spacing;
+  const auto on_side = [](Vec3d p) { return std::hypot(p.x, p.y) > 0.5 * (1 - 4e-4); };
+  // About one for each square of the spacing.
+  EXPECT_NEAR(count(on_side) * a * a / (2 * std::numbers::pi), 1, 0.15);
+  for (const auto& [name, z] : {std::pair{"z-", -1.0}, std::pair{"z+", 1.0}}) {
+    for (const Index i : cloud.regions.at(name)) EXPECT_NEAR(cloud.position[i].z, z, 1e-12);
+    EXPECT_EQ(static_cast<double>(cloud.regions.at(name).size()),
+              count([z = z](Vec3d p) { return std::abs(p.z - z) < 1e-12; }));
+  }
+  rod.jitter = 0.1;
+  EXPECT_THROW(make_shape(rod), InputError);
+  rod.jitter = 0;
+  rod.surface = false;
+  EXPECT_THROW(make_shape(rod), InputError);
 }
 
 }  // namespace
