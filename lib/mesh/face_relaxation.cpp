@@ -65,27 +65,23 @@ namespace {
 /// The pieces that sample points lie on, by the nearest of the points.
 class NearestPiece {
  public:
-  NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing)
-      : sample_(sample), spacing_(spacing) {
+  NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing) : sample_(sample) {
     const auto place = in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; });
     if (spacing.is_uniform()) {
       uniform_.emplace(place, 0.4 * spacing.coarsest());
     } else {
-      graded_.emplace(place, tabulated(sample.size(), [&](std::size_t k) {
-                        return 0.4 * spacing.at(sample[k].point);
-                      }));
+      std::vector<double> size = spacing.at(place);
+      for (double& s : size) s *= 0.4;
+      graded_.emplace(place, size);
     }
   }
   std::size_t at(Vec3d p) const {
     if (uniform_) return sample_[uniform_->nearest(p).index].piece;
-    auto found = graded_->nearest(p, spacing_.at(p));
-    if (found.index < 0) found = graded_->nearest(p);
-    return sample_[found.index].piece;
+    return sample_[graded_->nearest(p).index].piece;
   }
 
  private:
   std::span<const PointOn> sample_;
-  const SpacingField& spacing_;
   std::optional<SpatialHash> uniform_;
   std::optional<GradedHash> graded_;
 };

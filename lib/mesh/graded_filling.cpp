@@ -9,7 +9,6 @@
 #include "mesh/rooms.hpp"
 #include "mesh/surface_points.hpp"
 #include "stage.hpp"
-#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -54,7 +53,7 @@ class Levels {
 /// Tests places for their distance from the surface, from cuts and from the phyxels on them.
 class Clear {
  public:
-  Clear(const LatticeRequest& request, const SpacingField& spacing) : spacing_(spacing) {
+  Clear(const LatticeRequest& request, const SpacingField& spacing) {
     std::vector<Vec3d> place = all_sites(request.sites);
     sites_ = place.size();
     for (const PointOn& p :
@@ -62,13 +61,14 @@ class Clear {
       place.push_back(p.point);
     }
     place.insert(place.end(), request.sites.cut_points.begin(), request.sites.cut_points.end());
-    hash_.emplace(
-        place, tabulated(place.size(), [&](std::size_t k) { return 0.5 * spacing.at(place[k]); }));
+    std::vector<double> size = spacing.at(place);
+    for (double& s : size) s *= 0.5;
+    hash_.emplace(place, size);
   }
 
   /// The clearance of a place, in spacings; 1 for all that is farther.
-  double at(Vec3d place) const {
-    const double spacing = spacing_.at(place);
+  /// @param spacing the one wanted at the place [m]
+  double at(Vec3d place, double spacing) const {
     double clearance = spacing;
     hash_->visit_ball(
         place, [&](double) { return spacing; },
@@ -80,7 +80,6 @@ class Clear {
   }
 
  private:
-  const SpacingField& spacing_;
   std::size_t sites_ = 0;
   std::optional<GradedHash> hash_;
 };
@@ -114,7 +113,7 @@ std::vector<Node> nodes_inside(const LatticeRequest& request, const SpacingField
             const Vec3d p = block.position(k);
             const double s = spacing.at(p);
             if (levels.level_of(s) != level) continue;
-            const double clearance = clear.at(p);
+            const double clearance = clear.at(p, s);
             if (clearance < least_clearance) continue;
             by_task[task].push_back(
                 {p, static_cast<float>(clearance), static_cast<float>(std::pow(constant / s, 3))});
@@ -185,8 +184,7 @@ class GradedSkin {
   std::vector<double> volumes(Stage& stage) const {
     const Levels levels(spacing_);
     const Rooms rooms(request_.sites.cuts, point_);
-    const auto size =
-        tabulated(point_.size(), [&](std::size_t k) { return spacing_.at(point_[k]); });
+    const std::vector<double> size = spacing_.at(point_);
     std::vector<double> volume(point_.size(), 0);
     for (std::size_t room = 0; room < rooms.size(); ++room) {
       for (int level = 0; level < levels.count(); ++level) {

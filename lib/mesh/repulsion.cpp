@@ -1,7 +1,5 @@
 #include "mesh/repulsion.hpp"
 
-#include "tabulated.hpp"
-
 namespace phyxel {
 
 Repulsion::Repulsion(std::span<const Vec3d> point, const SpacingField& spacing)
@@ -9,7 +7,7 @@ Repulsion::Repulsion(std::span<const Vec3d> point, const SpacingField& spacing)
   if (spacing.is_uniform()) {
     uniform_.emplace(point, 0.5 * repulsion_reach * spacing_);
   } else {
-    size_ = tabulated(point.size(), [&](std::size_t k) { return spacing.at(point[k]); });
+    size_ = spacing.at(point);
     graded_.emplace(point, size_);
   }
 }

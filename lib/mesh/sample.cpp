@@ -152,7 +152,7 @@ void measure_gaps(const std::vector<Vec3d>& site, const SpacingField& spacing,
   if (spacing.is_uniform()) {
     measure(SpatialHash(site, spacing.coarsest()));
   } else {
-    measure(GradedHash(site, tabulated(site.size(), [&](auto k) { return spacing.at(site[k]); })));
+    measure(GradedHash(site, spacing.at(site)));
   }
   report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
@@ -304,8 +304,7 @@ SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& 
   cloud.volume = std::move(inside.volume);
   cloud.cuts = sites.cuts;
   if (spacing.is_uniform()) return SpacingField(inside.spacing);
-  cloud.spacing = tabulated(cloud.position.size(),
-                            [&](std::size_t k) { return spacing.at(cloud.position[k]); });
+  cloud.spacing = spacing.at(cloud.position);
   return spacing;
 }
 

@@ -1,15 +1,20 @@
 #include "mesh/spacing_field.hpp"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <numbers>
+
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Sources of a leaf that are not worth another division.
-constexpr std::size_t few_sources = 8;
-constexpr int deepest = 14;
+double wanted_by(const SpacingSource& source, double growth, Vec3d place) {
+  return source.spacing + growth * norm(place - source.place);
+}
 
 /// The middle of a cube's child.
 Vec3d middle_of_child(Vec3d middle, double half, int child) {
@@ -19,46 +24,83 @@ Vec3d middle_of_child(Vec3d middle, double half, int child) {
 
 }  // namespace
 
+/// A cube: either a leaf, or one with eight children, made when a place in them is first asked for.
+struct SpacingCone::Cube {
+  using Children = std::array<std::atomic<const Cube*>, 8>;
+  /// A source that may want the smallest spacing somewhere in the cube.
+  struct Offer {
+    float in_middle;  ///< The spacing that it wants in the middle of the cube, rounded down [m].
+    std::uint32_t source;
+  };
+
+  std::vector<Offer> offers;           ///< Those of a leaf, the smallest first.
+  std::unique_ptr<Children> children;  ///< Null for a leaf.
+
+  Cube() = default;
+  Cube(const Cube&) = delete;
+  Cube& operator=(const Cube&) = delete;
+  ~Cube() {
+    if (!children) return;
+    for (const std::atomic<const Cube*>& child : *children) delete child.load();
+  }
+};
+
 SpacingCone::SpacingCone(std::span<const SpacingSource> sources, double growth, double least,
                          double most, const Box& box)
-    : sources_(sources.begin(), sources.end()), growth_(growth), least_(least), most_(most) {
-  std::erase_if(sources_, [&](const SpacingSource& s) { return !(s.spacing < most); });
-  nodes_.emplace_back();
-  if (sources_.empty()) return;
-  middle_ = 0.5 * (box.low + box.high);
-  half_ = 0.5 * box.extent() + least;
-  std::vector<std::uint32_t> all(sources_.size());
-  for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<std::uint32_t>(k);
-  divide(0, middle_, half_, std::move(all), 0);
+    : growth_(growth),
+      least_(least),
+      most_(most),
+      middle_(0.5 * (box.low + box.high)),
+      half_(0.5 * box.extent() + least),
+      tree_(tabulated(sources.size(), [&](std::size_t k) { return sources[k].place; })) {
+  sources_ = tabulated(sources.size(), [&](std::size_t k) { return sources[tree_.order()[k]]; });
+  finest_ = tree_.summaries([&](std::size_t k) { return sources_[k].spacing; },
+                            [](double a, double b) { return std::min(a, b); });
+  root_ = made_cube(middle_, half_, 0);
 }
 
-void SpacingCone::divide(std::size_t node, Vec3d middle, double half,
-                         std::vector<std::uint32_t> sources, int depth) {
-  const double radius = std::numbers::sqrt3 * half;
+SpacingCone::~SpacingCone() = default;
+
+/// Calls visit(k) for sources that may want no more than `limit` at a place [m].
+template <class Visit>
+void SpacingCone::search(Vec3d place, const double& limit, Visit&& visit) const {
+  tree_.search(
+      [&](std::size_t node) {
+        return finest_[node] + growth_ * std::sqrt(distance2(place, tree_.box(node)));
+      },
+      limit, visit);
+}
+
+std::unique_ptr<SpacingCone::Cube> SpacingCone::made_cube(Vec3d middle, double half,
+                                                          int depth) const {
+  constexpr std::size_t few_sources = 8;
+  constexpr int deepest = 14;
   double best = most_;
-  const auto in_middle = [&](std::uint32_t k) {
-    return sources_[k].spacing + growth_ * norm(middle - sources_[k].place);
-  };
-  for (const std::uint32_t k : sources) best = std::min(best, in_middle(k));
+  search(middle, best,
+         [&](std::size_t k) { best = std::min(best, wanted_by(sources_[k], growth_, middle)); });
   // A source wins over the best of the middle only if it is within that of it by what both change
   // inside the cube.
-  const double limit = best + 2 * growth_ * radius * (1 + 1e-9);
-  std::erase_if(sources, [&](std::uint32_t k) {
-    return in_middle(k) > limit || in_middle(k) - growth_ * radius >= most_;
+  const double change = growth_ * std::numbers::sqrt3 * half,
+               most = std::min(best + 2 * change, most_ + change) * (1 + 1e-12);
+  const bool is_small = half < 0.5 * std::max(best, least_) || depth == deepest;
+  auto cube = std::make_unique<Cube>();
+  double limit = most;
+  search(middle, limit, [&](std::size_t k) {
+    const double wanted = wanted_by(sources_[k], growth_, middle);
+    if (!(wanted <= most)) return;
+    cube->offers.push_back(
+        {static_cast<float>(wanted * (1 - 1e-6)), static_cast<std::uint32_t>(k)});
+    if (!is_small && cube->offers.size() > few_sources) limit = -1;
   });
-  if (sources.size() <= few_sources || half < 0.25 * std::max(best, least_) || depth == deepest) {
-    nodes_[node].begin = static_cast<std::uint32_t>(listed_.size());
-    listed_.insert(listed_.end(), sources.begin(), sources.end());
-    nodes_[node].end = static_cast<std::uint32_t>(listed_.size());
-    return;
+  if (!is_small && cube->offers.size() > few_sources) {
+    cube->offers = {};
+    cube->children = std::make_unique<Cube::Children>();
+    return cube;
   }
-  const std::size_t first = nodes_.size();
-  nodes_[node].first_child = static_cast<std::int32_t>(first);
-  nodes_.resize(first + 8);
-  for (int child = 0; child < 8; ++child) {
-    divide(first + static_cast<std::size_t>(child), middle_of_child(middle, half, child),
-           0.5 * half, sources, depth + 1);
-  }
+  std::sort(cube->offers.begin(), cube->offers.end(),
+            [](const Cube::Offer& a, const Cube::Offer& b) { return a.in_middle < b.in_middle; });
+  cube->offers.shrink_to_fit();
+  return cube;
 }
 
 double SpacingCone::at(Vec3d place) const {
@@ -67,24 +109,41 @@ double SpacingCone::at(Vec3d place) const {
   };
   const Vec3d inside{within(place.x, middle_.x), within(place.y, middle_.y),
                      within(place.z, middle_.z)};
-  if (sources_.empty()) return most_;
   if (!(inside == place)) return std::min(most_, at(inside) + growth_ * norm(place - inside));
-  std::size_t node = 0;
+  const Cube* cube = root_.get();
   Vec3d middle = middle_;
   double half = half_;
-  while (nodes_[node].first_child >= 0) {
+  for (int depth = 1; cube->children; ++depth) {
     const int child =
         (place.x > middle.x ? 1 : 0) + (place.y > middle.y ? 2 : 0) + (place.z > middle.z ? 4 : 0);
     middle = middle_of_child(middle, half, child);
     half *= 0.5;
-    node = static_cast<std::size_t>(nodes_[node].first_child + child);
+    std::atomic<const Cube*>& found = (*cube->children)[child];
+    cube = found.load(std::memory_order_acquire);
+    if (cube != nullptr) continue;
+    auto made = made_cube(middle, half, depth);
+    // Another thread may have made the same one.
+    if (found.compare_exchange_strong(cube, made.get(), std::memory_order_acq_rel)) {
+      cube = made.release();
+    }
   }
   double spacing = most_;
-  for (std::uint32_t at = nodes_[node].begin; at < nodes_[node].end; ++at) {
-    const SpacingSource& source = sources_[listed_[at]];
-    spacing = std::min(spacing, source.spacing + growth_ * norm(place - source.place));
+  const double change = growth_ * norm(place - middle) * (1 + 1e-9);
+  for (const Cube::Offer& offer : cube->offers) {
+    if (offer.in_middle - change >= spacing) break;
+    spacing = std::min(spacing, wanted_by(sources_[offer.source], growth_, place));
   }
   return spacing;
+}
+
+std::vector<double> SpacingField::of_sources(std::span<const Vec3d> place) const {
+  return tabulated(place.size(), [&](std::size_t k) {
+    return cone_ ? cone_->at(place[k]) : std::numeric_limits<double>::infinity();
+  });
+}
+
+std::vector<double> SpacingField::at(std::span<const Vec3d> place) const {
+  return tabulated(place.size(), [&](std::size_t k) { return at(place[k]); });
 }
 
 double SpacingField::at(Vec3d place, double of_sources) const {
