@@ -16,6 +16,9 @@ double wanted_by(const SpacingSource& source, double growth, Vec3d place) {
   return source.spacing + growth * norm(place - source.place);
 }
 
+/// A number in single precision that is no larger.
+float rounded_down(double value) { return static_cast<float>(value * (1 - 1e-6)); }
+
 /// The middle of a cube's child.
 Vec3d middle_of_child(Vec3d middle, double half, int child) {
   const auto side = [&](int bit) { return child & bit ? 0.5 * half : -0.5 * half; };
@@ -75,31 +78,34 @@ std::unique_ptr<SpacingCone::Cube> SpacingCone::made_cube(Vec3d middle, double h
                                                           int depth) const {
   constexpr std::size_t few_sources = 8;
   constexpr int deepest = 14;
-  double best = most_;
-  search(middle, best,
-         [&](std::size_t k) { best = std::min(best, wanted_by(sources_[k], growth_, middle)); });
+  // Smaller cubes have shorter lists, of which a place still needs only the first few.
+  constexpr double small = 1.25;  // half a side, in spacings
   // A source wins over the best of the middle only if it is within that of it by what both change
   // inside the cube.
-  const double change = growth_ * std::numbers::sqrt3 * half,
-               most = std::min(best + 2 * change, most_ + change) * (1 + 1e-12);
-  const bool is_small = half < 0.5 * std::max(best, least_) || depth == deepest;
+  const double change = growth_ * std::numbers::sqrt3 * half;
+  const auto most = [&](double best) {
+    return std::min(best + 2 * change, most_ + change) * (1 + 1e-12);
+  };
+  double best = most_, limit = most(best);
   auto cube = std::make_unique<Cube>();
-  double limit = most;
+  std::vector<Cube::Offer>& offers = cube->offers;
   search(middle, limit, [&](std::size_t k) {
     const double wanted = wanted_by(sources_[k], growth_, middle);
-    if (!(wanted <= most)) return;
-    cube->offers.push_back(
-        {static_cast<float>(wanted * (1 - 1e-6)), static_cast<std::uint32_t>(k)});
-    if (!is_small && cube->offers.size() > few_sources) limit = -1;
+    if (wanted > limit) return;
+    offers.push_back({rounded_down(wanted), static_cast<std::uint32_t>(k)});
+    if (wanted >= best) return;
+    best = wanted;
+    limit = most(best);
   });
-  if (!is_small && cube->offers.size() > few_sources) {
-    cube->offers = {};
+  std::erase_if(offers, [&](const Cube::Offer& offer) { return offer.in_middle > limit; });
+  if (offers.size() > few_sources && half > small * std::max(best, least_) && depth < deepest) {
+    offers = {};
     cube->children = std::make_unique<Cube::Children>();
     return cube;
   }
-  std::sort(cube->offers.begin(), cube->offers.end(),
+  std::sort(offers.begin(), offers.end(),
             [](const Cube::Offer& a, const Cube::Offer& b) { return a.in_middle < b.in_middle; });
-  cube->offers.shrink_to_fit();
+  offers.shrink_to_fit();
   return cube;
 }
 
