@@ -4,17 +4,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "mesh/nearest_site.hpp"
+#include "mesh/graded_volumes.hpp"
 #include "mesh/repulsion.hpp"
-#include "mesh/rooms.hpp"
 #include "mesh/surface_points.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Sample points for a volume along a spacing.
-constexpr double samples_along = 5;
 /// Levels of an octave, each with a lattice and a size of samples of its own.
 constexpr int levels_of_octave = 3;
 
@@ -35,7 +32,6 @@ class Levels {
     const double octaves = std::log2(spacing / spacing_.finest());
     return std::clamp(static_cast<int>(std::floor(levels_of_octave * octaves)), 0, count_ - 1);
   }
-  int level_at(Vec3d place) const { return level_of(spacing_.at(place)); }
   /// False if no place of a ball has a spacing of the level.
   bool may_reach(int level, Vec3d middle, double radius) const {
     // Outside the body the field may grow faster, in two directions at once.
@@ -179,45 +175,10 @@ class GradedSkin {
     return {point_.begin() + static_cast<std::ptrdiff_t>(first_inside_), point_.end()};
   }
 
-  /// Shares of the inside by sample points, level by level of their spacing: the nearest phyxel to
-  /// a sample has a spacing near that of the sample [m³]. Cells end at cuts.
+  /// Shares of the inside by sample points [m³].
   std::vector<double> volumes(Stage& stage) const {
-    const Levels levels(spacing_);
-    const Rooms rooms(request_.sites.cuts, point_);
-    const std::vector<double> size = spacing_.at(point_);
-    std::vector<double> volume(point_.size(), 0);
-    for (std::size_t room = 0; room < rooms.size(); ++room) {
-      for (int level = 0; level < levels.count(); ++level) {
-        const double smallest = levels.smallest(level);
-        std::vector<std::size_t> near;
-        std::vector<Vec3d> site;
-        for (const std::size_t k : rooms.points_in(room)) {
-          if (size[k] < 0.5 * smallest || size[k] > 2.5 * smallest) continue;
-          near.push_back(k);
-          site.push_back(point_[k]);
-        }
-        if (site.empty()) continue;
-        const auto wanted = [&](Vec3d middle, double half) {
-          const double radius = std::numbers::sqrt3 * half;
-          return rooms.may_reach(room, middle, radius) && levels.may_reach(level, middle, radius);
-        };
-        const auto counts = [&](Vec3d p) {
-          return levels.level_at(p) == level && (rooms.size() == 1 || rooms.room_of(p) == room);
-        };
-        const double voxel = smallest / samples_along;
-        const std::vector<std::uint32_t> count =
-            NearestSite(site, smallest)
-                .samples_of_sites(request_.sampler,
-                                  {.voxel = voxel, .seed = request_.seed + 2, .wanted = wanted},
-                                  stage, counts);
-        for (std::size_t k = 0; k < near.size(); ++k) {
-          volume[near[k]] += count[k] * std::pow(voxel, 3);
-        }
-      }
-    }
-    for (std::size_t k = 0; k < point_.size(); ++k) {
-      volume[k] = std::max(volume[k], 0.5 * std::pow(size[k] / samples_along, 3));
-    }
+    std::vector<double> volume = graded_volumes(request_.sampler, point_, request_.sites.cuts,
+                                                spacing_, request_.seed + 2, stage);
     if (!request_.exact_volume) return volume;
     double sum = 0;
     for (const double v : volume) sum += v;
