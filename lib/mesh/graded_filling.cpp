@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "mesh/graded_volumes.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/surface_points.hpp"
+#include "model/graded_hash.hpp"
 #include "stage.hpp"
 
 namespace phyxel {
@@ -158,16 +160,16 @@ class GradedSkin {
     first_inside_ = point_.size();
     point_.insert(point_.end(), inside.begin(), inside.end());
     ball_.resize(point_.size());
+    repulsion_.emplace(point_, first_inside_, spacing_);
   }
 
   /// Moves each phyxel inside by the sum of the forces at the places before the sweep.
   void sweep() {
-    const Repulsion repulsion(point_, spacing_);
     std::vector<Vec3d> moved = point_;
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t k = first_inside_; k < point_.size(); ++k) {
-      moved[k] = repelled_inside(request_, repulsion, point_[k], static_cast<Index>(k), ball_[k]);
-    }
+    repulsion_->for_each([&](std::size_t k, auto&& step_of) {
+      moved[k] = repelled_inside(request_, point_[k], ball_[k], step_of);
+    });
+    repulsion_->move_to(moved);
     point_.swap(moved);
   }
 
@@ -192,6 +194,7 @@ class GradedSkin {
   std::vector<Vec3d> point_;
   std::vector<InsideSampler::Ball> ball_;  ///< Ball of each point (`repelled_inside`).
   std::size_t first_inside_ = 0;
+  std::optional<GradedRepulsion> repulsion_;
 };
 
 }  // namespace

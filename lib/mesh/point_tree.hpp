@@ -13,15 +13,23 @@
 namespace phyxel {
 
 /// A balanced binary tree over points in the order of a space-filling curve: the leaves are runs of
-/// about eight points, and the children of node k are 2k + 1 and 2k + 2.
+/// points, and the children of node k are 2k + 1 and 2k + 2.
 class PointTree {
  public:
-  explicit PointTree(std::span<const Vec3d> point);
+  /// @param most largest number of points in a leaf; some leaves have half as many
+  explicit PointTree(std::span<const Vec3d> point, std::size_t most = 8);
 
   /// The points' indices in the order of the tree, in which nodes are ranges.
   const std::vector<Index>& order() const { return order_; }
   std::size_t nodes() const { return order_.empty() ? 0 : 2 * leaves_ - 1; }
   const Box& box(std::size_t node) const { return box_[node]; }
+  std::size_t leaves() const { return order_.empty() ? 0 : leaves_; }
+  std::size_t node_of(std::size_t leaf) const { return leaves_ - 1 + leaf; }
+  /// The first point of a leaf, which is also the end of the leaf before.
+  std::size_t first_of(std::size_t leaf) const { return order_.size() * leaf / leaves_; }
+
+  /// Makes the boxes those of the points' new places; the order stays.
+  void move_to(std::span<const Vec3d> point);
 
   /// A summary of the points of each node, shape [nodes].
   /// @param of_point of_point(k) is the summary of point `order()[k]`
@@ -31,11 +39,12 @@ class PointTree {
     std::vector<decltype(of_point(std::size_t{0}))> summary(nodes());
     if (summary.empty()) return summary;
 #pragma omp parallel for schedule(static)
-    for (std::size_t leaf = leaves_ - 1; leaf < summary.size(); ++leaf) {
-      std::size_t k = first_of(leaf);
-      const std::size_t end = first_of(leaf + 1);
-      summary[leaf] = of_point(k);
-      while (++k < end) summary[leaf] = both(summary[leaf], of_point(k));
+    for (std::size_t leaf = 0; leaf < leaves_; ++leaf) {
+      auto all = of_point(first_of(leaf));
+      for (std::size_t k = first_of(leaf) + 1; k < first_of(leaf + 1); ++k) {
+        all = both(all, of_point(k));
+      }
+      summary[node_of(leaf)] = all;
     }
     for (std::size_t node = leaves_ - 1; node-- > 0;) {
       summary[node] = both(summary[2 * node + 1], summary[2 * node + 2]);
@@ -57,7 +66,8 @@ class PointTree {
       const auto [node, least] = waiting[--depth];
       if (least > limit) continue;
       if (node >= leaves_ - 1) {
-        for (std::size_t k = first_of(node), end = first_of(node + 1); k < end; ++k) visit(k);
+        const std::size_t leaf = node - (leaves_ - 1), end = first_of(leaf + 1);
+        for (std::size_t k = first_of(leaf); k < end; ++k) visit(k);
         continue;
       }
       std::size_t near = 2 * node + 1, far = near + 1;
@@ -72,11 +82,6 @@ class PointTree {
   }
 
  private:
-  /// The first point of a leaf, which is also the end of the leaf before.
-  std::size_t first_of(std::size_t leaf) const {
-    return order_.size() * (leaf - (leaves_ - 1)) / leaves_;
-  }
-
   std::vector<Index> order_;
   std::vector<Box> box_;
   std::size_t leaves_ = 1;  ///< A power of two, no larger than the number of points.
@@ -85,15 +90,18 @@ class PointTree {
 /// The box around two boxes.
 Box box_of(const Box& a, const Box& b);
 
-/// The square of the distance from a place to a box [m²]; no larger than that of any point in it,
-/// rounding included.
-inline double distance2(Vec3d place, const Box& box) {
-  const auto gap = [](double at, double low, double high) {
-    return at > high ? at - high : at < low ? at - low : 0;
+/// The square of the distance between two boxes [m²]; no larger than that of any two points in
+/// them, rounding included.
+inline double distance2(const Box& a, const Box& b) {
+  const auto gap = [](double low_a, double high_a, double low_b, double high_b) {
+    return low_a > high_b ? low_a - high_b : high_a < low_b ? low_b - high_a : 0;
   };
-  const Vec3d apart{gap(place.x, box.low.x, box.high.x), gap(place.y, box.low.y, box.high.y),
-                    gap(place.z, box.low.z, box.high.z)};
+  const Vec3d apart{gap(a.low.x, a.high.x, b.low.x, b.high.x),
+                    gap(a.low.y, a.high.y, b.low.y, b.high.y),
+                    gap(a.low.z, a.high.z, b.low.z, b.high.z)};
   return dot(apart, apart);
 }
+/// The same for a place and a box.
+inline double distance2(Vec3d place, const Box& box) { return distance2(Box{place, place}, box); }
 
 }  // namespace phyxel

@@ -16,6 +16,7 @@
 #include "mesh/surface_topology.hpp"
 #include "model/closing_areas.hpp"
 #include "model/cloud_check.hpp"
+#include "model/graded_hash.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"

@@ -148,7 +148,7 @@ TEST(SpacingField, GrowsNoFasterThanAsked) {
 /// Points at the wanted distances stay where they are: planes of points, as dense as asked, move by
 /// less than a two-hundredth of a spacing. If forces had one energy for all, they would move by
 /// 0.044 of it, to where points are farther apart.
-TEST(Repulsion, DoesNotPushFinePointsAmongCoarseOnes) {
+TEST(GradedRepulsion, DoesNotPushFinePointsAmongCoarseOnes) {
   const SpacingField field(nullptr, {{ball({0, 0, 0}, 1e-9), 8}}, 0.1, 8, 0.4);
   std::vector<Vec3d> point;
   std::vector<double> planes;  // at distances as asked, perpendicular to x
@@ -159,11 +159,13 @@ TEST(Repulsion, DoesNotPushFinePointsAmongCoarseOnes) {
       for (int z = -5; z <= 5; ++z) point.push_back({x, y * s, z * s});
     }
   }
-  const Repulsion repulsion(point, field);
+  const GradedRepulsion repulsion(point, 0, field);
+  std::vector<Vec3d> step(point.size());
+  repulsion.for_each(
+      [&](std::size_t i, auto&& step_of) { step[i] = step_of([](Index) { return 1.0; }); });
   for (std::size_t k = 6; k + 6 < planes.size(); ++k) {
-    const auto middle = static_cast<Index>(121 * k + 60);
-    const double s = field.at(point[middle]);
-    EXPECT_LT(norm(repulsion.step(point[middle], middle, [](Index) { return 1.0; })), 0.005 * s);
+    const std::size_t middle = 121 * k + 60;
+    EXPECT_LT(norm(step[middle]), 0.005 * field.at(point[middle]));
   }
 }
 
