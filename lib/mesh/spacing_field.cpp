@@ -12,10 +12,6 @@
 namespace phyxel {
 namespace {
 
-double wanted_by(const SpacingSource& source, double growth, Vec3d place) {
-  return source.spacing + growth * norm(place - source.place);
-}
-
 /// A number in single precision that is no larger.
 float rounded_down(double value) { return static_cast<float>(value * (1 - 1e-6)); }
 
@@ -48,31 +44,44 @@ struct SpacingCone::Cube {
   }
 };
 
+SourceTree::SourceTree(std::span<const SpacingSource> sources, double growth)
+    : growth_(growth),
+      tree_(tabulated(sources.size(), [&](std::size_t k) { return sources[k].place; })),
+      sources_(tabulated(sources.size(), [&](std::size_t k) { return sources[tree_.order()[k]]; })),
+      finest_(tree_.summaries([&](std::size_t k) { return sources_[k].spacing; },
+                              [](double a, double b) { return std::min(a, b); })) {}
+
+std::vector<SpacingSource> SourceTree::that_matter() const {
+  const auto wants_least = tabulated(sources_.size(), [&](std::size_t k) {
+    // A little less, so that no rounding error lets the source win anywhere.
+    double limit = sources_[k].spacing * (1 - 1e-9);
+    bool least = true;
+    search(sources_[k].place, limit, [&](std::size_t other) {
+      if (wanted_by(other, sources_[k].place) > limit) return;
+      least = false;
+      limit = -1;
+    });
+    return static_cast<std::uint8_t>(least);
+  });
+  std::vector<SpacingSource> kept;
+  for (std::size_t k = 0; k < sources_.size(); ++k) {
+    if (wants_least[k]) kept.push_back(sources_[k]);
+  }
+  return kept;
+}
+
 SpacingCone::SpacingCone(std::span<const SpacingSource> sources, double growth, double least,
                          double most, const Box& box)
-    : growth_(growth),
+    : sources_(SourceTree(sources, growth).that_matter(), growth),
+      growth_(growth),
       least_(least),
       most_(most),
       middle_(0.5 * (box.low + box.high)),
-      half_(0.5 * box.extent() + least),
-      tree_(tabulated(sources.size(), [&](std::size_t k) { return sources[k].place; })) {
-  sources_ = tabulated(sources.size(), [&](std::size_t k) { return sources[tree_.order()[k]]; });
-  finest_ = tree_.summaries([&](std::size_t k) { return sources_[k].spacing; },
-                            [](double a, double b) { return std::min(a, b); });
+      half_(0.5 * box.extent() + least) {
   root_ = made_cube(middle_, half_, 0);
 }
 
 SpacingCone::~SpacingCone() = default;
-
-/// Calls visit(k) for sources that may want no more than `limit` at a place [m].
-template <class Visit>
-void SpacingCone::search(Vec3d place, const double& limit, Visit&& visit) const {
-  tree_.search(
-      [&](std::size_t node) {
-        return finest_[node] + growth_ * std::sqrt(distance2(place, tree_.box(node)));
-      },
-      limit, visit);
-}
 
 std::unique_ptr<SpacingCone::Cube> SpacingCone::made_cube(Vec3d middle, double half,
                                                           int depth) const {
@@ -89,8 +98,8 @@ std::unique_ptr<SpacingCone::Cube> SpacingCone::made_cube(Vec3d middle, double h
   double best = most_, limit = most(best);
   auto cube = std::make_unique<Cube>();
   std::vector<Cube::Offer>& offers = cube->offers;
-  search(middle, limit, [&](std::size_t k) {
-    const double wanted = wanted_by(sources_[k], growth_, middle);
+  sources_.search(middle, limit, [&](std::size_t k) {
+    const double wanted = sources_.wanted_by(k, middle);
     if (wanted > limit) return;
     offers.push_back({rounded_down(wanted), static_cast<std::uint32_t>(k)});
     if (wanted >= best) return;
@@ -137,7 +146,7 @@ double SpacingCone::at(Vec3d place) const {
   const double change = growth_ * norm(place - middle) * (1 + 1e-9);
   for (const Cube::Offer& offer : cube->offers) {
     if (offer.in_middle - change >= spacing) break;
-    spacing = std::min(spacing, wanted_by(sources_[offer.source], growth_, place));
+    spacing = std::min(spacing, sources_.wanted_by(offer.source, place));
   }
   return spacing;
 }

@@ -1,6 +1,7 @@
 /// The distance between phyxels that is wanted at each place of a body.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <span>
@@ -24,6 +25,37 @@ struct FinerRegion {
   double ratio = 1;  ///< The coarsest spacing of the body over the one in the region.
 };
 
+/// Sources in a tree, for searches of those that may want a small spacing at a place.
+class SourceTree {
+ public:
+  /// @param growth growth of a wanted spacing along the distance from its source
+  SourceTree(std::span<const SpacingSource> sources, double growth);
+
+  /// The spacing that source k wants at a place [m].
+  double wanted_by(std::size_t k, Vec3d place) const {
+    return sources_[k].spacing + growth_ * norm(place - sources_[k].place);
+  }
+  /// Calls visit(k) for sources of which some may want no more than a limit at a place [m].
+  /// @param limit the limit, which a visit may make smaller
+  template <class Visit>
+  void search(Vec3d place, const double& limit, Visit&& visit) const {
+    tree_.search(
+        [&](std::size_t node) {
+          return finest_[node] + growth_ * std::sqrt(distance2(place, tree_.box(node)));
+        },
+        limit, visit);
+  }
+  /// The sources but those that want the smallest spacing nowhere: another one wants less where
+  /// they are.
+  std::vector<SpacingSource> that_matter() const;
+
+ private:
+  double growth_;
+  PointTree tree_;
+  std::vector<SpacingSource> sources_;  ///< In the order of the tree.
+  std::vector<double> finest_;          ///< The smallest spacing of each node of the tree [m].
+};
+
 /// The smallest of s + growth * |p - x| over sources at x with spacings s, by an octree of cubes:
 /// each leaf has a list of the sources that may be the smallest somewhere in it. A cube is made
 /// when a place in it is first asked for, by a search of a tree of the sources.
@@ -42,16 +74,12 @@ class SpacingCone {
 
  private:
   struct Cube;
-  template <class Visit>
-  void search(Vec3d place, const double& limit, Visit&& visit) const;
   std::unique_ptr<Cube> made_cube(Vec3d middle, double half, int depth) const;
 
-  std::vector<SpacingSource> sources_;  ///< In the order of the tree.
+  SourceTree sources_;
   double growth_, least_, most_;
   Vec3d middle_;
   double half_ = 0;  ///< Half the side of the octree's cube [m].
-  PointTree tree_;
-  std::vector<double> finest_;  ///< The smallest spacing of each node of the tree [m].
   std::unique_ptr<const Cube> root_;
 };
 
