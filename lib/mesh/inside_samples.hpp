@@ -53,7 +53,8 @@ struct SampleSweep {
   /// may be left out. Called on many threads. Null: all are.
   std::function<bool(Vec3d middle, double half)> wanted;
   /// Tells whether a cube, given likewise, may be one block: its voxels are then a quarter of its
-  /// side, which is that of `voxel` doubled some times. Null: no cube, and all voxels are the same.
+  /// side, which is that of `voxel` doubled some times. The largest cubes are divided all the same,
+  /// into tasks for many threads. Null: no cube, and all voxels have the same size.
   std::function<bool(Vec3d middle, double half)> coarse;
   Offset most_work = std::numeric_limits<Offset>::max();  ///< Upper limit of the work.
 };
