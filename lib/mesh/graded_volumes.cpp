@@ -17,14 +17,15 @@ namespace {
 /// Least number of sample points along a spacing.
 constexpr double samples_along = 5;
 
-/// Points of one room and with about the spacings of an octave.
+/// The points of a room that have about the spacings of an octave.
 struct OctavePoints {
   std::vector<std::size_t> index;  ///< Indices of the points, ascending.
   std::vector<Vec3d> place;        ///< [m]
   std::optional<NearestSite> search;
 };
 
-/// Searches for the points nearest to sample points, octave by octave of the spacing.
+/// Searches of the points nearest to sample points, one for each octave of the spacing in each
+/// room.
 class Octaves {
  public:
   Octaves(const std::vector<Vec3d>& point, const Rooms& rooms, const SpacingField& spacing)
@@ -62,7 +63,7 @@ class Octaves {
   std::vector<std::vector<OctavePoints>> of_room_;
 };
 
-/// Counts the voxels of each point, by the volume of the smallest voxel.
+/// Numbers of voxels that belong to each point, in units of the smallest voxel.
 class VoxelCount {
  public:
   VoxelCount(const Rooms& rooms, const Octaves& octaves, const SpacingField& spacing,

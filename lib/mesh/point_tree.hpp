@@ -21,9 +21,13 @@ class PointTree {
 
   /// The points' indices in the order of the tree, in which nodes are ranges.
   const std::vector<Index>& order() const { return order_; }
+  /// Number of nodes; node 0 is the root.
   std::size_t nodes() const { return order_.empty() ? 0 : 2 * leaves_ - 1; }
+  /// The box around the points of a node.
   const Box& box(std::size_t node) const { return box_[node]; }
+  /// Number of leaves, which are numbered along the order.
   std::size_t leaves() const { return order_.empty() ? 0 : leaves_; }
+  /// The node that is a leaf.
   std::size_t node_of(std::size_t leaf) const { return leaves_ - 1 + leaf; }
   /// The first point of a leaf, which is also the end of the leaf before.
   std::size_t first_of(std::size_t leaf) const { return order_.size() * leaf / leaves_; }

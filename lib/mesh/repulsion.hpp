@@ -145,7 +145,7 @@ class GradedRepulsion {
   PointTree tree_;
   std::vector<Placed> point_;        ///< In the order of the tree.
   std::vector<double> coarsest_;     ///< The largest spacing of each node [m].
-  std::vector<std::uint8_t> moves_;  ///< Whether a point of each leaf may move.
+  std::vector<std::uint8_t> moves_;  ///< 1 for each leaf with a point that may move.
 };
 
 }  // namespace phyxel

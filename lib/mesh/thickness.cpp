@@ -22,7 +22,7 @@ double least_dot(Vec3d v, const Box& box) {
                  v.z > 0 ? box.low.z : box.high.z});
 }
 
-/// Points on a surface with its normals, in a tree.
+/// Points on a surface with the normals of their faces, in a tree.
 class SurfaceTree {
  public:
   SurfaceTree(std::span<const Vec3d> place, std::span<const Vec3d> normal)
