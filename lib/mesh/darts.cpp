@@ -162,11 +162,12 @@ namespace {
 struct Candidate {
   std::uint64_t rank;  ///< Ranks are random, and no two are the same.
   Vec3d place;         ///< [m]
+  double spacing;      ///< The one wanted there [m].
 };
 
 /// All sample points in random order, relative to `origin`.
-Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks, Vec3d origin,
-                                    std::uint64_t seed) {
+Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks,
+                                    const SpacingField& spacing, Vec3d origin, std::uint64_t seed) {
   std::vector<std::size_t> first{0};
   for (const SampleBlock& block : blocks) first.push_back(first.back() + block.offset.size());
   Bulk<Candidate> all(first.back());
@@ -174,7 +175,9 @@ Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks, Vec3
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     for (std::size_t k = 0; k < blocks[b].offset.size(); ++k) {
       const std::size_t sample = first[b] + k;
-      all[sample] = {mix_bits(mix_bits(seed ^ mix_bits(sample))), blocks[b].position(k) - origin};
+      const Vec3d place = blocks[b].position(k) - origin;
+      all[sample] = {mix_bits(mix_bits(seed ^ mix_bits(sample))), place,
+                     spacing.at(place + origin)};
     }
   }
   parallel_sort(all, [](const Candidate& a, const Candidate& b) { return a.rank < b.rank; });
@@ -189,9 +192,9 @@ namespace {
 /// distance.
 class Spaced {
  public:
-  /// @param origin places are relative to it. @param expected number of points
-  Spaced(const SpacingField& spacing, double gap, Vec3d origin, std::size_t expected)
-      : spacing_(spacing), gap_(gap), origin_(origin) {
+  /// @param expected number of points
+  Spaced(const SpacingField& spacing, double gap, std::size_t expected)
+      : spacing_(spacing), gap_(gap) {
     if (spacing.is_uniform()) {
       tables_.emplace_back(gap * spacing.coarsest(), expected);
     } else {
@@ -204,18 +207,21 @@ class Spaced {
     numbers_.resize(tables_.size());
   }
 
-  void add(Vec3d place) {
-    const int octave = spacing_.is_uniform() ? 0 : octave_of(gap_at(place));
+  /// @param spacing the one wanted at the place [m]
+  void add(Vec3d place, double spacing) {
+    const int octave = octave_of(gap_ * spacing);
     tables_[octave].add(place);
     numbers_[octave].push_back(static_cast<Index>(points_.size()));
     points_.push_back(place);
+    wanted_.push_back(spacing);
   }
   /// Calls visit(number) for points nearer to a place than its gap until it is false.
+  /// @param spacing the one wanted at the place [m]
   /// @returns false if it was
   template <class Visit>
-  bool visit_near(Vec3d place, Visit&& visit) const {
-    const double gap = spacing_.is_uniform() ? gap_ * spacing_.coarsest() : gap_at(place);
-    const int octave = spacing_.is_uniform() ? 0 : octave_of(gap);
+  bool visit_near(Vec3d place, double spacing, Visit&& visit) const {
+    const double gap = gap_ * spacing;
+    const int octave = octave_of(gap);
     // The gap changes by less than a factor of two over its own length.
     for (int k = std::max(octave - 1, 0);
          k <= std::min(octave + 1, static_cast<int>(tables_.size()) - 1); ++k) {
@@ -226,24 +232,26 @@ class Spaced {
     }
     return true;
   }
-  /// True if a point is nearer to a place than its gap.
-  bool is_near(Vec3d place) const {
-    return !visit_near(place, [](Index) { return false; });
+  /// True if a point is nearer to a place than its gap. @param spacing likewise
+  bool is_near(Vec3d place, double spacing) const {
+    return !visit_near(place, spacing, [](Index) { return false; });
   }
   const std::vector<Vec3d>& points() const { return points_; }
+  /// The spacing wanted at each point [m].
+  const std::vector<double>& wanted() const { return wanted_; }
 
  private:
-  double gap_at(Vec3d place) const { return gap_ * spacing_.at(place + origin_); }
   int octave_of(double gap) const {
+    if (spacing_.is_uniform()) return 0;
     return std::max(0, std::ilogb(gap / (gap_ * spacing_.finest())));
   }
 
   const SpacingField& spacing_;
   double gap_;
-  Vec3d origin_;
   std::vector<GrowingHash> tables_;
   std::vector<std::vector<Index>> numbers_;  ///< Of the points in each table.
   std::vector<Vec3d> points_;
+  std::vector<double> wanted_;
 };
 
 /// Tells which points are accepted if one goes through them in order and accepts each that has no
@@ -262,7 +270,7 @@ std::vector<char> accepted_in_order(const Spaced& spaced) {
     for (std::size_t k = 0; k < left.size(); ++k) {
       const Index i = left[k];
       bool waits = false;
-      const bool none = spaced.visit_near(place[i], [&](Index j) {
+      const bool none = spaced.visit_near(place[i], spaced.wanted()[i], [&](Index j) {
         const char other = j < i ? state[j].load(std::memory_order_relaxed) : char{refused};
         waits = waits || other == open;
         return other != accepted;
@@ -287,9 +295,9 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                                    std::span<const Vec3d> before) {
   if (blocks.empty()) return {};
   const Vec3d origin = blocks.front().centre;
-  const Bulk<Candidate> all = all_in_random_order(blocks, origin, seed);
-  Spaced taken(spacing, gap, origin, before.size() + all.size() / 16);
-  for (const Vec3d& p : before) taken.add(p - origin);
+  const Bulk<Candidate> all = all_in_random_order(blocks, spacing, origin, seed);
+  Spaced taken(spacing, gap, before.size() + all.size() / 16);
+  for (const Vec3d& p : before) taken.add(p - origin, spacing.at(p - origin + origin));
   // Most candidates have a point nearby that was accepted long before: these are sorted out first,
   // batch by batch. Batches grow, since ever fewer are left.
   std::vector<char> is_free;
@@ -297,14 +305,16 @@ std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
     end = std::min(all.size(), begin + std::max<std::size_t>(1024, begin / 4));
     is_free.resize(end - begin);
 #pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t k = begin; k < end; ++k) is_free[k - begin] = !taken.is_near(all[k].place);
-    Spaced rest(spacing, gap, origin, static_cast<std::size_t>(std::ranges::count(is_free, 1)));
     for (std::size_t k = begin; k < end; ++k) {
-      if (is_free[k - begin]) rest.add(all[k].place);
+      is_free[k - begin] = !taken.is_near(all[k].place, all[k].spacing);
+    }
+    Spaced rest(spacing, gap, static_cast<std::size_t>(std::ranges::count(is_free, 1)));
+    for (std::size_t k = begin; k < end; ++k) {
+      if (is_free[k - begin]) rest.add(all[k].place, all[k].spacing);
     }
     const std::vector<char> is_accepted = accepted_in_order(rest);
     for (std::size_t k = 0; k < is_accepted.size(); ++k) {
-      if (is_accepted[k]) taken.add(rest.points()[k]);
+      if (is_accepted[k]) taken.add(rest.points()[k], rest.wanted()[k]);
     }
   }
   std::vector<Vec3d> site(taken.points().begin() + static_cast<std::ptrdiff_t>(before.size()),

@@ -6,7 +6,9 @@
 
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
+#include "model/graded_hash.hpp"
 #include "model/space_filling_curve.hpp"
+#include "model/spatial_hash.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
 
@@ -31,12 +33,21 @@ void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField&
                 int sweeps, Move&& move, Done&& done) {
   std::vector<Vec3d> moved = site;
   const auto n = static_cast<std::ptrdiff_t>(site.size());
+  const auto same = [](Index) { return 1.0; };
+  std::optional<GradedRepulsion> graded;
+  if (!spacing.is_uniform()) graded.emplace(site, fixed, spacing);
   for (int sweep = 0; sweep < sweeps; ++sweep) {
-    const Repulsion repulsion(site, spacing);
+    if (graded) {
+      graded->for_each(
+          [&](std::size_t i, auto&& step_of) { moved[i] = move(i, site[i], step_of(same)); });
+      graded->move_to(moved);
+    } else {
+      const Repulsion repulsion(site, spacing.coarsest());
 #pragma omp parallel for schedule(dynamic, 256)
-    for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
-      const Vec3d step = repulsion.step(site[i], static_cast<Index>(i), [](Index) { return 1.0; });
-      moved[i] = move(static_cast<std::size_t>(i), site[i], step);
+      for (std::ptrdiff_t i = static_cast<std::ptrdiff_t>(fixed); i < n; ++i) {
+        const Vec3d step = repulsion.step(site[i], static_cast<Index>(i), same);
+        moved[i] = move(static_cast<std::size_t>(i), site[i], step);
+      }
     }
     site.swap(moved);
     done(sweep + 1);
@@ -65,27 +76,23 @@ namespace {
 /// The pieces that sample points lie on, by the nearest of the points.
 class NearestPiece {
  public:
-  NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing)
-      : sample_(sample), spacing_(spacing) {
+  NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing) : sample_(sample) {
     const auto place = in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; });
     if (spacing.is_uniform()) {
       uniform_.emplace(place, 0.4 * spacing.coarsest());
     } else {
-      graded_.emplace(place, tabulated(sample.size(), [&](std::size_t k) {
-                        return 0.4 * spacing.at(sample[k].point);
-                      }));
+      std::vector<double> size = spacing.at(place);
+      for (double& s : size) s *= 0.4;
+      graded_.emplace(place, size);
     }
   }
   std::size_t at(Vec3d p) const {
     if (uniform_) return sample_[uniform_->nearest(p).index].piece;
-    auto found = graded_->nearest(p, spacing_.at(p));
-    if (found.index < 0) found = graded_->nearest(p);
-    return sample_[found.index].piece;
+    return sample_[graded_->nearest(p).index].piece;
   }
 
  private:
   std::span<const PointOn> sample_;
-  const SpacingField& spacing_;
   std::optional<SpatialHash> uniform_;
   std::optional<GradedHash> graded_;
 };

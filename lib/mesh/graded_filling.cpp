@@ -3,19 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
-#include "mesh/nearest_site.hpp"
+#include "mesh/graded_volumes.hpp"
 #include "mesh/repulsion.hpp"
-#include "mesh/rooms.hpp"
 #include "mesh/surface_points.hpp"
+#include "model/graded_hash.hpp"
 #include "stage.hpp"
-#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
-/// Sample points for a volume along a spacing.
-constexpr double samples_along = 5;
 /// Levels of an octave, each with a lattice and a size of samples of its own.
 constexpr int levels_of_octave = 3;
 
@@ -36,7 +34,6 @@ class Levels {
     const double octaves = std::log2(spacing / spacing_.finest());
     return std::clamp(static_cast<int>(std::floor(levels_of_octave * octaves)), 0, count_ - 1);
   }
-  int level_at(Vec3d place) const { return level_of(spacing_.at(place)); }
   /// False if no place of a ball has a spacing of the level.
   bool may_reach(int level, Vec3d middle, double radius) const {
     // Outside the body the field may grow faster, in two directions at once.
@@ -54,7 +51,7 @@ class Levels {
 /// Tests places for their distance from the surface, from cuts and from the phyxels on them.
 class Clear {
  public:
-  Clear(const LatticeRequest& request, const SpacingField& spacing) : spacing_(spacing) {
+  Clear(const LatticeRequest& request, const SpacingField& spacing) {
     std::vector<Vec3d> place = all_sites(request.sites);
     sites_ = place.size();
     for (const PointOn& p :
@@ -62,13 +59,14 @@ class Clear {
       place.push_back(p.point);
     }
     place.insert(place.end(), request.sites.cut_points.begin(), request.sites.cut_points.end());
-    hash_.emplace(
-        place, tabulated(place.size(), [&](std::size_t k) { return 0.5 * spacing.at(place[k]); }));
+    std::vector<double> size = spacing.at(place);
+    for (double& s : size) s *= 0.5;
+    hash_.emplace(place, size);
   }
 
   /// The clearance of a place, in spacings; 1 for all that is farther.
-  double at(Vec3d place) const {
-    const double spacing = spacing_.at(place);
+  /// @param spacing the one wanted at the place [m]
+  double at(Vec3d place, double spacing) const {
     double clearance = spacing;
     hash_->visit_ball(
         place, [&](double) { return spacing; },
@@ -80,7 +78,6 @@ class Clear {
   }
 
  private:
-  const SpacingField& spacing_;
   std::size_t sites_ = 0;
   std::optional<GradedHash> hash_;
 };
@@ -114,7 +111,7 @@ std::vector<Node> nodes_inside(const LatticeRequest& request, const SpacingField
             const Vec3d p = block.position(k);
             const double s = spacing.at(p);
             if (levels.level_of(s) != level) continue;
-            const double clearance = clear.at(p);
+            const double clearance = clear.at(p, s);
             if (clearance < least_clearance) continue;
             by_task[task].push_back(
                 {p, static_cast<float>(clearance), static_cast<float>(std::pow(constant / s, 3))});
@@ -163,16 +160,16 @@ class GradedSkin {
     first_inside_ = point_.size();
     point_.insert(point_.end(), inside.begin(), inside.end());
     ball_.resize(point_.size());
+    repulsion_.emplace(point_, first_inside_, spacing_);
   }
 
   /// Moves each phyxel inside by the sum of the forces at the places before the sweep.
   void sweep() {
-    const Repulsion repulsion(point_, spacing_);
     std::vector<Vec3d> moved = point_;
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t k = first_inside_; k < point_.size(); ++k) {
-      moved[k] = repelled_inside(request_, repulsion, point_[k], static_cast<Index>(k), ball_[k]);
-    }
+    repulsion_->for_each([&](std::size_t k, auto&& step_of) {
+      moved[k] = repelled_inside(request_, point_[k], ball_[k], step_of);
+    });
+    repulsion_->move_to(moved);
     point_.swap(moved);
   }
 
@@ -180,46 +177,10 @@ class GradedSkin {
     return {point_.begin() + static_cast<std::ptrdiff_t>(first_inside_), point_.end()};
   }
 
-  /// Shares of the inside by sample points, level by level of their spacing: the nearest phyxel to
-  /// a sample has a spacing near that of the sample [m³]. Cells end at cuts.
+  /// Shares of the inside by sample points [m³].
   std::vector<double> volumes(Stage& stage) const {
-    const Levels levels(spacing_);
-    const Rooms rooms(request_.sites.cuts, point_);
-    const auto size =
-        tabulated(point_.size(), [&](std::size_t k) { return spacing_.at(point_[k]); });
-    std::vector<double> volume(point_.size(), 0);
-    for (std::size_t room = 0; room < rooms.size(); ++room) {
-      for (int level = 0; level < levels.count(); ++level) {
-        const double smallest = levels.smallest(level);
-        std::vector<std::size_t> near;
-        std::vector<Vec3d> site;
-        for (const std::size_t k : rooms.points_in(room)) {
-          if (size[k] < 0.5 * smallest || size[k] > 2.5 * smallest) continue;
-          near.push_back(k);
-          site.push_back(point_[k]);
-        }
-        if (site.empty()) continue;
-        const auto wanted = [&](Vec3d middle, double half) {
-          const double radius = std::numbers::sqrt3 * half;
-          return rooms.may_reach(room, middle, radius) && levels.may_reach(level, middle, radius);
-        };
-        const auto counts = [&](Vec3d p) {
-          return levels.level_at(p) == level && (rooms.size() == 1 || rooms.room_of(p) == room);
-        };
-        const double voxel = smallest / samples_along;
-        const std::vector<std::uint32_t> count =
-            NearestSite(site, smallest)
-                .samples_of_sites(request_.sampler,
-                                  {.voxel = voxel, .seed = request_.seed + 2, .wanted = wanted},
-                                  stage, counts);
-        for (std::size_t k = 0; k < near.size(); ++k) {
-          volume[near[k]] += count[k] * std::pow(voxel, 3);
-        }
-      }
-    }
-    for (std::size_t k = 0; k < point_.size(); ++k) {
-      volume[k] = std::max(volume[k], 0.5 * std::pow(size[k] / samples_along, 3));
-    }
+    std::vector<double> volume = graded_volumes(request_.sampler, point_, request_.sites.cuts,
+                                                spacing_, request_.seed + 2, stage);
     if (!request_.exact_volume) return volume;
     double sum = 0;
     for (const double v : volume) sum += v;
@@ -233,6 +194,7 @@ class GradedSkin {
   std::vector<Vec3d> point_;
   std::vector<InsideSampler::Ball> ball_;  ///< Ball of each point (`repelled_inside`).
   std::size_t first_inside_ = 0;
+  std::optional<GradedRepulsion> repulsion_;
 };
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <tuple>
 
 #include "mesh/surface_points.hpp"
-#include "model/spatial_hash.hpp"
+#include "mesh/thickness.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -21,8 +21,6 @@ constexpr double samples_on_square = 4;
 /// Phyxels through a place, of which there are at least so many wherever the finest spacing allows
 /// it: with fewer, phyxels on opposite sides would be nearer to each other than those side by side.
 constexpr double least_across = 2;
-/// Cosine between the outward normals of two faces from which they are two sides of a thin place.
-constexpr double opposite = -0.6;
 
 /// An edge between two triangles that are nearly, but not quite, in one plane.
 struct SmoothEdge {
@@ -114,27 +112,10 @@ void add_thin(const GradedBody& body, double across, double uniform, double most
     place[k] = points[k].point;
     normal[k] = normalised(area_of(body.surface, static_cast<Index>(points[k].piece)));
   }
-  const SpatialHash hash(place, 0.5 * uniform);
   // Thicker places ask for no less than the coarsest spacing, or twice the uniform one, and coarser
   // phyxels would save little.
   const double farthest = across * std::min(most, (across > 2 * least_across ? 2 : 4) * uniform);
-  std::vector<double> thickness(points.size(), HUGE_VAL);
-#pragma omp parallel for schedule(dynamic, 256)
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    for (double reach = uniform; !(thickness[k] < HUGE_VAL); reach *= 2) {
-      reach = std::min(reach, farthest);
-      double nearest = reach * reach;
-      hash.visit_ball(place[k], reach, [&](const SpatialHash::Entry& e) {
-        const Vec3d apart = place[k] - e.position;
-        const double through = dot(apart, normal[k]), distance2 = dot(apart, apart);
-        if (distance2 > nearest || !(through > 0.1 * std::sqrt(distance2))) return;
-        if (dot(normal[k], normal[e.index]) > opposite) return;
-        nearest = distance2;
-        thickness[k] = through;
-      });
-      if (reach == farthest) break;
-    }
-  }
+  const std::vector<double> thickness = thicknesses(place, normal, farthest);
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (thickness[k] / across < most) sources.push_back({place[k], thickness[k] / across});
   }
@@ -188,8 +169,7 @@ double fitting_spacing(const GradedBody& body, const SpacingField& field, double
   }
   on_surface.size = area / static_cast<double>(std::max<std::size_t>(on_surface.place.size(), 1));
   for (WeighedPoints* points : {&inside, &on_surface}) {
-    points->of_sources = tabulated(
-        points->place.size(), [&](std::size_t k) { return field.of_sources(points->place[k]); });
+    points->of_sources = field.of_sources(points->place);
   }
   const auto phyxels = [&](double coarsest) {
     const SpacingField tried = field.with_coarsest(coarsest);

@@ -366,19 +366,29 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, Wo
                             const std::function<void(const SampleBlock&)>& visit_block) const {
   if (cell.known && !(cell.winding > 0.5)) return;
   if (limit.reached()) return;
-  if (grid.sweep.wanted) {
-    const double half = 0.5 * grid.voxel * static_cast<double>(std::int64_t{1} << cell.level);
-    if (!grid.sweep.wanted(grid.middle(cell), half)) return;
-  }
+  const double half = 0.5 * grid.voxel * static_cast<double>(std::int64_t{1} << cell.level);
+  if (grid.sweep.wanted && !grid.sweep.wanted(grid.middle(cell), half)) return;
   const Offset before = tally.work;
-  if (cell.level > block_level) {
+  if (cell.level > block_level &&
+      !(grid.sweep.coarse && grid.sweep.coarse(grid.middle(cell), half))) {
     std::vector<Cell> children = split(grid, cell, tally);
     limit.done += tally.work - before;
     for (Cell& child : children) descend(grid, child, tally, limit, visit_block);
     return;
   }
+  const int doubled = cell.level - block_level;
+  cell.x >>= doubled, cell.y >>= doubled, cell.z >>= doubled;
+  cell.level = block_level;
+  const SampleBlock block = filled(grid.coarser(doubled), cell, tally);
+  limit.done += tally.work - before;
+  if (!block.offset.empty()) visit_block(block);
+}
+
+/// The block of sample points in a cell.
+SampleBlock InsideSampler::filled(const Grid& grid, Cell& cell, SampleTally& tally) const {
   SampleBlock block;
   block.centre = grid.middle(cell);
+  block.voxel = grid.voxel;
   // The region is the cell one level up.
   Cell region;
   region.level = cell.level + 1;
@@ -390,8 +400,7 @@ void InsideSampler::descend(const Grid& grid, Cell& cell, SampleTally& tally, Wo
   // Sample points are rounded to float.
   block.region_radius = 0.5 * std::sqrt(3.0) * (static_cast<double>(side) + 1e-3) * grid.voxel;
   fill(grid, cell, block, tally);
-  limit.done += tally.work - before;
-  if (!block.offset.empty()) visit_block(block);
+  return block;
 }
 
 SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_block,

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -22,6 +23,7 @@ struct SampleBlock {
   std::vector<Vec3<float>> offset;  ///< [m], shape [n].
   Vec3d region;  ///< Middle of the cube of 8 x 8 x 8 voxels that contains the block [m].
   double region_radius = 0;  ///< Radius of a ball that contains that cube [m]; 0: there is none.
+  double voxel = 0;          ///< Side of the voxels, each with one sample point [m].
 
   Vec3d position(std::size_t k) const {
     return centre + Vec3d{offset[k].x, offset[k].y, offset[k].z};
@@ -50,6 +52,10 @@ struct SampleSweep {
   /// Tells whether a cube, given by its middle and half its side [m], is wanted; one that is not
   /// may be left out. Called on many threads. Null: all are.
   std::function<bool(Vec3d middle, double half)> wanted;
+  /// Tells whether a cube, given likewise, may be one block: its voxels are then a quarter of its
+  /// side, which is that of `voxel` doubled some times. The largest cubes are divided all the same,
+  /// into tasks for many threads. Null: no cube, and all voxels have the same size.
+  std::function<bool(Vec3d middle, double half)> coarse;
   Offset most_work = std::numeric_limits<Offset>::max();  ///< Upper limit of the work.
 };
 
@@ -114,6 +120,12 @@ class InsideSampler {
   };
   struct Grid {
     Grid(const InsideSampler& sampler, const SampleSweep& sweep, int levels);
+    /// The same places, by voxels whose side is doubled `times` times.
+    Grid coarser(int times) const {
+      Grid made = *this;
+      made.voxel = std::ldexp(voxel, times);
+      return made;
+    }
 
     const SampleSweep& sweep;
     double voxel;
@@ -152,6 +164,7 @@ class InsideSampler {
   bool agrees_throughout(const Grid& grid, const Cell& cell, SampleTally& tally) const;
   void descend(const Grid& grid, Cell& cell, SampleTally& tally, WorkLimit& limit,
                const std::function<void(const SampleBlock&)>& visit_block) const;
+  SampleBlock filled(const Grid& grid, Cell& cell, SampleTally& tally) const;
   void fill(const Grid& grid, Cell& cell, SampleBlock& block, SampleTally& tally) const;
   static void fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
                          SampleTally& tally);

@@ -25,9 +25,6 @@ constexpr double regular_clearance = 3;
 constexpr double largest_clearance = 4;
 /// Clearance of the nodes nearest to the surface beyond which a coarser lattice is tried.
 constexpr double most_clearance = 0.8;
-/// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
-/// which closed bars bend right.
-constexpr double surface_strength = 0.85;
 /// Sample points for a volume along a lattice constant. Errors of bodies of 2,000 to 40,000 phyxels
 /// are the same with 4; in small bodies, 6 take no time.
 double samples_along(Index phyxels) { return phyxels > 100'000 ? 4 : 6; }
@@ -175,15 +172,17 @@ class Skin {
 
   /// Moves each node by the sum of the forces at the places before the sweep.
   void sweep() {
-    const Repulsion repulsion(point_, SpacingField(spacing_));
+    const Repulsion repulsion(point_, spacing_);
     std::vector<Vec3d> moved(near_.size());
     const auto n = static_cast<std::ptrdiff_t>(near_.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::ptrdiff_t k = 0; k < n; ++k) {
       const Vec3d before = point_[sites() + k];
+      const auto step_of = [&](auto&& strength) {
+        return repulsion.step(before, static_cast<Index>(sites() + k), strength);
+      };
       moved[k] = clearance_of(k) < moving_clearance
-                     ? repelled_inside(request_, repulsion, before, static_cast<Index>(sites() + k),
-                                       ball_[k])
+                     ? repelled_inside(request_, before, ball_[k], step_of)
                      : before;
     }
     std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
@@ -265,21 +264,6 @@ std::vector<Vec3d> all_sites(const SurfaceSites& sites) {
   std::vector<Vec3d> all = sites.position;
   all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
   return all;
-}
-
-Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
-                      Index self, InsideSampler::Ball& ball) {
-  const auto on_surface = static_cast<Index>(request.sites.position.size());
-  bool beside_surface = false;
-  const auto strength = [&](Index other) {
-    beside_surface |= other < on_surface;
-    return other < on_surface ? surface_strength : 1;
-  };
-  const Vec3d after = before + repulsion.step(before, self, strength);
-  // Only nodes beside phyxels on the surface can leave it.
-  const bool stays = !beside_surface || request.sampler.stays_inside(
-                                            before, after, request.sites.spacing.coarsest(), ball);
-  return stays ? after : before;
 }
 
 Mat3d turn_of_lattice() {

@@ -45,11 +45,28 @@ inline constexpr double sample_factor = 1.2;
 /// Phyxels on the surface, then those on cuts [m].
 std::vector<Vec3d> all_sites(const SurfaceSites& sites);
 
+/// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
+/// which closed bars bend right.
+inline constexpr double surface_strength = 0.85;
+
 /// The place of a point inside after a step of repulsion; the place before it if the step would
-/// leave the surface [m]. @param self index of the point, after those of the sites
-/// @param ball see `InsideSampler::stays_inside`
-Vec3d repelled_inside(const LatticeRequest& request, const Repulsion& repulsion, Vec3d before,
-                      Index self, InsideSampler::Ball& ball);
+/// leave the surface [m]. @param ball see `InsideSampler::stays_inside`
+/// @param step_of step_of(strength) is the step [m], with a strength for each other point
+template <class StepOf>
+Vec3d repelled_inside(const LatticeRequest& request, Vec3d before, InsideSampler::Ball& ball,
+                      StepOf&& step_of) {
+  const auto on_surface = static_cast<Index>(request.sites.position.size());
+  bool beside_surface = false;
+  const auto strength = [&](Index other) {
+    beside_surface |= other < on_surface;
+    return other < on_surface ? surface_strength : 1;
+  };
+  const Vec3d after = before + step_of(strength);
+  // Only nodes beside phyxels on the surface can leave it.
+  const bool stays = !beside_surface || request.sampler.stays_inside(
+                                            before, after, request.sites.spacing.coarsest(), ball);
+  return stays ? after : before;
+}
 
 /// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is
 /// that of a face that people draw, so that no layer of nodes has one clearance for all.

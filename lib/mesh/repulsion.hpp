@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cmath>
-#include <optional>
+#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "mesh/point_tree.hpp"
 #include "mesh/spacing_field.hpp"
-#include "model/graded_hash.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
@@ -20,52 +20,132 @@ inline constexpr double longest_step = 0.15;
 /// Sweeps of repulsion that even out distances as well as `relaxations` of Lloyd's relaxation.
 inline int repulsion_sweeps(int relaxations) { return (relaxations + 2) / 3; }
 
-/// Points that push each other away with forces (1 - r / reach)² until they have the distances of a
-/// spacing field.
-///
-/// Where spacings s differ, a pair has the mean of its own, and the energy of a force grows as s³:
-/// then the pressure of points with the wanted distances is the same everywhere, and does not push
-/// fine ones among coarse ones.
-class Repulsion {
+/// The sum of the forces (1 - r / reach)² that points push another one away with.
+class ForceSum {
  public:
-  Repulsion(std::span<const Vec3d> point, const SpacingField& spacing);
-
-  /// The step [m] of a point, in proportion to the sum of the forces and no longer than
-  /// `longest_step`. A displaced node of a cubic lattice of the spacing goes 0.6 times its
-  /// displacement back.
-  /// @param self index of the point
-  /// @param strength strength(index) multiplies the force of a point
-  template <class Strength>
-  Vec3d step(Vec3d place, Index self, Strength&& strength) const {
-    const double spacing = graded_ ? size_[self] : spacing_;
-    Vec3d force;
-    const auto add = [&](const SpatialHash::Entry& entry) {
-      const Vec3d d = place - entry.position;
-      const double of_pair = graded_ ? 0.5 * (spacing + size_[entry.index]) : spacing;
-      const double cut = repulsion_reach * of_pair, r2 = dot(d, d);
-      if (entry.index == self || r2 >= cut * cut || r2 == 0) return;
-      const double r = std::sqrt(r2), rest = 1 - r / cut;
-      double by = strength(entry.index);
-      if (graded_) by *= of_pair * of_pair / (spacing * spacing);
-      force += (by * rest * rest / r) * d;
-    };
-    if (graded_) {
-      graded_->visit_ball(
-          place, [&](double largest) { return repulsion_reach * 0.5 * (spacing + largest); }, add);
-    } else {
-      uniform_->visit_ball(place, repulsion_reach * spacing, add);
-    }
+  /// Adds the force of a point. @param apart the vector from that point [m], and the square of its
+  /// length [m²]; not zero. @param reach larger than its length [m]
+  void add(Vec3d apart, double distance2, double reach, double strength) {
+    const double r = std::sqrt(distance2), rest = 1 - r / reach;
+    sum_ += (strength * rest * rest / r) * apart;
+  }
+  /// The step [m] of the point, in proportion to the sum and no longer than `longest_step`. A
+  /// displaced node of a cubic lattice of the spacing goes 0.6 times its displacement back.
+  Vec3d step(double spacing) const {
     constexpr double mobility = 0.6;  // the stiffness of a cubic lattice is 1.00
-    const Vec3d step = mobility * force;
+    const Vec3d step = mobility * sum_;
     const double length = norm(step);
     return (length > longest_step ? longest_step / length : 1) * spacing * step;
   }
 
  private:
-  double spacing_;            ///< If it is one [m].
-  std::vector<double> size_;  ///< Else, of each point [m].
-  std::optional<SpatialHash> uniform_;
-  std::optional<GradedHash> graded_;
+  Vec3d sum_;
+};
+
+/// Points that push each other away until all have the same distances.
+class Repulsion {
+ public:
+  /// @param spacing the distance [m]
+  Repulsion(std::span<const Vec3d> point, double spacing)
+      : spacing_(spacing), hash_(point, 0.5 * repulsion_reach * spacing) {}
+
+  /// The step of a point [m]. @param self index of the point
+  /// @param strength strength(index) multiplies the force of a point
+  template <class Strength>
+  Vec3d step(Vec3d place, Index self, Strength&& strength) const {
+    const double reach = repulsion_reach * spacing_;
+    ForceSum force;
+    hash_.visit_ball(place, reach, [&](const SpatialHash::Entry& entry) {
+      const Vec3d d = place - entry.position;
+      const double r2 = dot(d, d);
+      if (entry.index == self || r2 >= reach * reach || r2 == 0) return;
+      force.add(d, r2, reach, strength(entry.index));
+    });
+    return force.step(spacing_);
+  }
+
+ private:
+  double spacing_;  ///< [m]
+  SpatialHash hash_;
+};
+
+/// Points that push each other away until they have the distances of a spacing field. Those that
+/// push the points of a leaf of a tree are found together.
+///
+/// Where spacings s differ, a pair has the mean of its own, and the energy of a force grows as s³:
+/// then the pressure of points with the wanted distances is the same everywhere, and does not push
+/// fine ones among coarse ones.
+class GradedRepulsion {
+ public:
+  /// @param fixed number of points that come first and never move
+  /// @param spacing must outlive the repulsion
+  GradedRepulsion(std::span<const Vec3d> point, std::size_t fixed, const SpacingField& spacing);
+
+  /// Takes over the points' new places, which should not be far from those before [m].
+  void move_to(std::span<const Vec3d> point);
+
+  /// Calls move(i, step_of) for each point i that may move, on many threads. step_of(strength)
+  /// returns the step of the point [m]; strength(index) multiplies the force of another point.
+  template <class Move>
+  void for_each(Move&& move) const {
+#pragma omp parallel
+    {
+      std::vector<Placed> near;
+      std::vector<std::uint32_t> reached;
+#pragma omp for schedule(dynamic, 16)
+      for (std::size_t leaf = 0; leaf < tree_.leaves(); ++leaf) {
+        if (!moves_[leaf]) continue;
+        find_near(leaf, near);
+        for (std::size_t k = tree_.first_of(leaf); k < tree_.first_of(leaf + 1); ++k) {
+          const Placed& self = point_[k];
+          if (static_cast<std::size_t>(self.index) < fixed_) continue;
+          move(static_cast<std::size_t>(self.index),
+               [&](auto&& strength) { return step(self, near, reached, strength); });
+        }
+      }
+    }
+  }
+
+ private:
+  struct Placed {
+    Vec3d place;     ///< [m]
+    double spacing;  ///< [m]
+    Index index;
+  };
+
+  void find_near(std::size_t leaf, std::vector<Placed>& near) const;
+
+  /// @param near points that may reach the point. @param reached is work space
+  template <class Strength>
+  Vec3d step(const Placed& self, const std::vector<Placed>& near,
+             std::vector<std::uint32_t>& reached, Strength&& strength) const {
+    constexpr double half_reach = 0.5 * repulsion_reach;
+    reached.resize(near.size());
+    std::size_t count = 0;
+    for (std::size_t j = 0; j < near.size(); ++j) {
+      const Vec3d d = self.place - near[j].place;
+      const double reach = half_reach * (self.spacing + near[j].spacing);
+      reached[count] = static_cast<std::uint32_t>(j);
+      count += dot(d, d) < reach * reach;
+    }
+    ForceSum force;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Placed& other = near[reached[k]];
+      const Vec3d d = self.place - other.place;
+      const double r2 = dot(d, d);
+      if (r2 == 0) continue;
+      const double of_pair = 0.5 * (self.spacing + other.spacing), ratio = of_pair / self.spacing;
+      force.add(d, r2, repulsion_reach * of_pair, strength(other.index) * ratio * ratio);
+    }
+    return force.step(self.spacing);
+  }
+
+  std::size_t fixed_;
+  const SpacingField& spacing_;
+  PointTree tree_;
+  std::vector<Placed> point_;        ///< In the order of the tree.
+  std::vector<double> coarsest_;     ///< The largest spacing of each node [m].
+  std::vector<std::uint8_t> moves_;  ///< 1 for each leaf with a point that may move.
 };
 
 }  // namespace phyxel

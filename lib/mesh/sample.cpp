@@ -16,6 +16,7 @@
 #include "mesh/surface_topology.hpp"
 #include "model/closing_areas.hpp"
 #include "model/cloud_check.hpp"
+#include "model/graded_hash.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -152,7 +153,7 @@ void measure_gaps(const std::vector<Vec3d>& site, const SpacingField& spacing,
   if (spacing.is_uniform()) {
     measure(SpatialHash(site, spacing.coarsest()));
   } else {
-    measure(GradedHash(site, tabulated(site.size(), [&](auto k) { return spacing.at(site[k]); })));
+    measure(GradedHash(site, spacing.at(site)));
   }
   report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
@@ -304,8 +305,7 @@ SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& 
   cloud.volume = std::move(inside.volume);
   cloud.cuts = sites.cuts;
   if (spacing.is_uniform()) return SpacingField(inside.spacing);
-  cloud.spacing = tabulated(cloud.position.size(),
-                            [&](std::size_t k) { return spacing.at(cloud.position[k]); });
+  cloud.spacing = spacing.at(cloud.position);
   return spacing;
 }
 

@@ -1,11 +1,13 @@
 /// The distance between phyxels that is wanted at each place of a body.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "mesh/point_tree.hpp"
 #include "model/box.hpp"
 #include "phyxel/space_region.hpp"
 #include "phyxel/types.hpp"
@@ -23,8 +25,40 @@ struct FinerRegion {
   double ratio = 1;  ///< The coarsest spacing of the body over the one in the region.
 };
 
-/// The smallest of s + growth * |p - x| over sources at x with spacings s, by a tree of cubes: each
-/// leaf has a list of the sources that may be the smallest somewhere in it.
+/// Sources in a tree, for searches of those that may want a small spacing at a place.
+class SourceTree {
+ public:
+  /// @param growth growth of a wanted spacing along the distance from its source
+  SourceTree(std::span<const SpacingSource> sources, double growth);
+
+  /// The spacing that source k wants at a place [m].
+  double wanted_by(std::size_t k, Vec3d place) const {
+    return sources_[k].spacing + growth_ * norm(place - sources_[k].place);
+  }
+  /// Calls visit(k) for sources of which some may want no more than a limit at a place [m].
+  /// @param limit the limit, which a visit may make smaller
+  template <class Visit>
+  void search(Vec3d place, const double& limit, Visit&& visit) const {
+    tree_.search(
+        [&](std::size_t node) {
+          return finest_[node] + growth_ * std::sqrt(distance2(place, tree_.box(node)));
+        },
+        limit, visit);
+  }
+  /// The sources but those that want the smallest spacing nowhere: another one wants less where
+  /// they are.
+  std::vector<SpacingSource> that_matter() const;
+
+ private:
+  double growth_;
+  PointTree tree_;
+  std::vector<SpacingSource> sources_;  ///< In the order of the tree.
+  std::vector<double> finest_;          ///< The smallest spacing of each node of the tree [m].
+};
+
+/// The smallest of s + growth * |p - x| over sources at x with spacings s, by an octree of cubes:
+/// each leaf has a list of the sources that may be the smallest somewhere in it. A cube is made
+/// when a place in it is first asked for, by a search of a tree of the sources.
 class SpacingCone {
  public:
   /// @param most spacings beyond this are not wanted [m]
@@ -32,26 +66,21 @@ class SpacingCone {
   /// @param box around all places that matter, sources included
   SpacingCone(std::span<const SpacingSource> sources, double growth, double least, double most,
               const Box& box);
+  ~SpacingCone();
 
   /// The spacing wanted at a place [m]; `most` where no source asks for less. Outside the box it
   /// grows from the box's faces.
   double at(Vec3d place) const;
 
  private:
-  /// A cube: either a leaf, or one with eight children in a row.
-  struct Node {
-    std::int32_t first_child = -1;     ///< -1 for a leaf.
-    std::uint32_t begin = 0, end = 0;  ///< Its sources, in `listed_`.
-  };
-  void divide(std::size_t node, Vec3d middle, double half, std::vector<std::uint32_t> sources,
-              int depth);
+  struct Cube;
+  std::unique_ptr<Cube> made_cube(Vec3d middle, double half, int depth) const;
 
-  std::vector<SpacingSource> sources_;
+  SourceTree sources_;
   double growth_, least_, most_;
   Vec3d middle_;
-  double half_ = 0;  ///< Half the side of the tree's cube [m].
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> listed_;
+  double half_ = 0;  ///< Half the side of the octree's cube [m].
+  std::unique_ptr<const Cube> root_;
 };
 
 /// The distance between phyxels that is wanted at each place: one throughout, or one between a
@@ -72,12 +101,15 @@ class SpacingField {
         coarsest_(coarsest) {}
 
   /// The distance wanted at a place [m].
-  double at(Vec3d place) const { return at(place, of_sources(place)); }
-  /// The part of it that does not depend on the coarsest spacing [m]: what sources want.
-  double of_sources(Vec3d place) const {
-    return cone_ ? cone_->at(place) : std::numeric_limits<double>::infinity();
+  double at(Vec3d place) const {
+    return at(place, cone_ ? cone_->at(place) : std::numeric_limits<double>::infinity());
   }
-  /// The distance wanted at a place [m]. @param of_sources as above
+  /// The distances wanted at many places [m].
+  std::vector<double> at(std::span<const Vec3d> place) const;
+  /// The parts of the distances at many places that do not depend on the coarsest spacing [m]: the
+  /// distances that sources want.
+  std::vector<double> of_sources(std::span<const Vec3d> place) const;
+  /// The distance wanted at a place [m]. @param of_sources the distance that sources want there [m]
   double at(Vec3d place, double of_sources) const;
   bool is_uniform() const { return ratio_ == 1; }
   double coarsest() const { return coarsest_; }         ///< [m]

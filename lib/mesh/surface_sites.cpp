@@ -257,12 +257,16 @@ void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSit
 
 /// The area of a surface in squares of the spacing.
 double squares_on(const Surface& surface, const SpacingField& spacing) {
+  const std::vector<Vec3d> middle = tabulated(surface.triangle.size(), [&](std::size_t t) {
+    const Triangle& corner = surface.triangle[t];
+    return (surface.position[corner[0]] + surface.position[corner[1]] +
+            surface.position[corner[2]]) /
+           3.0;
+  });
+  const std::vector<double> wanted = spacing.at(middle);
   double squares = 0;
-  for (std::size_t t = 0; t < surface.triangle.size(); ++t) {
-    const auto [a, b, c] = surface.triangle[t];
-    const double s =
-        spacing.at((surface.position[a] + surface.position[b] + surface.position[c]) / 3.0);
-    squares += norm(area_of(surface, static_cast<Index>(t))) / (s * s);
+  for (std::size_t t = 0; t < middle.size(); ++t) {
+    squares += norm(area_of(surface, static_cast<Index>(t))) / (wanted[t] * wanted[t]);
   }
   return squares;
 }

@@ -131,6 +131,37 @@ TEST(SpacingCone, IsTheSmallestOfAllSources) {
   EXPECT_EQ(SpacingCone({}, growth, 0.01, most, box).at({0, 0, 0}), most);
 }
 
+/// A source that wants more than another one does at its place wants the smallest spacing nowhere.
+TEST(SourceTree, LeavesOutSourcesThatWantTheSmallestSpacingNowhere) {
+  const double growth = 0.25;
+  std::vector<SpacingSource> sources{{{0, 0, 0}, 0.1}, {{1, 0, 0}, 0.3}, {{1, 1, 0}, 0.5}};
+  // The first one wants 0.35 at (1, 0, 0), where the second one wants less, and the second one
+  // wants 0.55 at (1, 1, 0); but 0.1 + 0.25 * sqrt(2) < 0.5.
+  const std::vector<SpacingSource> kept = SourceTree(sources, growth).that_matter();
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(std::max(kept[0].spacing, kept[1].spacing), 0.3);
+  sources[2].spacing = 0.45;
+  EXPECT_EQ(SourceTree(sources, growth).that_matter().size(), 3u);
+}
+
+/// Threads that make the cubes of the octree at the same time find the same spacings as one thread.
+TEST(SpacingCone, IsTheSameOnManyThreads) {
+  std::mt19937_64 engine(4);
+  std::uniform_real_distribution<double> along(0, 1);
+  std::vector<SpacingSource> sources;
+  for (int k = 0; k < 3000; ++k) {
+    sources.push_back({{along(engine), along(engine), along(engine)}, 0.01 + 0.02 * along(engine)});
+  }
+  std::vector<Vec3d> place;
+  for (int k = 0; k < 20000; ++k) place.push_back({along(engine), along(engine), along(engine)});
+  const Box box{{0, 0, 0}, {1, 1, 1}};
+  const SpacingCone one(sources, 0.3, 0.01, 1, box), many(sources, 0.3, 0.01, 1, box);
+  std::vector<double> spacing(place.size());
+#pragma omp parallel for schedule(dynamic, 1) num_threads(8)
+  for (std::size_t k = 0; k < place.size(); ++k) spacing[k] = many.at(place[k]);
+  for (std::size_t k = 0; k < place.size(); ++k) EXPECT_EQ(spacing[k], one.at(place[k]));
+}
+
 /// Between two fine regions the distance grows from either, and nowhere faster than asked.
 TEST(SpacingField, GrowsNoFasterThanAsked) {
   std::vector<FinerRegion> regions{{ball({0, 0, 0}, 0.1), 8}, {ball({1, 0, 0}, 0.2), 4}};
@@ -148,7 +179,7 @@ TEST(SpacingField, GrowsNoFasterThanAsked) {
 /// Points at the wanted distances stay where they are: planes of points, as dense as asked, move by
 /// less than a two-hundredth of a spacing. If forces had one energy for all, they would move by
 /// 0.044 of it, to where points are farther apart.
-TEST(Repulsion, DoesNotPushFinePointsAmongCoarseOnes) {
+TEST(GradedRepulsion, DoesNotPushFinePointsAmongCoarseOnes) {
   const SpacingField field(nullptr, {{ball({0, 0, 0}, 1e-9), 8}}, 0.1, 8, 0.4);
   std::vector<Vec3d> point;
   std::vector<double> planes;  // at distances as asked, perpendicular to x
@@ -159,11 +190,13 @@ TEST(Repulsion, DoesNotPushFinePointsAmongCoarseOnes) {
       for (int z = -5; z <= 5; ++z) point.push_back({x, y * s, z * s});
     }
   }
-  const Repulsion repulsion(point, field);
+  const GradedRepulsion repulsion(point, 0, field);
+  std::vector<Vec3d> step(point.size());
+  repulsion.for_each(
+      [&](std::size_t i, auto&& step_of) { step[i] = step_of([](Index) { return 1.0; }); });
   for (std::size_t k = 6; k + 6 < planes.size(); ++k) {
-    const auto middle = static_cast<Index>(121 * k + 60);
-    const double s = field.at(point[middle]);
-    EXPECT_LT(norm(repulsion.step(point[middle], middle, [](Index) { return 1.0; })), 0.005 * s);
+    const std::size_t middle = 121 * k + 60;
+    EXPECT_LT(norm(step[middle]), 0.005 * field.at(point[middle]));
   }
 }
 

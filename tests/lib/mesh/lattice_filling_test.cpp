@@ -156,7 +156,7 @@ TEST(LatticeFilling, ADisplacedNodeOfALatticeGoesSixTenthsBack) {
       for (int z = -3; z <= 3; ++z) lattice.push_back(a * Vec3d{double(x), double(y), double(z)});
     }
   }
-  const Repulsion repulsion(lattice, SpacingField(a));
+  const Repulsion repulsion(lattice, a);
   const auto self = static_cast<Index>(lattice.size() / 2);
   for (const Vec3d off : {Vec3d{1e-4, 0, 0}, Vec3d{0, -1e-4, 0}, Vec3d{6e-5, 6e-5, 6e-5}}) {
     const Vec3d step = repulsion.step(a * off, self, [](Index) { return 1.0; });
