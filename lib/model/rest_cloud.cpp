@@ -11,11 +11,19 @@
 namespace phyxel {
 namespace {
 
+/// The grading of a source, with its finer regions.
+std::optional<Grading> grading_of(const CutSource& from) {
+  std::optional<Grading> grading = from.source.grading;
+  if (grading) grading->finer = from.finer;
+  return grading;
+}
+
 /// The request of a shape that is no body of the paper's. @param piece that is to be made
 ShapeRequest shape_of(const CutSource& from, Piece piece) {
   ShapeRequest shape = from.source.shape;
   shape.seed = from.source.seed;
   shape.supports = from.cuts;
+  shape.grading = grading_of(from);
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
   return shape;
 }
@@ -33,8 +41,6 @@ Cloud rest_cloud(const CutSource& from) {
   }
   if (!source.mesh.empty()) {
     const Surface surface = read_mesh(source.mesh);
-    std::optional<Grading> grading = source.grading;
-    if (grading) grading->finer = from.finer;
     try {
       SampleReport report;
       Cloud cloud = sample_surface(surface,
@@ -43,7 +49,7 @@ Cloud rest_cloud(const CutSource& from) {
                                     .relaxations = source.relaxations,
                                     .on_surface = source.on_surface,
                                     .cuts = from.cuts,
-                                    .grading = grading},
+                                    .grading = grading_of(from)},
                                    &report);
       cloud.cuts.shift = from.shift;
       for (const std::string& warning : report.warnings) {

@@ -224,7 +224,7 @@ std::vector<SceneKey> body_keys() {
            "sharp edges: far more accurate in bending, with `closure` above all. Needs a closed "
            "mesh that does not overlap itself, and enough phyxels."},
       {.section = "body", .name = "grading", .type = KeyType::table, .otherwise = "one distance between phyxels everywhere",
-       .meaning = "Where the phyxels of a mesh are nearer to each other than elsewhere."},
+       .meaning = "Where the phyxels of a mesh, or of a fitted shape, are nearer to each other than elsewhere."},
       {.section = "body", .name = "surfels", .type = KeyType::boolean, .fallback = "true",
        .meaning = "Whether a built-in shape gets its surfels."},
       {.section = "body", .name = "scale", .fallback = "1", .range = length(),

@@ -81,7 +81,7 @@ std::vector<SceneSection> make_sections() {
        "where its rest shape comes from:\n\n"
        "- `shape = \"beam\"` and `\"block\"` need `size`, `\"cylinder\"` needs `radius` and "
        "`length`, `\"sphere\"` needs `radius`; each also needs exactly one of `spacing` and "
-       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`) and `surfels`. The beam lies "
+       "`phyxels`, and may have `lattice`, `jitter`, `seed` (with `jitter`, or if fitted), `surfels` and `grading` (if fitted). The beam lies "
        "along x from the origin, with its axis on the x axis; the others are centred on the "
        "origin, the cylinder along z.\n"
        "- `shape = \"alien_head\"`, `\"horn_bug\"` and `\"dino\"` are the bodies of Farias et al. "
@@ -100,9 +100,10 @@ std::vector<SceneSection> make_sections() {
        "the strength of hourglass control. Where several hold a phyxel, the last counts. The "
        "phyxels of a body with inclusions are numbered material by material."},
       {"body.grading", "[body.grading]", "",
-       "Distances between the phyxels of a mesh that differ from place to place: smaller where the surface "
-       "curves, where the body is thin, and in finer regions, and growing from there. How many phyxels there are "
-       "is still said by `phyxels`. The smallest distance sets the time step. Needs a mesh that phyxels can lie on."},
+       "Distances between the phyxels of a mesh or a `fitted` shape that differ from place to place: smaller where "
+       "the surface curves, where the body is thin, and in finer regions, and growing from there. How many phyxels "
+       "there are is still said by `phyxels`. The smallest distance sets the time step. Needs a surface that phyxels "
+       "can lie on."},
       {"body.grading.finer", "[[body.grading.finer]]", "selection",
        "A `box` or a `ball` in which phyxels are nearer to each other."},
       {"body.neighbours", "[body.neighbours]", "",

@@ -20,7 +20,9 @@ struct SourceKeys {
 };
 
 SourceKeys lattice_keys(std::vector<const char*> needed) {
-  return {std::move(needed), {"spacing", "phyxels", "lattice", "jitter", "seed", "surfels"}, true};
+  return {std::move(needed),
+          {"spacing", "phyxels", "lattice", "jitter", "seed", "surfels", "grading"},
+          true};
 }
 
 SourceKeys keys_of_source(const char* kind, const std::string& shape) {
@@ -61,6 +63,7 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
 ShapeRequest::Placement placement_for(const BodyRequest& body) {
   ShapeRequest shape = body.source.shape;
   shape.supports = source_of(body).cuts;
+  shape.grading = body.source.grading;
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, std::max(1, body.source.phyxels));
   return best_placement(shape, body.closure.value_or(1) > 0 && !body.neighbourhood.one_sided());
 }
@@ -158,6 +161,12 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
   if (shape.name.empty() || is_paper_shape(shape.name)) return;
   if (!kernel && !table.has("lattice")) shape.placement = placement_for(body);
+  if (body.source.grading && shape.placement != ShapeRequest::Placement::fitted) {
+    table.refuse("grading",
+                 "found, but the phyxels lie in a lattice, as they do where they are few, and with "
+                 "jitter, surfels = false, closure = 0, one-sided lists or the kernel's volumes; "
+                 "allowed: lattice = \"fitted\"");
+  }
   const bool is_random = shape.jitter > 0 || shape.placement == ShapeRequest::Placement::fitted;
   if (table.has("seed") && !is_random && !table.has("jitter")) {
     table.refuse("seed",

@@ -58,7 +58,7 @@ void require_memory_for_cloud(const std::string& shape, double phyxels, Piece pi
   require_host_memory(fmt::format("shape \"{}\"", shape), phyxels, bytes_per_phyxel / piece.of);
 }
 
-void check_request(const ShapeRequest& request) {
+void check_spacing(const ShapeRequest& request) {
   check_size(request);
   check_positive(request.name, "spacing", request.spacing);
   const Vec3d extent = make_lattice(request, 1).extent;
@@ -68,11 +68,20 @@ void check_request(const ShapeRequest& request) {
         "shape \"{}\": spacing = {} m is larger than the whole shape: at most {} m is allowed",
         request.name, request.spacing, longest));
   }
+}
+
+void check_request(const ShapeRequest& request) {
+  check_spacing(request);
   if (!(request.jitter >= 0 && request.jitter <= 0.5)) {
     throw InputError(fmt::format("shape \"{}\": jitter = {}: 0 to 0.5 spacings are allowed",
                                  request.name, request.jitter));
   }
-  if (request.placement != ShapeRequest::Placement::fitted) return;
+  if (request.placement != ShapeRequest::Placement::fitted) {
+    if (!request.grading) return;
+    throw InputError(fmt::format(
+        "shape \"{}\": a lattice cannot be graded; allowed: lattice = \"fitted\", or no grading",
+        request.name));
+  }
   if (request.jitter > 0) {
     throw InputError(fmt::format(
         "shape \"{}\": jitter = {} with lattice \"fitted\", which is no lattice: allowed is 0",
@@ -109,7 +118,7 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
                                 .seed = request.seed,
                                 .on_surface = {},
                                 .cuts = request.supports,
-                                .grading = {}},
+                                .grading = request.grading},
                                &report);
   for (const std::string& warning : report.warnings) {
     cloud.warnings.push_back(fmt::format("shape \"{}\": {}", request.name, warning));
@@ -163,12 +172,13 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
 
 ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed) {
   using Placement = ShapeRequest::Placement;
-  check_request(request);
+  check_spacing(request);
   const Lattice lattice = make_lattice(request, request.spacing);
   const Vec3d& size = lattice.extent;
   const double thinnest = std::min({size.x, size.y, size.z});
   const bool is_box = lattice.solid == Lattice::Solid::box;
-  const bool layers_do = is_box && std::ranges::all_of(request.supports, is_along_axes);
+  const bool layers_do =
+      is_box && !request.grading && std::ranges::all_of(request.supports, is_along_axes);
   if (closed && !layers_do && request.surface && request.jitter == 0 &&
       thinnest > 3 * request.spacing) {
     return Placement::fitted;

@@ -1,10 +1,12 @@
 /// Built-in bodies that need no file.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "phyxel/cloud.hpp"
+#include "phyxel/grading.hpp"
 
 namespace phyxel {
 
@@ -37,6 +39,8 @@ struct ShapeRequest {
   /// the axes, or on all boundaries if `fitted`, so that supports act where these end:
   /// `Cloud::cuts`.
   std::vector<SpaceRegion> supports = {};
+  /// Unset for the same distance everywhere. Needs `fitted`.
+  std::optional<Grading> grading = {};
   bool operator==(const ShapeRequest&) const = default;
 };
 

@@ -204,7 +204,7 @@ std::vector<Late> refused_gradings() {
       {with_body("mesh = 'ball.obj'\nphyxels = 2147483647\n[body.grading]\nratio = 10"),
        {":5:1", "ball.obj: 2147483647", "GiB"}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 0.5\n[body.grading]"),
-       {":9:1", "grading", "shape"}},
+       {":9:1", "grading", "lattice", "allowed: lattice = \"fitted\""}},
       {with_body("mesh = 'ball.obj'\nphyxels = 50\n[body.grading]\nratio = 3\n"
                  "[[body.grading.finer]]\nregion = 'x+'"),
        {":10:1", "box", "ball"}},
@@ -275,6 +275,11 @@ std::vector<Late> late_refusals() {
        {":5:1", "a single phyxel"}},
       // Bodies
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
+      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\njitter = 0.1"),
+       {":5:1", "jitter = 0.1", "allowed is 0"}},
+      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n"
+                 "surfels = false"),
+       {":5:1", "surfels", "\"cells\" or \"nodes\""}},
       {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
        {":5:1", "lattice \"nodes\""}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},

@@ -286,6 +286,7 @@ TEST(Scene, WhatIsLeftOutIsWhatIsMostAccurate) {
   EXPECT_EQ(held("", ball), Placement::fitted);
   EXPECT_EQ(held("closure = 0", ball), Placement::nodes);
   EXPECT_EQ(held("lattice = \"nodes\"", ball), Placement::nodes);
+  EXPECT_EQ(held("", box + "\n[body.grading]"), Placement::fitted);
 
   EXPECT_EQ(body(beam + "spacing = 0.05").material.hourglass, 0.1);
   EXPECT_EQ(body(beam + "spacing = 0.05", "hourglass = 0").material.hourglass, 0);

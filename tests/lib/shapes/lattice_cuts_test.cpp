@@ -292,6 +292,14 @@ TEST(FittedShapes, HavePhyxelsOnTheirFaces) {
     EXPECT_EQ(static_cast<double>(cloud.regions.at(name).size()),
               count([z = z](Vec3d p) { return std::abs(p.z - z) < 1e-12; }));
   }
+  ShapeRequest graded = rod;
+  graded.grading = Grading{.ratio = 3, .finer = {{box({-1, -1, 0.8}, {1, 1, 1}), 3}}};
+  const Cloud finer = make_shape(graded);
+  EXPECT_EQ(finer.position.size(), 3000u);
+  const auto [least, most] = std::minmax_element(finer.spacing.begin(), finer.spacing.end());
+  EXPECT_GT(*most / *least, 2);
+  graded.placement = ShapeRequest::Placement::nodes;
+  EXPECT_THROW(make_shape(graded), InputError);
   rod.jitter = 0.1;
   EXPECT_THROW(make_shape(rod), InputError);
   rod.jitter = 0;
