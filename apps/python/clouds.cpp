@@ -90,36 +90,6 @@ Cloud cloud_from(const py::object& position, const py::object& volume, const py:
   return cloud;
 }
 
-Cloud make(const std::string& name, Vec3d size, double radius, double length, double spacing,
-           Index phyxels, const std::string& lattice, double jitter, std::uint64_t seed,
-           bool surfels) {
-  ShapeRequest request;
-  request.name = name;
-  request.size = size;
-  request.radius = radius;
-  request.length = length;
-  request.spacing = spacing;
-  request.jitter = jitter;
-  request.seed = seed;
-  request.surface = surfels;
-  if (lattice != "nodes" && lattice != "cells" && lattice != "fitted" && lattice != "auto") {
-    throw InputError(
-        fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes, fitted", lattice));
-  }
-  if (lattice == "nodes") request.placement = ShapeRequest::Placement::nodes;
-  if (lattice == "fitted") request.placement = ShapeRequest::Placement::fitted;
-  if (!is_paper_shape(name)) {
-    if ((spacing > 0) == (phyxels > 0)) {
-      throw InputError(
-          fmt::format("shape \"{}\": exactly one of spacing and phyxels is needed", name));
-    }
-    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
-    if (lattice == "auto") request.placement = best_placement(request);
-    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
-  }
-  return make_shape(request);
-}
-
 /// The surface of a mesh file, or of a pair (points, triangles).
 Surface surface_of(const py::object& mesh) {
   if (py::isinstance<py::str>(mesh) || py::hasattr(mesh, "__fspath__")) {
@@ -173,6 +143,37 @@ Grading grading_from(const py::dict& given) {
   return grading;
 }
 
+Cloud make(const std::string& name, Vec3d size, double radius, double length, double spacing,
+           Index phyxels, const std::string& lattice, double jitter, std::uint64_t seed,
+           bool surfels, const std::optional<py::dict>& grading) {
+  ShapeRequest request;
+  request.name = name;
+  request.size = size;
+  request.radius = radius;
+  request.length = length;
+  request.spacing = spacing;
+  request.jitter = jitter;
+  request.seed = seed;
+  request.surface = surfels;
+  if (grading) request.grading = grading_from(*grading);
+  if (lattice != "nodes" && lattice != "cells" && lattice != "fitted" && lattice != "auto") {
+    throw InputError(
+        fmt::format("lattice: \"{}\" found; allowed: auto, cells, nodes, fitted", lattice));
+  }
+  if (lattice == "nodes") request.placement = ShapeRequest::Placement::nodes;
+  if (lattice == "fitted") request.placement = ShapeRequest::Placement::fitted;
+  if (!is_paper_shape(name)) {
+    if ((spacing > 0) == (phyxels > 0)) {
+      throw InputError(
+          fmt::format("shape \"{}\": exactly one of spacing and phyxels is needed", name));
+    }
+    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
+    if (lattice == "auto") request.placement = best_placement(request);
+    if (phyxels > 0) request.spacing = spacing_for(request, phyxels);
+  }
+  return make_shape(request);
+}
+
 Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int relaxations,
              std::optional<bool> on_surface, const std::optional<py::dict>& grading,
              const py::object& progress) {
@@ -206,10 +207,11 @@ void add_functions(py::module_& module) {
       "dictionaries, {\"ball\": (centre, radius), \"by\": 4} or {\"box\": (low, high)} [m].");
   module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,
              "length"_a = 0.0, "spacing"_a = 0.0, "phyxels"_a = 0, "lattice"_a = "auto",
-             "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true,
+             "jitter"_a = 0.0, "seed"_a = 1, "surfels"_a = true, "grading"_a = py::none(),
              "A built-in shape, as scenes have it: beam, block (size), cylinder (radius, length),\n"
              "sphere (radius), each with `spacing` [m] or `phyxels`; alien_head, horn_bug, dino.\n"
-             "`lattice` is \"cells\", \"nodes\", \"fitted\" or \"auto\", the most accurate.");
+             "`lattice` is \"cells\", \"nodes\", \"fitted\" or \"auto\", the most accurate;\n"
+             "fitted shapes may have a grading, as meshes have in `sample`.");
   module.def(
       "read_mesh",
       [](const std::filesystem::path& file) {

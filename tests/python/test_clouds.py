@@ -37,6 +37,17 @@ def test_a_mesh_is_graded():
         phyxel.sample(cube(), phyxels=100, grading={"finer": [{"by": 2}]})
 
 
+def test_round_and_graded_shapes_are_fitted():
+    ball = phyxel.shape("sphere", radius=0.5, phyxels=700)
+    assert len(ball) == 700
+    assert ball.volume.sum() == pytest.approx(np.pi / 6, rel=2e-3)  # the surface is a polyhedron
+    assert np.linalg.norm(ball.position, axis=1).max() == pytest.approx(0.5, rel=1e-3)
+    graded = phyxel.shape("block", size=(1, 1, 1), phyxels=1500, grading={"ratio": 3})
+    assert len(graded) == 1500 and graded.spacing.shape == (1500,)
+    with pytest.raises(phyxel.InputError, match="cannot be graded"):
+        phyxel.shape("block", size=(1, 1, 1), phyxels=1500, lattice="nodes", grading={"ratio": 3})
+
+
 def test_clouds_come_back_from_files(tmp_path):
     file = tmp_path / "beam.h5"
     BEAM.write(file)
