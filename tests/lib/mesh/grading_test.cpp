@@ -8,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 #include <random>
+#include <thread>
 
 #include "mesh/repulsion.hpp"
 #include "mesh/spacing_field.hpp"
@@ -157,8 +158,14 @@ TEST(SpacingCone, IsTheSameOnManyThreads) {
   const Box box{{0, 0, 0}, {1, 1, 1}};
   const SpacingCone one(sources, 0.3, 0.01, 1, box), many(sources, 0.3, 0.01, 1, box);
   std::vector<double> spacing(place.size());
-#pragma omp parallel for schedule(dynamic, 1) num_threads(8)
-  for (std::size_t k = 0; k < place.size(); ++k) spacing[k] = many.at(place[k]);
+  constexpr std::size_t threads = 8;
+  std::vector<std::thread> running;
+  for (std::size_t t = 0; t < threads; ++t) {
+    running.emplace_back([&, t] {
+      for (std::size_t k = t; k < place.size(); k += threads) spacing[k] = many.at(place[k]);
+    });
+  }
+  for (std::thread& thread : running) thread.join();
   for (std::size_t k = 0; k < place.size(); ++k) EXPECT_EQ(spacing[k], one.at(place[k]));
 }
 
