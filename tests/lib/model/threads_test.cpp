@@ -6,6 +6,8 @@
 #include <random>
 
 #include "exact_sum.hpp"
+#include "mesh/darts.hpp"
+#include "mesh/random_bits.hpp"
 #include "model/spatial_hash.hpp"
 #include "parallel_sort.hpp"
 #include "tabulated.hpp"
@@ -138,6 +140,45 @@ TEST_P(Threads, SortWhatHasNoFirstValue) {
     seen[k] = 1;
   }
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), many);
+}
+
+/// Sample points that keep a distance are those that one loop accepts, in the order of their random
+/// ranks, where the distance is the same everywhere and where it is not.
+TEST_P(Threads, ThrowDartsAsOne) {
+  std::mt19937_64 engine(3);
+  std::uniform_real_distribution<float> anywhere(-0.5, 0.5);
+  std::vector<SampleBlock> blocks(20);
+  std::vector<Vec3d> all;
+  for (SampleBlock& block : blocks) {
+    block.centre = {0.5, 0.5, 0.5};
+    for (int k = 0; k < 300; ++k) {
+      block.offset.push_back({anywhere(engine), anywhere(engine), anywhere(engine)});
+      all.push_back(block.position(static_cast<std::size_t>(k)));
+    }
+  }
+  constexpr std::uint64_t seed = 5;
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    order.emplace_back(mix_bits(mix_bits(seed ^ mix_bits(k))), k);
+  }
+  std::sort(order.begin(), order.end());
+  const std::vector<Vec3d> before{{0.1, 0.2, 0.3}, {0.7, 0.7, 0.7}};
+  const FinerRegion corner{{.centre = {0, 0, 0}, .radius = 0.3, .is_ball = true}, 4};
+  for (const SpacingField& spacing :
+       {SpacingField(0.1), SpacingField(nullptr, {corner}, 0.25, 4, 0.12)}) {
+    std::vector<Vec3d> expected = before;
+    for (const auto& [rank, k] : order) {
+      const double gap = 0.8 * spacing.at(all[k]);
+      if (std::ranges::all_of(expected, [&](Vec3d p) { return norm(p - all[k]) >= gap; })) {
+        expected.push_back(all[k]);
+      }
+    }
+    const std::vector<Vec3d> found = fill_with_darts(blocks, spacing, 0.8, seed, before);
+    ASSERT_EQ(found.size(), expected.size() - before.size());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      EXPECT_LT(norm(found[k] - expected[before.size() + k]), 1e-15);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, Threads, ::testing::Values(1, 2, 3, 5));
