@@ -167,10 +167,11 @@ TEST_P(Threads, ThrowDartsAsOne) {
   for (const SpacingField& spacing :
        {SpacingField(0.1), SpacingField(nullptr, {corner}, 0.25, 4, 0.12)}) {
     std::vector<Vec3d> expected = before;
-    for (const auto& [rank, k] : order) {
-      const double gap = 0.8 * spacing.at(all[k]);
-      if (std::ranges::all_of(expected, [&](Vec3d p) { return norm(p - all[k]) >= gap; })) {
-        expected.push_back(all[k]);
+    for (const auto& dart : order) {
+      const Vec3d place = all[dart.second];
+      const double gap = 0.8 * spacing.at(place);
+      if (std::ranges::all_of(expected, [&](Vec3d p) { return norm(p - place) >= gap; })) {
+        expected.push_back(place);
       }
     }
     const std::vector<Vec3d> found = fill_with_darts(blocks, spacing, 0.8, seed, before);
