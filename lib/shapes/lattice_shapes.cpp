@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "mesh/random_bits.hpp"
 #include "shapes/lattice_cuts.hpp"
@@ -262,6 +263,29 @@ double Lattice::phyxels() const {
   return sum;
 }
 
+namespace {
+
+/// The layers of a lattice inside a cut; nothing if there are none. A layer between this cut and an
+/// earlier one, which would have no space of its own, counts as inside.
+std::optional<LatticeRoom> room_of(const Lattice& lattice, const SupportCut& cut) {
+  LatticeRoom room{.cut = cut, .layers = {}};
+  const SpaceRegion inside = cut.wall.shrunk(4 * lattice.depth);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Layers& layers = lattice.layers[axis];
+    auto& [first, end] = room.layers[axis];
+    first = layers.first_above(component(inside.low, axis));
+    end = layers.first_above(component(inside.high, axis));
+    if (!(first < end)) return {};
+    for (const LatticeRoom& earlier : lattice.rooms) {
+      if (earlier.layers[axis][1] == first - 1) --first;
+      if (earlier.layers[axis][0] - 1 == end) ++end;
+    }
+  }
+  return room;
+}
+
+}  // namespace
+
 Lattice make_lattice(const ShapeRequest& request, double spacing) {
   Lattice lattice;
   if (request.name == "cylinder") {
@@ -292,16 +316,9 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
                                   plan.on_end[axis], plan.planes[axis]);
   }
   for (const SupportCut& cut : plan.cuts) {
-    LatticeRoom room{.cut = cut, .layers = {}};
-    bool has_layers = true;
-    for (int axis = 0; axis < 3; ++axis) {
-      const SpaceRegion inside = cut.wall.shrunk(4 * lattice.depth);
-      const Layers& of = lattice.layers[axis];
-      room.layers[axis] = {of.first_above(component(inside.low, axis)),
-                           of.first_above(component(inside.high, axis))};
-      has_layers = has_layers && room.layers[axis][0] < room.layers[axis][1];
+    if (const std::optional<LatticeRoom> room = room_of(lattice, cut)) {
+      lattice.rooms.push_back(*room);
     }
-    if (has_layers) lattice.rooms.push_back(room);
   }
   return lattice;
 }

@@ -106,14 +106,20 @@ TEST(LatticeCuts, CellsEndAtFaces) {
   }
 }
 
-/// Boxes that overlap share out the whole volume, too.
-TEST(LatticeCuts, OverlappingBoxesKeepTheVolume) {
-  const Cloud cloud =
-      make_shape(block(ShapeRequest::Placement::nodes,
-                       {box({-9, -9, -9}, {-0.4, 9, 0.1}), box({-0.7, -9, -0.2}, {0.3, 9, 9})}));
-  EXPECT_EQ(cloud.cuts.list.size(), 2u);
-  EXPECT_NEAR(volume_if(cloud, [](Vec3d) { return true; }), 2, 1e-12);
-  EXPECT_GT(*std::min_element(cloud.volume.begin(), cloud.volume.end()), 0);
+/// Boxes that overlap, or that share a face, or a part of one, share out the whole volume, too.
+TEST(LatticeCuts, SeveralBoxesKeepTheVolume) {
+  const SpaceRegion lower = box({-9, -9, -9}, {-0.4, 9, 0.1});
+  for (const SpaceRegion& other :
+       {box({-0.7, -9, -0.2}, {0.3, 9, 9}), box({-0.4, -9, -9}, {0.3, 9, 9}),
+        box({-0.4, -9, -0.3}, {0.3, 9, 9}), box({-9, -9, 0.1}, {-0.4, 9, 9}),
+        box({-9, -0.2, 0.1}, {0.3, 9, 9})}) {
+    for (const std::vector<SpaceRegion>& both : {std::vector{lower, other}, {other, lower}}) {
+      const Cloud cloud = make_shape(block(ShapeRequest::Placement::nodes, both));
+      EXPECT_EQ(cloud.cuts.list.size(), 2u);
+      EXPECT_NEAR(volume_if(cloud, [](Vec3d) { return true; }), 2, 1e-12);
+      EXPECT_GT(*std::min_element(cloud.volume.begin(), cloud.volume.end()), 1e-5);
+    }
+  }
 }
 
 /// Regions whose faces are no layers of a lattice leave it as it is.
