@@ -25,6 +25,9 @@ ShapeRequest shape_of(const CutSource& from, Piece piece) {
   shape.supports = from.cuts;
   shape.grading = grading_of(from);
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
+  // So far from the origin, coordinates do not tell a layer from the face that it lies on.
+  const bool is_lattice_far = is_lattice(from.source) && from.shift > 1e8 * shape.spacing;
+  if (is_lattice_far) shape.supports.clear();
   return shape;
 }
 

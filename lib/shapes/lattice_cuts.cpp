@@ -28,7 +28,9 @@ std::optional<std::array<Range, 3>> along_axes(const SpaceRegion& region) {
       if (std::abs(component(edge, other)) > std::abs(component(edge, axis))) axis = other;
     }
     const bool forwards = component(edge, axis) > 0;
-    if (std::abs(std::abs(component(edge, axis)) - 1) > rounding) return {};
+    for (int other = 0; other < 3; ++other) {
+      if (other != axis && std::abs(component(edge, other)) > rounding) return {};
+    }
     const double low = component(region.low, k), high = component(region.high, k);
     ranges[axis] = forwards ? Range{low, high} : Range{-high, -low};
   }
