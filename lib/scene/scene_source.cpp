@@ -161,6 +161,11 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
   if (shape.name.empty() || is_paper_shape(shape.name)) return;
   if (!kernel && !table.has("lattice")) shape.placement = placement_for(body);
+  if (kernel && shape.placement == ShapeRequest::Placement::fitted) {
+    table.refuse("lattice",
+                 "\"fitted\" found with volumes = \"kernel\", which takes phyxels on a surface for "
+                 "ones with others all around; allowed: \"cells\"");
+  }
   if (body.source.grading && shape.placement != ShapeRequest::Placement::fitted) {
     table.refuse("grading",
                  "found, but the phyxels lie in a lattice, as they do where they are few, and with "

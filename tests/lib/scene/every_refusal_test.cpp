@@ -280,6 +280,9 @@ std::vector<Late> late_refusals() {
       {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n"
                  "surfels = false"),
        {":5:1", "surfels", "\"cells\" or \"nodes\""}},
+      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n"
+                 "volumes = 'kernel'"),
+       {"key body.lattice", "\"fitted\"", "allowed: \"cells\""}},
       {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
        {":5:1", "lattice \"nodes\""}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
