@@ -219,6 +219,7 @@ std::vector<Late> refused_gradings() {
 
 /// What only shows when the model is built or its steps are planned.
 std::vector<Late> late_refusals() {
+  const std::string fitted = "shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n";
   const std::string implicit = "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
   const std::string rest = "[solver]\nmethod = 'equilibrium'\nprecision = 'double'\n";
   const std::string mesh = "mesh = 'ball.obj'\nphyxels = 50\n";
@@ -275,13 +276,9 @@ std::vector<Late> late_refusals() {
        {":5:1", "a single phyxel"}},
       // Bodies
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
-      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\njitter = 0.1"),
-       {":5:1", "jitter = 0.1", "allowed is 0"}},
-      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n"
-                 "surfels = false"),
-       {":5:1", "surfels", "\"cells\" or \"nodes\""}},
-      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n"
-                 "volumes = 'kernel'"),
+      {with_body(fitted + "jitter = 0.1"), {":5:1", "jitter = 0.1", "allowed is 0"}},
+      {with_body(fitted + "surfels = false"), {":5:1", "surfels", "\"cells\" or \"nodes\""}},
+      {with_body(fitted + "volumes = 'kernel'"),
        {"key body.lattice", "\"fitted\"", "allowed: \"cells\""}},
       {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
        {":5:1", "lattice \"nodes\""}},
