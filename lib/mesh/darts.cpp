@@ -184,10 +184,6 @@ Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks,
   return all;
 }
 
-}  // namespace
-
-namespace {
-
 /// Points to which others have to keep a distance: in one table, or in one for each octave of that
 /// distance.
 class Spaced {

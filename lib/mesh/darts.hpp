@@ -10,9 +10,9 @@
 
 namespace phyxel {
 
-/// Selects exactly n sample points that are far from each other. Random candidates are accepted if
-/// no point accepted before is within a radius, and the radius shrinks until n are found.
-/// Source: McCool and Fiume 1992 (dart throwing with a shrinking radius).
+/// Selects exactly n sample points that keep a distance from each other. Random candidates are
+/// accepted if no point accepted before is within a radius, and the radius shrinks until n are
+/// found. Source: McCool and Fiume 1992 (dart throwing with a shrinking radius).
 /// @param spacing cube root of the volume of one point [m]
 /// @param before points accepted in advance, which are not returned
 std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, double spacing,

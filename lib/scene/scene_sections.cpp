@@ -59,12 +59,12 @@ std::vector<SceneSection> selection_sections() {
       {"selection", "Selections", "",
        "Each `[[body.inclusion]]`, `[[body.fixed]]`, `[[body.motion]]`, `[[body.load]]`, `[[body.traction]]` and each "
        "`[[probe]]` without points has exactly one of these keys. Positions are those at rest, after the body is placed.\n\n"
-       "A box or ball that holds or moves a part of a body made from a `mesh` acts where it ends: phyxels "
-       "lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
-       "has one layer of phyxels, in its middle; a ball that small has none of its own. So does any box or ball in a `fitted` shape; in a lattice, a box "
-       "whose faces are parallel to the layers, whose distance changes a little, so that some lie on these faces. In other bodies and regions, "
-       "and where a layer of the body beside the boundary is too thin for phyxels on both, the support ends with "
-       "the phyxels whose centres lie in it."},
+       "A box or ball that holds or moves a part of a body made from a `mesh`, or of a `fitted` shape, acts where it "
+       "ends: phyxels lie on its boundary, and if all axes are held, strains end at it. A box thinner than 0.8 spacings "
+       "has one layer of phyxels, in its middle; a ball that small has no phyxels of its own. A box in a lattice acts "
+       "where it ends, too, if its faces are parallel to the layers: the distance of layers changes a little, so that "
+       "layers lie on these faces. In other bodies and regions, and where a layer of the body beside the boundary is too "
+       "thin for phyxels on both, the support ends with the phyxels whose centres lie in it."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
 }

@@ -31,7 +31,7 @@ bool is_along_axes(const SpaceRegion& region);
 /// Plans layers on those faces of boxes along the axes that are inside a lattice, so that a support
 /// acts where its box ends. A box thinner than 0.8 spacings has
 /// one layer, in its middle. Balls, turned boxes and boxes whose layers would be less than half a
-/// spacing from others have none: they hold the phyxels that they contain.
+/// spacing from others have none, on any of their faces: they hold the phyxels that they contain.
 LayerPlan plan_layers(const LatticeBox& lattice, std::span<const SpaceRegion> regions);
 
 }  // namespace phyxel

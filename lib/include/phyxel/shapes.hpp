@@ -14,9 +14,9 @@ namespace phyxel {
 /// "beam", "block": `size` (beam lies along x, its end x = 0 at the origin and its axis on the
 /// x axis; the block is centred on the origin); "cylinder": `radius`, `length` (along z, centred);
 /// "sphere": `radius` (centred). These are filled by a lattice of `spacing`, each phyxel moved by
-/// up to `jitter` spacings in each direction, but not off a face that it lies on; or, if `fitted`,
-/// by as many phyxels as have its cube for a volume. "alien_head" (238
-/// phyxels, 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
+/// up to `jitter` spacings in each direction, but not off a face that it lies on. Without a lattice
+/// (`fitted`), the mean volume of a phyxel is the cube of `spacing`. "alien_head" (238 phyxels,
+/// 16,000 surfels), "horn_bug" (666; 1,460) and "dino" (575; 53,504): the bodies of Farias
 /// et al. 2008, section 6; their counts are fixed, about 1 m tall.
 struct ShapeRequest {
   /// Placement of phyxels in a lattice. `cells`: in the middle of each cell. `nodes` (not in a
@@ -53,10 +53,10 @@ bool is_paper_shape(const std::string& name);
 /// Lattice spacing [m] that fills the shape with about `phyxels` phyxels.
 double spacing_for(const ShapeRequest& request, Index phyxels);
 
-/// Where the phyxels of a lattice shape are most accurate: on its surface, but not in what is
-/// thinner than a spacing, where those on opposite faces would be nearest to each other. In a
-/// lattice, unless its layers would not lie on the surface, or where supports end; closed gradients
-/// are as accurate without one.
+/// The most accurate placement of the phyxels of a beam, block, cylinder or sphere. Phyxels should
+/// lie on the surface, but not if the shape is thinner than a spacing, since phyxels on opposite
+/// faces would then be nearest to each other. A shape has a lattice if layers can lie on its whole
+/// surface and on the boundaries of its supports; else it is `fitted`, if its gradients are closed.
 /// @param request with its spacing and supports
 /// @param closed whether gradients will be closed
 /// @throws InputError as `make_shape`

@@ -129,9 +129,11 @@ TEST(LatticeCuts, OtherRegionsChangeNothing) {
   SpaceRegion turned = box({-9, -9, -9}, {-0.43, 9, 9});
   const double c = std::numbers::sqrt2 / 2;
   turned.edge = {{{c, c, 0}, {-c, c, 0}, {0, 0, 1}}};
+  SpaceRegion turned_a_little = box({-9, -9, -9}, {-0.43, 9, 9});
+  turned_a_little.edge = {{{1, 1e-7, 0}, {-1e-7, 1, 0}, {0, 0, 1}}};
   const SpaceRegion ball{.centre = {-1, 0, 0}, .radius = 0.43, .is_ball = true};
   for (const SpaceRegion& region :
-       {turned, ball, box({-9, -9, -9}, {9, 9, 9}), box({-9, -9, -9}, {-1, 9, 9}),
+       {turned, turned_a_little, ball, box({-9, -9, -9}, {9, 9, 9}), box({-9, -9, -9}, {-1, 9, 9}),
         box({2, 2, 2}, {3, 3, 3}), box({-0.97, -9, -9}, {0.2, 9, 9})}) {
     const Cloud cloud = make_shape(block(nodes, {region}));
     EXPECT_EQ(cloud.position, plain.position);
@@ -143,6 +145,23 @@ TEST(LatticeCuts, OtherRegionsChangeNothing) {
   const Cloud sphere = make_shape(round);
   round.supports = {box({-9, -9, -9}, {-0.43, 9, 9})};
   EXPECT_EQ(make_shape(round).position, sphere.position);
+}
+
+/// Far from the origin, the digits of coordinates do not tell a layer from a face of its box.
+TEST(LatticeCuts, EndWhereCoordinatesAreTooCoarse) {
+  for (const double far : {1e6, 1e9}) {
+    BodyRequest body;
+    body.source.shape = {.name = "beam",
+                         .size = {2, 0.5, 0.5},
+                         .spacing = 0.05,
+                         .placement = ShapeRequest::Placement::nodes};
+    body.translation = {far, 0, 0};
+    Selection select;
+    select.box = Selection::Box{{far - 9, -9, -9}, {far + 0.33, 9, 9}};
+    body.fixed = {{.select = select}};
+    const Cloud cloud = make_cloud(body);
+    EXPECT_EQ(cloud.cuts.list.size(), far < 1e8 * 0.05 ? 1u : 0u) << far;
+  }
 }
 
 /// A thin box has one layer, in its middle; one that ends just inside the body has one on its face.
