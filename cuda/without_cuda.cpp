@@ -3,6 +3,7 @@
 #include "paper/paper_backend.hpp"
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
+#include "setup/closing.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 
@@ -34,6 +35,11 @@ double cuda_copy_bandwidth() { return 0; }
 std::string cuda_version() { return "no CUDA"; }
 
 Surveyor cuda_surveyor(int device) {
+  use_cuda_device(device);
+  return {};
+}
+
+ClosingSearch cuda_closing_search(int device) {
   use_cuda_device(device);
   return {};
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "model/closure.hpp"
 #include "mpi/communicator.hpp"
 #include "partition/partition.hpp"
 #include "phyxel/model.hpp"
@@ -25,6 +26,8 @@ struct ShareOptions {
   Index most_groups = 100'000;
   /// Above this number of phyxels, the edges of the graph come from a random sample.
   Index most_samples = 1'000'000;
+  /// The search of a device for closed gradients; empty: the host's.
+  ClosingSearch close;
 };
 
 struct BuiltShare {

@@ -136,7 +136,8 @@ void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local) 
   }
 }
 
-void close_share(const WholeBodies& whole, Model& share, std::vector<Vec3d> areas) {
+void close_share(const WholeBodies& whole, Model& share, const std::vector<Vec3d>& areas,
+                 const ClosingSearch& search) {
   std::vector<ClosedBody> closed;
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     if (!closes(whole, b)) continue;
@@ -144,7 +145,7 @@ void close_share(const WholeBodies& whole, Model& share, std::vector<Vec3d> area
     const std::size_t count = share.parts_of_body(share.parts[first]).size();
     closed.push_back({std::span(share.parts).subspan(first, count), whole.bodies[b].enclosed});
   }
-  if (const auto refusal = close_bodies(share, closed, std::move(areas))) {
+  if (const auto refusal = close_bodies(share, closed, areas, search ? search : search_on_host)) {
     throw AgreedError(ExitCode::bad_input, *refusal);
   }
 }

@@ -96,7 +96,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   std::size_t surfels = 0;
   for (const Surface& surface : whole.surfaces) surfels += surface.position.size();
   built.model.warnings = whole.warnings;
-  close_share(whole, built.model, std::move(areas));
+  close_share(whole, built.model, areas, setup.options.close);
   add_warnings(built.model, surfels);
   built.partitioner = cut.partitioner;
   built.quality = cut.quality;

@@ -154,7 +154,8 @@ void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel
 /// Closes the gradients of the bodies of a connected share that ask for it.
 /// @param areas of each phyxel of the share [m²]; empty if none asks
 /// @throws AgreedError for what `close_gradients` refuses
-void close_share(const WholeBodies& whole, Model& share, std::vector<Vec3d> areas);
+void close_share(const WholeBodies& whole, Model& share, const std::vector<Vec3d>& areas,
+                 const ClosingSearch& search);
 
 /// The phyxels nearest to points that no support reaches.
 struct Unreached {

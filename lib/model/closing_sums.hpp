@@ -1,19 +1,20 @@
-/// The sums that closed gradients have to satisfy, and the bodies that they are of.
+/// The sums that closed gradients have to satisfy.
 #pragma once
-
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <utility>
-#include <vector>
 
-#include "exact_sum.hpp"
+#include "model/closing_bodies.hpp"
 #include "model/closing_gathers.hpp"
-#include "model/owned_vectors.hpp"
 #include "phyxel/model.hpp"
-#include "rank_sums.hpp"
+
+/// Marks functions that `Loops` call, which may be those of a device.
+#if defined(__CUDACC__)
+#define PHYXEL_LOOPED __device__
+#else
+#define PHYXEL_LOOPED
+#endif
 
 namespace phyxel::closing {
 
@@ -28,125 +29,120 @@ struct Unknown {
   Vec3d closing;
   double area = 0, volume = 0;
 };
-inline double dot(const Unknown& a, const Unknown& b) {
+PHYXEL_HD double dot(const Unknown& a, const Unknown& b) {
   return dot(a.closing, b.closing) + a.area * b.area + a.volume * b.volume;
 }
-inline void add(Unknown& to, double s, const Unknown& x) {
+PHYXEL_HD void add(Unknown& to, double s, const Unknown& x) {
   to.closing += s * x.closing;
   to.area += s * x.area;
   to.volume += s * x.volume;
 }
 
-inline Sym3d symmetric_part(const Mat3d& m) {
+PHYXEL_HD Sym3d symmetric_part(const Mat3d& m) {
   return {m(0, 0), 0.5 * (m(0, 1) + m(1, 0)), 0.5 * (m(0, 2) + m(2, 0)),
           m(1, 1), 0.5 * (m(1, 2) + m(2, 1)), m(2, 2)};
 }
 
-/// A body whose gradients are closed, and where its search stands.
-struct Body {
-  std::span<Part> parts;
-  double tolerance = 0;
-  double unit = 1, volume = 1;  ///< s² [m²] and the volume of all phyxels [m³].
-  double areas = 0;             ///< Σ S², per s⁴ ρ⁴.
-  double residual_squared = 0, gradient_squared = 0, next_gradient_squared = 0, image_squared = 0;
-  double sum = 0, mean = 0;  ///< Sum and mean of the changes of volumes.
-  double sought_volume = 0;  ///< Volume of the phyxels that have unknowns [m³].
-  bool is_limited = false;   ///< True if some phyxels have none.
-  double left = 0;           ///< Root mean square of the sums over that of the areas.
-  double left_first = 0, left_before = HUGE_VAL;
-  int iterations = 0;
-
-  Index begin() const { return parts.front().begin; }
-  Index end() const { return parts.back().end; }
+/// The part of a phyxel in the search.
+enum class Role : char {
+  none,
+  beside,    ///< It is a neighbour of a `changed` one, whose sum reads its record.
+  changed,   ///< It is a neighbour of one with unknowns, which change its sum.
+  sought,    ///< It has unknowns, since it is supported and beside an irregular one.
+  irregular  ///< It has unknowns, since its sum is to change.
 };
 
-/// Bodies in the order of their phyxels, and the loops over them. Every rank has the same.
-class Bodies {
- public:
-  Bodies(const Model& model, std::span<Body> bodies) : model_(model) {
-    for (Body& body : bodies) list_.push_back(&body);
+/// What the sums of phyxels are made of, and their terms, phyxel by phyxel. Arrays have a value for
+/// each phyxel of the model.
+struct SumTerms {
+  const Vec3d* position;        ///< [m]
+  const double* support;        ///< [m]
+  const Offset* offsets;        ///< Of the rows of neighbours.
+  const Index* neighbours;      ///< `Neighbourhood::neighbours`.
+  const Sym3d* inverse_moment;  ///< A⁻¹
+  const Vec3d* moment_offset;   ///< b
+  const double* volume;         ///< [m³]
+  const char* supported;        ///< `supported_phyxels`.
+  Vec3d* areas;                 ///< S / (s² ρ²)
+  Vec3d* tilt;                  ///< a
+  double* weight;               ///< Σ_k w_jk (1 - a_j x_jk)
+  double* relative_size;        ///< ρ
+  Role* role;
+  Gathers gathers;  ///< What phyxels give to the sums of their neighbours.
+
+  PHYXEL_HD Row row(Index i) const {
+    return {neighbours + offsets[i], neighbours + offsets[i + 1]};
   }
-  bool empty() const { return list_.empty(); }
-  auto begin() const { return list_.begin(); }
-  auto end() const { return list_.end(); }
-  /// Leaves out bodies for which done(body).
-  template <class Done>
-  void erase_if(Done&& done) {
-    std::erase_if(list_, [&](Body* body) { return done(*body); });
+  PHYXEL_HD RowWeights weights_of(const Standing& body, Index i) const {
+    return {support, i, body.pair_length};
+  }
+  /// True if phyxel i has unknowns; those of the others are 0.
+  PHYXEL_HD bool is_sought(Index i) const { return role[i] >= Role::sought; }
+  /// True if unknowns change the sum of phyxel i.
+  PHYXEL_HD bool is_changed(Index i) const { return role[i] >= Role::changed; }
+  /// A sum of phyxel j over ρ².
+  PHYXEL_HD Vec3d per_size(Index j, Vec3d sum) const {
+    const double size = relative_size[j];
+    return sum / (size * size);
   }
 
-  /// Calls each(body, i) for the phyxels that are not ghosts.
-  template <class Each>
-  void for_each(Each&& each) const {
-    on_threads(own_end, [&](const Stretch& stretch) {
-      for (Index i = stretch.begin; i < stretch.end; ++i) each(*list_[stretch.body], i);
-    });
+  /// Sets a phyxel's values that do not change, but for its area.
+  PHYXEL_HD void set_up(const Standing& body, Index i) const {
+    tilt[i] = inverse_moment[i] * moment_offset[i];
+    const double length = body.pair_length;
+    relative_size[i] = length > 0 ? support[i] / length : 1;
   }
-  template <class Each>
-  void for_each_with_ghosts(Each&& each) const {
-    on_threads([](const Part& part) { return part.end; },
-               [&](const Stretch& stretch) {
-                 for (Index i = stretch.begin; i < stretch.end; ++i) each(*list_[stretch.body], i);
-               });
-  }
-  /// Sets a member of each body to Σ term(body, i) over its phyxels of all ranks, rounded once.
-  /// Collective.
-  template <class Term>
-  void sum(double Body::*into, Term&& term) const {
-    std::vector<ExactSum> sums(list_.size());
-    on_threads(own_end, [&](const Stretch& stretch) {
-      ExactSum own;
-      for (Index i = stretch.begin; i < stretch.end; ++i) own.add(term(*list_[stretch.body], i));
-#pragma omp critical(phyxel_closure_sum)
-      sums[stretch.body].add(own);
-    });
-    add_over_ranks(model_, sums);
-    for (std::size_t b = 0; b < list_.size(); ++b) list_[b]->*into = sums[b].value();
-  }
-  /// Copies the owners' values to the ghosts of all bodies from the first to the last. Collective.
-  template <class T>
-  void refresh_ghosts(std::vector<T>& values) const {
-    if (!model_.share || empty()) return;
-    phyxel::refresh_ghosts(*model_.share, values, list_.front()->begin(), list_.back()->end());
-  }
-
- private:
-  /// Phyxels [begin, end) of one part.
-  struct Stretch {
-    std::size_t body;
-    Index begin, end;
-  };
-  static Index own_end(const Part& part) { return part.owned_end(); }
-  /// Calls visit(stretch) on each thread for its share of the phyxels, so that many small bodies
-  /// keep all threads busy.
-  /// @param end end(part): the end of the phyxels to visit
-  template <class End, class Visit>
-  void on_threads(End&& end, Visit&& visit) const {
-    std::int64_t size = 0;
-    for (const Body* body : list_) {
-      for (const Part& part : body->parts) size += end(part) - part.begin;
+  /// Sets the area and the weight of an own phyxel. @param area S [m²]
+  PHYXEL_HD void set_weight(const Standing& body, Index i, Vec3d area) const {
+    const double size = relative_size[i];
+    areas[i] = supported[i] ? Vec3d{} : area / (body.unit * size * size);
+    double sum = 0;
+    const RowWeights weights = weights_of(body, i);
+    for (const Index k : row(i)) {
+      const Vec3d x = position[k] - position[i];
+      sum += weights(k, dot(x, x));
     }
-#pragma omp parallel
-    {
-      const std::int64_t threads = omp_get_num_threads(), thread = omp_get_thread_num();
-      const std::int64_t first = size * thread / threads, last = size * (thread + 1) / threads;
-      std::int64_t at = 0;
-      for (std::size_t b = 0; b < list_.size(); ++b) {
-        for (const Part& part : list_[b]->parts) {
-          const std::int64_t length = end(part) - part.begin;
-          const std::int64_t from = std::max(first - at, std::int64_t{0}),
-                             to = std::min(last - at, length);
-          if (from < to) {
-            visit({b, part.begin + static_cast<Index>(from), part.begin + static_cast<Index>(to)});
-          }
-          at += length;
-        }
-      }
-    }
+    weight[i] = sum - dot(tilt[i], moment_offset[i]);
   }
 
-  const Model& model_;
-  std::vector<Body*> list_;
+  /// The relative change of the volume of phyxel i, once means are found; 0 without unknowns.
+  PHYXEL_HD double change_of_volume(const Standing& body, Index i, const Unknown& x) const {
+    return ease_volume * (x.volume - (is_sought(i) ? body.mean : 0));
+  }
+  /// The closing vector ĉ that the unknowns of phyxel i mean [1/m]. @param of_volume [m³]
+  PHYXEL_HD Vec3d closing_vector(const Standing& body, Index i, const Unknown& x,
+                                 double of_volume) const {
+    return (body.unit / of_volume * relative_size[i]) * x.closing;
+  }
+
+  /// Sets the terms that phyxel k gives to the sums of its neighbours.
+  PHYXEL_HD void set_term(const Standing& body, Index k, const Unknown& x) const {
+    const double change = change_of_volume(body, k, x) * volume[k] / body.unit;
+    const Vec3d closing = relative_size[k] * x.closing;
+    gathers.set_term(k, position[k], closing,
+                     outer(closing, tilt[k]) - change * full(inverse_moment[k]));
+  }
+  /// The sum R_j, once terms are set. @param x unknowns of j
+  template <class Loops>
+  PHYXEL_HD Vec3d sum_at(const Standing& body, Index j, const Unknown& x) const {
+    if (supported[j]) return {};
+    const double size = relative_size[j];
+    // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
+    const Vec3d own = gathers.linear(j) * moment_offset[j] -
+                      (weight[j] + dot(tilt[j], moment_offset[j])) * (size * x.closing) -
+                      ease_area * x.area * (size * size * areas[j]);
+    return per_size(j, Loops::terms(gathers, j, row(j), weights_of(body, j), own));
+  }
+  /// The transpose of the sums at phyxel i, but for the mean change of volumes.
+  /// @param sum of phyxel i
+  template <class Loops>
+  PHYXEL_HD Unknown transposed_at(const Standing& body, Index i, Vec3d sum) const {
+    const Differences d = Loops::differences(gathers, i, row(i), weights_of(body, i));
+    return {.closing = relative_size[i] * (d.total - d.moment * tilt[i]),
+            .area = -ease_area * dot(areas[i], sum),
+            .volume = ease_volume * (volume[i] / body.unit) *
+                      contract(symmetric_part(d.moment), inverse_moment[i])};
+  }
 };
 
 /// The sums of bodies, per s² ρ², as a linear function of the unknowns:
@@ -156,18 +152,46 @@ class Bodies {
 /// it may be anything, and counts as 0. Of the changes σ only what leaves a body's volume as it is
 /// counts: by Σ x Sᵀ = V I, areas of whole faces stay, too. Vectors have a value for each phyxel of
 /// the model, of which ranks hold their shares.
+///
+/// `Loops` run on the host or on a device (closing_loops.hpp). All functions with loops are public,
+/// as compilers for devices ask.
+template <class Loops>
 class Sums {
  public:
+  template <class T>
+  using Vector = typename Loops::template Vector<T>;
+
   /// @param areas S of each phyxel of the model, those of ghosts undefined [m²]
-  Sums(const Model& model, const Bodies& bodies, std::vector<Vec3d> areas)
-      : model_(model),
-        areas_(std::move(areas)),
-        tilt_(areas_.size()),
-        weight_(areas_.size()),
-        relative_size_(areas_.size(), 1),
-        role_(areas_.size(), Role::sought),
-        gathers_(areas_.size()),
-        supported_(supported_phyxels(model)) {
+  Sums(const Loops& loops, const Model& model, const Bodies& bodies,
+       const std::vector<Vec3d>& areas)
+      : loops_(loops),
+        position_(loops.input(model.position)),
+        support_(loops.input(model.neighbourhood.support)),
+        offsets_(loops.input(model.neighbourhood.neighbours.offsets)),
+        neighbours_(loops.input(model.neighbourhood.neighbours.indices)),
+        inverse_moment_(loops.input(model.inverse_moment)),
+        moment_offset_(loops.input(model.moment_offset)),
+        volume_(loops.input(model.volume)),
+        supported_(loops.vector(supported_phyxels(model))),
+        areas_(loops.vector(areas)),
+        tilt_(loops.template make<Vec3d>()),
+        weight_(loops.template make<double>()),
+        relative_size_(loops.template make<double>()),
+        role_(loops.template make<Role>()),
+        records_(loops.template make<double>(Gathers::term_size, Gathers::line)),
+        terms_{position_.data(),   support_.data(),         offsets_.data(),
+               neighbours_.data(), inverse_moment_.data(),  moment_offset_.data(),
+               volume_.data(),     supported_.data(),       areas_.data(),
+               tilt_.data(),       weight_.data(),          relative_size_.data(),
+               role_.data(),       Gathers(records_.data())} {
+    set_up(bodies);
+  }
+  Sums(const Sums&) = delete;
+  Sums& operator=(const Sums&) = delete;
+
+  const SumTerms& terms() const { return terms_; }
+
+  void set_up(const Bodies& bodies) {
     for (Body* body : bodies) {
       double volume = 0;
       Index size = 0;
@@ -177,67 +201,77 @@ class Sums {
       }
       const double spacing = std::cbrt(volume / size);
       body->unit = spacing * spacing;
-#pragma omp parallel for schedule(static)
-      for (Index i = body->begin(); i < body->end(); ++i) {
-        tilt_[i] = model_.inverse_moment[i] * model_.moment_offset[i];
-        const double length = body->parts.front().pair_length;
-        if (length > 0) relative_size_[i] = model_.neighbourhood.support[i] / length;
-      }
+      body->pair_length = body->parts.front().pair_length;
     }
-    bodies.sum(&Body::volume, [&](const Body&, Index i) { return model_.volume[i]; });
-    bodies.for_each([&](const Body& body, Index i) {
-      const double size = relative_size_[i];
-      areas_[i] = supported_[i] ? Vec3d{} : areas_[i] / (body.unit * size * size);
-      double sum = 0;
-      const RowWeights weights = weights_of(body, i);
-      for (const Index k : model_.neighbourhood.neighbours.row(i)) {
-        const Vec3d x = model_.position[k] - model_.position[i];
-        sum += weights(k, dot(x, x));
-      }
-      weight_[i] = sum - dot(tilt_[i], model_.moment_offset[i]);
+    const SumTerms terms = terms_;
+    loops_.for_each_with_ghosts(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index i) {
+      terms.set_up(body, i);
+      terms.role[i] = Role::sought;
     });
-    bodies.sum(&Body::areas, [&](const Body&, Index i) { return dot(areas_[i], areas_[i]); });
+    loops_.sum(bodies, &Standing::volume,
+               [=] PHYXEL_LOOPED(const Standing&, Index i) -> double { return terms.volume[i]; });
+    loops_.sum(bodies, &Standing::areas,
+               [=] PHYXEL_LOOPED(const Standing& body, Index i) -> double {
+                 terms.set_weight(body, i, terms.areas[i]);
+                 return dot(terms.areas[i], terms.areas[i]);
+               });
   }
 
-  /// Calls take(i, sum) for the sum of each phyxel without closing, as it is to be 0, on many
-  /// threads.
-  template <class Take>
-  void open(const Bodies& bodies, Take&& take) {
+  /// Sets `residual` to -1 times the sum of each phyxel without closing, as it is to be 0, or adds
+  /// that to what it is.
+  void open(const Bodies& bodies, Vec3d* residual, bool adds) {
     for (Body* body : bodies) body->mean = 0;
     const Unknown ones{{}, 1 / ease_area, 1 / ease_volume};
-    set_terms(bodies, Role::none, [&](Index) { return ones; });
-    bodies.for_each([&](const Body& body, Index j) { take(j, sum_at(body, j, ones)); });
+    const SumTerms terms = terms_;
+    loops_.for_each_with_ghosts(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index k) {
+      terms.set_term(body, k, ones);
+    });
+    loops_.for_each(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index j) {
+      const Vec3d sum = terms.template sum_at<Loops>(body, j, ones);
+      residual[j] = adds ? residual[j] - sum : -sum;
+    });
   }
+
   /// Limits the unknowns to where sums are to change: the rest is a regular lattice.
   /// Collective.
   /// @param sums of all phyxels but ghosts
-  void limit_to_irregular(const Bodies& bodies, const std::vector<Vec3d>& sums) {
-    bodies.for_each([&](const Body& body, Index i) {
+  void limit_to_irregular(const Bodies& bodies, const Vec3d* sums) {
+    const SumTerms terms = terms_;
+    loops_.for_each(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index i) {
       const double least = regular * body.tolerance;
-      role_[i] = dot(sums[i], sums[i]) > least * least ? Role::irregular : Role::none;
+      terms.role[i] = dot(sums[i], sums[i]) > least * least ? Role::irregular : Role::none;
     });
-    bodies.refresh_ghosts(role_);
-    std::vector<Role> next = role_;
+    loops_.refresh_ghosts(bodies, role_);
+    Vector<Role> next_role = loops_.template make<Role>();
+    Role* const next = next_role.data();
     for (const Role role : {Role::sought, Role::changed, Role::beside}) {
-      bodies.for_each([&](const Body&, Index i) {
+      loops_.for_each(bodies, [=] PHYXEL_LOOPED(const Standing&, Index i) {
+        next[i] = terms.role[i];
         // Sums of supported phyxels may be anything, but their unknowns change those beside.
-        if (role_[i] != Role::none || (role == Role::sought && !supported_[i])) return;
-        const auto is_inner = [&](Index k) { return role_[k] > role; };
-        if (std::ranges::any_of(model_.neighbourhood.neighbours.row(i), is_inner)) next[i] = role;
+        if (next[i] != Role::none || (role == Role::sought && !terms.supported[i])) return;
+        for (const Index k : terms.row(i)) {
+          if (terms.role[k] <= role) continue;
+          next[i] = role;
+          return;
+        }
       });
-      bodies.refresh_ghosts(next);
-      role_ = next;
+      loops_.for_each(bodies,
+                      [=] PHYXEL_LOOPED(const Standing&, Index i) { terms.role[i] = next[i]; });
+      loops_.refresh_ghosts(bodies, role_);
     }
-    bodies.sum(&Body::sought_volume,
-               [&](const Body&, Index i) { return is_sought(i) ? model_.volume[i] : 0; });
+    loops_.sum(bodies, &Standing::sought_volume,
+               [=] PHYXEL_LOOPED(const Standing&, Index i) -> double {
+                 return terms.is_sought(i) ? terms.volume[i] : 0;
+               });
     for (Body* body : bodies) body->is_limited = body->sought_volume < body->volume;
   }
   /// Gives all phyxels of bodies unknowns.
   /// @param x the unknowns so far, which are rewritten to mean the same changes of volumes
-  void widen(const Bodies& bodies, std::vector<Unknown>& x) {
-    bodies.for_each_with_ghosts([&](const Body& body, Index i) {
-      if (is_sought(i)) x[i].volume -= body.mean;
-      role_[i] = Role::sought;
+  void widen(const Bodies& bodies, Unknown* x) {
+    const SumTerms terms = terms_;
+    loops_.for_each_with_ghosts(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index i) {
+      if (terms.is_sought(i)) x[i].volume -= body.mean;
+      terms.role[i] = Role::sought;
     });
     for (Body* body : bodies) {
       body->mean = 0;
@@ -246,117 +280,80 @@ class Sums {
       body->left_before = HUGE_VAL;  // the search starts anew
     }
   }
-  /// True if phyxel i has unknowns; those of the others are 0.
-  bool is_sought(Index i) const { return role_[i] >= Role::sought; }
-  /// True if unknowns change the sum of phyxel i.
-  bool is_changed(Index i) const { return role_[i] >= Role::changed; }
 
-  /// Sets a member of each body to Σ take(i, sum), which is given the sum of each phyxel that
-  /// unknowns change, on many threads. Collective.
+  /// Sets `image` to the sums that unknowns add, of the phyxels whose sums they change, and a
+  /// member of each body to the square of `image`. Collective.
   /// @param x its ghosts receive their owners' values
-  template <class Take>
-  void apply(const Bodies& bodies, std::vector<Unknown>& x, double Body::*into, Take&& take) {
-    bodies.refresh_ghosts(x);
-    find_means(bodies, x);
-    set_terms(bodies, Role::beside, [&](Index k) { return x[k]; });
-    bodies.sum(into, [&](const Body& body, Index j) {
-      return is_changed(j) ? take(j, sum_at(body, j, x[j])) : 0;
+  /// @param image image(i): where to put the sum of phyxel i
+  template <class Image>
+  void apply(const Bodies& bodies, Vector<Unknown>& x, double Standing::*square, Image&& image) {
+    loops_.refresh_ghosts(bodies, x);
+    find_means(bodies, x.data());
+    const SumTerms terms = terms_;
+    const Unknown* const unknowns = x.data();
+    loops_.for_each_with_ghosts(bodies, [=] PHYXEL_LOOPED(const Standing& body, Index k) {
+      if (terms.role[k] >= Role::beside) terms.set_term(body, k, unknowns[k]);
+    });
+    loops_.sum(bodies, square, [=] PHYXEL_LOOPED(const Standing& body, Index j) -> double {
+      if (!terms.is_changed(j)) return 0;
+      const Vec3d sum = terms.template sum_at<Loops>(body, j, unknowns[j]);
+      image.put(j, sum);
+      return dot(sum, sum);
     });
   }
   /// Sets the mean change of volume of each body, which takes no part [over `ease_volume`].
-  void find_means(const Bodies& bodies, const std::vector<Unknown>& x) const {
-    bodies.sum(&Body::mean, [&](const Body&, Index i) { return model_.volume[i] * x[i].volume; });
+  void find_means(const Bodies& bodies, const Unknown* x) {
+    const SumTerms terms = terms_;
+    loops_.sum(bodies, &Standing::mean, [=] PHYXEL_LOOPED(const Standing&, Index i) -> double {
+      return terms.volume[i] * x[i].volume;
+    });
     for (Body* body : bodies) {
       if (body->sought_volume > 0) body->mean /= body->sought_volume;
     }
   }
-  /// The relative change of the volume of phyxel i, once means are found; 0 without unknowns.
-  double change_of_volume(const Body& body, Index i, const Unknown& x) const {
-    return ease_volume * (x.volume - (is_sought(i) ? body.mean : 0));
-  }
-  /// The closing vector ĉ that the unknowns of phyxel i mean [1/m].
-  Vec3d closing_vector(const Body& body, Index i, const Unknown& x) const {
-    return (body.unit / model_.volume[i] * relative_size_[i]) * x.closing;
-  }
   /// Sets x to the transpose of `apply` times `sums`, and a member of each body to the square of x.
   /// Collective.
   /// @param sums their ghosts receive their owners' values
-  void apply_transpose(const Bodies& bodies, std::vector<Vec3d>& sums, std::vector<Unknown>& x,
-                       double Body::*square) {
-    bodies.refresh_ghosts(sums);
-    bodies.for_each_with_ghosts([&](const Body&, Index i) {
-      if (is_changed(i)) gathers_.set_value(i, model_.position[i], per_size(i, sums[i]));
+  void apply_transpose(const Bodies& bodies, Vector<Vec3d>& sums, Unknown* x,
+                       double Standing::*square) {
+    loops_.refresh_ghosts(bodies, sums);
+    const SumTerms terms = terms_;
+    const Vec3d* const values = sums.data();
+    loops_.for_each_with_ghosts(bodies, [=] PHYXEL_LOOPED(const Standing&, Index i) {
+      if (terms.is_changed(i)) {
+        terms.gathers.set_value(i, terms.position[i], terms.per_size(i, values[i]));
+      }
     });
-    bodies.sum(&Body::sum, [&](const Body& body, Index i) {
-      if (!is_sought(i)) return 0.0;
-      const auto [total, moment] =
-          gathers_.differences(i, model_.neighbourhood.neighbours.row(i), weights_of(body, i));
-      x[i] = {.closing = relative_size_[i] * (total - moment * tilt_[i]),
-              .area = -ease_area * dot(areas_[i], sums[i]),
-              .volume = ease_volume * (model_.volume[i] / body.unit) *
-                        contract(symmetric_part(moment), model_.inverse_moment[i])};
+    loops_.sum(bodies, &Standing::sum, [=] PHYXEL_LOOPED(const Standing& body, Index i) -> double {
+      if (!terms.is_sought(i)) return 0;
+      x[i] = terms.template transposed_at<Loops>(body, i, values[i]);
       return x[i].volume;
     });
-    bodies.sum(square, [&](const Body& body, Index i) {
-      if (!is_sought(i)) return 0.0;
-      x[i].volume -= model_.volume[i] / body.sought_volume * body.sum;
+    loops_.sum(bodies, square, [=] PHYXEL_LOOPED(const Standing& body, Index i) -> double {
+      if (!terms.is_sought(i)) return 0;
+      x[i].volume -= terms.volume[i] / body.sought_volume * body.sum;
       return dot(x[i], x[i]);
     });
   }
 
  private:
-  /// The part of a phyxel in the search.
-  enum class Role : char {
-    none,
-    beside,    ///< It is a neighbour of a `changed` one, whose sum reads its record.
-    changed,   ///< It is a neighbour of one with unknowns, which change its sum.
-    sought,    ///< It has unknowns, since it is supported and beside an irregular one.
-    irregular  ///< It has unknowns, since its sum is to change.
-  };
   /// A sum counts as that of a regular lattice if it is below this much of the tolerance.
   static constexpr double regular = 0.1;
 
-  /// Sets the terms that phyxels give to the sums of their neighbours. @param x x(k): unknowns
-  /// @param least role of the phyxels
-  template <class X>
-  void set_terms(const Bodies& bodies, Role least, X&& x) {
-    bodies.for_each_with_ghosts([&](const Body& body, Index k) {
-      if (role_[k] < least) return;
-      const Unknown of_k = x(k);
-      const double change = change_of_volume(body, k, of_k) * model_.volume[k] / body.unit;
-      const Vec3d closing = relative_size_[k] * of_k.closing;
-      gathers_.set_term(k, model_.position[k], closing,
-                        outer(closing, tilt_[k]) - change * full(model_.inverse_moment[k]));
-    });
-  }
-  /// The sum R_j, once terms are set. @param x unknowns of j
-  Vec3d sum_at(const Body& body, Index j, const Unknown& x) const {
-    if (supported_[j]) return {};
-    const double size = relative_size_[j];
-    // A⁻¹ b = a: what the offset of the moments takes of M_j b_j.
-    const Vec3d own = gathers_.linear(j) * model_.moment_offset[j] -
-                      (weight_[j] + dot(tilt_[j], model_.moment_offset[j])) * (size * x.closing) -
-                      ease_area * x.area * (size * size * areas_[j]);
-    return per_size(
-        j, gathers_.terms(j, model_.neighbourhood.neighbours.row(j), weights_of(body, j), own));
-  }
-  /// A sum of phyxel j over ρ².
-  Vec3d per_size(Index j, Vec3d sum) const {
-    const double size = relative_size_[j];
-    return sum / (size * size);
-  }
-  RowWeights weights_of(const Body& body, Index i) const {
-    return {model_.neighbourhood.support.data(), i, body.parts.front().pair_length};
-  }
-
-  const Model& model_;
-  std::vector<Vec3d> areas_;           ///< S / (s² ρ²)
-  std::vector<Vec3d> tilt_;            ///< a
-  std::vector<double> weight_;         ///< Σ_k w_jk (1 - a_j x_jk)
-  std::vector<double> relative_size_;  ///< ρ
-  std::vector<Role> role_;             ///< The role of each phyxel.
-  Gathers gathers_;                    ///< What phyxels give to the sums of their neighbours.
-  std::vector<char> supported_;        ///< `supported_phyxels`.
+  const Loops& loops_;
+  typename Loops::template Input<Vec3d> position_;
+  typename Loops::template Input<double> support_;
+  typename Loops::template Input<Offset> offsets_;
+  typename Loops::template Input<Index> neighbours_;
+  typename Loops::template Input<Sym3d> inverse_moment_;
+  typename Loops::template Input<Vec3d> moment_offset_;
+  typename Loops::template Input<double> volume_;
+  Vector<char> supported_;
+  Vector<Vec3d> areas_, tilt_;
+  Vector<double> weight_, relative_size_;
+  Vector<Role> role_;
+  Vector<double> records_;
+  SumTerms terms_;
 };
 
 }  // namespace phyxel::closing

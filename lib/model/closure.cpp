@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "model/closing_areas.hpp"
-#include "model/closing_sums.hpp"
+#include "model/closing_loops.hpp"
+#include "model/closing_search.hpp"
 #include "model/loads.hpp"
 #include "phyxel/error.hpp"
 #include "stage.hpp"
@@ -19,147 +20,20 @@ namespace {
 
 using closing::Bodies;
 using closing::Body;
-using closing::ease_area;
-using closing::Sums;
-using closing::Unknown;
-
-/// After so many the sums are as closed as they get: 1,500 phyxels take 2,600 to 1e-10.
-constexpr int most_iterations = 10'000;
-/// Iterations that have to take a tenth of what is left.
-constexpr int patience = 500;
-/// The same before all phyxels have unknowns.
-constexpr int limited_patience = 50;
-
-/// What is left of a body's sums, by their areas; nothing if all phyxels are supported.
-double left_of(const Body& body) {
-  return body.areas > 0 ? std::sqrt(body.residual_squared / body.areas) : 0;
-}
-
-/// Updates what is left of a body's sums.
-/// @returns whether they are as closed as is asked or as they get
-bool update_and_check(Body& body) {
-  body.left = left_of(body);
-  if (body.iterations == 0) body.left_first = body.left;
-  if (!(body.left > body.tolerance) || !(body.gradient_squared > 0) ||
-      body.iterations == most_iterations) {
-    return true;
-  }
-  if (body.iterations % (body.is_limited ? limited_patience : patience) != 0) return false;
-  const bool slow = !(body.left < 0.9 * body.left_before);
-  body.left_before = body.left;
-  return slow;
-}
-
-/// The share of the way to its tolerance that a body has come.
-double way_of(const Body& body) {
-  return std::log(body.left_first / body.left) / std::log(body.left_first / body.tolerance);
-}
-
-/// The search for the smallest unknowns that close the sums: conjugate gradients for least squares
-/// (Björck 1996, algorithm 7.4.1), of all bodies at once, each with its own steps. Smooth unknowns,
-/// which take the most of them, matter the least: a few iterations do most of what can be done.
-class Search {
- public:
-  /// @param n number of phyxels of the model
-  Search(Sums& sums, const Bodies& all, std::size_t n)
-      : sums_(sums), all_(all), x_(n), gradient_(n), direction_(n), residual_(n) {}
-
-  /// Returns the unknowns. What is left of each body's sums is summed anew at the end.
-  std::vector<Unknown> run() {
-    Stage stage("closed gradients");
-    sums_.open(all_, [&](Index i, Vec3d sum) { residual_[i] = -sum; });
-    sums_.limit_to_irregular(all_, residual_);
-    iterate(all_, stage);
-    // For a small tolerance the regular phyxels of a body may have to take part.
-    Bodies open = all_;
-    open.erase_if(
-        [](const Body& body) { return !body.is_limited || !(body.left > body.tolerance); });
-    if (!open.empty()) {
-      sums_.find_means(open, x_);
-      sums_.widen(open, x_);
-      find_residual(open);
-      iterate(open, stage);
-    }
-    find_residual(all_);
-    all_.sum(&Body::residual_squared, [&](const Body&, Index i) { return square_of(i); });
-    for (Body* body : all_) body->left = left_of(*body);
-    stage.finish();
-    return std::move(x_);
-  }
-
- private:
-  double square_of(Index i) const { return dot(residual_[i], residual_[i]); }
-
-  /// Finds the residual of the present unknowns, and the mean change of volume of each body.
-  void find_residual(const Bodies& bodies) {
-    bodies.for_each([&](const Body&, Index i) { residual_[i] = {}; });
-    sums_.apply(bodies, x_, &Body::image_squared, [&](Index i, Vec3d image) {
-      residual_[i] = -image;
-      return 0.0;
-    });
-    sums_.open(bodies, [&](Index i, Vec3d sum) { residual_[i] -= sum; });
-    sums_.find_means(bodies, x_);
-  }
-
-  /// Iterates from the present unknowns and their residual.
-  void iterate(Bodies active, Stage& stage) {
-    active.sum(&Body::residual_squared, [&](const Body&, Index i) { return square_of(i); });
-    sums_.apply_transpose(active, residual_, gradient_, &Body::gradient_squared);
-    active.for_each([&](const Body&, Index i) {
-      if (sums_.is_sought(i)) direction_[i] = gradient_[i];
-    });
-    for (;;) {
-      active.erase_if(update_and_check);
-      if (active.empty()) return;
-      double way = 1;
-      for (const Body* body : active) way = std::min(way, way_of(*body));
-      stage.reach(way);
-      // The gradient is used up, and its memory takes the image of the direction.
-      sums_.apply(active, direction_, &Body::image_squared, [&](Index i, Vec3d image) {
-        gradient_[i].closing = image;
-        return dot(image, image);
-      });
-      active.erase_if([](const Body& body) { return !(body.image_squared > 0); });
-      active.sum(&Body::residual_squared, [&](const Body& body, Index i) {
-        const double step = body.gradient_squared / body.image_squared;
-        if (sums_.is_sought(i)) add(x_[i], step, direction_[i]);
-        if (sums_.is_changed(i)) residual_[i] -= step * gradient_[i].closing;
-        return square_of(i);
-      });
-      sums_.apply_transpose(active, residual_, gradient_, &Body::next_gradient_squared);
-      active.for_each([&](const Body& body, Index i) {
-        if (!sums_.is_sought(i)) return;
-        Unknown turned = gradient_[i];
-        add(turned, body.next_gradient_squared / body.gradient_squared, direction_[i]);
-        direction_[i] = turned;
-      });
-      for (Body* body : active) {
-        body->gradient_squared = body->next_gradient_squared;
-        ++body->iterations;
-      }
-    }
-  }
-
-  Sums& sums_;
-  const Bodies& all_;
-  std::vector<Unknown> x_, gradient_, direction_;
-  std::vector<Vec3d> residual_;
-};
 
 /// The first phyxel of all ranks whose volume would have to change too far, and how far.
 struct Excess {
   double phyxel = HUGE_VAL;  ///< Index in the whole model; infinite: none.
   double change = 0;         ///< Relative; infinite: it is no number.
 };
-/// @param change(body, i) relative change of the volume of phyxel i
-template <class Change>
-Excess first_excess(const Model& model, const Bodies& bodies, Change&& change) {
+/// @param change relative change of the volume of each phyxel
+Excess first_excess(const Model& model, const Bodies& bodies, const std::vector<double>& change) {
   Excess first;
   for (const Body* body : bodies) {
     for (const Part& part : body->parts) {
       for (Index i = part.begin; i < part.owned_end(); ++i) {
         // Half is far beyond what closes clouds that are any good; NaN is none of these.
-        const double found = change(*body, i);
+        const double found = change[i];
         if (std::abs(found) < 0.5 || model.global_id(i) >= first.phyxel) continue;
         // A NaN would get lost among ranks.
         first = {static_cast<double>(model.global_id(i)), std::isnan(found) ? HUGE_VAL : found};
@@ -196,7 +70,7 @@ Unclosable unclosable(const Model& model, const Excess& excess) {
 
 /// Leaves a body as it was. @param before volume of each phyxel of the model [m³]
 void leave_open(Model& model, Bodies& bodies, const Unclosable& found,
-                const std::vector<double>& before) {
+                const std::vector<double>& before, Closing& closing) {
   model.warnings.push_back(fmt::format(
       "body \"{}\": gradients are not closed, as {}: stresses may be off by some 10%; more phyxels "
       "where the body is thin help",
@@ -208,6 +82,7 @@ void leave_open(Model& model, Bodies& bodies, const Unclosable& found,
     part.closure = 0;
     std::copy(before.begin() + part.begin, before.begin() + part.end,
               model.volume.begin() + part.begin);
+    std::fill(closing.area.begin() + part.begin, closing.area.begin() + part.end, 0);
   }
 }
 
@@ -246,26 +121,28 @@ std::vector<Facet> facets_of(const Model& model, const Part& part) {
 
 }  // namespace
 
+Closing search_on_host(const Model& model, const Bodies& bodies, const std::vector<Vec3d>& areas) {
+  const closing::HostLoops loops(model);
+  return closing::Search(loops, model, bodies, areas).run();
+}
+
 std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBody>& wanted,
-                                        std::vector<Vec3d> areas) {
+                                        const std::vector<Vec3d>& areas,
+                                        const ClosingSearch& search) {
   if (wanted.empty()) return std::nullopt;
   const Phase phase("closing gradients");
   const std::vector<double> before = model.volume;
   std::vector<Body> list, parts;
   for (const auto& [of_body, enclosed] : wanted) {
-    Body& body = list.emplace_back(Body{.parts = of_body, .tolerance = of_body.front().closure});
+    const Body& body = list.emplace_back(of_body, of_body.front().closure);
     double volume = 0;
     for (const Part& part : of_body) volume += part.volume;
     for (Index i = body.begin(); i < body.end(); ++i) model.volume[i] *= enclosed / volume;
   }
-  Bodies bodies(model, list);
-  Sums sums(model, bodies, std::move(areas));
-  const std::vector<Unknown> found = Search(sums, bodies, model.volume.size()).run();
-  const auto change = [&](const Body& body, Index i) {
-    return sums.change_of_volume(body, i, found[i]);
-  };
+  Bodies bodies(list);
+  Closing closing = search(model, bodies, areas);
   for (;;) {
-    const Excess excess = first_excess(model, bodies, change);
+    const Excess excess = first_excess(model, bodies, closing.volume);
     if (!(excess.phyxel < HUGE_VAL)) break;
     const Unclosable open = unclosable(model, excess);
     if (!open.body->automatic_closure) {
@@ -274,32 +151,32 @@ std::optional<std::string> close_bodies(Model& model, const std::vector<ClosedBo
           "where the body is thin, or closure = 0",
           open.body->name, open.body->closure, open.reason);
     }
-    leave_open(model, bodies, open, before);
+    leave_open(model, bodies, open, before, closing);
   }
   if (bodies.empty()) return std::nullopt;
+  const closing::HostLoops loops(model);
   model.closing.resize(model.volume.size());
-  bodies.for_each([&](const Body& body, Index i) {
-    model.volume[i] *= 1 + change(body, i);
-    model.closing[i] = sums.closing_vector(body, i, found[i]);
+  loops.for_each(bodies, [&](const closing::Standing&, Index i) {
+    model.volume[i] *= 1 + closing.volume[i];
+    model.closing[i] = closing.vector[i];
   });
-  bodies.refresh_ghosts(model.volume);
-  bodies.refresh_ghosts(model.closing);
+  loops.refresh_ghosts(bodies, model.volume);
+  loops.refresh_ghosts(bodies, model.closing);
   for (const Body* body : bodies) {
-    for (Part& part : body->parts) parts.push_back({.parts = {&part, 1}});
+    for (Part& part : body->parts) parts.emplace_back(std::span(&part, 1), part.closure);
   }
-  Bodies(model, parts).sum(&Body::volume, [&](const Body&, Index i) { return model.volume[i]; });
+  loops.sum(Bodies(parts), &closing::Standing::volume,
+            [&](const closing::Standing&, Index i) { return model.volume[i]; });
   for (const Body& part : parts) part.parts.front().volume = part.volume;
   follow_volumes(model, before);
-  std::vector<double> change_of_area(model.position.size());
-  bodies.for_each([&](const Body&, Index i) { change_of_area[i] = ease_area * found[i].area; });
   for (Load& load : model.loads) {
-    if (load.on_surface) follow_areas(model, load, change_of_area);
+    if (load.on_surface) follow_areas(model, load, closing.area);
   }
   for (const Body* body : bodies) warn_of(model, *body);
   return std::nullopt;
 }
 
-void close_gradients(Model& model) {
+void close_gradients(Model& model, const ClosingSearch& search) {
   std::vector<ClosedBody> closed;
   std::vector<Vec3d> areas;
   for (auto part = model.parts.begin(); part != model.parts.end();) {
@@ -322,7 +199,7 @@ void close_gradients(Model& model) {
     }
     part = next;
   }
-  if (const auto refusal = close_bodies(model, closed, std::move(areas))) {
+  if (const auto refusal = close_bodies(model, closed, areas, search)) {
     throw InputError(*refusal);
   }
 }

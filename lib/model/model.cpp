@@ -11,6 +11,7 @@
 #include "model/box.hpp"
 #include "model/closing_areas.hpp"
 #include "model/closure.hpp"
+#include "model/device_setup.hpp"
 #include "model/following.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
@@ -391,28 +392,32 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
 }
 
 /// Adds what needs all bodies of a model.
-void finish(Model& model, const Scene& scene) {
+void finish(Model& model, const Scene& scene, const ClosingSearch& close) {
   add_tractions(model, scene);
   find_moments(model);
-  close_gradients(model);
+  close_gradients(model, close ? close : search_on_host);
   find_following(model);
   add_warnings(model, model.surfels.position.size());
 }
 
-Model model_from_sources(const Scene& scene, const Surveyor* surveyor) {
+const Surveyor* surveyor_of(const DeviceSetup& device) {
+  return device.survey ? &device.survey : nullptr;
+}
+
+Model model_from_sources(const Scene& scene, const DeviceSetup& device) {
   validate(scene);
   Model model;
   model.gravity = scene.gravity;
   for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
     append(model.warnings, cloud.warnings);
-    naming(request, [&] { add_body(model, request, cloud, surveyor); });
+    naming(request, [&] { add_body(model, request, cloud, surveyor_of(device)); });
   });
-  finish(model, scene);
+  finish(model, scene, device.close);
   return model;
 }
 
 Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
-                        const Surveyor* surveyor) {
+                        const DeviceSetup& device) {
   if (clouds.size() != scene.bodies.size()) {
     throw InputError(fmt::format("{} clouds for a scene of {} bodies: one each is allowed",
                                  clouds.size(), scene.bodies.size()));
@@ -422,9 +427,10 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
   model.gravity = scene.gravity;
   for (std::size_t b = 0; b < clouds.size(); ++b) {
     append(model.warnings, clouds[b].warnings);
-    naming(scene.bodies[b], [&] { add_body(model, scene.bodies[b], clouds[b], surveyor); });
+    naming(scene.bodies[b],
+           [&] { add_body(model, scene.bodies[b], clouds[b], surveyor_of(device)); });
   }
-  finish(model, scene);
+  finish(model, scene, device.close);
   return model;
 }
 
@@ -472,17 +478,21 @@ Offset Model::pairs() const {
   return sum;
 }
 
-Model build_model(const Scene& scene) {
-  return naming(scene, [&] { return model_from_sources(scene, nullptr); });
-}
+Model build_model(const Scene& scene) { return build_model(scene, DeviceSetup{}); }
 Model build_model(const Scene& scene, std::span<const Cloud> clouds) {
-  return naming(scene, [&] { return model_from_clouds(scene, clouds, nullptr); });
+  return build_model(scene, clouds, DeviceSetup{});
 }
 Model build_model(const Scene& scene, const Surveyor& survey) {
-  return naming(scene, [&] { return model_from_sources(scene, &survey); });
+  return build_model(scene, DeviceSetup{survey, {}});
 }
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Surveyor& survey) {
-  return naming(scene, [&] { return model_from_clouds(scene, clouds, &survey); });
+  return build_model(scene, clouds, DeviceSetup{survey, {}});
+}
+Model build_model(const Scene& scene, const DeviceSetup& device) {
+  return naming(scene, [&] { return model_from_sources(scene, device); });
+}
+Model build_model(const Scene& scene, std::span<const Cloud> clouds, const DeviceSetup& device) {
+  return naming(scene, [&] { return model_from_clouds(scene, clouds, device); });
 }
 
 }  // namespace phyxel

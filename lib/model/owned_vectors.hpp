@@ -4,25 +4,14 @@
 
 #include <algorithm>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "exact_sum.hpp"
+#include "model/ghosts.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/share.hpp"
 
 namespace phyxel {
-
-/// Copies the owners' values to ghosts. Collective.
-/// @param values of each phyxel of the share. @param begin,end phyxels [begin, end) of whole
-/// bodies, to which the exchange is limited
-template <class T>
-void refresh_ghosts(const Share& share, std::vector<T>& values, Index begin = 0,
-                    Index end = std::numeric_limits<Index>::max()) {
-  share.transport->start({reinterpret_cast<std::byte*>(values.data() + begin), sizeof(T), sizeof(T),
-                          nullptr, begin, end});
-  share.transport->finish();
-}
 
 class OwnedVectors {
  public:

@@ -5,10 +5,12 @@
 #include <algorithm>
 
 #include "model/assembly.hpp"
+#include "model/device_setup.hpp"
 #include "mpi/communicator.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
+#include "setup/closing.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 #include "stage.hpp"
@@ -39,6 +41,14 @@ ChosenDevice device_if_usable(int number) {
 
 bool surveys(const ChosenDevice& device, const Scene& scene) {
   return device.gpu && can_survey_on_cuda(scene);
+}
+
+/// @param surveys true if the device searches for neighbours
+DeviceSetup setup_by(const ChosenDevice& device, bool surveys) {
+  DeviceSetup setup;
+  if (surveys) setup.survey = cuda_surveyor(device.gpu->index);
+  if (device.gpu) setup.close = cuda_closing_search(device.gpu->index);
+  return setup;
 }
 
 }  // namespace
@@ -76,8 +86,7 @@ ChosenDevice choose_device(const Ranks& ranks, const std::string& name, const st
 }
 
 Model build_model(const Scene& scene, const ChosenDevice& device) {
-  return surveys(device, scene) ? build_model(scene, cuda_surveyor(device.gpu->index))
-                                : build_model(scene);
+  return build_model(scene, setup_by(device, surveys(device, scene)));
 }
 
 Model build_model(const Scene& scene, std::span<const Cloud> clouds, const ChosenDevice& device) {
@@ -85,8 +94,7 @@ Model build_model(const Scene& scene, std::span<const Cloud> clouds, const Chose
   for (std::size_t b = 0; b < std::min(clouds.size(), scene.bodies.size()); ++b) {
     on_host = on_host || needs_lists_on_host(scene.bodies[b], clouds[b]);
   }
-  return on_host ? build_model(scene, clouds)
-                 : build_model(scene, clouds, cuda_surveyor(device.gpu->index));
+  return build_model(scene, clouds, setup_by(device, !on_host));
 }
 
 const std::vector<std::string>& transport_names() {

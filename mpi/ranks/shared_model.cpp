@@ -8,6 +8,7 @@
 #include "partition/partition.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
+#include "setup/closing.hpp"
 #include "setup/survey.hpp"
 #include "setup/tiling.hpp"
 
@@ -86,6 +87,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     options.tile = cuda::tile_size;
     if (can_survey_on_cuda(scene)) surveyor = cuda_share_surveyor(device_.gpu->index);
     options.surveyor = surveyor.get();
+    options.close = cuda_closing_search(device_.gpu->index);
   }
   const MpiCommunicator& all = ranks_.communicator();
   BuiltShare built =

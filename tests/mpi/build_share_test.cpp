@@ -11,6 +11,7 @@
 #include <map>
 
 #include "build_cases.hpp"
+#include "device.hpp"
 #include "host_surveyor.hpp"
 #include "model/closing_areas.hpp"
 #include "model/host_memory.hpp"
@@ -18,6 +19,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/solver.hpp"
 #include "ranks.hpp"
+#include "setup/closing.hpp"
 #include "setup/tiling.hpp"
 
 namespace phyxel {
@@ -31,6 +33,7 @@ const testing::HostSurveyor surveyor;
 struct Cut {
   const char* name;
   ShareOptions options;
+  bool gpu = false;  ///< Gradients are closed by a GPU.
 };
 void PrintTo(const Cut& c, std::ostream* out) { *out << c.name; }
 
@@ -46,13 +49,16 @@ const BuiltShare& built_of(const BuildCase& c, const Cut& cut) {
   const std::string name = std::string(c.name) + cut.name;
   const auto found = made.find(name);
   if (found != made.end()) return found->second;
-  return made[name] = c.clouds.empty() ? build_share(world(), c.scene, cut.options)
-                                       : build_share(world(), c.scene, c.clouds, cut.options);
+  ShareOptions options = cut.options;
+  if (cut.gpu && !cuda_devices().empty()) options.close = cuda_closing_search();
+  return made[name] = c.clouds.empty() ? build_share(world(), c.scene, options)
+                                       : build_share(world(), c.scene, c.clouds, options);
 }
 
 class BuiltShares : public ::testing::TestWithParam<std::tuple<BuildCase, Cut>> {
  protected:
   void SetUp() override {
+    if (cut_.gpu && cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
     for (const BodyRequest& body : case_.scene.bodies) {
       if (cut_.options.surveyor && body.neighbourhood.max_neighbours) {
         GTEST_SKIP() << "devices do not choose the nearest";
@@ -239,7 +245,8 @@ INSTANTIATE_TEST_SUITE_P(
                           Cut{"Curve", {{Partitioner::curve}, 0}},
                           Cut{"Groups", {{Partitioner::bisection}, cuda::tile_size, nullptr, 4}},
                           Cut{"Tiles", {{Partitioner::bisection}, cuda::tile_size}},
-                          Cut{"Device", {{Partitioner::curve}, cuda::tile_size, &surveyor}})),
+                          Cut{"Device", {{Partitioner::curve}, cuda::tile_size, &surveyor}},
+                          Cut{"Gpu", {{Partitioner::curve}, cuda::tile_size}, true})),
     [](const auto& test) {
       return std::string(std::get<0>(test.param).name) + std::get<1>(test.param).name;
     });
