@@ -143,20 +143,17 @@ class ListMaker {
   void find(Batch& b) {
     b.found = {b.places() * longest_, source_.what};
     b.length = {b.places(), source_.what};
-    for_each(
-        "find_neighbours", static_cast<std::int64_t>(b.places()),
-        [hash = source_.hash, phyxel_at = source_.phyxel_at + b.first_place(),
-         position = source_.position, support = source_.support,
-         inverse_reach = source_.inverse_reach, place_of = source_.place_of, found = b.found.data(),
-         length = b.length.data(), longest = longest_] __device__(std::int64_t row) {
-          const Index i = phyxel_at[row];
-          Index count = 0;
-          if (i >= 0) {
-            visit_neighbours(hash, hash.body_of(i), i, position[i], support, inverse_reach,
-                             [&](Index j, Vec3d) { found[row * longest + count++] = place_of[j]; });
-          }
-          length[row] = count;
-        });
+    for_each("find_neighbours", static_cast<std::int64_t>(b.places()),
+             [near = source_.near, phyxel_at = source_.phyxel_at + b.first_place(),
+              place_of = source_.place_of, found = b.found.data(), length = b.length.data(),
+              longest = longest_] __device__(std::int64_t row) {
+               const Index i = phyxel_at[row];
+               Index count = 0;
+               if (i >= 0) {
+                 near.visit(i, [&](Index j) { found[row * longest + count++] = place_of[j]; });
+               }
+               length[row] = count;
+             });
     b.halo = {static_cast<std::size_t>(b.tiles) * most_halo, source_.what};
     b.points = {static_cast<std::size_t>(b.tiles), source_.what};
     collect_halo<<<b.tiles, tile_size>>>(source_.tile_begin + b.first_tile, b.found.data(),

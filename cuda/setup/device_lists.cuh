@@ -26,15 +26,38 @@ __device__ void visit_neighbours(const HashView& hash, int body, Index phyxel, V
                   });
 }
 
-/// Data on the device from which the lists of a model are found. It must outlive the search.
-struct ListSource {
+/// Neighbours of phyxels, or phyxels that have them as neighbours: searched for by a hash, or read
+/// from lists that the host made.
+struct NeighbourSource {
   HashView hash;
   const Vec3d* position;        ///< Rest positions [m], shape [n].
   const double* support;        ///< [m], shape [n].
   const double* inverse_reach;  ///< Largest support of each body [m]; null: lists of neighbours.
-  const Index* phyxel_at;       ///< Phyxel at each place, or -1.
-  const Index* place_of;        ///< Place of each phyxel in the whole model's tiles, shape [n].
-  const Index* tile_begin;      ///< First place of each tile in the whole model's tiles.
+  const Offset* offsets;        ///< Of the rows of lists, shape [n + 1]; null: no lists.
+  const Index* rows;
+
+  /// Calls visit(j) for each neighbour j of phyxel i.
+  template <class Visit>
+  __device__ void visit(Index i, Visit&& visit) const {
+    if (offsets) {
+      for (Offset e = offsets[i]; e < offsets[i + 1]; ++e) visit(rows[e]);
+    } else {
+      visit_neighbours(hash, hash.body_of(i), i, position[i], support, inverse_reach,
+                       [&](Index j, Vec3d) { visit(j); });
+    }
+  }
+  /// The k-th phyxel in an order in which those that follow one another lie together.
+  __device__ Index in_order(std::int64_t k) const {
+    return offsets ? static_cast<Index>(k) : hash.index[k];
+  }
+};
+
+/// Data on the device from which the lists of a model are found. It must outlive the search.
+struct ListSource {
+  NeighbourSource near;
+  const Index* phyxel_at;   ///< Phyxel at each place, or -1.
+  const Index* place_of;    ///< Place of each phyxel in the whole model's tiles, shape [n].
+  const Index* tile_begin;  ///< First place of each tile in the whole model's tiles.
   /// Places in the whole model, ascending, and the same phyxels' places in a share; null for a
   /// whole model.
   const Index *whole_place, *place_here;

@@ -9,51 +9,56 @@
 namespace phyxel::cuda {
 namespace {
 
-// --- lists copied from the host --------------------------------------------------------------
-
-DeviceTileLists send(const TileLists& lists, const std::string& what) {
-  return {sent(lists.halo, what), lists.halo_stride, sent(lists.rows, what),
-          sent(lists.entries, what)};
-}
-
-DeviceTiling send_tiling(const Model& model) {
-  Tiling tiling = make_tiling(model);
-  const std::string what = "neighbour lists of " + std::to_string(model.size()) + " phyxels";
-  DeviceTiling out;
-  out.neighbours = send(tiling.neighbours, what);
-  if (!tiling.inverse.rows.empty()) out.inverse = send(tiling.inverse, what);
-  std::vector<Sym3d> inverse_moment(tiling.phyxel.size());
-  std::vector<Vec3d> moment_offset(tiling.phyxel.size());
-  for (Index i = 0; i < model.size(); ++i) {
-    inverse_moment[tiling.place[i]] = model.inverse_moment[i];
-    moment_offset[tiling.place[i]] = model.moment_offset[i];
-  }
-  out.inverse_moment = sent(inverse_moment, what);
-  out.moment_offset = sent(moment_offset, what);
-  out.phyxel_at = sent(tiling.phyxel, what);
-  out.phyxel = std::move(tiling.phyxel);
-  out.place = std::move(tiling.place);
-  out.part = std::move(tiling.part);
-  out.own_tiles = tiling.own_tiles;
-  out.boundary_tiles = tiling.boundary_tiles;
-  return out;
-}
-
-// --- lists found on the device ---------------------------------------------------------------
-
-/// Input of the neighbour search.
-struct SearchCloud {
-  DeviceArray<Vec3d> position;  ///< Rest positions [m], shape [n].
-  DeviceArray<double> support;  ///< [m], shape [n].
-  std::vector<DeviceHash::Body> bodies;
-  std::vector<double> largest_support;  ///< Largest support of each body [m].
+/// Rows of lists that the host made.
+struct SentRows {
+  DeviceArray<Offset> offsets;
+  DeviceArray<Index> indices;
 };
 
-SearchCloud send_cloud(const Model& model) {
-  SearchCloud cloud{sent(model.position, "rest positions"),
-                    sent(model.neighbourhood.support, "supports"),
-                    {},
-                    {}};
+SentRows send(const Csr& lists, const Model& model) {
+  const std::string what = "neighbour lists of " + std::to_string(model.size()) + " phyxels";
+  return {sent(lists.offsets, what), sent(lists.indices, what)};
+}
+
+/// Neighbours of a model's phyxels: by a search, or from lists that the host made.
+struct Neighbours {
+  DeviceArray<Vec3d> position;  ///< Rest positions [m], shape [n].
+  DeviceArray<double> support;  ///< [m], shape [n].
+  std::optional<DeviceHash> table;
+  DeviceArray<double> largest_support;  ///< Largest support of each body [m].
+  SentRows lists, inverse_lists;
+
+  NeighbourSource near() const {
+    return {table ? table->view() : HashView{},
+            position.data(),
+            support.data(),
+            nullptr,
+            lists.offsets.data(),
+            lists.indices.data()};
+  }
+  NeighbourSource inverse() const {
+    return {table ? table->view() : HashView{},
+            position.data(),
+            support.data(),
+            largest_support.data(),
+            inverse_lists.offsets.data(),
+            inverse_lists.indices.data()};
+  }
+};
+
+Neighbours neighbours_of(const Model& model) {
+  Neighbours all;
+  all.position = sent(model.position, "rest positions");
+  all.support = sent(model.neighbourhood.support, "supports");
+  if (model.has_lists()) {
+    all.lists = send(model.neighbourhood.neighbours, model);
+    if (!model.neighbourhood.symmetric) {
+      all.inverse_lists = send(model.neighbourhood.inverse(), model);
+    }
+    return all;
+  }
+  std::vector<DeviceHash::Body> bodies;
+  std::vector<double> largest_support;
   for (const Part& part : model.parts) {
     const auto begin = model.neighbourhood.support.begin() + part.begin,
                end = model.neighbourhood.support.begin() + part.end;
@@ -63,19 +68,32 @@ SearchCloud send_cloud(const Model& model) {
       largest = std::max(largest, *h);
     }
     const double mean = sum / std::max(1, part.end - part.begin);
-    cloud.bodies.push_back({part.begin, part.end, model.neighbourhood.symmetric ? largest : mean});
-    cloud.largest_support.push_back(largest);
+    bodies.push_back({part.begin, part.end, model.neighbourhood.symmetric ? largest : mean});
+    largest_support.push_back(largest);
   }
-  return cloud;
+  all.table.emplace(all.position, bodies);
+  all.largest_support = sent(largest_support, "supports");
+  return all;
 }
 
-/// Builder of a model's tiles by a neighbour search on the device.
+/// The last of some ascending numbers, the first of which is 0, that is not above `i`.
+__device__ Index last_before(const Index* begins, Index count, Index i) {
+  Index first = 0, last = count - 1;
+  while (first < last) {
+    const Index middle = (first + last + 1) / 2;
+    if (begins[middle] <= i) {
+      first = middle;
+    } else {
+      last = middle - 1;
+    }
+  }
+  return first;
+}
+
+/// Builder of a model's tiles on the device.
 class Finder {
  public:
-  explicit Finder(const Model& model)
-      : model_(model), cloud_(send_cloud(model)), table_(cloud_.position, cloud_.bodies) {
-    largest_support_ = sent(cloud_.largest_support, "supports");
-  }
+  explicit Finder(const Model& model) : model_(model), neighbours_(neighbours_of(model)) {}
 
   DeviceTiling find() {
     if (model_.share) {
@@ -83,27 +101,26 @@ class Finder {
     } else {
       place_phyxels();
     }
-    find_moments();
-    out_.neighbours = make_lists(nullptr, most_neighbours_);
+    if (model_.has_lists()) {
+      send_moments();
+    } else {
+      find_moments();
+    }
+    out_.neighbours = make_lists(neighbours_.near(), most_neighbours_);
     if (!model_.neighbourhood.symmetric) {
-      const DeviceArray<Index> length = count(largest_support_.data());
-      out_.inverse = make_lists(largest_support_.data(), largest(length));
+      out_.inverse = make_lists(neighbours_.inverse(), largest(count(neighbours_.inverse())));
     }
     return std::move(out_);
   }
 
   /// Length of each phyxel's list, shape [n].
-  DeviceArray<Index> count(const double* inverse_reach) {
-    const auto n = static_cast<std::size_t>(model_.size());
-    DeviceArray<Index> length(n, "list lengths");
-    const HashView hash = table_.view();
+  DeviceArray<Index> count(const NeighbourSource& from) {
+    DeviceArray<Index> length(static_cast<std::size_t>(model_.size()), "list lengths");
     for_each("count_neighbours", model_.size(),
-             [hash, length = length.data(), support = cloud_.support.data(),
-              inverse_reach] __device__(std::int64_t at) {
-               const Index i = hash.index[at];
+             [from, length = length.data()] __device__(std::int64_t k) {
+               const Index i = from.in_order(k);
                Index found = 0;
-               visit_neighbours(hash, hash.body_of(i), i, hash.entries[at].position, support,
-                                inverse_reach, [&](Index, Vec3d) { ++found; });
+               from.visit(i, [&](Index) { ++found; });
                length[i] = found;
              });
     return length;
@@ -113,7 +130,7 @@ class Finder {
   /// the start of a tile; within a tile, phyxels with long lists first.
   void place_phyxels() {
     const Index n = model_.size();
-    const DeviceArray<Index> length = count(nullptr);
+    const DeviceArray<Index> length = count(neighbours_.near());
     most_neighbours_ = largest(length);
     const DeviceArray<Index> order = curve_order();
     std::vector<Index> tile_begin;  // first phyxel of each tile in the order, and the end
@@ -145,28 +162,22 @@ class Finder {
     const DeviceArray<char> owned = sent(share.owned, "places");
     DeviceArray<Index> length(n, "list lengths");
     DeviceArray<char> reaches(n, "list lengths");
-    const HashView hash = table_.view();
-    const double* inverse_reach =
-        model_.neighbourhood.symmetric ? nullptr : largest_support_.data();
     for_each("reach_ghosts", model_.size(),
-             [hash, length = length.data(), reaches = reaches.data(), owned = owned.data(),
-              support = cloud_.support.data(), inverse_reach] __device__(std::int64_t at) {
-               const Index i = hash.index[at];
-               const int body = hash.body_of(i);
+             [near = neighbours_.near(), inverse = neighbours_.inverse(), owned = owned.data(),
+              symmetric = model_.neighbourhood.symmetric, length = length.data(),
+              reaches = reaches.data()] __device__(std::int64_t k) {
+               const Index i = near.in_order(k);
                Index found = 0;
                char ghosts = 0;
+               const auto look_at = [&](Index j) {
+                 if (!owned[j]) ghosts = 1;
+               };
                if (owned[i]) {
-                 const Vec3d here = hash.entries[at].position;
-                 visit_neighbours(hash, body, i, here, support, nullptr, [&](Index j, Vec3d) {
+                 near.visit(i, [&](Index j) {
                    ++found;
-                   if (!owned[j]) ghosts = 1;
+                   look_at(j);
                  });
-                 if (inverse_reach) {
-                   visit_neighbours(hash, body, i, here, support, inverse_reach,
-                                    [&](Index j, Vec3d) {
-                                      if (!owned[j]) ghosts = 1;
-                                    });
-                 }
+                 if (!symmetric) inverse.visit(i, look_at);
                }
                length[i] = found;
                reaches[i] = ghosts;
@@ -195,27 +206,43 @@ class Finder {
     sort_pairs(whole_place_, place_here_);
   }
 
+  /// Sends the moments that the host has found along with the lists.
+  void send_moments() {
+    const auto places = out_.phyxel.size();
+    out_.inverse_moment = {places, "inverse moments"};
+    out_.moment_offset = {places, "moments"};
+    out_.inverse_moment.clear();
+    out_.moment_offset.clear();
+    const DeviceArray<Index> place = sent(out_.place, "places");
+    const DeviceArray<Sym3d> inverse_moment = sent(model_.inverse_moment, "inverse moments");
+    const DeviceArray<Vec3d> moment_offset = sent(model_.moment_offset, "moments");
+    for_each("place_moments", model_.size(),
+             [place = place.data(), from = inverse_moment.data(),
+              from_offset = moment_offset.data(), to = out_.inverse_moment.data(),
+              to_offset = out_.moment_offset.data()] __device__(std::int64_t i) {
+               to[place[i]] = from[i];
+               to_offset[place[i]] = from_offset[i];
+             });
+    PHYXEL_CUDA(cudaDeviceSynchronize());
+  }
+
   void find_moments() {
     const auto places = out_.phyxel.size();
     out_.inverse_moment = {places, "inverse moments"};
     out_.moment_offset = {places, "moments"};
     out_.inverse_moment.clear();
     out_.moment_offset.clear();
-    const HashView hash = table_.view();
     for_each("moments", static_cast<std::int64_t>(out_.own_tiles) * tile_size,
-             [hash, global_id = global_id_.data(), phyxel_at = out_.phyxel_at.data(),
-              position = cloud_.position.data(), support = cloud_.support.data(),
-              inverse_moment = out_.inverse_moment.data(),
+             [near = neighbours_.near(), global_id = global_id_.data(),
+              phyxel_at = out_.phyxel_at.data(), position = neighbours_.position.data(),
+              support = neighbours_.support.data(), inverse_moment = out_.inverse_moment.data(),
               moment_offset = out_.moment_offset.data()] __device__(std::int64_t place) {
                const Index i = phyxel_at[place];
                Sym3d moment;
                Vec3d offset;
                if (i >= 0) {
                  const double inverse_h_squared = 1 / (support[i] * support[i]);
-                 const auto each = [&](auto&& offer) {
-                   visit_neighbours(hash, hash.body_of(i), i, position[i], support, nullptr,
-                                    [&](Index j, Vec3d) { offer(j); });
-                 };
+                 const auto each = [&](auto&& offer) { near.visit(i, offer); };
                  in_ascending_order(global_id, each, [&](Index j) {
                    const Vec3d x = position[j] - position[i];
                    const double w = weight_shape(dot(x, x), inverse_h_squared);
@@ -231,26 +258,32 @@ class Finder {
   DeviceArray<Index> curve_order() {
     const Index n = model_.size();
     std::vector<HilbertFrame> frames;
+    std::vector<Index> begins;
     for (const Part& part : model_.parts) {
-      const Box box = box_around(cloud_.position, part.begin, part.end);
+      const Box box = box_around(neighbours_.position, part.begin, part.end);
       frames.push_back(HilbertFrame::around(box.low, box.high));
+      begins.push_back(part.begin);
     }
     const DeviceArray<HilbertFrame> frame = sent(frames, "set-up");
+    const DeviceArray<Index> begin = sent(begins, "set-up");
+    const auto parts = static_cast<Index>(begins.size());
     DeviceArray<std::uint64_t> key(static_cast<std::size_t>(n), "places along a curve");
     DeviceArray<Index> order(static_cast<std::size_t>(n), "places along a curve");
-    const HashView hash = table_.view();
-    for_each("hilbert_keys", n,
-             [hash, frame = frame.data(), key = key.data(), order = order.data(),
-              position = cloud_.position.data()] __device__(std::int64_t i) {
-               key[i] = frame[hash.body_of(static_cast<Index>(i))].key_of(position[i]);
-               order[i] = static_cast<Index>(i);
-             });
+    for_each(
+        "hilbert_keys", n,
+        [parts, begin = begin.data(), frame = frame.data(), key = key.data(), order = order.data(),
+         position = neighbours_.position.data()] __device__(std::int64_t k) {
+          const auto i = static_cast<Index>(k);
+          key[i] = frame[last_before(begin, parts, i)].key_of(position[i]);
+          order[i] = i;
+        });
     sort_pairs(key, order);
     if (model_.parts.size() > 1) {
       DeviceArray<std::uint32_t> body(static_cast<std::size_t>(n), "set-up");
       for_each("bodies", n,
-               [hash, body = body.data(), order = order.data()] __device__(std::int64_t k) {
-                 body[k] = static_cast<std::uint32_t>(hash.body_of(order[k]));
+               [parts, begin = begin.data(), body = body.data(),
+                order = order.data()] __device__(std::int64_t k) {
+                 body[k] = static_cast<std::uint32_t>(last_before(begin, parts, order[k]));
                });
       sort_pairs(body, order);
     }
@@ -260,13 +293,9 @@ class Finder {
   void sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Index>& order,
                   const DeviceArray<Index>& length);
 
-  /// Finds the lists of one pass.
-  /// @param inverse_reach null for lists of neighbours
-  DeviceTileLists make_lists(const double* inverse_reach, Index longest) const {
-    return find_lists({.hash = table_.view(),
-                       .position = cloud_.position.data(),
-                       .support = cloud_.support.data(),
-                       .inverse_reach = inverse_reach,
+  /// Makes the lists of one pass.
+  DeviceTileLists make_lists(const NeighbourSource& near, Index longest) const {
+    return find_lists({.near = near,
                        .phyxel_at = out_.phyxel_at.data(),
                        .place_of = place_of_.data(),
                        .tile_begin = tile_begin_.data(),
@@ -280,9 +309,7 @@ class Finder {
 
  private:
   const Model& model_;
-  SearchCloud cloud_;
-  DeviceHash table_;
-  DeviceArray<double> largest_support_;
+  Neighbours neighbours_;
   Index most_neighbours_ = 0;
   DeviceArray<Index> place_of_;    ///< Place of each phyxel in the whole model's tiles.
   DeviceArray<Index> tile_begin_;  ///< First place of each own tile in the whole model's tiles.
@@ -328,9 +355,7 @@ void Finder::sort_tiles(const DeviceArray<Index>& begins, const DeviceArray<Inde
 
 }  // namespace
 
-DeviceTiling make_device_tiling(const Model& model) {
-  return model.has_lists() ? send_tiling(model) : Finder(model).find();
-}
+DeviceTiling make_device_tiling(const Model& model) { return Finder(model).find(); }
 
 Tiling fetched_tiling(const DeviceTiling& on_device) {
   const auto lists = [](const DeviceTileLists& l) {

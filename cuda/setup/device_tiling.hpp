@@ -1,4 +1,4 @@
-/// A model's tiles in device memory, found there or copied from the host.
+/// A model's tiles in device memory.
 #pragma once
 
 #include <optional>
@@ -35,8 +35,8 @@ struct DeviceTiling {
   const DeviceTileLists& second() const { return inverse ? *inverse : neighbours; }
 };
 
-/// Makes the tiling on the current device. Lists that the model has are copied; otherwise they are
-/// found on the device, and are equal to the host's.
+/// Makes the tiling on the current device, equal to that of `make_tiling`. Neighbours that the
+/// model lists are sent there; otherwise the device searches for them.
 /// @throws DeviceError; InputError if a tile reaches more points than 16-bit slots can address
 DeviceTiling make_device_tiling(const Model& model);
 

@@ -86,7 +86,8 @@ struct Tiling {
   const TileLists& second() const { return inverse.rows.empty() ? neighbours : inverse; }
 };
 
-/// Makes the tiles and lists of a model. The own tiles of a share are tiles of the whole model,
+/// Makes the tiles and lists of a model on the host: what a device makes (`make_device_tiling`) is
+/// compared with them. The own tiles of a share are tiles of the whole model,
 /// with the same entries in the same order, so that sums round alike; a partition must not cut them
 /// (see `curve_groups`). Ghosts follow, in tiles of their own.
 /// @throws InputError if a tile reaches more points than 16-bit slots can address
