@@ -54,7 +54,7 @@ BuiltShare built(const ShareSetup& setup, const Pieces& piece) {
 ShareOptions options_for(const Scene& scene, const ShareOptions& options) {
   ShareOptions own = options;
   for (const BodyRequest& body : scene.bodies) {
-    if (needs_lists_on_host(body)) own.surveyor = nullptr;
+    if (needs_lists_on_host(body) || (!own.close && may_close(body))) own.surveyor = nullptr;
   }
   return own;
 }

@@ -3,8 +3,9 @@
 #
 #   scripts/measure_gpu.sh [folder [part...]]   after cmake --preset cuda && cmake --build --preset cuda
 #
-# Parts: sizes, terms, small and setup, which are the default; for docs/scaling.md on hosts with several GPUs, ranks
-# (2, 4, 8 GPUs) and large (LARGE phyxels on all GPUs; a billion by default, with 4 or more).
+# Parts: sizes, terms, small and setup, which are the default; meshes (runs of MESH, a file, by MESH_PHYXELS phyxels with
+# MESH_CLOSURE); for docs/scaling.md on hosts with several GPUs, ranks (2, 4, 8 GPUs) and large (LARGE phyxels on all GPUs;
+# a billion by default, with 4 or more).
 # PHYXEL is the program (default: build/cuda/bin/phyxel), PHYXEL_STUDIES phyxel_studies (default: beside it).
 # bench/make_pages.py writes the pages. The set-up of the largest body takes about 100 GB of the GPU's memory, and
 # nearly as much of the host's.
@@ -65,6 +66,56 @@ fi
 if has setup; then
   measured gpu_setup "$studies" setup --phyxels 103823,1000000,4096000,16003008 --precision float --repeat 3
   step gpu_capacity step --phyxels "${CAPACITY:-300763000}" --terms green --precision float --repeat 3
+fi
+if has meshes; then
+  mesh=$(realpath "${MESH:?is not set: the file of a mesh}")
+  closure=${MESH_CLOSURE:-\"auto\"}
+  folder=$(mktemp -d)
+  for phyxels in ${MESH_PHYXELS:-1000000 10000000 100000000}; do
+    scene=$folder/scene.toml
+    cat >"$scene" <<SCENE
+title = "$(basename "${mesh%.*}"), free and turning"
+[time]
+end = 2e-5
+step = 1e-7
+[solver]
+precision = "float"
+device = "cuda"
+[output]
+frames_per_second = 0
+surface = false
+checkpoint_every = 0
+[[body]]
+mesh = "$mesh"
+phyxels = $phyxels
+closure = $closure
+spin = [0, 0, 1]
+[body.material]
+young = 1e6
+poisson = 0.3
+density = 1000
+SCENE
+    name=gpu_mesh_$((phyxels / 1000000))m
+    echo "== $name"
+    "$program" run "$scene" --json --out "$folder/run" --force --profile "$folder/profile.json" >"$folder/run.json"
+    # The summary of the run, what it was asked for, and the seconds of the stages of its set-up.
+    python3 - "$folder" "$closure" >"$out/$name.json" <<'SUMMARY'
+import collections, json, pathlib, sys
+folder = pathlib.Path(sys.argv[1])
+run = json.loads((folder / "run.json").read_text())
+run = {key: value for key, value in run.items() if key not in ("scene", "directory", "checkpoint")}
+stages, peak = collections.Counter(), 0
+for event in json.loads((folder / "profile.json").read_text())["traceEvents"]:
+    if event["ph"] == "X":
+        stages[event["name"]] += event["dur"] * 1e-6
+    elif event["ph"] == "C":
+        peak = max(peak, event["args"]["GB"])
+run |= {"closure": json.loads(sys.argv[2]), "stages": dict(stages), "host_memory_gb": peak}
+print(json.dumps(run, indent=1))
+SUMMARY
+    rm -r "$folder/run"
+  done
+  rm -r "$folder"
 fi
 
 gpus=$(nvidia-smi -L | wc -l)

@@ -20,7 +20,7 @@ def add(page, results):
                       f"{run['steps_per_second']:.4g}", f"{run['phyxel_steps_per_second'] * 1e-9:.3g}",
                       f"{run['bytes'] / run['phyxels']:.0f}", f"{run['energy_drift']:.1e}"])
     page.paragraph("Summaries (`run.json`) of runs of `cheburashka.obj`, free and turning, in float, on one GPU and 16 cores. "
-                   "*Model*: sampling, neighbours and, where gradients are closed, closing; on the CPU but for neighbours "
-                   "without closing. *Energy drift*: relative, over the 200 steps of each run.")
+                   "*Model*: sampling on the CPU, neighbours and, where gradients are closed, closing on the GPU. "
+                   "*Energy drift*: relative, over the 200 steps of each run.")
     page.add(markdown_table(["phyxels", "closure", "GPU", "commit", "model [s]", "backend and step limit [s]", "steps/s",
                              "10⁹ phyxel-steps/s", "bytes per phyxel on the GPU", "energy drift"], cells))

@@ -10,7 +10,8 @@
 #include "phyxel/error.hpp"
 #include "rank_sums.hpp"
 #include "setup/closing.hpp"
-#include "setup/primitives.cuh"
+#include "setup/device_neighbours.cuh"
+#include "sort_unique.hpp"
 
 namespace phyxel::cuda {
 namespace {
@@ -88,6 +89,11 @@ __global__ void sum_stretches(const Stretch* stretches, const Standing* bodies,
   }
 }
 
+/// `moments_of` phyxel i, whose neighbours are listed in the order of global ids.
+__device__ Moments moments_in_order(const NeighbourSource& near, Index i) {
+  return moments_by(near, i, [&](auto&& visit) { near.visit(i, visit); });
+}
+
 /// The loops and vectors of the search on a device (see `closing::HostLoops`).
 class DeviceLoops {
  public:
@@ -96,23 +102,23 @@ class DeviceLoops {
   template <class T>
   using Input = DeviceArray<T>;
 
-  explicit DeviceLoops(const Model& model)
-      : model_(model), what_("closed gradients of " + std::to_string(model.size()) + " phyxels") {
-    if (!model.share) return;
-    std::vector<Index> send;
-    for (const HaloPlan::Peer& peer : model.share->halo->peers) {
-      send.insert(send.end(), peer.send.begin(), peer.send.end());
+  DeviceLoops(const Model& model, const Bodies& bodies)
+      : model_(model),
+        what_("closed gradients of " + std::to_string(model.size()) + " phyxels"),
+        near_(neighbours_of(model)) {
+    if (model.share) find_halo();
+    if (model.has_lists()) {
+      inverse_moment_ = sent(model.inverse_moment, what_);
+      moment_offset_ = sent(model.moment_offset, what_);
+    } else {
+      find_lists(bodies);
     }
-    std::ranges::sort(send);
-    send.erase(std::unique(send.begin(), send.end()), send.end());
-    sent_ = Halves(std::move(send));
-    std::vector<Index> ghosts;
-    for (Index i = 0; i < model.size(); ++i) {
-      if (!model.owns(i)) ghosts.push_back(i);
-    }
-    received_ = Halves(std::move(ghosts));
   }
 
+  closing::Neighbourhoods neighbourhoods() const {
+    return {near_.position.data(),      near_.support.data(),   near_.lists.offsets.data(),
+            near_.lists.indices.data(), inverse_moment_.data(), moment_offset_.data()};
+  }
   template <class T>
   Input<T> input(const std::vector<T>& values) const {
     return sent(values, what_);
@@ -180,6 +186,19 @@ class DeviceLoops {
   }
 
  private:
+  void find_halo() {
+    std::vector<Index> send, ghosts;
+    for (const HaloPlan::Peer& peer : model_.share->halo->peers) {
+      send.insert(send.end(), peer.send.begin(), peer.send.end());
+    }
+    sort_unique(send);
+    for (Index i = 0; i < model_.size(); ++i) {
+      if (!model_.owns(i)) ghosts.push_back(i);
+    }
+    sent_ = Halves(std::move(send));
+    received_ = Halves(std::move(ghosts));
+  }
+
   /// Ascending phyxels, on both sides.
   struct Halves {
     Halves() = default;
@@ -270,6 +289,30 @@ class DeviceLoops {
   }
 
  public:
+  /// Makes the lists of own phyxels and their moments; ghosts get those of their owners.
+  void find_lists(const Bodies& bodies) {
+    DeviceArray<Index> global_id;
+    DeviceArray<char> owned;
+    if (model_.share) {
+      global_id = sent(model_.share->global_id, what_);
+      owned = sent(model_.share->owned, what_);
+    }
+    near_.lists = rows_of(near_.near(), model_.size(), owned.data(), global_id.data(), what_);
+    near_.table.reset();
+    inverse_moment_ = make<Sym3d>();
+    moment_offset_ = make<Vec3d>();
+    cuda::for_each("moments", model_.size(),
+                   [near = near_.near(), inverse_moment = inverse_moment_.data(),
+                    moment_offset = moment_offset_.data()] __device__(std::int64_t k) {
+                     const auto i = static_cast<Index>(k);
+                     const Moments found = moments_in_order(near, i);
+                     inverse_moment[i] = pseudo_inverse(found.moment).matrix;
+                     moment_offset[i] = found.offset;
+                   });
+    refresh_ghosts(bodies, inverse_moment_);
+    refresh_ghosts(bodies, moment_offset_);
+  }
+
   template <class T>
   static void gather(const T* from, const Index* which, std::int64_t count, T* to) {
     cuda::for_each("gather", count, [=] __device__(std::int64_t k) { to[k] = from[which[k]]; });
@@ -282,6 +325,9 @@ class DeviceLoops {
  private:
   const Model& model_;
   std::string what_;
+  Neighbours near_;
+  DeviceArray<Sym3d> inverse_moment_;
+  DeviceArray<Vec3d> moment_offset_;
   Halves sent_, received_;
   mutable DeviceArray<Standing> standing_;
   mutable Stretches own_{false}, all_{true};
@@ -289,12 +335,18 @@ class DeviceLoops {
 
 /// True if the device has room for a search, on all ranks, which may share a device.
 bool has_room(const Model& model) {
-  const std::size_t per_phyxel =
-      sizeof(Vec3d) * 5 + sizeof(Sym3d) + sizeof(double) * (4 + closing::Gathers::term_size) +
-      sizeof(Offset) + 3 + 3 * sizeof(closing::Unknown) + sizeof(Vec3d) + 2 * sizeof(double);
-  const std::size_t bytes = static_cast<std::size_t>(model.size()) * per_phyxel +
-                            model.neighbourhood.neighbours.indices.size() * sizeof(Index) +
-                            (std::size_t{64} << 20);
+  const std::size_t per_phyxel = sizeof(Vec3d) * 5 + sizeof(Sym3d) +
+                                 sizeof(double) * (4 + closing::Gathers::term_size) +
+                                 sizeof(Offset) + 3 + 3 * sizeof(closing::Unknown) + sizeof(Vec3d);
+  const auto phyxels = static_cast<std::size_t>(model.size());
+  // A share with a search of its own has about as many pairs as the whole, phyxel by phyxel.
+  const std::size_t pairs =
+      model.has_lists()
+          ? model.neighbourhood.neighbours.indices.size()
+          : static_cast<std::size_t>(1.1 * static_cast<double>(model.pairs()) *
+                                     static_cast<double>(phyxels) /
+                                     static_cast<double>(std::max(1, model.global_count())));
+  const std::size_t bytes = phyxels * per_phyxel + pairs * sizeof(Index) + (std::size_t{64} << 20);
   DeviceArray<char> room;
   bool fits = true;
   try {
@@ -312,13 +364,18 @@ bool has_room(const Model& model) {
 namespace phyxel {
 
 ClosingSearch cuda_closing_search(int device) {
-  return
-      [device](const Model& model, const closing::Bodies& bodies, const std::vector<Vec3d>& areas) {
-        use_cuda_device(device);
-        if (!cuda::has_room(model)) return search_on_host(model, bodies, areas);
-        const cuda::DeviceLoops loops(model);
-        return closing::Search<cuda::DeviceLoops>(loops, model, bodies, areas).run();
-      };
+  return [device](const Model& model, const closing::Bodies& bodies,
+                  const std::vector<Vec3d>& areas) {
+    use_cuda_device(device);
+    if (!cuda::has_room(model)) {
+      if (model.has_lists()) return search_on_host(model, bodies, areas);
+      throw DeviceError("the memory of GPU " + std::to_string(device) +
+                        " has no room to close the gradients of " + std::to_string(model.size()) +
+                        " phyxels; allowed: fewer phyxels, more GPUs, the CPU, or closure = 0");
+    }
+    const cuda::DeviceLoops loops(model, bodies);
+    return closing::Search<cuda::DeviceLoops>(loops, model, bodies, areas).run();
+  };
 }
 
 }  // namespace phyxel

@@ -3,54 +3,10 @@
 
 #include <string>
 
-#include "setup/device_hash.cuh"
+#include "setup/device_neighbours.cuh"
 #include "setup/device_tiling.hpp"
 
 namespace phyxel::cuda {
-
-/// Calls visit(j, x_j - x_i) for each neighbour j of the phyxel; or, if `inverse_reach` is the
-/// largest support of each body, for each phyxel that has it as a neighbour.
-template <class Visit>
-__device__ void visit_neighbours(const HashView& hash, int body, Index phyxel, Vec3d here,
-                                 const double* support, const double* inverse_reach,
-                                 Visit&& visit) {
-  const double h = support[phyxel];
-  hash.visit_near(body, here, inverse_reach ? inverse_reach[body] : h,
-                  [&](std::uint32_t k, Vec3d p) {
-                    const Vec3d x = p - here;
-                    const Index j = hash.index[k];
-                    const double reach = inverse_reach ? support[j] : h;
-                    if (j != phyxel && dot(x, x) < reach * reach && hash.is_of(body, k)) {
-                      visit(j, x);
-                    }
-                  });
-}
-
-/// Neighbours of phyxels, or phyxels that have them as neighbours: searched for by a hash, or read
-/// from lists that the host made.
-struct NeighbourSource {
-  HashView hash;
-  const Vec3d* position;        ///< Rest positions [m], shape [n].
-  const double* support;        ///< [m], shape [n].
-  const double* inverse_reach;  ///< Largest support of each body [m]; null: lists of neighbours.
-  const Offset* offsets;        ///< Of the rows of lists, shape [n + 1]; null: no lists.
-  const Index* rows;
-
-  /// Calls visit(j) for each neighbour j of phyxel i.
-  template <class Visit>
-  __device__ void visit(Index i, Visit&& visit) const {
-    if (offsets) {
-      for (Offset e = offsets[i]; e < offsets[i + 1]; ++e) visit(rows[e]);
-    } else {
-      visit_neighbours(hash, hash.body_of(i), i, position[i], support, inverse_reach,
-                       [&](Index j, Vec3d) { visit(j); });
-    }
-  }
-  /// The k-th phyxel in an order in which those that follow one another lie together.
-  __device__ Index in_order(std::int64_t k) const {
-    return offsets ? static_cast<Index>(k) : hash.index[k];
-  }
-};
 
 /// Data on the device from which the lists of a model are found. It must outlive the search.
 struct ListSource {

@@ -2,79 +2,11 @@
 #include <algorithm>
 
 #include "model/space_filling_curve.hpp"
-#include "phyxel/physics/moment.hpp"
-#include "phyxel/physics/weight.hpp"
 #include "setup/device_lists.cuh"
+#include "setup/device_neighbours.cuh"
 
 namespace phyxel::cuda {
 namespace {
-
-/// Rows of lists that the host made.
-struct SentRows {
-  DeviceArray<Offset> offsets;
-  DeviceArray<Index> indices;
-};
-
-SentRows send(const Csr& lists, const Model& model) {
-  const std::string what = "neighbour lists of " + std::to_string(model.size()) + " phyxels";
-  return {sent(lists.offsets, what), sent(lists.indices, what)};
-}
-
-/// Neighbours of a model's phyxels: by a search, or from lists that the host made.
-struct Neighbours {
-  DeviceArray<Vec3d> position;  ///< Rest positions [m], shape [n].
-  DeviceArray<double> support;  ///< [m], shape [n].
-  std::optional<DeviceHash> table;
-  DeviceArray<double> largest_support;  ///< Largest support of each body [m].
-  SentRows lists, inverse_lists;
-
-  NeighbourSource near() const {
-    return {table ? table->view() : HashView{},
-            position.data(),
-            support.data(),
-            nullptr,
-            lists.offsets.data(),
-            lists.indices.data()};
-  }
-  NeighbourSource inverse() const {
-    return {table ? table->view() : HashView{},
-            position.data(),
-            support.data(),
-            largest_support.data(),
-            inverse_lists.offsets.data(),
-            inverse_lists.indices.data()};
-  }
-};
-
-Neighbours neighbours_of(const Model& model) {
-  Neighbours all;
-  all.position = sent(model.position, "rest positions");
-  all.support = sent(model.neighbourhood.support, "supports");
-  if (model.has_lists()) {
-    all.lists = send(model.neighbourhood.neighbours, model);
-    if (!model.neighbourhood.symmetric) {
-      all.inverse_lists = send(model.neighbourhood.inverse(), model);
-    }
-    return all;
-  }
-  std::vector<DeviceHash::Body> bodies;
-  std::vector<double> largest_support;
-  for (const Part& part : model.parts) {
-    const auto begin = model.neighbourhood.support.begin() + part.begin,
-               end = model.neighbourhood.support.begin() + part.end;
-    double sum = 0, largest = 0;
-    for (auto h = begin; h != end; ++h) {
-      sum += *h;
-      largest = std::max(largest, *h);
-    }
-    const double mean = sum / std::max(1, part.end - part.begin);
-    bodies.push_back({part.begin, part.end, model.neighbourhood.symmetric ? largest : mean});
-    largest_support.push_back(largest);
-  }
-  all.table.emplace(all.position, bodies);
-  all.largest_support = sent(largest_support, "supports");
-  return all;
-}
 
 /// The last of some ascending numbers, the first of which is 0, that is not above `i`.
 __device__ Index last_before(const Index* begins, Index count, Index i) {
@@ -234,24 +166,12 @@ class Finder {
     out_.moment_offset.clear();
     for_each("moments", static_cast<std::int64_t>(out_.own_tiles) * tile_size,
              [near = neighbours_.near(), global_id = global_id_.data(),
-              phyxel_at = out_.phyxel_at.data(), position = neighbours_.position.data(),
-              support = neighbours_.support.data(), inverse_moment = out_.inverse_moment.data(),
+              phyxel_at = out_.phyxel_at.data(), inverse_moment = out_.inverse_moment.data(),
               moment_offset = out_.moment_offset.data()] __device__(std::int64_t place) {
                const Index i = phyxel_at[place];
-               Sym3d moment;
-               Vec3d offset;
-               if (i >= 0) {
-                 const double inverse_h_squared = 1 / (support[i] * support[i]);
-                 const auto each = [&](auto&& offer) { near.visit(i, offer); };
-                 in_ascending_order(global_id, each, [&](Index j) {
-                   const Vec3d x = position[j] - position[i];
-                   const double w = weight_shape(dot(x, x), inverse_h_squared);
-                   moment += moment_term(x, w);
-                   offset += w * x;
-                 });
-               }
-               inverse_moment[place] = pseudo_inverse(moment).matrix;
-               moment_offset[place] = offset;
+               const Moments found = i >= 0 ? moments_of(near, i, global_id) : Moments{};
+               inverse_moment[place] = pseudo_inverse(found.moment).matrix;
+               moment_offset[place] = found.offset;
              });
   }
 

@@ -17,8 +17,8 @@ Surveyor cuda_surveyor(int device = 0);
 /// DeviceError
 std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device);
 
-/// True if the search on a GPU supports all bodies of a scene: no `max_neighbours`, no `closure`,
-/// no inclusions, and `nearest` up to 256.
+/// True if the search on a GPU supports all bodies of a scene: no `max_neighbours`, no inclusions,
+/// no supports that end inside a body, no spacings of their own, and `nearest` up to 256.
 bool can_survey_on_cuda(const Scene& scene);
 
 }  // namespace phyxel

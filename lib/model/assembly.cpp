@@ -57,7 +57,7 @@ bool needs_lists_on_host(const BodyRequest& request) {
   const bool may_have_spacing = request.source.grading || !request.source.cloud.empty() ||
                                 (!request.source.file.empty() && has_spacing(request.source.file));
   const bool pairwise = rule.resolved(may_have_spacing).pairwise();
-  return may_close(request) || !request.inclusions.empty() || may_be_cut || pairwise;
+  return !request.inclusions.empty() || may_be_cut || pairwise;
 }
 
 bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud) {

@@ -17,7 +17,7 @@
 
 namespace phyxel {
 
-/// True if the neighbour lists of a body cannot be left to a device.
+/// True if the neighbour lists of a body cannot be left to a device, which can close gradients.
 bool needs_lists_on_host(const BodyRequest& request);
 /// True likewise, for a body whose cloud the caller has made.
 bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud);

@@ -16,6 +16,17 @@ struct Row {
   PHYXEL_HD const Index* end() const { return last; }
 };
 
+/// The neighbours of phyxels, and what follows from where they lie. Arrays have a value for each
+/// phyxel of the model, but for `neighbours`.
+struct Neighbourhoods {
+  const Vec3d* position;        ///< [m]
+  const double* support;        ///< [m]
+  const Offset* offsets;        ///< Of the rows of neighbours.
+  const Index* neighbours;      ///< Ascending by global ids.
+  const Sym3d* inverse_moment;  ///< A⁻¹
+  const Vec3d* moment_offset;   ///< b
+};
+
 struct Differences {
   Vec3d total;   ///< Σ_k w_jk (value_k - value_j)
   Mat3d moment;  ///< Σ_k w_jk (value_k - value_j) x_jkᵀ

@@ -29,6 +29,12 @@ class HostLoops {
 
   explicit HostLoops(const Model& model) : model_(model) {}
 
+  Neighbourhoods neighbourhoods() const {
+    const Neighbourhood& hood = model_.with_lists().neighbourhood;
+    return {model_.position.data(),         hood.support.data(),
+            hood.neighbours.offsets.data(), hood.neighbours.indices.data(),
+            model_.inverse_moment.data(),   model_.moment_offset.data()};
+  }
   template <class T>
   Input<T> input(const std::vector<T>& values) const {
     return values;

@@ -156,6 +156,8 @@ class Search {
   }
 
   Closing result() {
+    gradient_ = {};  // makes room
+    direction_ = {};
     const SumTerms terms = sums_.terms();
     Vector<double> volume = loops_.template make<double>(), area = loops_.template make<double>();
     Vector<Vec3d> vector = loops_.template make<Vec3d>();

@@ -54,19 +54,13 @@ enum class Role : char {
 
 /// What the sums of phyxels are made of, and their terms, phyxel by phyxel. Arrays have a value for
 /// each phyxel of the model.
-struct SumTerms {
-  const Vec3d* position;        ///< [m]
-  const double* support;        ///< [m]
-  const Offset* offsets;        ///< Of the rows of neighbours.
-  const Index* neighbours;      ///< `Neighbourhood::neighbours`.
-  const Sym3d* inverse_moment;  ///< A⁻¹
-  const Vec3d* moment_offset;   ///< b
-  const double* volume;         ///< [m³]
-  const char* supported;        ///< `supported_phyxels`.
-  Vec3d* areas;                 ///< S / (s² ρ²)
-  Vec3d* tilt;                  ///< a
-  double* weight;               ///< Σ_k w_jk (1 - a_j x_jk)
-  double* relative_size;        ///< ρ
+struct SumTerms : Neighbourhoods {
+  const double* volume;   ///< [m³]
+  const char* supported;  ///< `supported_phyxels`.
+  Vec3d* areas;           ///< S / (s² ρ²)
+  Vec3d* tilt;            ///< a
+  double* weight;         ///< Σ_k w_jk (1 - a_j x_jk)
+  double* relative_size;  ///< ρ
   Role* role;
   Gathers gathers;  ///< What phyxels give to the sums of their neighbours.
 
@@ -165,12 +159,6 @@ class Sums {
   Sums(const Loops& loops, const Model& model, const Bodies& bodies,
        const std::vector<Vec3d>& areas)
       : loops_(loops),
-        position_(loops.input(model.position)),
-        support_(loops.input(model.neighbourhood.support)),
-        offsets_(loops.input(model.neighbourhood.neighbours.offsets)),
-        neighbours_(loops.input(model.neighbourhood.neighbours.indices)),
-        inverse_moment_(loops.input(model.inverse_moment)),
-        moment_offset_(loops.input(model.moment_offset)),
         volume_(loops.input(model.volume)),
         supported_(loops.vector(supported_phyxels(model))),
         areas_(loops.vector(areas)),
@@ -179,11 +167,9 @@ class Sums {
         relative_size_(loops.template make<double>()),
         role_(loops.template make<Role>()),
         records_(loops.template make<double>(Gathers::term_size, Gathers::line)),
-        terms_{position_.data(),   support_.data(),         offsets_.data(),
-               neighbours_.data(), inverse_moment_.data(),  moment_offset_.data(),
-               volume_.data(),     supported_.data(),       areas_.data(),
-               tilt_.data(),       weight_.data(),          relative_size_.data(),
-               role_.data(),       Gathers(records_.data())} {
+        terms_{loops.neighbourhoods(), volume_.data(), supported_.data(),
+               areas_.data(),          tilt_.data(),   weight_.data(),
+               relative_size_.data(),  role_.data(),   Gathers(records_.data())} {
     set_up(bodies);
   }
   Sums(const Sums&) = delete;
@@ -341,12 +327,6 @@ class Sums {
   static constexpr double regular = 0.1;
 
   const Loops& loops_;
-  typename Loops::template Input<Vec3d> position_;
-  typename Loops::template Input<double> support_;
-  typename Loops::template Input<Offset> offsets_;
-  typename Loops::template Input<Index> neighbours_;
-  typename Loops::template Input<Sym3d> inverse_moment_;
-  typename Loops::template Input<Vec3d> moment_offset_;
   typename Loops::template Input<double> volume_;
   Vector<char> supported_;
   Vector<Vec3d> areas_, tilt_;

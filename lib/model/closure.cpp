@@ -182,7 +182,6 @@ void close_gradients(Model& model, const ClosingSearch& search) {
   for (auto part = model.parts.begin(); part != model.parts.end();) {
     const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
     if (part->closure > 0 && part->begin < part->end) {
-      model.with_lists();
       const auto begin = static_cast<std::size_t>(part->begin),
                  count = static_cast<std::size_t>((next - 1)->end) - begin;
       const std::span<const Vec3d> position = std::span(model.position).subspan(begin, count);

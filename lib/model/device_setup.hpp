@@ -11,6 +11,7 @@ namespace phyxel {
 /// What a device does when a model is built; what is empty is the host's.
 struct DeviceSetup {
   Surveyor survey;  ///< Finds neighbourhoods, and leaves their lists on the device.
+  /// Closes gradients; if the device has searched for neighbours, from lists that it makes anew.
   ClosingSearch close;
 };
 

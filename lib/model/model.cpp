@@ -65,9 +65,11 @@ Survey survey_with_lists(const Cloud& cloud, const BodyRequest& request, bool ke
 }
 
 /// A surveyor's device finds neighbours within one support of unsorted phyxels, and no more.
+/// @param closes true if the device closes gradients, too
 /// @throws InputError if a body needs lists on the host
-void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kernel_volumes) {
-  if (may_close(request, cloud.surface, cloud.lattice, kernel_volumes)) {
+void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kernel_volumes,
+                      bool closes) {
+  if (!closes && may_close(request, cloud.surface, cloud.lattice, kernel_volumes)) {
     throw InputError(fmt::format(
         "{}: body \"{}\" has closed gradients (closure = {}), which are found from lists of "
         "neighbours on the host: allowed is a model built without a surveyor, or closure = 0",
@@ -251,8 +253,9 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
                 loaded_pieces(request, given.surface));
 }
 
-/// @param surveyor null: lists and moments are made here.
-void add_body(Model& model, BodyRequest request, const Cloud& given, const Surveyor* surveyor) {
+/// @param device without a survey: lists and moments are made here.
+void add_body(Model& model, BodyRequest request, const Cloud& given, const DeviceSetup& device) {
+  const Surveyor* const surveyor = device.survey ? &device.survey : nullptr;
   check_terms(request);
   check_cloud(request, given);
   request.neighbourhood = request.neighbourhood.resolved(!given.spacing.empty());
@@ -268,7 +271,9 @@ void add_body(Model& model, BodyRequest request, const Cloud& given, const Surve
       surveyor ? 300 : 950);
   const bool kernel_volumes =
       wants_kernel_volumes(request, !cloud.volume.empty(), cloud.position.size());
-  if (surveyor) check_surveyable(request, cloud, kernel_volumes);
+  if (surveyor) {
+    check_surveyable(request, cloud, kernel_volumes, static_cast<bool>(device.close));
+  }
   const Index shift = model.size();
   const auto surfel_shift = static_cast<Index>(model.surfels.position.size());
   const Survey survey = add_neighbours(model, request, cloud, surveyor, kernel_volumes);
@@ -400,17 +405,13 @@ void finish(Model& model, const Scene& scene, const ClosingSearch& close) {
   add_warnings(model, model.surfels.position.size());
 }
 
-const Surveyor* surveyor_of(const DeviceSetup& device) {
-  return device.survey ? &device.survey : nullptr;
-}
-
 Model model_from_sources(const Scene& scene, const DeviceSetup& device) {
   validate(scene);
   Model model;
   model.gravity = scene.gravity;
   for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
     append(model.warnings, cloud.warnings);
-    naming(request, [&] { add_body(model, request, cloud, surveyor_of(device)); });
+    naming(request, [&] { add_body(model, request, cloud, device); });
   });
   finish(model, scene, device.close);
   return model;
@@ -427,8 +428,7 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
   model.gravity = scene.gravity;
   for (std::size_t b = 0; b < clouds.size(); ++b) {
     append(model.warnings, clouds[b].warnings);
-    naming(scene.bodies[b],
-           [&] { add_body(model, scene.bodies[b], clouds[b], surveyor_of(device)); });
+    naming(scene.bodies[b], [&] { add_body(model, scene.bodies[b], clouds[b], device); });
   }
   finish(model, scene, device.close);
   return model;

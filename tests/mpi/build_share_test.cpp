@@ -20,6 +20,7 @@
 #include "phyxel/solver.hpp"
 #include "ranks.hpp"
 #include "setup/closing.hpp"
+#include "setup/survey.hpp"
 #include "setup/tiling.hpp"
 
 namespace phyxel {
@@ -33,7 +34,8 @@ const testing::HostSurveyor surveyor;
 struct Cut {
   const char* name;
   ShareOptions options;
-  bool gpu = false;  ///< Gradients are closed by a GPU.
+  bool gpu = false;       ///< Gradients are closed by a GPU.
+  bool searches = false;  ///< It also searches for neighbours.
 };
 void PrintTo(const Cut& c, std::ostream* out) { *out << c.name; }
 
@@ -50,7 +52,11 @@ const BuiltShare& built_of(const BuildCase& c, const Cut& cut) {
   const auto found = made.find(name);
   if (found != made.end()) return found->second;
   ShareOptions options = cut.options;
-  if (cut.gpu && !cuda_devices().empty()) options.close = cuda_closing_search();
+  if (cut.gpu && !cuda_devices().empty()) {
+    static const std::unique_ptr<ShareSurveyor> on_gpu = cuda_share_surveyor(0);
+    if (cut.searches) options.surveyor = on_gpu.get();
+    options.close = cuda_closing_search();
+  }
   return made[name] = c.clouds.empty() ? build_share(world(), c.scene, options)
                                        : build_share(world(), c.scene, c.clouds, options);
 }
@@ -60,16 +66,17 @@ class BuiltShares : public ::testing::TestWithParam<std::tuple<BuildCase, Cut>> 
   void SetUp() override {
     if (cut_.gpu && cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
     for (const BodyRequest& body : case_.scene.bodies) {
-      if (cut_.options.surveyor && body.neighbourhood.max_neighbours) {
+      if (searches_ && body.neighbourhood.max_neighbours) {
         GTEST_SKIP() << "devices do not choose the nearest";
       }
-      needs_host_ |= may_close(body) || !body.inclusions.empty();
+      needs_host_ |= (may_close(body) && !cut_.gpu) || !body.inclusions.empty();
     }
     for (const Walls& walls : whole_.walls) has_walls_ |= !walls.regions.empty();
     needs_host_ |= has_walls_;
   }
   const BuildCase& case_ = std::get<0>(GetParam());
   const Cut& cut_ = std::get<1>(GetParam());
+  const bool searches_ = cut_.options.surveyor || cut_.searches;
   const Model& whole_ = whole_of(case_);
   const Model& here_ = built_of(case_, cut_).model;
   /// Whether lists are made on the host, whoever is to search.
@@ -111,7 +118,7 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
   const Neighbourhood &hood = here_.neighbourhood, &lists = expected.neighbourhood;
   EXPECT_EQ(hood.symmetric, lists.symmetric);
   EXPECT_EQ(hood.support, lists.support);
-  const bool has_lists = !cut_.options.surveyor || needs_host_;
+  const bool has_lists = !searches_ || needs_host_;
   if (has_lists) {
     EXPECT_EQ(hood.neighbours.offsets, lists.neighbours.offsets);
     EXPECT_EQ(hood.neighbours.indices, lists.neighbours.indices);
@@ -246,7 +253,8 @@ INSTANTIATE_TEST_SUITE_P(
                           Cut{"Groups", {{Partitioner::bisection}, cuda::tile_size, nullptr, 4}},
                           Cut{"Tiles", {{Partitioner::bisection}, cuda::tile_size}},
                           Cut{"Device", {{Partitioner::curve}, cuda::tile_size, &surveyor}},
-                          Cut{"Gpu", {{Partitioner::curve}, cuda::tile_size}, true})),
+                          Cut{"Gpu", {{Partitioner::curve}, cuda::tile_size}, true},
+                          Cut{"GpuSearch", {{Partitioner::curve}, cuda::tile_size}, true, true})),
     [](const auto& test) {
       return std::string(std::get<0>(test.param).name) + std::get<1>(test.param).name;
     });
