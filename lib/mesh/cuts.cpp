@@ -76,6 +76,25 @@ class TriangleCutter {
 constexpr double thin = 0.8;
 /// Distance from the end of a body within which a box ends with it, in spacings.
 constexpr double flush = 0.35;
+/// Distance from a cut within which other phyxels may be too near to it, in spacings.
+constexpr double margin = 0.4;
+/// Radius of the balls in which the body's thickness beside a cut is measured, in spacings: in a
+/// layer of even thickness, phyxels need 0.4 spacings.
+constexpr double thin_radius = 1.2;
+
+/// Points spread evenly over a unit ball: spirals on three spheres.
+std::vector<Vec3d> points_of_ball() {
+  std::vector<Vec3d> points;
+  for (const auto& [radius, count] :
+       {std::pair{0.45, 6}, std::pair{0.72, 15}, std::pair{0.93, 27}}) {
+    for (int k = 0; k < count; ++k) {
+      const double z = (2 * k + 1.0) / count - 1, across = std::sqrt(1 - z * z);
+      const double angle = 2 * std::numbers::pi * (1 - 1 / std::numbers::phi) * k;
+      points.push_back(radius * Vec3d{across * std::cos(angle), across * std::sin(angle), z});
+    }
+  }
+  return points;
+}
 
 double& component_of(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -167,16 +186,12 @@ PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const 
   return planned;
 }
 
-std::vector<Crease> cutting_curves(const Surface& surface, std::span<const SpaceRegion> regions,
-                                   double step) {
+std::vector<Crease> cutting_curves(const Surface& surface, const SpaceRegion& region, double step) {
   std::vector<Crease> pieces;
-  for (const SpaceRegion& region : regions) {
-    TriangleCutter cutter(region, step, pieces);
-    for (const Triangle& t : surface.triangle) {
-      cutter.cut({measured(region, surface.position[t[0]]),
-                  measured(region, surface.position[t[1]]),
-                  measured(region, surface.position[t[2]])});
-    }
+  TriangleCutter cutter(region, step, pieces);
+  for (const Triangle& t : surface.triangle) {
+    cutter.cut({measured(region, surface.position[t[0]]), measured(region, surface.position[t[1]]),
+                measured(region, surface.position[t[2]])});
   }
   return pieces;
 }
@@ -227,6 +242,43 @@ std::vector<Vec3d> points_on_cut(const InsideSampler& sampler, const SpaceRegion
     points.insert(points.end(), of_task.begin(), of_task.end());
   }
   return points;
+}
+
+CutMargin::CutMargin(const InsideSampler& sampler, std::span<const CutFace> faces,
+                     const SpacingField& spacing)
+    : sampler_(sampler), faces_(faces), spacing_(spacing) {
+  for (const CutFace& face : faces) {
+    std::vector<Vec3d> points = face.points;
+    for (const auto& [from, to] : face.border) {
+      points.insert(points.end(), {from, 0.5 * (from + to), to});
+    }
+    points_.emplace_back(points, margin * spacing.coarsest());
+  }
+}
+
+bool CutMargin::contains(Vec3d place) const {
+  for (std::size_t k = 0; k < faces_.size(); ++k) {
+    const SpaceRegion& region = faces_[k].region;
+    const double spacing = spacing_.at(place), reach = margin * spacing;
+    if (std::abs(region.distance(place)) >= reach) continue;
+    // The boundary goes on outside the body, where it cuts nothing.
+    const Vec3d foot = region.nearest_on_boundary(place);
+    if (points_[k].nearest(foot, reach).distance2 >= reach * reach) continue;
+    if (is_thin(place, region, spacing)) return true;
+  }
+  return false;
+}
+
+/// True if most of the body near a place is on the other side of a region's boundary.
+bool CutMargin::is_thin(Vec3d place, const SpaceRegion& region, double spacing) const {
+  static const std::vector<Vec3d> ball_points = points_of_ball();
+  const bool here = region.contains(place);
+  int same = 0, other = 0;
+  for (const Vec3d& offset : ball_points) {
+    const Vec3d p = place + thin_radius * spacing * offset;
+    if (sampler_.inside(p)) ++(region.contains(p) == here ? same : other);
+  }
+  return same < other;
 }
 
 }  // namespace phyxel

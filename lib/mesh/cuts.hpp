@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "mesh/inside_samples.hpp"
+#include "mesh/spacing_field.hpp"
+#include "model/spatial_hash.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/space_region.hpp"
 
@@ -28,10 +30,9 @@ struct PlannedCut {
 PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const SpaceRegion& region,
                     double spacing);
 
-/// The curves on a surface along which the boundaries of regions cut it.
+/// The curves on a surface along which the boundary of a region cuts it.
 /// @param step greatest length of a piece [m]
-std::vector<Crease> cutting_curves(const Surface& surface, std::span<const SpaceRegion> regions,
-                                   double step);
+std::vector<Crease> cutting_curves(const Surface& surface, const SpaceRegion& region, double step);
 
 /// The points at which creases cross the boundaries of regions [m]. Of two crossings within `step`
 /// [m] of each other, both may be missed.
@@ -42,5 +43,36 @@ std::vector<Vec3d> crossings(std::span<const Crease> creases, std::span<const Sp
 /// each square of `gap` [m].
 std::vector<Vec3d> points_on_cut(const InsideSampler& sampler, const SpaceRegion& region,
                                  double gap, std::uint64_t seed);
+
+/// The part of a region's boundary that lies inside a surface.
+struct CutFace {
+  SpaceRegion region;
+  std::vector<Vec3d> points;   ///< Points spread evenly over the face [m]: `points_on_cut`.
+  double gap = 0;              ///< Each point stands for a square of this side [m].
+  std::vector<Crease> border;  ///< The curves along which the face meets the surface.
+};
+
+/// The places of a surface that are too near to a cut for phyxels of their own: the body between
+/// such a place and the cut is so thin that a phyxel would have hardly any volume. Phyxels on the
+/// cut itself, where it meets the surface, do not count as near.
+class CutMargin {
+ public:
+  /// @param faces the cuts; none: the margin is empty. @param spacing of the phyxels
+  /// The arguments must outlive the margin.
+  CutMargin(const InsideSampler& sampler, std::span<const CutFace> faces,
+            const SpacingField& spacing);
+
+  bool is_empty() const { return faces_.empty(); }
+  /// True if a place on the surface lies in the margin.
+  bool contains(Vec3d place) const;
+
+ private:
+  bool is_thin(Vec3d place, const SpaceRegion& region, double spacing) const;
+
+  const InsideSampler& sampler_;
+  std::span<const CutFace> faces_;
+  const SpacingField& spacing_;
+  std::vector<SpatialHash> points_;  ///< Points of each face and its border.
+};
 
 }  // namespace phyxel

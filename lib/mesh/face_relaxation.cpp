@@ -101,7 +101,7 @@ class NearestPiece {
 
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    int sweeps, Stage& stage) {
+                    const CutMargin& margin, int sweeps, Stage& stage) {
   order_along_curve(site, fixed);
   const NearestPiece nearest(sample, spacing);
   // The triangle on which each point lies.
@@ -116,9 +116,12 @@ void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
     const double size2 = dot(normal, normal);
     if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
     const Vec3d after = before + step;
-    piece[i] = nearest.at(after);
-    const auto [d, e, f] = corners_of(piece[i]);
-    return nearest_on_triangle(after, d, e, f);
+    const std::size_t triangle = nearest.at(after);
+    const auto [d, e, f] = corners_of(triangle);
+    const Vec3d on_face = nearest_on_triangle(after, d, e, f);
+    if (margin.contains(on_face)) return before;
+    piece[i] = triangle;
+    return on_face;
   };
   sweep_over(site, fixed, spacing, sweeps, move,
              [&](int done) { stage.reach(static_cast<double>(done) / sweeps); });
@@ -135,7 +138,7 @@ void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::
 
 void relax_on_edges(std::span<const Crease> piece, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    int sweeps) {
+                    const CutMargin& margin, int sweeps) {
   const NearestPiece nearest(sample, spacing);
   const auto move = [&](std::size_t, Vec3d before, Vec3d step) {
     const auto on_piece = [&](Vec3d p) {
@@ -144,7 +147,8 @@ void relax_on_edges(std::span<const Crease> piece, std::span<const PointOn> samp
       const double size2 = dot(along, along);
       return size2 > 0 ? from + std::clamp(dot(p - from, along) / size2, 0.0, 1.0) * along : from;
     };
-    return on_piece(before + step);
+    const Vec3d after = on_piece(before + step);
+    return margin.contains(after) ? before : after;
   };
   sweep_over(site, fixed, spacing, sweeps, move, [](int) {});
 }

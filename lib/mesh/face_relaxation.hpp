@@ -23,10 +23,11 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 /// @param site the points; all after the first `fixed` lie on faces [m]
 /// @param sample points spread over the whole surface, with their triangles
 /// @param spacing wanted distance between the points
+/// @param margin places that no point moves to
 /// @param stage is told the share of sweeps that is done
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    int sweeps, Stage& stage);
+                    const CutMargin& margin, int sweeps, Stage& stage);
 
 /// Evens out the distances between points on the boundary of a region inside a surface: they repel
 /// each other and are put back on the boundary, and stay inside the surface. The first `fixed`
@@ -39,6 +40,6 @@ void relax_on_cut(const SpaceRegion& region, const InsideSampler& sampler, std::
 /// @param piece ends of the pieces [m]. @param sample points spread over them, with their pieces
 void relax_on_edges(std::span<const Crease> piece, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    int sweeps);
+                    const CutMargin& margin, int sweeps);
 
 }  // namespace phyxel

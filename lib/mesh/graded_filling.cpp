@@ -7,6 +7,7 @@
 
 #include "mesh/graded_volumes.hpp"
 #include "mesh/repulsion.hpp"
+#include "mesh/small_volumes.hpp"
 #include "mesh/surface_points.hpp"
 #include "model/graded_hash.hpp"
 #include "stage.hpp"
@@ -181,6 +182,7 @@ class GradedSkin {
   std::vector<double> volumes(Stage& stage) const {
     std::vector<double> volume = graded_volumes(request_.sampler, point_, request_.sites.cuts,
                                                 spacing_, request_.seed + 2, stage);
+    raise_small_volumes(point_, request_.sites.cuts, request_.sites.spacing, volume);
     if (!request_.exact_volume) return volume;
     double sum = 0;
     for (const double v : volume) sum += v;

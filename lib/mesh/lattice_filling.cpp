@@ -8,6 +8,7 @@
 #include "mesh/nearest_site.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
+#include "mesh/small_volumes.hpp"
 #include "mesh/surface_points.hpp"
 #include "mesh/surface_sites.hpp"
 #include "stage.hpp"
@@ -195,7 +196,8 @@ class Skin {
   /// Volumes of the phyxels on the surface, on cuts, then of all nodes [m^3].
   std::vector<double> volumes(Stage& stage) const {
     const double cell = std::pow(spacing_, 3);
-    const std::vector<double> sampled = sampled_volumes(stage);
+    std::vector<double> sampled = sampled_volumes(stage);
+    raise_small_volumes(point_, request_.sites.cuts, request_.sites.spacing, sampled);
     std::vector<double> volume(sites() + nodes_.position.size(), cell);
     std::vector<std::size_t> irregular;  // phyxels whose volumes are not those of lattice cells
     double sum = 0;

@@ -143,17 +143,32 @@ std::vector<PointOn> points_along(const std::vector<Crease>& creases, const Spac
   return points;
 }
 
-/// Adds sites at random points of edges and relaxes them; the sites of the argument stay.
+/// The points that are not in a margin, in their order.
+std::vector<PointOn> outside(const CutMargin& margin, std::span<const PointOn> points) {
+  const auto n = static_cast<std::ptrdiff_t>(points.size());
+  std::vector<char> is_outside(points.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::ptrdiff_t k = 0; k < n; ++k) is_outside[k] = !margin.contains(points[k].point);
+  std::vector<PointOn> kept;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (is_outside[k]) kept.push_back(points[k]);
+  }
+  return kept;
+}
+
+/// Adds sites at random points of edges outside the margin and relaxes them; the sites of the
+/// argument stay.
 void add_along_edges(std::vector<Vec3d>& site, const std::vector<Crease>& creases,
-                     const SpacingField& spacing, std::uint64_t seed, int relaxations) {
+                     const SpacingField& spacing, const CutMargin& margin, std::uint64_t seed,
+                     int relaxations) {
   const std::size_t fixed = site.size();
-  const std::vector<PointOn> points = points_along(creases, spacing);
+  const std::vector<PointOn> points = outside(margin, points_along(creases, spacing));
   std::vector<SampleBlock> blocks = blocks_of(points, spacing.coarsest());
   const std::vector<Vec3d> more = fill_with_darts(blocks, spacing, gap_along_edges, seed, site);
   if (more.empty()) return;
   site.insert(site.end(), more.begin(), more.end());
   if (!spacing.is_uniform()) {
-    relax_on_edges(creases, points, site, fixed, spacing, repulsion_sweeps(relaxations));
+    relax_on_edges(creases, points, site, fixed, spacing, margin, repulsion_sweeps(relaxations));
     return;
   }
   SampledVoronoi voronoi(std::move(blocks));
@@ -164,19 +179,28 @@ void add_along_edges(std::vector<Vec3d>& site, const std::vector<Crease>& crease
   voronoi.snap(site, spacing.coarsest(), which, fixed);
 }
 
-/// Adds sites at random points of faces and relaxes them; the sites of the argument stay.
+/// Adds sites at random points of faces outside the margin and relaxes them; the sites of the
+/// argument stay.
 void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const SpacingField& spacing,
-                  std::uint64_t seed, int relaxations, Stage& stage) {
+                  const CutMargin& margin, std::uint64_t seed, int relaxations, Stage& stage) {
   const std::size_t fixed = site.size();
   const Bulk<PointOn> sample = points_over(surface, spacing, samples_on_faces, seed);
   {
     const Phase phase("darts on the surface");
-    const std::vector<Vec3d> more = fill_with_darts(blocks_of(sample, spacing.coarsest()), spacing,
-                                                    gap_on_faces, seed + 1, site);
-    site.insert(site.end(), more.begin(), more.end());
+    const auto add = [&](std::span<const PointOn> free) {
+      const std::vector<Vec3d> more = fill_with_darts(blocks_of(free, spacing.coarsest()), spacing,
+                                                      gap_on_faces, seed + 1, site);
+      site.insert(site.end(), more.begin(), more.end());
+    };
+    if (margin.is_empty()) {
+      add(sample);
+    } else {
+      add(outside(margin, sample));
+    }
   }
   const Phase phase("evening out the surface");
-  relax_on_faces(surface, sample, site, fixed, spacing, repulsion_sweeps(relaxations), stage);
+  relax_on_faces(surface, sample, site, fixed, spacing, margin, repulsion_sweeps(relaxations),
+                 stage);
 }
 
 /// Moves the sites from `first` on, which lie on the boundaries of regions, into these by `depth`
@@ -203,6 +227,19 @@ double finest_on(const SpacingField& spacing, const InsideSampler& sampler,
   return finest;
 }
 
+/// The parts of the boundaries of regions that lie in a body.
+std::vector<CutFace> faces_of(std::span<const SpaceRegion> boundaries, const Surface& surface,
+                              const InsideSampler& sampler, const SpacingField& spacing,
+                              std::uint64_t seed) {
+  std::vector<CutFace> faces;
+  for (const SpaceRegion& cut : boundaries) {
+    const double gap = finest_on(spacing, sampler, cut) / std::sqrt(samples_on_faces);
+    faces.push_back({cut, points_on_cut(sampler, cut, gap, seed), gap,
+                     cutting_curves(surface, cut, 0.5 * spacing.finest())});
+  }
+  return faces;
+}
+
 /// Adds sites where sharp edges cross the boundaries of regions.
 void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std::uint64_t seed) {
   const SpacingField& spacing = sites.spacing;
@@ -219,40 +256,41 @@ void add_crossings(SurfaceSites& sites, const std::vector<Crease>& creases, std:
 }
 
 /// Adds sites along the curves on a surface in which the boundaries of regions cut it.
-void add_along_cuts(const Surface& surface, SurfaceSites& sites, std::uint64_t seed,
-                    int relaxations) {
+void add_along_cuts(std::span<const CutFace> faces, const InsideSampler& sampler,
+                    SurfaceSites& sites, std::uint64_t seed, int relaxations) {
   const SpacingField& spacing = sites.spacing;
-  const std::vector<Crease> curves =
-      cutting_curves(surface, sites.boundaries, 0.5 * spacing.finest());
+  const CutMargin no_margin(sampler, {}, spacing);
+  std::vector<Crease> curves;
+  for (const CutFace& face : faces) {
+    curves.insert(curves.end(), face.border.begin(), face.border.end());
+  }
   if (curves.empty()) return;
   const std::size_t first = sites.position.size();
-  add_along_edges(sites.position, curves, spacing, seed, relaxations);
+  add_along_edges(sites.position, curves, spacing, no_margin, seed, relaxations);
   settle_on_cuts(sites.position, first, sites.boundaries, sites.cuts.depth);
 }
 
 /// Adds sites on the boundary of a region inside a surface, at most `most` with those there are.
-void add_on_cut(const InsideSampler& sampler, const SpaceRegion& cut, SurfaceSites& sites,
-                double most, std::uint64_t seed, int relaxations) {
+void add_on_cut(const InsideSampler& sampler, const CutFace& face, SurfaceSites& sites, double most,
+                std::uint64_t seed, int relaxations) {
   const SpacingField& spacing = sites.spacing;
-  const double gap = finest_on(spacing, sampler, cut) / std::sqrt(samples_on_faces);
-  const std::vector<Vec3d> points = points_on_cut(sampler, cut, gap, seed);
-  if (points.empty()) return;
+  if (face.points.empty()) return;
   std::vector<PointOn> samples;
-  for (const Vec3d p : points) samples.push_back({0, p});
+  for (const Vec3d p : face.points) samples.push_back({0, p});
   std::vector<Vec3d> all = sites.position;
   all.insert(all.end(), sites.on_cuts.begin(), sites.on_cuts.end());
   const std::size_t first = all.size();
   const std::vector<Vec3d> more =
-      fill_with_darts(blocks_of(samples, spacing.coarsest()), spacing, gap_on_faces, seed + 1, all);
+      fill_with_darts(blocks_of(samples, spacing.coarsest()), spacing, gap_on_faces, seed, all);
   // A boundary that two regions share has its sites already.
   if (more.empty() || static_cast<double>(sites.on_cuts.size() + more.size()) > 0.75 * most) return;
   all.insert(all.end(), more.begin(), more.end());
-  relax_on_cut(cut, sampler, all, first, spacing, repulsion_sweeps(relaxations));
-  settle_on_cuts(all, first, {&cut, 1}, sites.cuts.depth);
+  relax_on_cut(face.region, sampler, all, first, spacing, repulsion_sweeps(relaxations));
+  settle_on_cuts(all, first, {&face.region, 1}, sites.cuts.depth);
   sites.on_cuts.insert(sites.on_cuts.end(), all.begin() + static_cast<std::ptrdiff_t>(first),
                        all.end());
-  sites.cut_points.insert(sites.cut_points.end(), points.begin(), points.end());
-  sites.cut_area += gap * gap * static_cast<double>(points.size());
+  sites.cut_points.insert(sites.cut_points.end(), face.points.begin(), face.points.end());
+  sites.cut_area += face.gap * face.gap * static_cast<double>(face.points.size());
 }
 
 /// The area of a surface in squares of the spacing.
@@ -271,10 +309,11 @@ double squares_on(const Surface& surface, const SpacingField& spacing) {
   return squares;
 }
 
-/// A subset of the corners that are not too near to each other [m].
+/// A subset of the corners that are not too near to each other or to a cut [m].
 std::vector<Vec3d> corners_of(const Features& features, const SpacingField& spacing,
-                              std::uint64_t seed) {
-  const std::vector<SampleBlock> blocks = blocks_of(features.corners, spacing.coarsest());
+                              const CutMargin& margin, std::uint64_t seed) {
+  const std::vector<SampleBlock> blocks =
+      blocks_of(outside(margin, features.corners), spacing.coarsest());
   std::vector<Vec3d> site = fill_with_darts(blocks, spacing, gap_at_corners, seed, {});
   if (site.empty()) return site;
   // Sample offsets are rounded to float; this restores the exact corners.
@@ -308,18 +347,20 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
       if (planned.is_cut) found.boundaries.push_back(planned.boundary);
       if (planned.has_inside) found.cuts.list.push_back({region, planned.boundary});
     }
-    found.position = corners_of(features, s, seed);
+    const std::vector<CutFace> faces = faces_of(found.boundaries, surface, sampler, s, seed + 3);
+    const CutMargin margin(sampler, faces, s);
+    found.position = corners_of(features, s, margin, seed);
     add_crossings(found, features.creases, seed);
-    add_along_edges(found.position, features.creases, s, seed, relaxations);
-    add_along_cuts(surface, found, seed + 2, relaxations);
-    add_on_faces(surface, found.position, s, seed + 1, relaxations, stage);
+    add_along_edges(found.position, features.creases, s, margin, seed, relaxations);
+    add_along_cuts(faces, sampler, found, seed + 2, relaxations);
+    add_on_faces(surface, found.position, s, margin, seed + 1, relaxations, stage);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     const double least_inside = s.is_uniform() ? 0.25 * volume / std::pow(s.coarsest(), 3)
                                                : 0.1 * static_cast<double>(phyxels);
     if (inside > least_inside) {
-      for (const SpaceRegion& cut : found.boundaries) {
-        add_on_cut(sampler, cut, found, inside, seed + 3, relaxations);
+      for (const CutFace& face : faces) {
+        add_on_cut(sampler, face, found, inside, seed + 4, relaxations);
       }
       return found;
     }

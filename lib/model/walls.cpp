@@ -80,12 +80,16 @@ bool may_be_neighbours(std::size_t a, std::size_t b) {
   return a == b || a == open_room || b == open_room;
 }
 
+/// Neighbours lie nearly in a plane if the smallest eigenvalue of their moment matrix is at most
+/// one of these shares of the largest, while that of more neighbours is above it.
+constexpr double flat_shares[] = {0.05, 0.1, 0.15};
+
 /// True if those neighbours of phyxel i for which counts(j) is true span space: if the smallest
-/// eigenvalue of their moment matrix is above a twentieth of the largest. Beside a flat wall, or a
+/// eigenvalue of their moment matrix is above a share of the largest. Beside a flat wall, or a
 /// surface, it is 0.4 to 1 of it.
 template <class Counts>
 bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, double pair_length,
-                Index i, Counts&& counts) {
+                Index i, double share, Counts&& counts) {
   const RowWeights weights(hood.support.data(), i, pair_length);
   Sym3d moment;
   for (const Index j : hood.neighbours.row(i)) {
@@ -93,7 +97,7 @@ bool span_space(const Neighbourhood& hood, std::span<const Vec3d> position, doub
     const Vec3d x = position[j] - position[i];
     moment += moment_term(x, weights(j, dot(x, x)));
   }
-  return pseudo_inverse(moment, 0.05).rank == 3;
+  return pseudo_inverse(moment, share).rank == 3;
 }
 
 /// Opens the rooms of phyxels that no region contains, and whose neighbours in the same room lie
@@ -106,10 +110,12 @@ void open_thin_rooms(std::vector<std::size_t>& room, const Neighbourhood& hood,
   for (Index i = 0; i < hood.neighbours.rows(); ++i) {
     if (room[i] != outside) continue;
     const auto is_kept = [&](Index j) { return may_be_neighbours(room[i], room[j]); };
-    const auto row = hood.neighbours.row(i);
-    if (!std::ranges::all_of(row, is_kept) &&
-        !span_space(hood, position, pair_length, i, is_kept) &&
-        span_space(hood, position, pair_length, i, [](Index) { return true; })) {
+    const auto is_opened_by = [&](double share) {
+      return !span_space(hood, position, pair_length, i, share, is_kept) &&
+             span_space(hood, position, pair_length, i, share, [](Index) { return true; });
+    };
+    if (!std::ranges::all_of(hood.neighbours.row(i), is_kept) &&
+        std::ranges::any_of(flat_shares, is_opened_by)) {
       opened.push_back(i);
     }
   }

@@ -100,6 +100,25 @@ double fitted_phyxels(const ShapeRequest& request) {
   return std::max(1.0, std::round(volume / std::pow(request.spacing, 3)));
 }
 
+/// The surfels of a fitted shape, as far apart as its phyxels: the surface that the phyxels lie on
+/// may have many more vertices. Round ones are moved outward a little, such that their triangles
+/// enclose the solid's volume, on which the work of pressures depends.
+Surface fitted_surfels(const Lattice& lattice, double spacing) {
+  Surface surface = lattice_surface(lattice, spacing);
+  if (lattice.solid == Lattice::Solid::box) return surface;
+  const bool is_sphere = lattice.solid == Lattice::Solid::sphere;
+  const double growth = lattice.volume() / enclosed_volume(surface);
+  const double across = is_sphere ? std::cbrt(growth) : std::sqrt(growth);
+  const double along = is_sphere ? across : 1;
+  const Vec3d middle = lattice.low + 0.5 * lattice.extent;
+  for (Vec3d& p : surface.position) {
+    const Vec3d d = p - middle;
+    p = middle + Vec3d{across * d.x, across * d.y, along * d.z};
+  }
+  surface.normal = vertex_normals(surface.position, surface.triangle);
+  return surface;
+}
+
 /// Fills a shape as a mesh is filled.
 Cloud make_fitted_shape(const ShapeRequest& request) {
   check_request(request);
@@ -110,8 +129,8 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
   }
   // The polygon of a circle then has 0.04% less area.
   constexpr int corners = 128;
-  const Surface surface =
-      lattice_surface(make_lattice(request, request.spacing), request.spacing, corners);
+  const Lattice lattice = make_lattice(request, request.spacing);
+  const Surface surface = lattice_surface(lattice, request.spacing, corners);
   SampleReport report;
   Cloud cloud = sample_surface(surface,
                                {.phyxels = static_cast<Index>(phyxels),
@@ -123,6 +142,9 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
   for (const std::string& warning : report.warnings) {
     cloud.warnings.push_back(fmt::format("shape \"{}\": {}", request.name, warning));
   }
+  double finest = request.spacing;
+  for (const double spacing : cloud.spacing) finest = std::min(finest, spacing);
+  cloud.surface = fitted_surfels(lattice, finest);
   return cloud;
 }
 

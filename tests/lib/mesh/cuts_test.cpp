@@ -20,6 +20,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/physics/laws.hpp"
 #include "phyxel/point_fields.hpp"
+#include "phyxel/shapes.hpp"
 #include "phyxel/solver.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
@@ -295,6 +296,55 @@ TEST(Cuts, LeaveStepsAsLongAsWithoutSupports) {
     const double height = -1 + 0.1 * k;
     EXPECT_GT(step_held_to(height), 0.5 * without) << height;
   }
+}
+
+/// The largest step of a cylinder of radius 1 and length 3 that a ball holds along some axes.
+double step_of_cylinder(const std::optional<Selection::Ball>& support, Axes axes = {}) {
+  Scene scene = one_body();
+  BodyRequest& body = scene.bodies[0];
+  ShapeRequest& shape = body.source.shape;
+  shape.name = "cylinder";
+  shape.radius = 1;
+  shape.length = 3;
+  shape.placement = ShapeRequest::Placement::fitted;
+  shape.spacing = spacing_for(shape, 2500);
+  if (support) {
+    Selection held;
+    held.ball = support;
+    body.fixed = {{.select = held, .axes = axes}};
+  }
+  return step_limit(build_model(scene), 1).largest_step;
+}
+
+/// Balls that cut a body's surface and its edges at sharp angles cost no more than half of the
+/// step, where all axes are held, and little more where one axis is.
+TEST(Cuts, AtSharpAnglesLeaveStepsLong) {
+  const double without = step_of_cylinder(std::nullopt);
+  for (const Selection::Ball& support :
+       {Selection::Ball{{0.462, -0.585, 1.238}, 0.358},
+        Selection::Ball{{-0.227, 0.811, -0.896}, 0.6225},
+        Selection::Ball{{-0.544183, 0.083944, -0.865472}, 0.779151},
+        Selection::Ball{{-0.04858, -0.575602, 1.172445}, 0.610149}}) {
+    EXPECT_GT(step_of_cylinder(support), 0.4 * without) << support.radius;
+    EXPECT_GT(step_of_cylinder(support, {false, false, true}), 0.2 * without) << support.radius;
+  }
+}
+
+/// In the wedge of 9 degrees between a face and a cut, no free phyxel has a tiny volume.
+TEST(Cuts, LeaveNoTinyVolumesInWedges) {
+  const SpaceRegion tilted = SpaceRegion{.low = {-9, -9, -9}, .high = {0.5, 9, 9}}.placed(
+      1, rotation_by({0, 0, 0.9 * std::numbers::pi / 2}), {0, 0.35, 0});
+  const Cloud cloud = sample_surface(test::unit_cube(), {.phyxels = 3000, .cuts = {tilted}});
+  const double spacing = std::cbrt(1.0 / 3000);
+  int on_cut = 0;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const double distance = tilted.distance(cloud.position[i]);
+    on_cut += std::abs(distance) < 1e-6;
+    if (distance > 1e-6 && distance < spacing) {
+      EXPECT_GT(cloud.volume[i], 0.19 * std::pow(spacing, 3)) << distance;
+    }
+  }
+  EXPECT_GT(on_cut, 100);
 }
 
 /// A box thinner than a spacing holds one layer, in its middle.

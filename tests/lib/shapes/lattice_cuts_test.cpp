@@ -332,5 +332,25 @@ TEST(FittedShapes, HavePhyxelsOnTheirFaces) {
   EXPECT_THROW(make_shape(rod), InputError);
 }
 
+/// Fitted shapes have about one surfel for each square of the spacing, whose triangles enclose the
+/// solid's volume.
+TEST(FittedShapes, HaveFewSurfelsAroundTheirWholeVolume) {
+  for (const std::string name : {"sphere", "cylinder"}) {
+    ShapeRequest shape{
+        .name = name, .radius = 1, .length = 3, .placement = ShapeRequest::Placement::fitted};
+    shape.spacing = spacing_for(shape, 500);
+    const Cloud cloud = make_shape(shape);
+    const double volume = std::numbers::pi * (name == "sphere" ? 4.0 / 3 : 3),
+                 area = std::numbers::pi * (name == "sphere" ? 4 : 8);
+    EXPECT_NEAR(enclosed_volume(cloud.surface), volume, 1e-12 * volume);
+    const auto surfels = static_cast<double>(cloud.surface.position.size());
+    EXPECT_LT(surfels * shape.spacing * shape.spacing, 1.5 * area) << name;
+    EXPECT_GT(surfels * shape.spacing * shape.spacing, 0.7 * area) << name;
+    for (const Vec3d p : cloud.surface.position) {
+      EXPECT_LT(norm(p), (name == "sphere" ? 1 : std::hypot(1, 1.5)) + 0.05 * shape.spacing);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace phyxel
