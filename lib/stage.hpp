@@ -29,10 +29,13 @@ class Stage {
   /// next call of `reach` or `finish`.
   void count();
   /// Reports the end; the destructor does not. @throws what the observer throws
-  void finish() { reach(1); }
+  void finish() {
+    reach(1);
+    phase_.end();
+  }
 
  private:
-  const Phase phase_;
+  Phase phase_;
   const char* name_;
   const StageObserver* observer_;  // may be null
   double reached_ = 0, from_ = 0;

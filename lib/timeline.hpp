@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <utility>
 #include <vector>
 
 namespace phyxel {
@@ -29,14 +30,15 @@ class Timeline {
   static bool on_;
 };
 
-/// A span from its construction to the end of its block.
+/// A span from its construction to its end, or else to the end of its block.
 class Phase {
  public:
   explicit Phase(const char* what) : what_(Timeline::is_on() ? what : nullptr) {
     if (what_) since_ = std::chrono::steady_clock::now();
   }
-  ~Phase() {
-    if (what_) Timeline::add(what_, since_);
+  ~Phase() { end(); }
+  void end() {
+    if (what_) Timeline::add(std::exchange(what_, nullptr), since_);
   }
   Phase(const Phase&) = delete;
   Phase& operator=(const Phase&) = delete;

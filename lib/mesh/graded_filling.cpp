@@ -174,7 +174,7 @@ class GradedSkin {
     point_.swap(moved);
   }
 
-  std::vector<Vec3d> inside() const {
+  Bulk<Vec3d> inside() const {
     return {point_.begin() + static_cast<std::ptrdiff_t>(first_inside_), point_.end()};
   }
 

@@ -12,6 +12,7 @@
 #include "mesh/surface_points.hpp"
 #include "mesh/surface_sites.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -87,8 +88,8 @@ class Clearance {
 };
 
 struct Nodes {
-  std::vector<Vec3d> position;
-  std::vector<float> clearance;  ///< In spacings, shape [n_nodes].
+  Bulk<Vec3d> position;
+  Bulk<float> clearance;  ///< In spacings, shape [n_nodes].
 };
 
 /// All nodes of the lattice inside, task by task.
@@ -108,41 +109,49 @@ Nodes nodes_inside(const LatticeRequest& request, double spacing) {
           nodes.clearance.push_back(static_cast<float>(deep ? largest_clearance : clearance.at(p)));
         }
       });
-  Nodes all;
-  std::size_t count = 0;
-  for (const Nodes& nodes : by_task) count += nodes.position.size();
-  all.position.reserve(count);
-  all.clearance.reserve(count);
-  for (Nodes& nodes : by_task) {
-    all.position.insert(all.position.end(), nodes.position.begin(), nodes.position.end());
-    all.clearance.insert(all.clearance.end(), nodes.clearance.begin(), nodes.clearance.end());
+  std::vector<std::size_t> first{0};  // of each task
+  for (const Nodes& nodes : by_task) first.push_back(first.back() + nodes.position.size());
+  Nodes all{Bulk<Vec3d>(first.back()), Bulk<float>(first.back())};
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t task = 0; task < by_task.size(); ++task) {
+    Nodes& nodes = by_task[task];
+    const auto to = static_cast<std::ptrdiff_t>(first[task]);
+    std::ranges::copy(nodes.position, all.position.begin() + to);
+    std::ranges::copy(nodes.clearance, all.clearance.begin() + to);
     nodes = {};
   }
   return all;
 }
 
+/// The elements of an array that are to be kept.
+template <class T>
+Bulk<T> kept_of(const Bulk<T>& values, const std::vector<Index>& kept) {
+  return in_bulk(kept.size(), [&](std::size_t k) { return values[kept[k]]; });
+}
+
 /// Keeps the n nodes of largest clearance, in their order; of equal ones the first.
 /// @returns the smallest clearance kept
 float keep_farthest(Nodes& nodes, std::size_t n) {
-  std::vector<float> sorted = nodes.clearance;
-  const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(n) - 1;
-  std::nth_element(sorted.begin(), nth, sorted.end(), std::greater<>());
-  const float least = *nth;
-  auto ties = n - static_cast<std::size_t>(
-                      std::count_if(nodes.clearance.begin(), nodes.clearance.end(),
-                                    [&](float clearance) { return clearance > least; }));
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < nodes.clearance.size(); ++i) {
-    if (nodes.clearance[i] < least) continue;
-    if (nodes.clearance[i] == least) {
-      if (ties == 0) continue;
-      --ties;
-    }
-    nodes.position[kept] = nodes.position[i];
-    nodes.clearance[kept++] = nodes.clearance[i];
+  // Most nodes are so deep inside that all of them have the same clearance.
+  const Bulk<float>& clearance = nodes.clearance;
+  const auto all = static_cast<Index>(clearance.size());
+  const auto is_near = [&](Index i) { return clearance[i] < largest_clearance; };
+  Bulk<float> near = kept_of(clearance, chosen(0, all, is_near));
+  const std::size_t deep = clearance.size() - near.size();
+  float least = largest_clearance;
+  if (n > deep) {
+    const auto nth = near.begin() + static_cast<std::ptrdiff_t>(n - deep) - 1;
+    std::nth_element(near.begin(), nth, near.end(), std::greater<>());
+    least = *nth;
   }
-  nodes.position.resize(n);
-  nodes.clearance.resize(n);
+  const auto is_above = [&](float found) { return found > least; };
+  const auto above = static_cast<std::size_t>(std::ranges::count_if(near, is_above)) +
+                     (least < largest_clearance ? deep : 0);
+  std::vector<Index> ties = chosen(0, all, [&](Index i) { return clearance[i] == least; });
+  const Index end = ties.size() > n - above ? ties[n - above] : all;  // of the ties that stay
+  const std::vector<Index> kept = chosen(
+      0, all, [&](Index i) { return clearance[i] > least || (clearance[i] == least && i < end); });
+  nodes = {kept_of(nodes.position, kept), kept_of(nodes.clearance, kept)};
   return least;
 }
 
@@ -162,35 +171,59 @@ double lattice_constant(double volume, double area, Index n) {
 class Skin {
  public:
   Skin(const LatticeRequest& request, Nodes& nodes, double spacing)
-      : request_(request), nodes_(nodes), spacing_(spacing), point_(all_sites(request.sites)) {
-    for (std::size_t i = 0; i < nodes.position.size(); ++i) {
-      if (nodes.clearance[i] >= largest_clearance) continue;
-      near_.push_back(i);
-      point_.push_back(nodes.position[i]);
-    }
-    ball_.resize(near_.size());
+      : request_(request),
+        nodes_(nodes),
+        spacing_(spacing),
+        near_(chosen(0, static_cast<Index>(nodes.position.size()),
+                     [&](Index i) { return nodes.clearance[i] < largest_clearance; })),
+        point_(all_sites(request.sites)),
+        ball_(near_.size()) {
+    point_.resize(sites() + near_.size());
+#pragma omp parallel for schedule(static)
+    for (std::size_t k = 0; k < near_.size(); ++k) point_[sites() + k] = nodes.position[near_[k]];
   }
 
   /// Moves each node by the sum of the forces at the places before the sweep.
   void sweep() {
     const Repulsion repulsion(point_, spacing_);
-    std::vector<Vec3d> moved(near_.size());
+    Bulk<Vec3d> moved(near_.size());
     const auto n = static_cast<std::ptrdiff_t>(near_.size());
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::ptrdiff_t k = 0; k < n; ++k) {
-      const Vec3d before = point_[sites() + k];
-      const auto step_of = [&](auto&& strength) {
-        return repulsion.step(before, static_cast<Index>(sites() + k), strength);
-      };
-      moved[k] = clearance_of(k) < moving_clearance
-                     ? repelled_inside(request_, before, ball_[k], step_of)
-                     : before;
+#pragma omp parallel
+    {
+#pragma omp for schedule(dynamic, 256)
+      for (std::ptrdiff_t k = 0; k < n; ++k) {
+        const Vec3d before = point_[sites() + k];
+        const auto step_of = [&](auto&& strength) {
+          return repulsion.step(before, static_cast<Index>(sites() + k), strength);
+        };
+        moved[k] = clearance_of(k) < moving_clearance
+                       ? repelled_inside(request_, before, ball_[k], step_of)
+                       : before;
+      }
+#pragma omp for schedule(static)
+      for (std::ptrdiff_t k = 0; k < n; ++k) point_[sites() + k] = moved[k];
     }
-    std::copy(moved.begin(), moved.end(), point_.begin() + static_cast<std::ptrdiff_t>(sites()));
   }
 
   void write_back() {
+#pragma omp parallel for schedule(static)
     for (std::size_t k = 0; k < near_.size(); ++k) nodes_.position[near_[k]] = point_[sites() + k];
+  }
+
+  /// The distance from each phyxel on the surface, on cuts, then of all nodes to the nearest other
+  /// one [m]. Of those deep inside it is the lattice constant.
+  std::vector<double> gaps() const {
+    // Those that are nearest to a node of less clearance are among the points.
+    constexpr double known_clearance = largest_clearance - 1;
+    const SpatialHash hash(point_, spacing_);
+    std::vector<double> gap(sites() + nodes_.position.size(), spacing_);
+#pragma omp parallel for schedule(static)
+    for (std::size_t k = 0; k < point_.size(); ++k) {
+      if (k >= sites() && clearance_of(k - sites()) >= known_clearance) continue;
+      gap[k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()])] =
+          std::sqrt(hash.nearest(point_[k], HUGE_VAL, static_cast<Index>(k)).distance2);
+    }
+    return gap;
   }
 
   /// Volumes of the phyxels on the surface, on cuts, then of all nodes [m^3].
@@ -203,7 +236,7 @@ class Skin {
     double sum = 0;
     for (std::size_t k = 0; k < point_.size(); ++k) {
       if (k >= sites() && clearance_of(k - sites()) >= regular_clearance) continue;
-      irregular.push_back(k < sites() ? k : sites() + near_[k - sites()]);
+      irregular.push_back(k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()]));
       volume[irregular.back()] = sampled[k];
       sum += sampled[k];
     }
@@ -255,8 +288,8 @@ class Skin {
   const LatticeRequest& request_;
   Nodes& nodes_;
   double spacing_;
-  std::vector<std::size_t> near_;  ///< Nodes whose clearance is known.
-  std::vector<Vec3d> point_;       ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
+  std::vector<Index> near_;   ///< Nodes whose clearance is known.
+  std::vector<Vec3d> point_;  ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
   std::vector<InsideSampler::Ball> ball_;  ///< Ball of each node of `near_` (`repelled_inside`).
 };
 
@@ -319,6 +352,7 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   Stage measuring("volumes of phyxels");
   filling.volume = skin.volumes(measuring);
   measuring.finish();
+  filling.gap = skin.gaps();
   filling.position = std::move(nodes.position);
   return filling;
 }

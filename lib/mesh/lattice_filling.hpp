@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "bulk.hpp"
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/surface_sites.hpp"
@@ -26,9 +27,11 @@ struct LatticeRequest {
 
 /// Phyxels inside a surface, and the volumes of all its phyxels.
 struct LatticeFilling {
-  std::vector<Vec3d> position;  ///< Phyxels inside [m], shape [request.phyxels].
+  Bulk<Vec3d> position;  ///< Phyxels inside [m], shape [request.phyxels].
   /// Volumes of the phyxels on the surface, on cuts, then of those inside, shape [n_phyxels] [m^3].
   std::vector<double> volume;
+  /// Distance from each phyxel to the nearest other one [m], shape [n_phyxels]; empty: not known.
+  std::vector<double> gap;
   double spacing = 0;  ///< Lattice constant [m].
 };
 

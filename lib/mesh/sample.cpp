@@ -138,24 +138,22 @@ void refuse_if_too_open(const SampleTally& tally, const SurfaceDefects& defects,
       100 * doubtful, defects.describe()));
 }
 
-/// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
-void measure_gaps(const std::vector<Vec3d>& site, const SpacingField& spacing,
-                  SampleReport& report) {
-  const auto n = static_cast<std::ptrdiff_t>(site.size());
-  if (n < 2) return;
-  std::vector<double> gap(site.size());
-  const auto measure = [&](const auto& hash) {
-#pragma omp parallel for schedule(static)
-    for (std::ptrdiff_t i = 0; i < n; ++i) {
-      gap[i] = std::sqrt(hash.nearest(site[i], HUGE_VAL, static_cast<Index>(i)).distance2);
-    }
+/// The distance from each phyxel to the nearest other one [m].
+std::vector<double> gaps_between(const std::vector<Vec3d>& site, const SpacingField& spacing) {
+  const auto measured = [&](const auto& hash) {
+    return tabulated(site.size(), [&](std::size_t i) {
+      return std::sqrt(hash.nearest(site[i], HUGE_VAL, static_cast<Index>(i)).distance2);
+    });
   };
-  if (spacing.is_uniform()) {
-    measure(SpatialHash(site, spacing.coarsest()));
-  } else {
-    measure(GradedHash(site, spacing.at(site)));
-  }
-  report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(n);
+  return spacing.is_uniform() ? measured(SpatialHash(site, spacing.coarsest()))
+                              : measured(GradedHash(site, spacing.at(site)));
+}
+
+/// Sets the mean and the smallest distance to the nearest phyxel [m]; zero for a single phyxel.
+/// @param gap that distance, of each phyxel
+void report_gaps(const std::vector<double>& gap, SampleReport& report) {
+  if (gap.size() < 2) return;
+  report.spacing = std::accumulate(gap.begin(), gap.end(), 0.0) / static_cast<double>(gap.size());
   report.smallest_gap = *std::min_element(gap.begin(), gap.end());
 }
 
@@ -283,10 +281,11 @@ void report_tally(const PreparedSurface& prepared, const SampleTally& tally, Sam
 }
 
 /// Fills the inside of a surface that has phyxels on it.
+/// @param gap receives `LatticeFilling::gap`
 /// @returns the distances between phyxels
 SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& sampler,
                           const SampleRequest& request, const SurfaceSites& sites, double volume,
-                          bool exact_volume, Cloud& cloud) {
+                          bool exact_volume, Cloud& cloud, std::vector<double>& gap) {
   const auto placed = static_cast<Index>(sites.position.size() + sites.on_cuts.size());
   const LatticeRequest lattice{.surface = prepared.surface,
                                .sampler = sampler,
@@ -299,10 +298,15 @@ SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& 
   SpacingField spacing = sites.spacing;
   LatticeFilling inside =
       spacing.is_uniform() ? fill_by_lattice(lattice) : fill_graded(lattice, spacing);
-  cloud.position = sites.position;
-  cloud.position.insert(cloud.position.end(), sites.on_cuts.begin(), sites.on_cuts.end());
-  cloud.position.insert(cloud.position.end(), inside.position.begin(), inside.position.end());
+  cloud.position = all_sites(sites);
+  const std::size_t before = cloud.position.size();
+  cloud.position.resize(before + inside.position.size());
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < inside.position.size(); ++k) {
+    cloud.position[before + k] = inside.position[k];
+  }
   cloud.volume = std::move(inside.volume);
+  gap = std::move(inside.gap);
   cloud.cuts = sites.cuts;
   if (spacing.is_uniform()) return SpacingField(inside.spacing);
   cloud.spacing = spacing.at(cloud.position);
@@ -385,6 +389,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   }
   Cloud cloud;
   SpacingField spacing(0);
+  std::vector<double> gap;
   if (sites.position.empty()) {
     const double samples = samples_per_phyxel(request.phyxels);
     check_memory(request.phyxels, bytes_scattered(samples));
@@ -393,7 +398,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
     spacing = SpacingField(std::cbrt(volume / request.phyxels));
     fill_scattered(sampler, filling, request, spacing.coarsest(), cloud);
   } else {
-    spacing = fill_between(prepared, sampler, request, sites, volume, exact, cloud);
+    spacing = fill_between(prepared, sampler, request, sites, volume, exact, cloud, gap);
   }
   found.on_surface = static_cast<Index>(sites.position.size());
   report_tally(prepared, tally, found);
@@ -403,7 +408,9 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   for (double& v : cloud.volume) v *= found.volume / total;
 
   if (request.grading) warn_of_no_effect(cloud, *request.grading, prepared.exponent, found);
-  measure_gaps(cloud.position, spacing, found);
+  if (gap.empty()) gap = gaps_between(cloud.position, spacing);
+  report_gaps(gap, found);
+  release(gap);
   add_regions(cloud, prepared.surface, sites.position.size(), spacing.finest());
   cloud.surface = std::move(prepared.surface);
   order_along_curve(cloud);
