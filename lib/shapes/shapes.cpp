@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "model/host_memory.hpp"
 #include "phyxel/error.hpp"
@@ -100,25 +101,6 @@ double fitted_phyxels(const ShapeRequest& request) {
   return std::max(1.0, std::round(volume / std::pow(request.spacing, 3)));
 }
 
-/// The surfels of a fitted shape, as far apart as its phyxels: the surface that the phyxels lie on
-/// may have many more vertices. Round ones are moved outward a little, such that their triangles
-/// enclose the solid's volume, on which the work of pressures depends.
-Surface fitted_surfels(const Lattice& lattice, double spacing) {
-  Surface surface = lattice_surface(lattice, spacing);
-  if (lattice.solid == Lattice::Solid::box) return surface;
-  const bool is_sphere = lattice.solid == Lattice::Solid::sphere;
-  const double growth = lattice.volume() / enclosed_volume(surface);
-  const double across = is_sphere ? std::cbrt(growth) : std::sqrt(growth);
-  const double along = is_sphere ? across : 1;
-  const Vec3d middle = lattice.low + 0.5 * lattice.extent;
-  for (Vec3d& p : surface.position) {
-    const Vec3d d = p - middle;
-    p = middle + Vec3d{across * d.x, across * d.y, along * d.z};
-  }
-  surface.normal = vertex_normals(surface.position, surface.triangle);
-  return surface;
-}
-
 /// Fills a shape as a mesh is filled.
 Cloud make_fitted_shape(const ShapeRequest& request) {
   check_request(request);
@@ -127,8 +109,9 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
     throw InputError(fmt::format("shape \"{}\": {:.4g} phyxels; allowed are at most {}",
                                  request.name, phyxels, std::numeric_limits<Index>::max()));
   }
-  // The polygon of a circle then has 0.04% less area.
-  constexpr int corners = 128;
+  // Phyxels lie on a polygon whose area is 0.04% below that of its circle. Surfels are as far apart
+  // as phyxels, or, on the coarsest bodies, have 0.2% less.
+  constexpr int corners = 128, surfel_corners = 64;
   const Lattice lattice = make_lattice(request, request.spacing);
   const Surface surface = lattice_surface(lattice, request.spacing, corners);
   SampleReport report;
@@ -144,7 +127,9 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
   }
   double finest = request.spacing;
   for (const double spacing : cloud.spacing) finest = std::min(finest, spacing);
-  cloud.surface = fitted_surfels(lattice, finest);
+  cloud.surface = lattice_surface(lattice, finest, surfel_corners);
+  const double all = std::accumulate(cloud.volume.begin(), cloud.volume.end(), 0.0);
+  for (double& volume : cloud.volume) volume *= lattice.volume() / all;
   return cloud;
 }
 
