@@ -32,11 +32,14 @@ Vec3d crossing(const SpaceRegion& region, Measured a, Measured b) {
   return a.inside() ? a.point : b.point;
 }
 
+/// The cosine of the largest angle that is sharp, 60 degrees.
+constexpr double sharp_cosine = 0.5;
+
 /// Adds the pieces of the curve along which a region's boundary cuts a triangle.
 class TriangleCutter {
  public:
-  TriangleCutter(const SpaceRegion& region, double step, std::vector<Crease>& pieces)
-      : region_(region), step_(step), pieces_(pieces) {}
+  TriangleCutter(const SpaceRegion& region, double step, CuttingCurves& curves)
+      : region_(region), step_(step), curves_(curves) {}
 
   void cut(const std::array<Measured, 3>& corner) {
     int longest = 0;
@@ -62,13 +65,24 @@ class TriangleCutter {
       const Measured &a = corner[k], &b = corner[(k + 1) % 3];
       if (a.inside() != b.inside()) ends.push_back(crossing(region_, a, b));
     }
-    if (ends.size() == 2) pieces_.push_back({ends[0], ends[1]});
+    if (ends.size() == 2) add({ends[0], ends[1]}, corner);
   }
 
  private:
+  void add(const Crease& piece, const std::array<Measured, 3>& corner) {
+    curves_.piece.push_back(piece);
+    const Vec3d on = region_.nearest_on_boundary(piece.from),
+                outward = on - region_.nearest_on_boundary(piece.from, 1e-3 * step_),
+                normal =
+                    cross(corner[1].point - corner[0].point, corner[2].point - corner[0].point);
+    if (std::abs(dot(outward, normal)) > sharp_cosine * norm(outward) * norm(normal)) {
+      curves_.sharp.push_back(0.5 * (piece.from + piece.to));
+    }
+  }
+
   const SpaceRegion& region_;
   double step_;
-  std::vector<Crease>& pieces_;
+  CuttingCurves& curves_;
 };
 
 /// Sides of a box of which the shortest is less than this many spacings leave no room for two
@@ -78,6 +92,8 @@ constexpr double thin = 0.8;
 constexpr double flush = 0.35;
 /// Distance from a cut within which other phyxels may be too near to it, in spacings.
 constexpr double margin = 0.4;
+/// Length of the wedge beside a curve of sharp angles, in spacings.
+constexpr double wedge = 2.5;
 /// Radius of the balls in which the body's thickness beside a cut is measured, in spacings: in a
 /// layer of even thickness, phyxels need 0.4 spacings.
 constexpr double thin_radius = 1.2;
@@ -98,10 +114,19 @@ std::vector<Vec3d> points_of_ball() {
 
 double& component_of(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
-/// A box whose faces that are beyond the body, or nearly so, are moved well away from it.
+/// A region whose faces that are beyond the body, or nearly so, are moved well away from it.
 SpaceRegion beyond_body(const SpaceRegion& region, const Surface& surface, double slack) {
   SpaceRegion made = region;
-  if (region.is_ball) return made;
+  if (region.is_ball) {
+    double farthest = 0;
+    for (const Triangle& t : surface.triangle) {
+      for (const Index corner : t) {
+        farthest = std::max(farthest, norm(surface.position[corner] - region.centre));
+      }
+    }
+    if (region.radius > farthest - slack) made.radius = 2 * (region.radius + farthest);
+    return made;
+  }
   for (int k = 0; k < 3; ++k) {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (const Triangle& t : surface.triangle) {
@@ -186,14 +211,14 @@ PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const 
   return planned;
 }
 
-std::vector<Crease> cutting_curves(const Surface& surface, const SpaceRegion& region, double step) {
-  std::vector<Crease> pieces;
-  TriangleCutter cutter(region, step, pieces);
+CuttingCurves cutting_curves(const Surface& surface, const SpaceRegion& region, double step) {
+  CuttingCurves curves;
+  TriangleCutter cutter(region, step, curves);
   for (const Triangle& t : surface.triangle) {
     cutter.cut({measured(region, surface.position[t[0]]), measured(region, surface.position[t[1]]),
                 measured(region, surface.position[t[2]])});
   }
-  return pieces;
+  return curves;
 }
 
 std::vector<Vec3d> crossings(std::span<const Crease> creases, std::span<const SpaceRegion> regions,
@@ -246,25 +271,27 @@ std::vector<Vec3d> points_on_cut(const InsideSampler& sampler, const SpaceRegion
 
 CutMargin::CutMargin(const InsideSampler& sampler, std::span<const CutFace> faces,
                      const SpacingField& spacing)
-    : sampler_(sampler), faces_(faces), spacing_(spacing) {
+    : sampler_(sampler), spacing_(spacing) {
   for (const CutFace& face : faces) {
+    if (face.border.sharp.empty()) continue;
     std::vector<Vec3d> points = face.points;
-    for (const auto& [from, to] : face.border) {
+    for (const auto& [from, to] : face.border.piece) {
       points.insert(points.end(), {from, 0.5 * (from + to), to});
     }
-    points_.emplace_back(points, margin * spacing.coarsest());
+    faces_.push_back({face.region, SpatialHash(points, margin * spacing.coarsest()),
+                      SpatialHash(face.border.sharp, wedge * spacing.coarsest())});
   }
 }
 
 bool CutMargin::contains(Vec3d place) const {
-  for (std::size_t k = 0; k < faces_.size(); ++k) {
-    const SpaceRegion& region = faces_[k].region;
-    const double spacing = spacing_.at(place), reach = margin * spacing;
-    if (std::abs(region.distance(place)) >= reach) continue;
+  for (const Face& face : faces_) {
+    const double spacing = spacing_.at(place), reach = margin * spacing, length = wedge * spacing;
+    if (std::abs(face.region.distance(place)) >= reach) continue;
+    if (face.sharp.nearest(place, length).distance2 >= length * length) continue;
     // The boundary goes on outside the body, where it cuts nothing.
-    const Vec3d foot = region.nearest_on_boundary(place);
-    if (points_[k].nearest(foot, reach).distance2 >= reach * reach) continue;
-    if (is_thin(place, region, spacing)) return true;
+    const Vec3d foot = face.region.nearest_on_boundary(place);
+    if (face.points.nearest(foot, reach).distance2 >= reach * reach) continue;
+    if (is_thin(place, face.region, spacing)) return true;
   }
   return false;
 }

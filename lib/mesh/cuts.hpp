@@ -30,9 +30,14 @@ struct PlannedCut {
 PlannedCut plan_cut(const InsideSampler& sampler, const Surface& surface, const SpaceRegion& region,
                     double spacing);
 
-/// The curves on a surface along which the boundary of a region cuts it.
+/// The curves along which the boundary of a region cuts a surface.
+struct CuttingCurves {
+  std::vector<Crease> piece;  ///< Pieces of the curves.
+  std::vector<Vec3d> sharp;   ///< Places where boundary and surface meet at a sharp angle [m].
+};
+/// Finds the curves along which the boundary of a region cuts a surface.
 /// @param step greatest length of a piece [m]
-std::vector<Crease> cutting_curves(const Surface& surface, const SpaceRegion& region, double step);
+CuttingCurves cutting_curves(const Surface& surface, const SpaceRegion& region, double step);
 
 /// The points at which creases cross the boundaries of regions [m]. Of two crossings within `step`
 /// [m] of each other, both may be missed.
@@ -47,14 +52,14 @@ std::vector<Vec3d> points_on_cut(const InsideSampler& sampler, const SpaceRegion
 /// The part of a region's boundary that lies inside a surface.
 struct CutFace {
   SpaceRegion region;
-  std::vector<Vec3d> points;   ///< Points spread evenly over the face [m]: `points_on_cut`.
-  double gap = 0;              ///< Each point stands for a square of this side [m].
-  std::vector<Crease> border;  ///< The curves along which the face meets the surface.
+  std::vector<Vec3d> points;  ///< Points spread evenly over the face [m]: `points_on_cut`.
+  double gap = 0;             ///< Each point stands for a square of this side [m].
+  CuttingCurves border;       ///< The curves along which the face meets the surface.
 };
 
-/// The places of a surface that are too near to a cut for phyxels of their own: the body between
-/// such a place and the cut is so thin that a phyxel would have hardly any volume. Phyxels on the
-/// cut itself, where it meets the surface, do not count as near.
+/// The places of a surface that are too near to a cut for phyxels of their own: they lie in the
+/// wedge beside a curve along which the two meet at a sharp angle, where a phyxel would have hardly
+/// any volume. Phyxels on the cut itself, where it meets the surface, do not count as near.
 class CutMargin {
  public:
   /// @param faces the cuts; none: the margin is empty. @param spacing of the phyxels
@@ -69,10 +74,16 @@ class CutMargin {
  private:
   bool is_thin(Vec3d place, const SpaceRegion& region, double spacing) const;
 
+  /// A face that meets the surface at a sharp angle somewhere.
+  struct Face {
+    SpaceRegion region;
+    SpatialHash points;  ///< Points of the face and its border.
+    SpatialHash sharp;   ///< Places of the border where the angle is sharp.
+  };
+
   const InsideSampler& sampler_;
-  std::span<const CutFace> faces_;
   const SpacingField& spacing_;
-  std::vector<SpatialHash> points_;  ///< Points of each face and its border.
+  std::vector<Face> faces_;
 };
 
 }  // namespace phyxel

@@ -230,12 +230,16 @@ class Skin {
   std::vector<double> volumes(Stage& stage) const {
     const double cell = std::pow(spacing_, 3);
     std::vector<double> sampled = sampled_volumes(stage);
-    raise_small_volumes(point_, request_.sites.cuts, request_.sites.spacing, sampled);
+    // The others have the volumes of lattice cells.
+    const auto is_irregular = [&](std::size_t k) {
+      return k < sites() || clearance_of(k - sites()) < regular_clearance;
+    };
+    raise_small_volumes(point_, request_.sites.cuts, request_.sites.spacing, sampled, is_irregular);
     std::vector<double> volume(sites() + nodes_.position.size(), cell);
-    std::vector<std::size_t> irregular;  // phyxels whose volumes are not those of lattice cells
+    std::vector<std::size_t> irregular;
     double sum = 0;
     for (std::size_t k = 0; k < point_.size(); ++k) {
-      if (k >= sites() && clearance_of(k - sites()) >= regular_clearance) continue;
+      if (!is_irregular(k)) continue;
       irregular.push_back(k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()]));
       volume[irregular.back()] = sampled[k];
       sum += sampled[k];

@@ -26,11 +26,13 @@ struct NearPoint {
 }  // namespace
 
 void raise_small_volumes(std::span<const Vec3d> point, const SupportCuts& cuts,
-                         const SpacingField& spacing, std::vector<double>& volume) {
+                         const SpacingField& spacing, std::vector<double>& volume,
+                         const std::function<bool(std::size_t)>& may_change) {
   if (cuts.list.empty()) return;
   std::vector<NearPoint> near;
   std::vector<Vec3d> place;
   for (std::size_t k = 0; k < point.size(); ++k) {
+    if (may_change && !may_change(k)) continue;
     double distance = HUGE_VAL;
     for (const SupportCut& cut : cuts.list) {
       distance = std::min(distance, std::abs(cut.wall.distance(point[k])));

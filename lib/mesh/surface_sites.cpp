@@ -262,7 +262,7 @@ void add_along_cuts(std::span<const CutFace> faces, const InsideSampler& sampler
   const CutMargin no_margin(sampler, {}, spacing);
   std::vector<Crease> curves;
   for (const CutFace& face : faces) {
-    curves.insert(curves.end(), face.border.begin(), face.border.end());
+    curves.insert(curves.end(), face.border.piece.begin(), face.border.piece.end());
   }
   if (curves.empty()) return;
   const std::size_t first = sites.position.size();

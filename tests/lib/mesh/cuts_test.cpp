@@ -347,6 +347,42 @@ TEST(Cuts, LeaveNoTinyVolumesInWedges) {
   EXPECT_GT(on_cut, 100);
 }
 
+/// A face along which a cut runs keeps its phyxels, however near the cut is: only wedges beside
+/// curves of sharp angles lose theirs.
+TEST(Cuts, BelowAFaceLeaveItsPhyxels) {
+  constexpr Index phyxels = 3000;
+  const double of_cube = std::cbrt(1.0 / phyxels);
+  const auto on_top = [&](double below) {
+    SampleRequest request{.phyxels = phyxels};
+    if (below > 0) request.cuts = {{.low = {-1, -1, -1}, .high = {2, 2, 1 - below * of_cube}}};
+    const Cloud cloud = sample_surface(test::unit_cube(), request);
+    return std::count_if(cloud.position.begin(), cloud.position.end(),
+                         [](Vec3d p) { return p.z > 1 - 1e-9; });
+  };
+  const auto plain = static_cast<double>(on_top(0));
+  EXPECT_GT(plain, 150);
+  for (const double below : {0.2, 0.38, 0.42, 0.5}) {
+    EXPECT_NEAR(static_cast<double>(on_top(below)), plain, 0.1 * plain) << below;
+  }
+  const Surface ball_surface = test::sphere({0, 0, 0}, 1, 3);
+  const double spacing = std::cbrt(4.0 / 3 * std::numbers::pi / phyxels);
+  const auto on_ball = [&](double below) {
+    SampleRequest request{.phyxels = phyxels};
+    if (below > 0) {
+      request.cuts = {{.centre = {0, 0, 0}, .radius = 1 - below * spacing, .is_ball = true}};
+    }
+    SampleReport report;
+    sample_surface(ball_surface, request, &report);
+    EXPECT_TRUE(report.warnings.empty()) << report.warnings[0];
+    return static_cast<double>(report.on_surface);
+  };
+  const double everywhere = on_ball(0);
+  EXPECT_GT(everywhere, 500);
+  for (const double below : {0.1, 0.3, 0.42, 0.6}) {
+    EXPECT_NEAR(on_ball(below), everywhere, 0.1 * everywhere) << below;
+  }
+}
+
 /// A box thinner than a spacing holds one layer, in its middle.
 TEST(Cuts, OfThinBoxesAreOneLayer) {
   const HeldCube cube = held_in({0.47, -1, -1}, {0.49, 2, 2});
