@@ -64,6 +64,10 @@ function(phyxel_library name)
                         PRIVATE $<BUILD_INTERFACE:phyxel_flags> fmt::fmt OpenMP::OpenMP_CXX)
 endfunction()
 
+# Test programs, which are many, are linked by LLVM's linker if there is one: it is much the fastest.
+find_program(PHYXEL_LLD ld.lld)
+mark_as_advanced(PHYXEL_LLD)
+
 # Only exit code 77 of a skipped case (tests/support/skips.hpp) makes CTest report "Skipped".
 set(PHYXEL_SKIP_PROPERTIES SKIP_RETURN_CODE 77)
 
@@ -78,6 +82,9 @@ function(phyxel_configure_test name)
   target_link_libraries(${name} PRIVATE phyxel phyxel_flags)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_SOURCE_DIR}/lib)
   target_compile_definitions(${name} PRIVATE PHYXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  if(PHYXEL_LLD)
+    target_link_options(${name} PRIVATE "$<$<LINK_LANGUAGE:CXX>:-fuse-ld=lld>")
+  endif()
   set_target_properties(${name} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
 endfunction()
