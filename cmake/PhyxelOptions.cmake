@@ -100,6 +100,10 @@ function(phyxel_add_test name)
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   phyxel_configure_test(${name})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} phyxel_test_main)
+  if(PHYXEL_PCH)
+    target_link_libraries(${name} PRIVATE OpenMP::OpenMP_CXX)  # as the precompiled headers
+    phyxel_precompile(${name} REUSE_FROM phyxel_test_main)
+  endif()
   set(properties TIMEOUT ${arg_TIMEOUT} ${PHYXEL_SKIP_PROPERTIES})
   if(arg_LABELS)
     list(JOIN arg_LABELS "_" label)  # one label, since lists cannot be passed on
