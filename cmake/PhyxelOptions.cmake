@@ -31,13 +31,16 @@ if(PHYXEL_SANITIZE)
   target_link_options(phyxel_flags INTERFACE -fsanitize=${PHYXEL_SANITIZE})
 endif()
 
-# phyxel_precompile(target header...), phyxel_precompile(target REUSE_FROM target): precompiles headers of a target with
-# PHYXEL_PCH. Builds without it check that each source includes what it uses, and share objects through ccache, for which a
+# phyxel_precompile(target header...), phyxel_precompile(target REUSE_FROM target): precompiles headers of a target if
+# PHYXEL_PCH is ON. Builds without it check that each source includes what it uses, and share objects through ccache, for which a
 # precompiled header in another folder is a different compilation.
 function(phyxel_precompile target)
-  if(NOT PHYXEL_PCH)
-    return()
+  if(PHYXEL_PCH STREQUAL "ON")
+    phyxel_precompile_always(${target} ${ARGN})
   endif()
+endfunction()
+
+function(phyxel_precompile_always target)
   if(ARGV1 STREQUAL "REUSE_FROM")
     target_precompile_headers(${target} REUSE_FROM ${ARGV2})
   else()
@@ -45,6 +48,8 @@ function(phyxel_precompile target)
   endif()
   if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")  # otherwise ccache takes a new time stamp for a change
     target_compile_options(${target} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+  else()
+    target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fpch-preprocess>)
   endif()
 endfunction()
 
@@ -77,11 +82,13 @@ function(phyxel_one_skip name)
     -DFOLDER=${CMAKE_CURRENT_BINARY_DIR} -DNAME=${name} -P ${PROJECT_SOURCE_DIR}/cmake/PhyxelOneSkip.cmake)
 endfunction()
 
-# Gives a test the path of the sources and the include folders.
+# Gives a test the path of the sources and the include folders. Tests are many, and most of their time is the library's:
+# they are not optimised far.
 function(phyxel_configure_test name)
   target_link_libraries(${name} PRIVATE phyxel phyxel_flags)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests ${PROJECT_SOURCE_DIR}/lib)
   target_compile_definitions(${name} PRIVATE PHYXEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_compile_options(${name} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<NOT:$<CONFIG:Debug>>>:-O1>)
   if(PHYXEL_LLD)
     target_link_options(${name} PRIVATE "$<$<LINK_LANGUAGE:CXX>:-fuse-ld=lld>")
   endif()
@@ -102,7 +109,8 @@ function(phyxel_add_test name)
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} phyxel_test_main)
   if(PHYXEL_PCH)
     target_link_libraries(${name} PRIVATE OpenMP::OpenMP_CXX)  # as the precompiled headers
-    phyxel_precompile(${name} REUSE_FROM phyxel_test_main)
+    set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    phyxel_precompile_always(${name} REUSE_FROM phyxel_test_main)
   endif()
   set(properties TIMEOUT ${arg_TIMEOUT} ${PHYXEL_SKIP_PROPERTIES})
   if(arg_LABELS)
