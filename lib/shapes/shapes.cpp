@@ -38,8 +38,8 @@ void check_size(const ShapeRequest& request) {
   } else {
     if (request.placement == ShapeRequest::Placement::nodes && request.name == "sphere") {
       throw InputError(
-          "shape \"sphere\": lattice \"nodes\": its outer layer would not lie on a round surface; "
-          "allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
+          "shape \"sphere\": lattice = \"nodes\" found, whose outer layer would not lie on a round "
+          "surface; allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
     }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
@@ -79,18 +79,21 @@ void check_request(const ShapeRequest& request) {
   if (request.placement != ShapeRequest::Placement::fitted) {
     if (!request.grading) return;
     throw InputError(fmt::format(
-        "shape \"{}\": a lattice cannot be graded; allowed: lattice = \"fitted\", or no grading",
-        request.name));
+        "shape \"{}\": lattice = \"{}\" found, which cannot be graded; allowed: \"fitted\", or no "
+        "grading",
+        request.name, request.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells"));
   }
   if (request.jitter > 0) {
     throw InputError(fmt::format(
-        "shape \"{}\": jitter = {} with lattice \"fitted\", which is no lattice: allowed is 0",
+        "shape \"{}\": jitter = {} found with lattice = \"fitted\", which is no lattice; allowed: "
+        "jitter = 0, or lattice = \"nodes\" or \"cells\"",
         request.name, request.jitter));
   }
   if (!request.surface) {
-    throw InputError(fmt::format(
-        "shape \"{}\": lattice \"fitted\" without surfels: allowed is \"cells\" or \"nodes\"",
-        request.name));
+    throw InputError(
+        fmt::format("shape \"{}\": lattice = \"fitted\" found without surfels; allowed: \"nodes\" "
+                    "or \"cells\", or surfels",
+                    request.name));
   }
 }
 
