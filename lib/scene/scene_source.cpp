@@ -62,7 +62,7 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
 /// Where the phyxels of a body's shape are most accurate (`best_placement`).
 ShapeRequest::Placement placement_for(const BodyRequest& body) {
   ShapeRequest shape = body.source.shape;
-  shape.supports = source_of(body).cuts;
+  shape.supports = source_of(body).supports();
   shape.grading = body.source.grading;
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, std::max(1, body.source.phyxels));
   return best_placement(shape, body.closure.value_or(1) > 0 && !body.neighbourhood.one_sided());

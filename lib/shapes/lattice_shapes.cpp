@@ -377,7 +377,7 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
                      (lattice.solid == Lattice::Solid::cylinder && axis == 2);
     box.on_end[axis] = nodes && box.flat[axis];
   }
-  const LayerPlan plan = plan_layers(box, request.supports);
+  LayerPlan plan = plan_layers(box, request.supports);
   for (int axis = 0; axis < 3; ++axis) {
     lattice.layers[axis] = Layers(component(low, axis), component(extent, axis), spacing,
                                   plan.on_end[axis], plan.planes[axis]);
@@ -387,6 +387,7 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
       lattice.rooms.push_back(*room);
     }
   }
+  lattice.moved = std::move(plan.moved);
   return lattice;
 }
 

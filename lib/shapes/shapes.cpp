@@ -122,6 +122,12 @@ Surface fitted_surfels(const Lattice& lattice, double spacing) {
   return surface;
 }
 
+std::vector<SpaceRegion> regions_of(std::span<const SupportRegion> supports) {
+  std::vector<SpaceRegion> regions;
+  for (const SupportRegion& support : supports) regions.push_back(support.region);
+  return regions;
+}
+
 /// Fills a shape as a mesh is filled.
 Cloud make_fitted_shape(const ShapeRequest& request) {
   check_request(request);
@@ -139,7 +145,7 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
                                {.phyxels = static_cast<Index>(phyxels),
                                 .seed = request.seed,
                                 .on_surface = {},
-                                .cuts = request.supports,
+                                .cuts = regions_of(request.supports),
                                 .grading = request.grading},
                                &report);
   for (const std::string& warning : report.warnings) {
@@ -203,7 +209,8 @@ ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed)
   const double thinnest = std::min({size.x, size.y, size.z});
   const bool is_box = lattice.solid == Lattice::Solid::box;
   const bool layers_do =
-      is_box && !request.grading && std::ranges::all_of(request.supports, is_along_axes);
+      is_box && !request.grading &&
+      std::ranges::all_of(request.supports, is_along_axes, &SupportRegion::region);
   if (closed && !layers_do && request.surface && request.jitter == 0 &&
       thinnest > 3 * request.spacing) {
     return Placement::fitted;
@@ -235,6 +242,7 @@ CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
   made.cloud.cuts.depth = lattice.depth;
   made.cloud.cuts.spacing = request.spacing;
   for (const LatticeRoom& room : lattice.rooms) made.cloud.cuts.list.push_back(room.cut);
+  made.cloud.cuts.moved = lattice.moved;
   return made;
 }
 

@@ -240,6 +240,13 @@ std::vector<Late> late_refusals() {
       {with_bar("[[body.fixed]]\nall = true\n[[body.fixed]]\nregion = 'x-'\n"),
        {":16:", "already fixed or moved"}},
       {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake), {":16:", "already fixed or moved"}},
+      {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\naxes = 'xy'\n"
+                "[[body.fixed]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\naxes = 'yz'\n"),
+       {":17:", "fixed 2 of body \"beam\" shares a face with fixed 1", "\"xy\"", "\"yz\"",
+        "allowed: "}},
+      {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\n"
+                "[[body.motion]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\nvelocity = [1, 0, 0]\n"),
+       {":16:", "motion 1 of body \"beam\" shares a face with fixed 1", "\"xyz\"", "allowed: "}},
       // Inclusions
       {with_bar("[[body.inclusion]]\nbox = [[7, 7, 7], [8, 8, 8]]\nyoung = 1e6\n"),
        {":14:", "selects no phyxel"}},
