@@ -108,7 +108,8 @@ TEST(LatticeCuts, CellsEndAtFaces) {
   }
 }
 
-/// Boxes that overlap, or that share a face, or a part of one, share out the whole volume, too.
+/// Boxes that overlap, or that share a face, or a part of one, share out the whole volume, too, and
+/// alike in both orders.
 TEST(LatticeCuts, SeveralBoxesKeepTheVolume) {
   const SpaceRegion lower = box({-9, -9, -9}, {-0.4, 9, 0.1});
   for (const SpaceRegion& other :
@@ -116,8 +117,11 @@ TEST(LatticeCuts, SeveralBoxesKeepTheVolume) {
         box({-0.4, -9, -0.3}, {0.3, 9, 9}), box({-9, -9, 0.1}, {-0.4, 9, 9}),
         box({-9, -0.2, 0.1}, {0.3, 9, 9}), box({-9, -9, 0.1}, {9, 9, 9}),
         box({-9, -9, 0.13}, {0.6, 0.2, 9})}) {
+    const Cloud first = make_shape(block(ShapeRequest::Placement::nodes, {lower, other}));
     for (const std::vector<SpaceRegion>& both : {std::vector{lower, other}, {other, lower}}) {
       const Cloud cloud = make_shape(block(ShapeRequest::Placement::nodes, both));
+      EXPECT_EQ(cloud.position, first.position);
+      EXPECT_EQ(cloud.volume, first.volume);
       EXPECT_EQ(cloud.cuts.list.size(), 2u);
       EXPECT_NEAR(volume_if(cloud, [](Vec3d) { return true; }), 2, 1e-12);
       EXPECT_GT(*std::min_element(cloud.volume.begin(), cloud.volume.end()), 1e-5);
