@@ -53,6 +53,7 @@ DealtCloud::DealtCloud(const MpiCommunicator& ranks, Cloud cloud, int maker)
   common_.surface = broadcast_surface(ranks, std::move(cloud.surface), maker);
   common_.warnings = broadcast_texts(ranks, cloud.warnings, maker);
   common_.cuts.list = ranks.broadcast(std::move(cloud.cuts.list), maker);
+  common_.cuts.moved = ranks.broadcast(std::move(cloud.cuts.moved), maker);
   const SupportCuts& cuts = cloud.cuts;
   const std::vector<double> lengths =
       ranks.broadcast(std::vector{cuts.depth, cuts.spacing, cuts.shift}, maker);

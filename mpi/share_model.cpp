@@ -285,6 +285,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
   const std::span<const MigratingPhyxel> here = of_range(local.phyxels, local.bodies[b]);
   Cloud cloud;
   cloud.position = tabulated(here.size(), [&](std::size_t k) { return here[k].position; });
+  cloud.cuts = body.cuts;
   const auto in_region = [&](Index region) {
     std::vector<Index> chosen;
     for (std::size_t k = 0; k < here.size(); ++k) {
@@ -303,6 +304,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
       choice.chosen.push_back(region >= 0 ? in_region(region)
                                           : select(*selection, {cloud, {}, body.size}, request));
     }
+    choice.share_boundaries(request, {cloud, {}, body.size});
     return choice;
   }
   auto number = tabulated(here.size(), [&](std::size_t k) { return here[k].number; });
@@ -397,6 +399,7 @@ void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local
         choices[b].refuse_empty(request, {count, count + entries}, whole.boxes[b]);
         if (entries > 0) {
           choices[b].warn_of_few(request, {count, count + entries}, whole.warnings);
+          choices[b].warn_of_moved(request, whole.bodies[b].cuts, whole.warnings);
         }
       });
       count += entries;

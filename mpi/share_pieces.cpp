@@ -205,6 +205,7 @@ MigratingPhyxels make_pieces(const ShareSetup& setup, const Pieces& piece, Whole
       lattices[b] = cloud.lattice;
       const BodyRequest& request = setup.scene.bodies[b];
       body.walls = walls_of(request, cloud);
+      body.cuts = cloud.cuts;
       const std::vector<std::uint32_t> sets =
           naming(request, [&] { return find_region_sets(request, made, body); });
       if (!request.inclusions.empty()) {

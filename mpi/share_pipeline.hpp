@@ -36,6 +36,7 @@ struct WholeBody {
   bool kernel_volumes = false;
   bool lattice = false;              ///< `Cloud::lattice`.
   Walls walls;                       ///< `walls_of` its cloud.
+  SupportCuts cuts;                  ///< `Cloud::cuts`.
   double closure = 0;                ///< Tolerance of closed gradients; 0: they are not closed.
   std::vector<std::string> regions;  ///< Names of its regions, those that the scene uses first.
   std::size_t used_regions = 0;

@@ -322,15 +322,17 @@ std::vector<const Selection*> selections_of(const BodyRequest& request) {
   return all;
 }
 
-namespace {
-/// Returns the axes of the fixed and moved entries of a body, in the order of `selections_of`.
 std::vector<Axes> axes_of_supports(const BodyRequest& request) {
   std::vector<Axes> axes;
   for (const FixRequest& fix : request.fixed) axes.push_back(fix.axes);
   for (const MotionRequest& motion : request.motions) axes.push_back(motion.axes);
   return axes;
 }
-}  // namespace
+
+std::string name_of_support(const BodyRequest& request, std::size_t entry) {
+  return entry < request.fixed.size() ? entry_name("fixed", entry)
+                                      : entry_name("motion", entry - request.fixed.size());
+}
 
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
@@ -340,17 +342,19 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
   const SomePhyxels here{cloud, number, size};
   choice.first_load = request.fixed.size() + request.motions.size();
   choice.first_probe = choice.first_load + request.loads.size();
-  for (const Selection* selection : selections_of(request)) {
-    const std::size_t entry = choice.chosen.size();
-    const int bits = entry < choice.first_load ? axes[entry].bits() : 0;
-    const std::vector<Index>& chosen =
-        choice.chosen.emplace_back(select(*selection, here, request));
-    for (const Index i : chosen) {
+  const std::vector<const Selection*> selections = selections_of(request);
+  for (const Selection* selection : selections) {
+    choice.chosen.push_back(select(*selection, here, request));
+  }
+  choice.share_boundaries(request, here);
+  for (std::size_t entry = 0; entry < choice.first_load; ++entry) {
+    const int bits = axes[entry].bits();
+    for (const Index i : choice.chosen[entry]) {
       if (moved[i] & bits) {
         throw InputError(fmt::format(
             "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry; allowed: "
             "one entry for each of its axes",
-            selection->where, here.number_of(i), request.name));
+            selections[entry]->where, here.number_of(i), request.name));
       }
       moved[i] = static_cast<char>(moved[i] | bits);
     }
@@ -410,7 +414,12 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
                                   const std::vector<std::int64_t>& counts, const Box& box) const {
   const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < selections.size(); ++entry) {
-    if (counts[entry] == 0) refuse_selection(*selections[entry], request.name, box);
+    if (counts[entry] > 0) continue;
+    const bool may_share = entry < first_load && first_load > 1 && region_of(*selections[entry]);
+    refuse_selection(
+        *selections[entry], request.name, box,
+        may_share ? "; phyxels on a face that it shares with another support are left to that one"
+                  : "");
   }
 }
 
@@ -420,14 +429,12 @@ void BoundaryChoice::warn_of_few(const BodyRequest& request,
   const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < first_load; ++entry) {
     if (counts[entry] > 2 || !region_of(*selections[entry])) continue;
-    const std::string name = entry < request.fixed.size()
-                                 ? entry_name("fixed", entry)
-                                 : entry_name("motion", entry - request.fixed.size());
     const char* region = selections[entry]->box ? "box" : "ball";
     warnings.push_back(fmt::format(
         "body \"{}\", {}: only {} of its phyxels {} in the {}, and a body can turn about so few: a "
         "larger {}, or more phyxels, hold it",
-        request.name, name, counts[entry], counts[entry] == 1 ? "lies" : "lie", region, region));
+        request.name, name_of_support(request, entry), counts[entry],
+        counts[entry] == 1 ? "lies" : "lie", region, region));
   }
 }
 

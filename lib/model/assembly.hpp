@@ -11,6 +11,7 @@
 #include "model/cloud_check.hpp"
 #include "model/cloud_piece.hpp"
 #include "model/loads.hpp"
+#include "model/selection.hpp"
 #include "model/symmetry.hpp"
 #include "model/walls.hpp"
 #include "phyxel/model.hpp"
@@ -130,12 +131,24 @@ struct BodySums {
 /// regions of probes, as the scene has them.
 std::vector<const Selection*> selections_of(const BodyRequest& request);
 
+/// The axes of the fixed and moved entries of a body, in the order of `selections_of`.
+std::vector<Axes> axes_of_supports(const BodyRequest& request);
+
 /// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
   std::size_t first_load = 0, first_probe = 0;
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
+
+  /// Leaves each phyxel on a face that several supports share, and each of its axes, to one of
+  /// these, whatever the order of the entries: to the one that holds or moves more axes, among them
+  /// all of the other's; and of equal ones to the first in space. @param here as in `chosen`
+  /// @throws InputError for supports that contradict each other there
+  void share_boundaries(const BodyRequest& request, const SomePhyxels& here);
+  /// Warns of supports whose faces have moved to the layers of a lattice.
+  void warn_of_moved(const BodyRequest& request, const SupportCuts& cuts,
+                     std::vector<std::string>& warnings) const;
 
   /// Adds planes of symmetry. A phyxel that another entry, or an earlier plane, holds or moves
   /// along a plane's normal is left to that.
@@ -166,5 +179,8 @@ struct BoundaryChoice {
 ///   phyxels that two entries move
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size);
+
+/// The name of the entry of a support, e.g. "motion 1". @param entry in `selections_of`
+std::string name_of_support(const BodyRequest& request, std::size_t entry);
 
 }  // namespace phyxel

@@ -50,6 +50,7 @@ std::uint64_t cloud_digest(const Cloud& cloud) {
   add(cloud.surface.position);
   add(cloud.surface.triangle);
   add(std::array{static_cast<double>(cloud.cuts.list.size()), cloud.cuts.depth});
+  if (!cloud.cuts.moved.empty()) add(std::array{static_cast<double>(cloud.cuts.moved.size())});
   for (const auto& [name, members] : cloud.regions) {
     add(name);
     add(members);

@@ -22,7 +22,7 @@ std::optional<Grading> grading_of(const CutSource& from) {
 ShapeRequest shape_of(const CutSource& from, Piece piece) {
   ShapeRequest shape = from.source.shape;
   shape.seed = from.source.seed;
-  shape.supports = from.cuts;
+  shape.supports = from.supports();
   shape.grading = grading_of(from);
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
   // So far from the origin, coordinates do not tell a layer from the face that it lies on.

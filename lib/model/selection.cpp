@@ -94,12 +94,9 @@ std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
   if (selection.region) return of_region(selection, cloud, request.name);
   if (selection.indices) return of_indices(selection, body, request.name);
   if (!selection.mesh.empty()) return inside_mesh(selection, cloud, request);
-  if (const std::optional<SpaceRegion> region = region_of(selection)) {
-    // Coordinates of faces that a scene means may differ in their last digits.
-    constexpr double digits = 1e-12;
-    const double size = region->is_ball ? region->radius : norm(region->high - region->low);
+  if (const std::optional<SpaceRegion> region = acting_region(selection, cloud.cuts)) {
     return indices_where(cloud, [&](Vec3d p) {
-      return region->distance(p) <= digits * (norm(p) + std::min(size, norm(p)));
+      return region->distance(p) <= boundary_tolerance(*region, p, cloud.cuts);
     });
   }
   return indices_where(cloud, [](Vec3d) { return true; });
@@ -113,11 +110,27 @@ std::optional<SpaceRegion> region_of(const Selection& selection) {
   return std::nullopt;
 }
 
-void refuse_selection(const Selection& selection, const std::string& name, const Box& box) {
+std::optional<SpaceRegion> acting_region(const Selection& selection, const SupportCuts& cuts) {
+  const std::optional<SpaceRegion> region = region_of(selection);
+  if (!region) return region;
+  const auto moved = std::ranges::find(cuts.moved, *region, &SupportCut::support);
+  return moved == cuts.moved.end() ? region : moved->wall;
+}
+
+double boundary_tolerance(const SpaceRegion& region, Vec3d point, const SupportCuts& cuts) {
+  // Coordinates of faces that a scene means may differ in their last digits.
+  constexpr double digits = 1e-12;
+  const double size = region.is_ball ? region.radius : norm(region.high - region.low);
+  return std::max(2 * cuts.depth, digits * (norm(point) + std::min(size, norm(point))));
+}
+
+void refuse_selection(const Selection& selection, const std::string& name, const Box& box,
+                      const char* more) {
   throw InputError(fmt::format(
       "{}: this selects no phyxel of body \"{}\", whose phyxels lie in [{:g}, {:g}, {:g}] to "
-      "[{:g}, {:g}, {:g}] m",
-      selection.where, name, box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z));
+      "[{:g}, {:g}, {:g}] m{}",
+      selection.where, name, box.low.x, box.low.y, box.low.z, box.high.x, box.high.y, box.high.z,
+      more));
 }
 
 }  // namespace phyxel

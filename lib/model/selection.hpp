@@ -36,8 +36,17 @@ std::string alternatives_to(const std::string& name,
 /// The part of space that a selection means; unset if it means none.
 std::optional<SpaceRegion> region_of(const Selection& selection);
 
-/// For a selection of nothing. @param box around the body @throws InputError
+/// The part of space in which a selection has phyxels: `region_of`, or, of a support of which faces
+/// have moved to layers of a lattice, the region with these faces.
+std::optional<SpaceRegion> acting_region(const Selection& selection, const SupportCuts& cuts);
+
+/// The distance of a point from a region's boundary within which it lies on the boundary [m]: twice
+/// the depth of phyxels, so that those on a face that two regions share belong to both.
+double boundary_tolerance(const SpaceRegion& region, Vec3d point, const SupportCuts& cuts);
+
+/// For a selection of nothing. @param box around the body @param more words for the message's end
+/// @throws InputError
 [[noreturn]] void refuse_selection(const Selection& selection, const std::string& name,
-                                   const Box& box);
+                                   const Box& box, const char* more = "");
 
 }  // namespace phyxel

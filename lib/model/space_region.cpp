@@ -1,6 +1,7 @@
 #include "phyxel/space_region.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 namespace phyxel {
 namespace {
@@ -101,6 +102,15 @@ SpaceRegion SpaceRegion::scaled(double factor) const {
   made.centre = factor * centre;
   made.radius = factor * radius;
   return made;
+}
+
+bool comes_before(const SpaceRegion& a, const SpaceRegion& b) {
+  const auto of_vector = [](Vec3d v) { return std::tuple(v.x, v.y, v.z); };
+  const auto key = [&](const SpaceRegion& r) {
+    return std::tuple(r.is_ball, of_vector(r.low), of_vector(r.high), of_vector(r.centre), r.radius,
+                      of_vector(r.edge[0]), of_vector(r.edge[1]), of_vector(r.edge[2]));
+  };
+  return key(a) < key(b);
 }
 
 }  // namespace phyxel

@@ -24,6 +24,15 @@ void for_each_support(const BodyRequest& request, Visit&& visit) {
   for (const MotionRequest& motion : request.motions) one(motion);
 }
 
+/// The axes along which the entries of a region hold or move its phyxels, a bit for each.
+int axes_held_in(const BodyRequest& request, const SpaceRegion& region) {
+  int axes = 0;
+  for_each_support(request, [&](const SpaceRegion& other, Axes held) {
+    if (other == region) axes |= held.bits();
+  });
+  return axes;
+}
+
 /// True if numbers differ by no more than the rounding of differences of numbers of size `shift`.
 bool nearly_equal(Vec3d a, Vec3d b, double shift) {
   const auto near = [&](double x, double y) {
@@ -58,7 +67,7 @@ std::vector<std::size_t> rooms_of(std::span<const Vec3d> position, const Walls& 
     std::size_t nearest = outside;
     for (std::size_t k = 0; k < outside; ++k) {
       const double distance = walls.regions[k].distance(position[i]);
-      lies_on = lies_on || distance <= walls.depth;
+      lies_on = lies_on || distance <= 2 * walls.depth;
       if (distance < walls.spacing) nearest = k;
     }
     if (lies_on) {
@@ -135,11 +144,7 @@ std::size_t Walls::room_of(Vec3d point) const {
 Walls walls_of(const BodyRequest& request, const Cloud& cloud) {
   Walls walls{.regions = {}, .depth = cloud.cuts.depth, .spacing = cloud.cuts.spacing};
   for (const SupportCut& cut : cloud.cuts.list) {
-    int axes = 0;
-    for_each_support(request, [&](const SpaceRegion& region, Axes held) {
-      if (region == cut.support) axes |= held.bits();
-    });
-    if (axes == Axes{}.bits()) walls.regions.push_back(cut.wall);
+    if (axes_held_in(request, cut.support) == Axes{}.bits()) walls.regions.push_back(cut.wall);
   }
   return walls;
 }
@@ -163,23 +168,32 @@ void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls&
   if (!hood.symmetric) hood.inverse_lists = transpose(lists, lists.rows());
 }
 
-std::vector<SpaceRegion> support_regions(const BodyRequest& request) {
-  std::vector<SpaceRegion> regions;
+std::vector<SupportRegion> support_regions(const BodyRequest& request) {
+  std::vector<SupportRegion> supports;
   for_each_support(request, [&](const SpaceRegion& region, Axes) {
-    if (std::count(regions.begin(), regions.end(), region) == 0) regions.push_back(region);
+    if (std::ranges::count(supports, region, &SupportRegion::region) > 0) return;
+    supports.push_back({region, axes_held_in(request, region) == Axes{}.bits()});
   });
-  return regions;
+  std::ranges::sort(supports, comes_before, &SupportRegion::region);
+  return supports;
+}
+
+std::vector<SupportRegion> CutSource::supports() const {
+  std::vector<SupportRegion> all;
+  for (std::size_t k = 0; k < cuts.size(); ++k) all.push_back({cuts[k], holds_all[k] != 0});
+  return all;
 }
 
 CutSource source_of(const BodyRequest& request) {
-  CutSource made{request.source, {}, {}, 0};
+  CutSource made{request.source, {}, {}, {}, 0};
   const std::string& shape = request.source.shape.name;
   const bool is_shape =
       !shape.empty() && !is_paper_shape(shape) && request.volume_rule != VolumeRule::kernel;
   if (request.source.mesh.empty() && !is_shape) return made;
   const Mat3d rotation = rotation_of(request);
-  for (const SpaceRegion& region : support_regions(request)) {
+  for (const auto& [region, holds_all] : support_regions(request)) {
     made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
+    made.holds_all.push_back(holds_all);
   }
   for (const FinerRequest& finer : request.finer) {
     made.finer.push_back(
@@ -197,27 +211,32 @@ bool is_same(const CutSource& a, const CutSource& b) {
   const auto equal_finer = [&](const Grading::Finer& one, const Grading::Finer& other) {
     return one.by == other.by && equal(one.region, other.region);
   };
-  return a.source == b.source && std::ranges::equal(a.cuts, b.cuts, equal) &&
+  return a.source == b.source && a.holds_all == b.holds_all &&
+         std::ranges::equal(a.cuts, b.cuts, equal) &&
          std::ranges::equal(a.finer, b.finer, equal_finer);
 }
 
 void place_cuts(Cloud& cloud, const BodyRequest& request) {
   cloud.cuts.depth *= request.scale;
   cloud.cuts.spacing *= request.scale;
-  if (cloud.cuts.list.empty()) return;
+  if (cloud.cuts.list.empty() && cloud.cuts.moved.empty()) return;
   const CutSource source = source_of(request);
-  const std::vector<SpaceRegion> placed = support_regions(request);
+  const std::vector<SupportRegion> supports = support_regions(request);
   const Mat3d rotation = rotation_of(request);
-  std::vector<SupportCut> cuts;
-  for (std::size_t k = 0; k < source.cuts.size(); ++k) {
-    const auto cut =
-        std::find_if(cloud.cuts.list.begin(), cloud.cuts.list.end(), [&](const SupportCut& c) {
-          return nearly_equal(c.support, source.cuts[k], 2 * source.shift + cloud.cuts.shift);
-        });
-    if (cut == cloud.cuts.list.end()) continue;
-    cuts.push_back({placed[k], cut->wall.placed(request.scale, rotation, request.translation)});
-  }
-  cloud.cuts.list = std::move(cuts);
+  const auto placed = [&](const std::vector<SupportCut>& cuts) {
+    std::vector<SupportCut> all;
+    for (std::size_t k = 0; k < source.cuts.size(); ++k) {
+      const auto cut = std::find_if(cuts.begin(), cuts.end(), [&](const SupportCut& c) {
+        return nearly_equal(c.support, source.cuts[k], 2 * source.shift + cloud.cuts.shift);
+      });
+      if (cut == cuts.end()) continue;
+      all.push_back(
+          {supports[k].region, cut->wall.placed(request.scale, rotation, request.translation)});
+    }
+    return all;
+  };
+  cloud.cuts.list = placed(cloud.cuts.list);
+  cloud.cuts.moved = placed(cloud.cuts.moved);
 }
 
 }  // namespace phyxel

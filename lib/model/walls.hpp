@@ -22,16 +22,22 @@ Walls walls_of(const BodyRequest& request, const Cloud& cloud);
 void separate(Neighbourhood& hood, std::span<const Vec3d> position, const Walls& walls,
               double pair_length);
 
-/// The regions of space in which a body is held or moved, in place and without repetitions.
-std::vector<SpaceRegion> support_regions(const BodyRequest& request);
+/// The regions of space in which a body is held or moved, in place, without repetitions, and in the
+/// order of `comes_before`. A region holds all axes if the entries that have it hold or move all,
+/// one or several together.
+std::vector<SupportRegion> support_regions(const BodyRequest& request);
 
 /// The source of a body, with the regions at whose boundaries the body's supports end, before it
 /// is scaled and moved.
 struct CutSource {
   BodySource source;
   std::vector<SpaceRegion> cuts;
+  std::vector<char> holds_all;        ///< `SupportRegion::holds_all` of each cut.
   std::vector<Grading::Finer> finer;  ///< Regions in which phyxels are nearer to each other.
   double shift = 0;  ///< Length of the translation, whose digits the cuts' coordinates lack [m].
+
+  /// The cuts with what they hold.
+  std::vector<SupportRegion> supports() const;
 };
 CutSource source_of(const BodyRequest& request);
 

@@ -212,7 +212,9 @@ std::vector<SceneKey> body_keys() {
        .words = {"cells", "nodes", "fitted"},
        .meaning = "Phyxels of a shape: \"cells\", in the middle of each cell of a lattice; \"nodes\", on flat faces "
            "too, in a beam and block at the cells' corners (not in a sphere); \"fitted\", on all faces, as in "
-           "a body from a mesh, not in a lattice: exactly `phyxels` of them, or one for each cube of `spacing`."},
+           "a body from a mesh, not in a lattice: exactly `phyxels` of them, or one for each cube of `spacing`; needs "
+           "surfels, and no jitter. In a lattice, a ball, a turned box, and a box that cuts a round side hold the phyxels that "
+           "they contain; fitted shapes have phyxels on their boundaries."},
       {.section = "body", .name = "jitter", .fallback = "0", .range = between(0, 0.5),
        .meaning = "Each phyxel of a lattice is moved at random by up to this many spacings."},
       {.section = "body", .name = "seed", .type = KeyType::integer, .fallback = "1",

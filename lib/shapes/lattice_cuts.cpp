@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace phyxel {
 namespace {
@@ -16,8 +15,158 @@ constexpr double flush = 0.05;
 
 using Range = std::array<double, 2>;
 
-/// The ranges of the coordinates of a box along the axes.
-std::optional<std::array<Range, 3>> along_axes(const SpaceRegion& region) {
+/// One axis of a box, once its layers are chosen.
+struct LaidAxis {
+  Range acts;  ///< Where the support begins and ends: the box's faces, or where they moved [m].
+  std::array<bool, 2> open{};  ///< Whether it goes on to the end of the lattice.
+  std::array<bool, 2> ends{};  ///< Ends of the lattice on which a layer is to lie.
+  std::vector<double> planes;  ///< Other places where layers are to lie [m].
+  bool is_thin = false;        ///< True if it has one layer only.
+  bool whole() const { return open[0] && open[1]; }
+};
+
+class Planner {
+ public:
+  explicit Planner(const LatticeBox& lattice) : lattice_(lattice) {
+    for (int axis = 0; axis < 3; ++axis) {
+      plan_.on_end[axis] = {lattice.on_end[axis], lattice.on_end[axis]};
+    }
+  }
+
+  void add(const SupportRegion& support) {
+    const auto box = ranges_along_axes(support.region);
+    if (!box || !can_be_laid(*box)) return;
+    std::array<LaidAxis, 3> laid;
+    // Phyxels that are free to vibrate on both of two near layers would shorten the time step.
+    for (int axis = 0; axis < 3; ++axis) {
+      laid[axis] = lay(axis, (*box)[axis], lattice_.on_end[axis] ? closest : flush);
+    }
+    // Where all phyxels on the end are held, none of them is.
+    for (int axis = 0; axis < 3 && support.holds_all; ++axis) {
+      const bool covers = laid[(axis + 1) % 3].whole() && laid[(axis + 2) % 3].whole();
+      if (covers) laid[axis] = lay(axis, (*box)[axis], flush);
+    }
+    keep(support, *box, laid);
+  }
+
+  LayerPlan run() { return std::move(plan_); }
+
+ private:
+  double low(int axis) const { return component(lattice_.low, axis); }
+  double high(int axis) const { return low(axis) + component(lattice_.extent, axis); }
+
+  /// True if layers can lie on all faces of a box that are inside the lattice.
+  bool can_be_laid(const std::array<Range, 3>& box) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto [from, to] = box[axis];
+      const double slack = lattice_.depth;
+      if (to < low(axis) - slack || from > high(axis) + slack) return false;
+      const bool whole = from <= low(axis) + slack && to >= high(axis) - slack;
+      if (!whole && !lattice_.flat[axis]) return false;
+    }
+    return true;
+  }
+
+  /// The layer or end of the lattice that a layer at `place` would be too near to, or `place`.
+  /// @param reach shortest distance from each end [spacings]
+  double settled(int axis, double place, Range reach) const {
+    double found = place, least = HUGE_VAL;
+    const auto offer = [&](double other, double limit) {
+      const double distance = std::abs(place - other);
+      if (distance >= limit * lattice_.spacing || distance >= least) return;
+      found = other;
+      least = distance;
+    };
+    offer(low(axis), reach[0]);
+    offer(high(axis), reach[1]);
+    for (const double plane : plan_.planes[axis]) offer(plane, closest);
+    return found;
+  }
+
+  /// Adds a layer at a settled place.
+  void lay_at(int axis, double place, LaidAxis& laid) const {
+    if (place == low(axis)) {
+      laid.ends[0] = true;
+    } else if (place == high(axis)) {
+      laid.ends[1] = true;
+    } else if (std::ranges::count(laid.planes, place) == 0) {
+      laid.planes.push_back(place);
+    }
+  }
+
+  /// Chooses the layers of a box along one axis.
+  /// @param reach least distance of a face from the end that its box holds [spacings]
+  LaidAxis lay(int axis, Range box, double reach) const {
+    const double begin = low(axis), end = high(axis), h = lattice_.spacing;
+    LaidAxis laid{.acts = box,
+                  .open = {box[0] <= begin + lattice_.depth, box[1] >= end - lattice_.depth},
+                  .ends = {},
+                  .planes = {}};
+    if (laid.whole()) return laid;
+    if (!laid.open[0] && !laid.open[1] && box[1] - box[0] < thin * h) {
+      const double middle = 0.5 * (box[0] + box[1]);
+      const double place = settled(axis, middle, {closest, closest});
+      laid.acts = {place, place};
+      lay_at(axis, place, laid);
+      laid.is_thin = true;
+      return laid;
+    }
+    const std::array<bool, 2> was_open = laid.open;
+    for (int side = 0; side < 2; ++side) {
+      if (was_open[side]) continue;
+      // Beyond the face there is free material, on its other side the support.
+      const double held_end = was_open[1 - side] ? reach : closest;
+      const double place =
+          settled(axis, box[side], side == 0 ? Range{closest, held_end} : Range{held_end, closest});
+      if (std::abs(place - box[side]) > lattice_.depth) laid.acts[side] = place;
+      laid.open[side] = place == (side == 0 ? begin : end);
+      if (!laid.open[side]) lay_at(axis, place, laid);
+    }
+    laid.is_thin = laid.planes.size() + laid.ends[0] + laid.ends[1] == 1 &&
+                   (laid.ends[0] || laid.ends[1] || !(laid.open[0] || laid.open[1]));
+    return laid;
+  }
+
+  /// Adds the layers of a box to the plan, where it acts, and its wall.
+  void keep(const SupportRegion& support, const std::array<Range, 3>& box,
+            const std::array<LaidAxis, 3>& laid) {
+    bool is_moved = false, is_thin = false, is_whole = true;
+    std::array<Range, 3> acts, wall;
+    for (int axis = 0; axis < 3; ++axis) {
+      const LaidAxis& one = laid[axis];
+      is_moved = is_moved || one.acts != box[axis];
+      is_thin = is_thin || one.is_thin;
+      is_whole = is_whole && one.whole();
+      acts[axis] = wall[axis] = one.acts;
+      const double length = component(lattice_.extent, axis);
+      if (one.open[0]) wall[axis][0] = low(axis) - length;
+      if (one.open[1]) wall[axis][1] = high(axis) + length;
+      std::vector<double>& planes = plan_.planes[axis];
+      for (const double plane : one.planes) {
+        if (std::ranges::count(planes, plane) == 0) planes.push_back(plane);
+      }
+      std::sort(planes.begin(), planes.end());
+      for (int end = 0; end < 2; ++end) {
+        plan_.on_end[axis][end] = plan_.on_end[axis][end] || one.ends[end];
+      }
+    }
+    const auto box_of = [](const std::array<Range, 3>& range) {
+      return SpaceRegion{.low = {range[0][0], range[1][0], range[2][0]},
+                         .high = {range[0][1], range[1][1], range[2][1]}};
+    };
+    if (is_moved) plan_.moved.push_back({support.region, box_of(acts)});
+    if (support.holds_all && !is_thin && !is_whole) {
+      plan_.cuts.push_back({support.region, box_of(wall)});
+    }
+  }
+
+  const LatticeBox& lattice_;
+  LayerPlan plan_;
+};
+
+}  // namespace
+
+std::optional<std::array<Range, 3>> ranges_along_axes(const SpaceRegion& region) {
   constexpr double rounding = 1e-12;
   if (region.is_ball) return {};
   std::array<Range, 3> ranges;
@@ -37,119 +186,17 @@ std::optional<std::array<Range, 3>> along_axes(const SpaceRegion& region) {
   return ranges;
 }
 
-/// What one axis of a box asks for.
-struct Asked {
-  Range wall;                           ///< The box's ends, or places beyond the lattice [m].
-  std::vector<double> planes;           ///< Where layers are to lie [m].
-  std::array<bool, 2> ends{};           ///< Ends on which a layer is to lie.
-  bool whole = false, is_thin = false;  ///< Whether it holds all layers, or has one of its own.
-  bool is_near_end = false;             ///< Whether a plane is near to the end that it holds.
-};
+bool is_along_axes(const SpaceRegion& region) { return ranges_along_axes(region).has_value(); }
 
-/// What a box asks for along an axis of a lattice; nothing if it cannot be cut.
-std::optional<Asked> asked(const LatticeBox& lattice, int axis, Range box) {
-  const double low = component(lattice.low, axis), length = component(lattice.extent, axis),
-               high = low + length, h = lattice.spacing;
-  if (box[1] < low || box[0] > high) return {};
-  const bool open[2] = {box[0] <= low, box[1] >= high};
-  Asked found{.wall = {open[0] ? low - length : box[0], open[1] ? high + length : box[1]}};
-  if (open[0] && open[1]) {
-    found.whole = true;
-    return found;
-  }
-  if (!lattice.flat[axis]) return {};
-  if (!open[0] && box[0] < low + closest * h) return {};
-  if (!open[1] && box[1] > high - closest * h) return {};
-  if (!open[0] && !open[1] && box[1] - box[0] < thin * h) {
-    found.is_thin = true;
-    found.planes = {0.5 * (box[0] + box[1])};
-    return found;
-  }
-  if (open[0] || open[1]) {
-    const int end = open[0] ? 0 : 1;
-    const double reach = open[0] ? box[1] - low : high - box[0];
-    if (reach < flush * h) {
-      found.is_thin = found.ends[end] = true;
-      return found;
-    }
-    found.is_near_end = reach < closest * h;
-  }
-  if (!open[0]) found.planes.push_back(box[0] + lattice.depth);
-  if (!open[1]) found.planes.push_back(box[1] - lattice.depth);
-  return found;
-}
-
-/// The planes of an axis with those of one more box, ascending; nothing if they would be too near
-/// to each other.
-std::optional<std::vector<double>> joined(std::vector<double> planes,
-                                          const std::vector<double>& more, double spacing) {
-  for (const double plane : more) {
-    double nearest = HUGE_VAL;
-    for (const double other : planes) nearest = std::min(nearest, std::abs(plane - other));
-    if (nearest < 1e-6 * spacing) continue;  // that of a box beside this one
-    if (nearest < closest * spacing) return {};
-    planes.push_back(plane);
-  }
-  std::sort(planes.begin(), planes.end());
-  return planes;
-}
-
-class Planner {
- public:
-  explicit Planner(const LatticeBox& lattice) : lattice_(lattice) {
-    for (int axis = 0; axis < 3; ++axis) {
-      plan_.on_end[axis] = {lattice.on_end[axis], lattice.on_end[axis]};
-    }
-  }
-
-  void add(const SpaceRegion& region) {
-    const auto box = along_axes(region);
-    if (!box) return;
-    std::array<Asked, 3> of;
-    std::array<std::vector<double>, 3> planes;
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::optional<Asked> found = asked(lattice_, axis, (*box)[axis]);
-      if (!found) return;
-      of[axis] = *found;
-      const auto both = joined(plan_.planes[axis], found->planes, lattice_.spacing);
-      if (!both) return;
-      planes[axis] = *both;
-    }
-    // Near to an end, layers are laid only if all phyxels on it are held.
-    for (int axis = 0; axis < 3; ++axis) {
-      const bool covers = of[(axis + 1) % 3].whole && of[(axis + 2) % 3].whole;
-      if (of[axis].is_near_end && !covers) return;
-    }
-    bool is_thin = false, whole = true;
-    for (int axis = 0; axis < 3; ++axis) {
-      is_thin = is_thin || of[axis].is_thin;
-      whole = whole && of[axis].whole;
-      plan_.planes[axis] = planes[axis];
-      for (int end = 0; end < 2; ++end) {
-        plan_.on_end[axis][end] = plan_.on_end[axis][end] || of[axis].ends[end];
-      }
-    }
-    if (is_thin || whole) return;
-    SpaceRegion wall;
-    wall.low = {of[0].wall[0], of[1].wall[0], of[2].wall[0]};
-    wall.high = {of[0].wall[1], of[1].wall[1], of[2].wall[1]};
-    plan_.cuts.push_back({region, wall});
-  }
-
-  LayerPlan run() { return std::move(plan_); }
-
- private:
-  const LatticeBox& lattice_;
-  LayerPlan plan_;
-};
-
-}  // namespace
-
-bool is_along_axes(const SpaceRegion& region) { return along_axes(region).has_value(); }
-
-LayerPlan plan_layers(const LatticeBox& lattice, std::span<const SpaceRegion> regions) {
+LayerPlan plan_layers(const LatticeBox& lattice, std::span<const SupportRegion> supports) {
+  std::vector<SupportRegion> sorted(supports.begin(), supports.end());
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [](const SupportRegion& a, const SupportRegion& b) {
+                     if (a.holds_all != b.holds_all) return a.holds_all;
+                     return comes_before(a.region, b.region);
+                   });
   Planner planner(lattice);
-  for (const SpaceRegion& region : regions) planner.add(region);
+  for (const SupportRegion& support : sorted) planner.add(support);
   return planner.run();
 }
 

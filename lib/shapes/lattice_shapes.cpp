@@ -197,43 +197,115 @@ Vec3d Lattice::place(const Site& site) const {
   return {along(0), along(1), along(2)};
 }
 
-double Lattice::share(const Site& site) const {
-  std::array<double, 3> at;
-  std::array<std::array<double, 2>, 3> part;
+namespace {
+
+constexpr std::size_t no_room = std::numeric_limits<std::size_t>::max();
+
+/// The parts of a site beside it, below and above along each axis [m].
+using Parts = std::array<std::array<double, 2>, 3>;
+
+Parts parts_of(const Lattice& lattice, const Lattice::Site& site) {
+  Parts parts;
   for (int axis = 0; axis < 3; ++axis) {
-    at[axis] = static_cast<double>(site[axis]);
-    part[axis] = layers[axis].shares(at[axis]);
+    parts[axis] = lattice.layers[axis].shares(static_cast<double>(site[axis]));
   }
+  return parts;
+}
+
+/// The product of the parts of a site on the sides given by the bits of `corner`.
+double octant(const Parts& parts, int corner) {
+  return parts[0][corner & 1] * parts[1][corner >> 1 & 1] * parts[2][corner >> 2];
+}
+
+/// The site below or above another one along each axis, by the bits of `corner`.
+Lattice::Site beside(const Lattice::Site& site, int corner, int step) {
+  return {site[0] + step * (corner & 1), site[1] + step * (corner >> 1 & 1),
+          site[2] + step * (corner >> 2)};
+}
+
+/// The first room between whose layers a cell lies, those on the room's boundary included; or
+/// `no_room`. @param low the cell's lowest corner
+std::size_t room_of_cell(const Lattice& lattice, const Lattice::Site& low) {
+  const auto contains = [&](const LatticeRoom& room) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto lower = static_cast<double>(low[axis]);
+      if (lower < room.layers[axis][0] - 1 || lower + 1 > room.layers[axis][1]) return false;
+    }
+    return true;
+  };
+  const auto found = std::find_if(lattice.rooms.begin(), lattice.rooms.end(), contains);
+  return found == lattice.rooms.end() ? no_room
+                                      : static_cast<std::size_t>(found - lattice.rooms.begin());
+}
+
+/// The room that a site has its volume in: the first one that it is inside of; or, if all cells
+/// around it are in rooms, as between two that touch, the first one of these.
+std::size_t room_of_site(const Lattice& lattice, const Lattice::Site& site, const Parts& parts) {
+  const auto contains = [&](const LatticeRoom& room) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto at = static_cast<double>(site[axis]);
+      if (at < room.layers[axis][0] || at >= room.layers[axis][1]) return false;
+    }
+    return true;
+  };
+  const auto inside = std::find_if(lattice.rooms.begin(), lattice.rooms.end(), contains);
+  if (inside != lattice.rooms.end()) {
+    return static_cast<std::size_t>(inside - lattice.rooms.begin());
+  }
+  std::size_t first = no_room;
+  for (int corner = 0; corner < 8; ++corner) {
+    if (octant(parts, corner) == 0) continue;
+    const std::size_t room = room_of_cell(lattice, beside(beside(site, 7, -1), corner, 1));
+    if (room == no_room) return no_room;
+    first = std::min(first, room);
+  }
+  return first;
+}
+
+/// The sites at a cell's corners, and those of them that have their volume in a room.
+struct CellSites {
+  int all = 0, in_room = 0;
+};
+CellSites count_sites(const Lattice& lattice, const Lattice::Site& low, std::size_t room) {
+  CellSites count;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Lattice::Site site = beside(low, corner, 1);
+    bool exists = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      exists = exists && site[axis] >= 0 &&
+               static_cast<double>(site[axis]) < lattice.layers[axis].count();
+    }
+    if (!exists) continue;
+    ++count.all;
+    count.in_room += room_of_site(lattice, site, parts_of(lattice, site)) == room;
+  }
+  return count;
+}
+
+}  // namespace
+
+double Lattice::share(const Site& site) const {
+  const Parts parts = parts_of(*this, site);
   if (rooms.empty()) {
-    const auto whole = [&](int axis) { return part[axis][0] + part[axis][1]; };
+    const auto whole = [&](int axis) { return parts[axis][0] + parts[axis][1]; };
     return whole(0) * whole(1) * whole(2);
   }
-  // The room of the site. A cell is in the first room between whose layers it lies, those on the
-  // room's boundary included.
-  const auto is_inside = [&](const LatticeRoom& room, int axis) {
-    return at[axis] >= room.layers[axis][0] && at[axis] < room.layers[axis][1];
-  };
-  const auto own = std::find_if(rooms.begin(), rooms.end(), [&](const LatticeRoom& room) {
-    return is_inside(room, 0) && is_inside(room, 1) && is_inside(room, 2);
-  });
-  const auto between = [&](const LatticeRoom& room, int axis, int above) {
-    const double lower = at[axis] - 1 + above;  // the layer below the cell
-    return lower >= room.layers[axis][0] - 1 && lower + 1 <= room.layers[axis][1];
-  };
-  if (own != rooms.end()) {  // cells that reach the boundary belong to the layers inside
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto [first, end] = own->layers[axis];
-      if (at[axis] == first && first > 0) part[axis][0] *= 2;
-      if (at[axis] == end - 1 && end < layers[axis].count()) part[axis][1] *= 2;
-    }
+  // Each cell belongs to the sites at its corners that have their volume in the cell's room.
+  const std::size_t own = room_of_site(*this, site, parts);
+  bool beside_boundary = false;
+  for (int axis = 0; axis < 3 && own != no_room; ++axis) {
+    const auto [first, end] = rooms[own].layers[axis];
+    const auto at = static_cast<double>(site[axis]);
+    beside_boundary = beside_boundary || (at <= first && first > 0) ||
+                      (at >= end - 1 && end < layers[axis].count());
   }
   double sum = 0;
   for (int corner = 0; corner < 8; ++corner) {
-    const int above[3] = {corner & 1, corner >> 1 & 1, corner >> 2};
-    const auto room = std::find_if(rooms.begin(), rooms.end(), [&](const LatticeRoom& r) {
-      return between(r, 0, above[0]) && between(r, 1, above[1]) && between(r, 2, above[2]);
-    });
-    if (room == own) sum += part[0][above[0]] * part[1][above[1]] * part[2][above[2]];
+    const double part = octant(parts, corner);
+    const Site cell = beside(beside(site, 7, -1), corner, 1);
+    if (part == 0 || room_of_cell(*this, cell) != own) continue;
+    const CellSites count = beside_boundary ? count_sites(*this, cell, own) : CellSites{1, 1};
+    sum += part * count.all / count.in_room;
   }
   return sum;
 }
@@ -265,8 +337,7 @@ double Lattice::phyxels() const {
 
 namespace {
 
-/// The layers of a lattice inside a cut; nothing if there are none. A layer between this cut and an
-/// earlier one, which would have no space of its own, counts as inside.
+/// The layers of a lattice inside a cut; nothing if there are none.
 std::optional<LatticeRoom> room_of(const Lattice& lattice, const SupportCut& cut) {
   LatticeRoom room{.cut = cut, .layers = {}};
   const SpaceRegion inside = cut.wall.shrunk(4 * lattice.depth);
@@ -276,10 +347,6 @@ std::optional<LatticeRoom> room_of(const Lattice& lattice, const SupportCut& cut
     first = layers.first_above(component(inside.low, axis));
     end = layers.first_above(component(inside.high, axis));
     if (!(first < end)) return {};
-    for (const LatticeRoom& earlier : lattice.rooms) {
-      if (earlier.layers[axis][1] == first - 1) --first;
-      if (earlier.layers[axis][0] - 1 == end) ++end;
-    }
   }
   return room;
 }
@@ -310,7 +377,7 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
                      (lattice.solid == Lattice::Solid::cylinder && axis == 2);
     box.on_end[axis] = nodes && box.flat[axis];
   }
-  const LayerPlan plan = plan_layers(box, request.supports);
+  LayerPlan plan = plan_layers(box, request.supports);
   for (int axis = 0; axis < 3; ++axis) {
     lattice.layers[axis] = Layers(component(low, axis), component(extent, axis), spacing,
                                   plan.on_end[axis], plan.planes[axis]);
@@ -320,6 +387,7 @@ Lattice make_lattice(const ShapeRequest& request, double spacing) {
       lattice.rooms.push_back(*room);
     }
   }
+  lattice.moved = std::move(plan.moved);
   return lattice;
 }
 

@@ -29,6 +29,7 @@ struct Lattice {
   double cells = 1;              ///< Cells across a round solid, an integer.
   std::array<Layers, 3> layers;  ///< By axis.
   std::vector<LatticeRoom> rooms;
+  std::vector<SupportCut> moved;  ///< `SupportCuts::moved`.
   double depth = 0;  ///< How deep phyxels lie below the boundaries of rooms, a rounding error [m].
 
   double volume() const;         ///< Volume of the solid [m^3].

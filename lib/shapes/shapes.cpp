@@ -39,8 +39,8 @@ void check_size(const ShapeRequest& request) {
   } else {
     if (request.placement == ShapeRequest::Placement::nodes && request.name == "sphere") {
       throw InputError(
-          "shape \"sphere\": lattice \"nodes\": its outer layer would not lie on a round surface; "
-          "allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
+          "shape \"sphere\": lattice = \"nodes\" found, whose outer layer would not lie on a round "
+          "surface; allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
     }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
@@ -80,18 +80,21 @@ void check_request(const ShapeRequest& request) {
   if (request.placement != ShapeRequest::Placement::fitted) {
     if (!request.grading) return;
     throw InputError(fmt::format(
-        "shape \"{}\": a lattice cannot be graded; allowed: lattice = \"fitted\", or no grading",
-        request.name));
+        "shape \"{}\": lattice = \"{}\" found, which cannot be graded; allowed: \"fitted\", or no "
+        "grading",
+        request.name, request.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells"));
   }
   if (request.jitter > 0) {
     throw InputError(fmt::format(
-        "shape \"{}\": jitter = {} with lattice \"fitted\", which is no lattice: allowed is 0",
+        "shape \"{}\": jitter = {} found with lattice = \"fitted\", which is no lattice; allowed: "
+        "jitter = 0, or lattice = \"nodes\" or \"cells\"",
         request.name, request.jitter));
   }
   if (!request.surface) {
-    throw InputError(fmt::format(
-        "shape \"{}\": lattice \"fitted\" without surfels: allowed is \"cells\" or \"nodes\"",
-        request.name));
+    throw InputError(
+        fmt::format("shape \"{}\": lattice = \"fitted\" found without surfels; allowed: \"nodes\" "
+                    "or \"cells\", or surfels",
+                    request.name));
   }
 }
 
@@ -99,6 +102,12 @@ void check_request(const ShapeRequest& request) {
 double fitted_phyxels(const ShapeRequest& request) {
   const double volume = make_lattice(request, request.spacing).volume();
   return std::max(1.0, std::round(volume / std::pow(request.spacing, 3)));
+}
+
+std::vector<SpaceRegion> regions_of(std::span<const SupportRegion> supports) {
+  std::vector<SpaceRegion> regions;
+  for (const SupportRegion& support : supports) regions.push_back(support.region);
+  return regions;
 }
 
 /// Fills a shape as a mesh is filled.
@@ -119,7 +128,7 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
                                {.phyxels = static_cast<Index>(phyxels),
                                 .seed = request.seed,
                                 .on_surface = {},
-                                .cuts = request.supports,
+                                .cuts = regions_of(request.supports),
                                 .grading = request.grading},
                                &report);
   for (const std::string& warning : report.warnings) {
@@ -185,7 +194,8 @@ ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed)
   const double thinnest = std::min({size.x, size.y, size.z});
   const bool is_box = lattice.solid == Lattice::Solid::box;
   const bool layers_do =
-      is_box && !request.grading && std::ranges::all_of(request.supports, is_along_axes);
+      is_box && !request.grading &&
+      std::ranges::all_of(request.supports, is_along_axes, &SupportRegion::region);
   if (closed && !layers_do && request.surface && request.jitter == 0 &&
       thinnest > 3 * request.spacing) {
     return Placement::fitted;
@@ -217,6 +227,7 @@ CloudPiece make_lattice_shape(const ShapeRequest& request, Piece piece) {
   made.cloud.cuts.depth = lattice.depth;
   made.cloud.cuts.spacing = request.spacing;
   for (const LatticeRoom& room : lattice.rooms) made.cloud.cuts.list.push_back(room.cut);
+  made.cloud.cuts.moved = lattice.moved;
   return made;
 }
 

@@ -268,6 +268,38 @@ inline BuildCase supported() {
   return c;
 }
 
+/// Supports whose faces touch each other, or move to other layers: in a body of one material, in
+/// one with a stiffer part, and in a fitted one.
+inline BuildCase faces_shared() {
+  BuildCase c{"FacesShared",
+              {.bodies = {shape("beam", 0.12), shape("beam", 0.13), shape("cylinder", 0.2)}},
+              {}};
+  constexpr Axes only_y{false, true, false}, x_and_y{true, true, false};
+  const auto between = [](double begin, double end) {
+    return Selection{.box = Selection::Box{{begin, -9, -9}, {end, 9, 9}}};
+  };
+  for (std::size_t b = 0; b < 2; ++b) {
+    BodyRequest& beam = c.scene.bodies[b];
+    beam.source.shape.placement = ShapeRequest::Placement::nodes;
+    beam.source.shape.jitter = 0;
+    const double length = beam.source.shape.size.x;
+    beam.motions = {{.select = between(0.5 * length, 9), .velocity = {0.1, 0, 0}}};
+    beam.fixed = {{between(0.3 * length, 0.5 * length), x_and_y},
+                  {between(-9, 0.3 * length - 0.03), only_y}};
+  }
+  BodyRequest& column = c.scene.bodies[2];
+  column.source.shape.length = 2;
+  column.source.shape.jitter = 0;
+  column.source.shape.placement = ShapeRequest::Placement::fitted;
+  column.fixed = {{.select = {.box = Selection::Box{{-9, -9, -9}, {9, 9, 0.1}}}, .axes = only_y},
+                  {.select = {.box = Selection::Box{{-9, -9, 0.1}, {9, 9, 9}}}}};
+  Material stiff = c.scene.bodies[1].material;
+  stiff.young *= 3;
+  c.scene.bodies[1].inclusions.push_back(
+      {.select = {.ball = Selection::Ball{{0.4, 0, 0}, 0.2}}, .material = stiff});
+  return c;
+}
+
 inline const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{beam(),          rules(),
                                             nearest(),       small(),
@@ -276,7 +308,8 @@ inline const std::vector<BuildCase>& build_cases() {
                                             included(),      closed(),
                                             mixed(),         closed_alone(),
                                             many_regions(),  closed_by_default(),
-                                            graded_clouds(), supported()};
+                                            graded_clouds(), supported(),
+                                            faces_shared()};
   return cases;
 }
 

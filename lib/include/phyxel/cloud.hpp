@@ -40,6 +40,10 @@ struct SupportCuts {
   double depth = 0;    ///< Largest depth of phyxels below their boundary, a rounding error [m].
   double spacing = 0;  ///< Distance within which each place of a boundary has a phyxel [m].
   double shift = 0;    ///< Length of the body's translation, whose digits coordinates lack [m].
+  /// Supports in a lattice some of whose faces have no layer, because it would be too near to
+  /// another layer or an end: `wall` is the region that holds phyxels instead, whose faces are on
+  /// the nearest layers or ends.
+  std::vector<SupportCut> moved = {};
 };
 
 /// Rest points of one body, in the caller's order.

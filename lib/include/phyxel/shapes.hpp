@@ -38,7 +38,7 @@ struct ShapeRequest {
   /// Regions in which the body will be held or moved. Layers of phyxels lie on faces of boxes along
   /// the axes, or on all boundaries if `fitted`, so that supports act where these end:
   /// `Cloud::cuts`.
-  std::vector<SpaceRegion> supports = {};
+  std::vector<SupportRegion> supports = {};
   /// Unset for the same distance everywhere. Needs `fitted`.
   std::optional<Grading> grading = {};
   bool operator==(const ShapeRequest&) const = default;

@@ -37,6 +37,17 @@ struct SpaceRegion {
   bool operator==(const SpaceRegion&) const = default;
 };
 
+/// True if region a has a place before region b in an order by shape and coordinates. Supports are
+/// laid in this order, so that the order of a scene's entries changes nothing.
+bool comes_before(const SpaceRegion& a, const SpaceRegion& b);
+
+/// A region of space in which a body is held or moved.
+struct SupportRegion {
+  SpaceRegion region;
+  bool holds_all = true;  ///< True if its phyxels are held or moved along all axes.
+  bool operator==(const SupportRegion&) const = default;
+};
+
 /// The boundaries at which supports part the phyxels of a body: regions inside which all phyxels
 /// are held or moved along all axes.
 struct Walls {

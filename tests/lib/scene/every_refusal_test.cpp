@@ -240,6 +240,13 @@ std::vector<Late> late_refusals() {
       {with_bar("[[body.fixed]]\nall = true\n[[body.fixed]]\nregion = 'x-'\n"),
        {":16:", "already fixed or moved"}},
       {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake), {":16:", "already fixed or moved"}},
+      {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\naxes = 'xy'\n"
+                "[[body.fixed]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\naxes = 'yz'\n"),
+       {":17:", "fixed 2 of body \"beam\" shares a face with fixed 1", "\"xy\"", "\"yz\"",
+        "allowed: "}},
+      {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\n"
+                "[[body.motion]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\nvelocity = [1, 0, 0]\n"),
+       {":16:", "motion 1 of body \"beam\" shares a face with fixed 1", "\"xyz\"", "allowed: "}},
       // Inclusions
       {with_bar("[[body.inclusion]]\nbox = [[7, 7, 7], [8, 8, 8]]\nyoung = 1e6\n"),
        {":14:", "selects no phyxel"}},
@@ -276,12 +283,14 @@ std::vector<Late> late_refusals() {
        {":5:1", "a single phyxel"}},
       // Bodies
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
-      {with_body(fitted + "jitter = 0.1"), {":5:1", "jitter = 0.1", "allowed is 0"}},
-      {with_body(fitted + "surfels = false"), {":5:1", "surfels", "\"cells\" or \"nodes\""}},
+      {with_body(fitted + "jitter = 0.1"),
+       {":9:11", "key body.lattice", "\"fitted\" found", "jitter = 0.1", "allowed: \"cells\""}},
+      {with_body(fitted + "surfels = false"),
+       {":9:11", "key body.lattice", "\"fitted\" found", "allowed: \"cells\", or surfels = true"}},
       {with_body(fitted + "volumes = 'kernel'"),
        {"key body.lattice", "\"fitted\"", "allowed: \"cells\""}},
       {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
-       {":5:1", "lattice \"nodes\""}},
+       {":9:11", "key body.lattice", "\"nodes\" found", "allowed: \"fitted\" or \"cells\""}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 2147483647"), {":5:1", "GiB"}},
       {with_body("mesh = 'ball.obj'\nphyxels = 2147483647"),

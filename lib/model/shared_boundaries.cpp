@@ -1,0 +1,177 @@
+/// Faces that several supports of a body share, and faces that have moved to layers of a lattice.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "model/assembly.hpp"
+#include "model/selection.hpp"
+#include "phyxel/error.hpp"
+#include "shapes/lattice_cuts.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr const char* axis_names[] = {"x", "y", "z"};
+
+std::string names_of(int axes) {
+  std::string names;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axes >> axis & 1) names += axis_names[axis];
+  }
+  return names;
+}
+
+/// A support that is given by a region of space.
+struct Support {
+  std::size_t entry;   ///< Its entry, in the order of `selections_of`.
+  SpaceRegion region;  ///< Where it acts.
+  int axes;            ///< A bit for each axis that it holds or moves.
+};
+
+/// True if the regions of two supports touch each other and may share phyxels on their boundaries,
+/// but do not overlap.
+bool may_share_face(const SpaceRegion& a, const SpaceRegion& b, const SupportCuts& cuts) {
+  const auto one = ranges_along_axes(a), other = ranges_along_axes(b);
+  if (!one || !other) return true;
+  bool touches = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double begin = std::max((*one)[axis][0], (*other)[axis][0]);
+    const double end = std::min((*one)[axis][1], (*other)[axis][1]);
+    constexpr double digits = 4e-12;
+    const double slack = std::max(4 * cuts.depth, digits * std::abs(begin));
+    if (end - begin < -slack) return false;
+    touches = touches || end - begin <= slack;
+  }
+  return touches;
+}
+
+/// The phyxels of a cloud that two supports choose and that lie on the boundaries of both.
+std::vector<Index> on_both(const Support& a, const Support& b,
+                           const std::vector<std::vector<Index>>& chosen, const Cloud& cloud) {
+  std::vector<Index> both;
+  if (!may_share_face(a.region, b.region, cloud.cuts)) return both;
+  std::set_intersection(chosen[a.entry].begin(), chosen[a.entry].end(), chosen[b.entry].begin(),
+                        chosen[b.entry].end(), std::back_inserter(both));
+  const auto is_inside = [&](const SpaceRegion& region, Vec3d p) {
+    return region.distance(p) < -boundary_tolerance(region, p, cloud.cuts);
+  };
+  std::erase_if(both, [&](Index i) {
+    return is_inside(a.region, cloud.position[i]) || is_inside(b.region, cloud.position[i]);
+  });
+  return both;
+}
+
+/// The motion of a support; that of a fixed one is none.
+MotionRequest motion_of(const BodyRequest& request, std::size_t entry) {
+  const std::size_t fixed = request.fixed.size();
+  return entry < fixed ? MotionRequest{} : request.motions[entry - fixed];
+}
+
+/// True if two supports prescribe the same displacements to phyxels.
+bool move_alike(const BodyRequest& request, const Support& a, const Support& b) {
+  const MotionRequest one = motion_of(request, a.entry), other = motion_of(request, b.entry);
+  const bool turns_alike =
+      one.rotation == other.rotation && (one.about == other.about || one.rotation == Vec3d{});
+  return turns_alike && one.displacement == other.displacement && one.duration == other.duration &&
+         one.velocity == other.velocity && one.amplitude == other.amplitude &&
+         one.frequency == other.frequency;
+}
+
+/// True if a support leaves the phyxels on a face that it shares to another one.
+bool gives_way(const BodyRequest& request, const Support& a, const Support& to) {
+  if (a.axes == to.axes) {
+    return move_alike(request, a, to) && comes_before(to.region, a.region);
+  }
+  return (a.axes & to.axes) == a.axes;
+}
+
+[[noreturn]] void refuse_shared(const BodyRequest& request, const Support& first,
+                                const Support& second, const Selection& select, Index phyxel) {
+  const std::string which = fmt::format("{}: {} of body \"{}\" shares a face with {}", select.where,
+                                        name_of_support(request, second.entry), request.name,
+                                        name_of_support(request, first.entry));
+  if (first.axes == second.axes) {
+    throw InputError(
+        fmt::format("{}, and phyxels on it, such as {}, cannot follow both along \"{}\"; allowed: "
+                    "the same motion, or none, in both, or regions a spacing apart",
+                    which, phyxel, names_of(first.axes)));
+  }
+  throw InputError(fmt::format(
+      "{}: axes \"{}\" and \"{}\" found, and phyxels on it, such as {}, would be held twice along "
+      "\"{}\"; allowed: axes of one entry that include the other's, no axis in common, or regions "
+      "a spacing apart",
+      which, names_of(second.axes), names_of(first.axes), phyxel,
+      names_of(first.axes & second.axes)));
+}
+
+}  // namespace
+
+void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyxels& here) {
+  const std::vector<const Selection*> selections = selections_of(request);
+  const std::vector<Axes> axes = axes_of_supports(request);
+  std::vector<Support> supports;
+  for (std::size_t entry = 0; entry < axes.size(); ++entry) {
+    if (const auto region = acting_region(*selections[entry], here.cloud.cuts)) {
+      supports.push_back({entry, *region, axes[entry].bits()});
+    }
+  }
+  const auto visit_pairs = [&](auto&& visit) {
+    for (std::size_t second = 1; second < supports.size(); ++second) {
+      for (std::size_t first = 0; first < second; ++first) {
+        if (supports[first].axes & supports[second].axes) visit(supports[first], supports[second]);
+      }
+    }
+  };
+  std::vector<std::vector<Index>> left(axes.size());  // phyxels that each entry leaves to others
+  visit_pairs([&](const Support& a, const Support& b) {
+    const bool first = gives_way(request, a, b);
+    if (!first && !gives_way(request, b, a)) return;
+    const std::vector<Index> both = on_both(a, b, chosen, here.cloud);
+    std::vector<Index>& to = left[(first ? a : b).entry];
+    to.insert(to.end(), both.begin(), both.end());
+  });
+  for (std::size_t entry = 0; entry < left.size(); ++entry) {
+    std::vector<Index>& leaves = left[entry];
+    std::sort(leaves.begin(), leaves.end());
+    std::erase_if(chosen[entry],
+                  [&](Index i) { return std::binary_search(leaves.begin(), leaves.end(), i); });
+  }
+  visit_pairs([&](const Support& a, const Support& b) {
+    const std::vector<Index> both = on_both(a, b, chosen, here.cloud);
+    if (!both.empty()) {
+      refuse_shared(request, a, b, *selections[b.entry], here.number_of(both[0]));
+    }
+  });
+}
+
+void BoundaryChoice::warn_of_moved(const BodyRequest& request, const SupportCuts& cuts,
+                                   std::vector<std::string>& warnings) const {
+  const std::vector<const Selection*> selections = selections_of(request);
+  constexpr double noticeable = 0.05;  // spacings
+  for (std::size_t entry = 0; entry < first_load; ++entry) {
+    const auto region = region_of(*selections[entry]);
+    const auto acting = acting_region(*selections[entry], cuts);
+    if (!region || *region == *acting) continue;
+    const auto asked = ranges_along_axes(*region), found = ranges_along_axes(*acting);
+    for (int face = 0; asked && found && face < 6; ++face) {
+      const int axis = face / 2, side = face % 2;
+      double from = (*asked)[axis][side];
+      const double to = (*found)[axis][side];
+      const bool is_layer = (*found)[axis][0] == (*found)[axis][1];
+      if (is_layer)
+        from = 0.5 * ((*asked)[axis][0] + (*asked)[axis][1]);  // the layer of a thin box
+      if (is_layer && side == 1) continue;
+      if (std::abs(from - to) <= noticeable * cuts.spacing) continue;
+      warnings.push_back(fmt::format(
+          "body \"{0}\", {1}: box: its face at {2} = {3:g} m acts at {2} = {4:g} m, where the "
+          "nearest layer or end of the lattice is, as a layer of its own would be too near to that "
+          "for a spacing of {5:g} m; a face there, or phyxels nearer to each other, act where the "
+          "box ends",
+          request.name, name_of_support(request, entry), axis_names[axis], from, to, cuts.spacing));
+    }
+  }
+}
+
+}  // namespace phyxel
