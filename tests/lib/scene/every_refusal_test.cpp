@@ -217,12 +217,39 @@ std::vector<Late> refused_gradings() {
   };
 }
 
+/// Shapes, meshes and files of which no body can be made.
+std::vector<Late> refused_bodies() {
+  const std::string fitted = "shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n";
+  const std::string mesh = "mesh = 'ball.obj'\nphyxels = 50\n";
+  return {
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
+      {with_body(fitted + "jitter = 0.1"),
+       {":9:11", "key body.lattice", "\"fitted\" found", "jitter = 0.1", "allowed: \"cells\""}},
+      {with_body(fitted + "surfels = false"),
+       {":9:11", "key body.lattice", "\"fitted\" found", "allowed: \"cells\", or surfels = true"}},
+      {with_body(fitted + "volumes = 'kernel'"),
+       {"key body.lattice", "\"fitted\"", "allowed: \"cells\""}},
+      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
+       {":9:11", "key body.lattice", "\"nodes\" found", "allowed: \"fitted\" or \"cells\""}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
+      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 2147483647"), {":5:1", "GiB"}},
+      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647"),
+       {":5:1", "ball.obj: 2147483647", "GiB"}},
+      {with_body("mesh = 'empty.obj'\nphyxels = 50"), {":5:1", "empty.obj: the file is empty"}},
+      {with_body("mesh = 'flat.obj'\nphyxels = 50"), {":5:1", "flat.obj: the surface encloses no"}},
+      {with_body("mesh = 'ball.txt'\nphyxels = 50"), {":5:1", "ball.txt: the extension"}},
+      {with_body("mesh = 'flat.obj'\nphyxels = 50\non_surface = true"), {":5:1", "flat.obj: "}},
+      {with_body(mesh + "on_surface = true"), {":5:1", "ball.obj: "}},
+      {with_body("file = 'ball.obj'"), {":5:1", "ball.obj: not a file written by phyxel"}},
+      {with_body("cloud = 'mine'"), {":5:1", "key body.cloud: \"mine\" found"}},
+      {with_body("mesh = 'gone.obj'\nphyxels = 5"), {":6:8", "gone.obj"}},
+  };
+}
+
 /// What only shows when the model is built or its steps are planned.
 std::vector<Late> late_refusals() {
-  const std::string fitted = "shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'fitted'\n";
   const std::string implicit = "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
   const std::string rest = "[solver]\nmethod = 'equilibrium'\nprecision = 'double'\n";
-  const std::string mesh = "mesh = 'ball.obj'\nphyxels = 50\n";
   const auto step = [](const char* size) {
     return fmt::format("[time]\nend = 1.0\nstep = {}\n", size);
   };
@@ -281,28 +308,6 @@ std::vector<Late> late_refusals() {
       {with_body("file = 'bare.h5'\nclosure = 0.1"), {":5:1", "closure = 0.1"}},
       {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 1\nvolumes = 'kernel'"),
        {":5:1", "a single phyxel"}},
-      // Bodies
-      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 3"), {":5:1", "spacing = 3 m"}},
-      {with_body(fitted + "jitter = 0.1"),
-       {":9:11", "key body.lattice", "\"fitted\" found", "jitter = 0.1", "allowed: \"cells\""}},
-      {with_body(fitted + "surfels = false"),
-       {":9:11", "key body.lattice", "\"fitted\" found", "allowed: \"cells\", or surfels = true"}},
-      {with_body(fitted + "volumes = 'kernel'"),
-       {"key body.lattice", "\"fitted\"", "allowed: \"cells\""}},
-      {with_body("shape = 'sphere'\nradius = 1\nspacing = 0.2\nlattice = 'nodes'"),
-       {":9:11", "key body.lattice", "\"nodes\" found", "allowed: \"fitted\" or \"cells\""}},
-      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nspacing = 1e-6"), {":5:1", "phyxels"}},
-      {with_body("shape = 'beam'\nsize = [1, 1, 1]\nphyxels = 2147483647"), {":5:1", "GiB"}},
-      {with_body("mesh = 'ball.obj'\nphyxels = 2147483647"),
-       {":5:1", "ball.obj: 2147483647", "GiB"}},
-      {with_body("mesh = 'empty.obj'\nphyxels = 50"), {":5:1", "empty.obj: the file is empty"}},
-      {with_body("mesh = 'flat.obj'\nphyxels = 50"), {":5:1", "flat.obj: the surface encloses no"}},
-      {with_body("mesh = 'ball.txt'\nphyxels = 50"), {":5:1", "ball.txt: the extension"}},
-      {with_body("mesh = 'flat.obj'\nphyxels = 50\non_surface = true"), {":5:1", "flat.obj: "}},
-      {with_body(mesh + "on_surface = true"), {":5:1", "ball.obj: "}},
-      {with_body("file = 'ball.obj'"), {":5:1", "ball.obj: not a file written by phyxel"}},
-      {with_body("cloud = 'mine'"), {":5:1", "key body.cloud: \"mine\" found"}},
-      {with_body("mesh = 'gone.obj'\nphyxels = 5"), {":6:8", "gone.obj"}},
   };
 }
 
@@ -315,8 +320,8 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   bare.volume.clear();
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
-  for (const std::vector<Late>& refusals :
-       {late_refusals(), refused_gradings(), refused_loads(), refused_planes(), refused_probes()}) {
+  for (const std::vector<Late>& refusals : {late_refusals(), refused_bodies(), refused_gradings(),
+                                            refused_loads(), refused_planes(), refused_probes()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);
