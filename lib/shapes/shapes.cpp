@@ -119,8 +119,8 @@ Cloud make_fitted_shape(const ShapeRequest& request) {
                                  request.name, phyxels, std::numeric_limits<Index>::max()));
   }
   // Phyxels lie on a polygon whose area is 0.04% below that of its circle. Surfels are as far apart
-  // as phyxels, or, on the coarsest bodies, have 0.2% less.
-  constexpr int corners = 128, surfel_corners = 64;
+  // as phyxels, but nearer on coarse bodies, where they have 0.07% less.
+  constexpr int corners = 128, surfel_corners = 96;
   const Lattice lattice = make_lattice(request, request.spacing);
   const Surface surface = lattice_surface(lattice, request.spacing, corners);
   SampleReport report;
