@@ -228,7 +228,8 @@ std::vector<Vec3d> crossings(std::span<const Crease> creases, std::span<const Sp
     for (const auto& [from, to] : creases) {
       const double length = norm(to - from);
       const auto whole = measured(region, 0.5 * (from + to));
-      if (std::abs(whole.distance) > 0.5 * length) continue;
+      // A crease that ends on the boundary may seem to end before it, by rounding.
+      if (std::abs(whole.distance) > 0.5 * length + 1e-9 * step) continue;
       const auto pieces = static_cast<int>(std::ceil(std::min(length / step, 1e6)));
       Measured before = measured(region, from);
       for (int k = 1; k <= pieces; ++k) {

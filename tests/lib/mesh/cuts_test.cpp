@@ -383,6 +383,21 @@ TEST(Cuts, BelowAFaceLeaveItsPhyxels) {
   }
 }
 
+/// Sharp edges have phyxels where a cut crosses them, also if an edge of the mesh ends just there.
+TEST(Cuts, HavePhyxelsOnSharpEdgesThatEndOnThem) {
+  for (const double end : {0.36, 0.399, 0.4, 0.41, 0.6}) {
+    ShapeRequest bar{.name = "beam", .size = {1, 0.2, 0.2}, .spacing = 0.04};
+    bar.placement = ShapeRequest::Placement::fitted;
+    bar.supports = {{.region = {.low = {-9, -9, -9}, .high = {end, 9, 9}}, .holds_all = true}};
+    const SpatialHash hash(make_shape(bar).position, 0.04);
+    for (const double y : {-0.1, 0.1}) {
+      for (const double z : {-0.1, 0.1}) {
+        EXPECT_LT(hash.nearest({end, y, z}).distance2, 1e-10) << end;
+      }
+    }
+  }
+}
+
 /// A box thinner than a spacing holds one layer, in its middle.
 TEST(Cuts, OfThinBoxesAreOneLayer) {
   const HeldCube cube = held_in({0.47, -1, -1}, {0.49, 2, 2});
