@@ -66,35 +66,12 @@ Piece piece_of(int ranks, int rank, std::size_t body) {
   return {static_cast<int>((static_cast<std::size_t>(rank) + body) % size), ranks};
 }
 
-/// A source of clouds that one rank makes, and the bodies that are copies of it, which follow one
-/// another.
-struct SharedSource {
-  CutSource from;
-  std::vector<std::size_t> bodies;
-};
-
-/// The sources of all bodies but lattices, which are made piece by piece.
-std::vector<SharedSource> shared_sources(const Scene& scene) {
-  std::vector<SharedSource> sources;
-  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
-    if (is_lattice(scene.bodies[b].source)) continue;
-    CutSource source = source_of(scene.bodies[b]);
-    const bool is_copy = !sources.empty() && is_same(sources.back().from, source);
-    if (!is_copy) sources.emplace_back();
-    sources.back().from = std::move(source);  // of the copy before
-    sources.back().bodies.push_back(b);
-  }
-  return sources;
-}
-
-/// Makes this rank's piece of each body. Each rank makes clouds of its own, one at a time, and
-/// deals them out.
-std::vector<CloudPiece> pieces_of(const MpiCommunicator& ranks, const Scene& scene) {
+/// Makes this rank's piece of each body but of lattices, which are made piece by piece. Each rank
+/// makes clouds of its own, one at a time, and deals them out.
+std::vector<CloudPiece> pieces_of(const MpiCommunicator& ranks, const Scene& scene,
+                                  std::vector<SharedSource> sources) {
   std::vector<CloudPiece> pieces(scene.bodies.size());
-  const std::vector<SharedSource> sources = ranks.agreed([&] {
-    validate(scene);
-    return shared_sources(scene);
-  });
+  std::erase_if(sources, [](const SharedSource& s) { return is_lattice(s.from.source); });
   const auto at_once = static_cast<std::size_t>(ranks.size());
   for (std::size_t begin = 0; begin < sources.size(); begin += at_once) {
     const std::size_t end = std::min(begin + at_once, sources.size()),
@@ -121,12 +98,20 @@ BuiltShare build_share(const MpiCommunicator& ranks, const Scene& scene,
                        const ShareOptions& options) {
   const ShareOptions own = options_for(scene, options);
   return naming(scene, [&] {
-    std::vector<CloudPiece> pieces = pieces_of(ranks, scene);
+    const std::vector<SharedSource> sources = ranks.agreed([&] {
+      validate(scene);
+      return shared_sources(scene);
+    });
+    std::vector<const CutSource*> source_of_body;
+    for (const SharedSource& source : sources) {
+      source_of_body.insert(source_of_body.end(), source.bodies.size(), &source.from);
+    }
+    std::vector<CloudPiece> pieces = pieces_of(ranks, scene, sources);
     return built({ranks, scene, own}, [&](std::size_t b) {
       const BodyRequest& request = scene.bodies[b];
       const Piece number = piece_of(ranks.size(), ranks.rank(), b);
       return naming(request, [&] {
-        CloudPiece piece = is_lattice(request.source) ? lattice_piece(source_of(request), number)
+        CloudPiece piece = is_lattice(request.source) ? lattice_piece(*source_of_body[b], number)
                                                       : std::move(pieces[b]);
         place(piece.cloud, request);
         return piece;

@@ -379,21 +379,17 @@ const Cloud& named_cloud(const BodyRequest& request, const std::map<std::string,
 /// `use(request, cloud)` of every body of the scene, its cloud in place.
 template <class Use>
 void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& named, Use&& use) {
-  // Copies of a body follow one another; filling a mesh once serves them all.
-  std::optional<CutSource> made;
-  Cloud rest;
-  for (const BodyRequest& request : scene.bodies) {
-    CutSource source = source_of(request);
-    if (!made || !is_same(*made, source)) {
-      rest = naming(request, [&] {
-        return request.source.cloud.empty() ? rest_cloud(source) : named_cloud(request, named);
-      });
+  for (const SharedSource& source : shared_sources(scene)) {
+    const BodyRequest& first = scene.bodies[source.bodies.front()];
+    Cloud rest = naming(first, [&] {
+      return first.source.cloud.empty() ? rest_cloud(source.from) : named_cloud(first, named);
+    });
+    for (const std::size_t b : source.bodies) {
+      Cloud cloud = b == source.bodies.back() ? std::move(rest) : rest;
+      rest.warnings.clear();  // once is enough
+      place(cloud, scene.bodies[b]);
+      use(scene.bodies[b], std::move(cloud));
     }
-    made = std::move(source);
-    Cloud cloud = rest;
-    rest.warnings.clear();  // once is enough
-    place(cloud, request);
-    use(request, std::move(cloud));
   }
 }
 

@@ -216,6 +216,19 @@ bool is_same(const CutSource& a, const CutSource& b) {
          std::ranges::equal(a.finer, b.finer, equal_finer);
 }
 
+std::vector<SharedSource> shared_sources(const Scene& scene) {
+  std::vector<SharedSource> sources;
+  std::optional<CutSource> before;
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    CutSource source = source_of(scene.bodies[b]);
+    // Each copy is compared with the one before: those far apart differ by more.
+    if (!before || !is_same(*before, source)) sources.push_back({source, {}});
+    sources.back().bodies.push_back(b);
+    before = std::move(source);
+  }
+  return sources;
+}
+
 void place_cuts(Cloud& cloud, const BodyRequest& request) {
   cloud.cuts.depth *= request.scale;
   cloud.cuts.spacing *= request.scale;

@@ -41,6 +41,15 @@ struct CutSource {
 };
 CutSource source_of(const BodyRequest& request);
 
+/// The source of bodies that follow one another and are copies: that of the first, so that all have
+/// the same cloud before they are placed.
+struct SharedSource {
+  CutSource from;
+  std::vector<std::size_t> bodies;  ///< Their numbers in the scene, ascending.
+};
+/// The sources of a scene's bodies, in their order.
+std::vector<SharedSource> shared_sources(const Scene& scene);
+
 /// True if two sources are the same but for the rounding of their cuts, as those of copies of a
 /// body are.
 bool is_same(const CutSource& a, const CutSource& b);

@@ -300,6 +300,33 @@ inline BuildCase faces_shared() {
   return c;
 }
 
+/// Copies of bodies, whose supports move with them and are rounded otherwise: all have the cloud of
+/// the first.
+inline BuildCase copies() {
+  BuildCase c{"Copies", {}, {}};
+  const BodyRequest beam = shape("beam", 0.12), column = shape("cylinder", 0.2);
+  for (const BodyRequest& body : {beam, column}) {
+    for (int k = 0; k < 4; ++k) {
+      const Vec3d by{97.3 * (3 - k), 0.7 * k, 33.1 * (3 - k)};  // the first one's digits are fewest
+      BodyRequest copy = body;
+      copy.name += std::to_string(k);
+      copy.source.shape.jitter = 0;
+      copy.source.shape.length = 2;
+      copy.translation += by;
+      if (body.name == beam.name) {
+        copy.source.shape.placement = ShapeRequest::Placement::nodes;
+        copy.fixed = {
+            {.select = {.box = Selection::Box{Vec3d{-9, -9, -9} + by, Vec3d{0.71, 9, 9} + by}}}};
+      } else {
+        copy.source.shape.placement = ShapeRequest::Placement::fitted;
+        copy.fixed = {{.select = {.ball = Selection::Ball{Vec3d{0.1, 0.2, 0.3} + by, 0.4}}}};
+      }
+      c.scene.bodies.push_back(copy);
+    }
+  }
+  return c;
+}
+
 inline const std::vector<BuildCase>& build_cases() {
   static const std::vector<BuildCase> cases{beam(),          rules(),
                                             nearest(),       small(),
@@ -309,7 +336,7 @@ inline const std::vector<BuildCase>& build_cases() {
                                             mixed(),         closed_alone(),
                                             many_regions(),  closed_by_default(),
                                             graded_clouds(), supported(),
-                                            faces_shared()};
+                                            faces_shared(),  copies()};
   return cases;
 }
 
