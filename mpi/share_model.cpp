@@ -302,7 +302,8 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
     for (const Selection* selection : selections_of(request)) {
       const int region = body.region_of_entry[choice.chosen.size()];
       choice.chosen.push_back(region >= 0 ? in_region(region)
-                                          : select(*selection, {cloud, {}, body.size}, request));
+                                          : select(*selection, {cloud, {}, body.size}, request,
+                                                   choice.faces_of_next()));
     }
     choice.share_boundaries(request, {cloud, {}, body.size});
     return choice;
@@ -374,9 +375,11 @@ void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local
                             tabulated(here.size(), [&](std::size_t k) { return here[k].position; }),
                             planes[b]);
       BoundaryChoice own = choices[b];
-      for (std::vector<Index>& chosen : own.chosen) {
-        std::erase_if(chosen,
-                      [&](Index i) { return !owns(local, static_cast<std::size_t>(begin + i)); });
+      for (auto* lists : {&own.chosen, &own.left}) {
+        for (std::vector<Index>& phyxels : *lists) {
+          std::erase_if(phyxels,
+                        [&](Index i) { return !owns(local, static_cast<std::size_t>(begin + i)); });
+        }
       }
       for (const std::int64_t count : own.counts()) counts.push_back(count);
       sums[b] = own.load_sums(m, begin, whole.bodies[b].origin);
@@ -394,7 +397,7 @@ void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local
     auto count = counts.begin();
     for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
       const BodyRequest& request = setup.scene.bodies[b];
-      const auto entries = static_cast<std::ptrdiff_t>(choices[b].chosen.size());
+      const auto entries = static_cast<std::ptrdiff_t>(choices[b].counts().size());
       naming(request, [&] {
         choices[b].refuse_empty(request, {count, count + entries}, whole.boxes[b]);
         if (entries > 0) {

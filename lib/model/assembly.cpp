@@ -344,7 +344,7 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
   choice.first_probe = choice.first_load + request.loads.size();
   const std::vector<const Selection*> selections = selections_of(request);
   for (const Selection* selection : selections) {
-    choice.chosen.push_back(select(*selection, here, request));
+    choice.chosen.push_back(select(*selection, here, request, choice.faces_of_next()));
   }
   choice.share_boundaries(request, here);
   for (std::size_t entry = 0; entry < choice.first_load; ++entry) {
@@ -392,8 +392,10 @@ void BoundaryChoice::renumber(const std::vector<Index>& place) {
 
 std::vector<std::int64_t> BoundaryChoice::counts() const {
   std::vector<std::int64_t> counts;
-  for (const std::vector<Index>& phyxels : chosen) {
-    counts.push_back(static_cast<std::int64_t>(phyxels.size()));
+  for (const auto* lists : {&chosen, &left}) {
+    for (const std::vector<Index>& phyxels : *lists) {
+      counts.push_back(static_cast<std::int64_t>(phyxels.size()));
+    }
   }
   return counts;
 }
@@ -415,11 +417,12 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
   const std::vector<const Selection*> selections = selections_of(request);
   for (std::size_t entry = 0; entry < selections.size(); ++entry) {
     if (counts[entry] > 0) continue;
-    const bool may_share = entry < first_load && first_load > 1 && region_of(*selections[entry]);
-    refuse_selection(
-        *selections[entry], request.name, box,
-        may_share ? "; phyxels on a face that it shares with another support are left to that one"
-                  : "");
+    const bool shares = entry < first_load && counts[chosen.size() + entry] > 0;
+    refuse_selection(*selections[entry], request.name, box,
+                     shares
+                         ? "; those on its face lie on that of another support, too, which holds "
+                           "them: leave this entry out, or let its box reach a spacing farther"
+                         : "");
   }
 }
 

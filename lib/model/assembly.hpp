@@ -137,9 +137,13 @@ std::vector<Axes> axes_of_supports(const BodyRequest& request);
 /// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
+  std::vector<std::vector<Index>> left;    ///< [support], what it leaves to others on a face.
   std::size_t first_load = 0, first_probe = 0;
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
+
+  /// Where the faces of the next entry to be chosen are.
+  Faces faces_of_next() const { return chosen.size() < first_load ? Faces::laid : Faces::asked; }
 
   /// Leaves each phyxel on a face that several supports share, and each of its axes, to one of
   /// these, whatever the order of the entries: to the one that holds or moves more axes, among them
@@ -157,6 +161,7 @@ struct BoundaryChoice {
 
   /// Phyxel i of the cloud is phyxel place[i] of the body.
   void renumber(const std::vector<Index>& place);
+  /// The numbers of phyxels that each entry chooses, then of those that each support leaves.
   std::vector<std::int64_t> counts() const;
   /// Sums over the phyxels of each load. @param origin of positions in the sums [m]
   std::vector<LoadSums> load_sums(const Model& model, Index shift, Vec3d origin) const;

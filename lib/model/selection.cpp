@@ -89,12 +89,13 @@ std::string alternatives_to(const std::string& name,
 }
 
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
-                          const BodyRequest& request) {
+                          const BodyRequest& request, Faces faces) {
   const Cloud& cloud = body.cloud;
   if (selection.region) return of_region(selection, cloud, request.name);
   if (selection.indices) return of_indices(selection, body, request.name);
   if (!selection.mesh.empty()) return inside_mesh(selection, cloud, request);
-  if (const std::optional<SpaceRegion> region = acting_region(selection, cloud.cuts)) {
+  if (const std::optional<SpaceRegion> region =
+          faces == Faces::laid ? acting_region(selection, cloud.cuts) : region_of(selection)) {
     return indices_where(cloud, [&](Vec3d p) {
       return region->distance(p) <= boundary_tolerance(*region, p, cloud.cuts);
     });

@@ -22,11 +22,15 @@ struct SomePhyxels {
   Index number_of(Index i) const { return number.empty() ? i : number[i]; }
 };
 
+/// Where the faces of a box are: as the scene has them, or, of a support, where layers of a lattice
+/// were laid for them.
+enum class Faces { asked, laid };
+
 /// The selected phyxels, ascending, counted in the cloud; there may be none.
 /// @param request of the body
 /// @throws InputError if a region is unknown, an index out of range, or a mesh not closed
 std::vector<Index> select(const Selection& selection, const SomePhyxels& body,
-                          const BodyRequest& request);
+                          const BodyRequest& request, Faces faces = Faces::asked);
 
 /// Words for a message about a name that is not among the `named` sets, e.g.
 /// ` (did you mean "x-"?); it has: x-, x+`.
@@ -36,8 +40,8 @@ std::string alternatives_to(const std::string& name,
 /// The part of space that a selection means; unset if it means none.
 std::optional<SpaceRegion> region_of(const Selection& selection);
 
-/// The part of space in which a selection has phyxels: `region_of`, or, of a support of which faces
-/// have moved to layers of a lattice, the region with these faces.
+/// The part of space in which a support acts: `region_of`, or, if faces have moved to layers of a
+/// lattice, the region with these faces.
 std::optional<SpaceRegion> acting_region(const Selection& selection, const SupportCuts& cuts);
 
 /// The distance of a point from a region's boundary within which it lies on the boundary [m]: twice

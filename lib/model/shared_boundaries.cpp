@@ -27,6 +27,7 @@ std::string names_of(int axes) {
 struct Support {
   std::size_t entry;   ///< Its entry, in the order of `selections_of`.
   SpaceRegion region;  ///< Where it acts.
+  SpaceRegion asked;   ///< Where the scene has it.
   int axes;            ///< A bit for each axis that it holds or moves.
 };
 
@@ -69,9 +70,16 @@ MotionRequest motion_of(const BodyRequest& request, std::size_t entry) {
   return entry < fixed ? MotionRequest{} : request.motions[entry - fixed];
 }
 
+/// True if a motion leaves everything where it is.
+bool is_at_rest(const MotionRequest& motion) {
+  return motion.displacement == Vec3d{} && motion.rotation == Vec3d{} &&
+         motion.velocity == Vec3d{} && motion.amplitude == Vec3d{};
+}
+
 /// True if two supports prescribe the same displacements to phyxels.
 bool move_alike(const BodyRequest& request, const Support& a, const Support& b) {
   const MotionRequest one = motion_of(request, a.entry), other = motion_of(request, b.entry);
+  if (is_at_rest(one) && is_at_rest(other)) return true;
   const bool turns_alike =
       one.rotation == other.rotation && (one.about == other.about || one.rotation == Vec3d{});
   return turns_alike && one.displacement == other.displacement && one.duration == other.duration &&
@@ -82,7 +90,13 @@ bool move_alike(const BodyRequest& request, const Support& a, const Support& b) 
 /// True if a support leaves the phyxels on a face that it shares to another one.
 bool gives_way(const BodyRequest& request, const Support& a, const Support& to) {
   if (a.axes == to.axes) {
-    return move_alike(request, a, to) && comes_before(to.region, a.region);
+    if (!move_alike(request, a, to)) return false;
+    if (comes_before(to.region, a.region) || comes_before(a.region, to.region)) {
+      return comes_before(to.region, a.region);
+    }
+    // Faces of both have moved to the same places.
+    return comes_before(to.asked, a.asked) ||
+           (!comes_before(a.asked, to.asked) && to.entry < a.entry);
   }
   return (a.axes & to.axes) == a.axes;
 }
@@ -114,7 +128,7 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
   std::vector<Support> supports;
   for (std::size_t entry = 0; entry < axes.size(); ++entry) {
     if (const auto region = acting_region(*selections[entry], here.cloud.cuts)) {
-      supports.push_back({entry, *region, axes[entry].bits()});
+      supports.push_back({entry, *region, *region_of(*selections[entry]), axes[entry].bits()});
     }
   }
   const auto visit_pairs = [&](auto&& visit) {
@@ -124,7 +138,7 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
       }
     }
   };
-  std::vector<std::vector<Index>> left(axes.size());  // phyxels that each entry leaves to others
+  left.assign(axes.size(), {});
   visit_pairs([&](const Support& a, const Support& b) {
     const bool first = gives_way(request, a, b);
     if (!first && !gives_way(request, b, a)) return;
@@ -165,11 +179,12 @@ void BoundaryChoice::warn_of_moved(const BodyRequest& request, const SupportCuts
       if (is_layer && side == 1) continue;
       if (std::abs(from - to) <= noticeable * cuts.spacing) continue;
       warnings.push_back(fmt::format(
-          "body \"{0}\", {1}: box: its face at {2} = {3:g} m acts at {2} = {4:g} m, where the "
+          "body \"{0}\", {1}: box: its {6} at {2} = {3:g} m acts at {2} = {4:g} m, where the "
           "nearest layer or end of the lattice is, as a layer of its own would be too near to that "
           "for a spacing of {5:g} m; a face there, or phyxels nearer to each other, act where the "
           "box ends",
-          request.name, name_of_support(request, entry), axis_names[axis], from, to, cuts.spacing));
+          request.name, name_of_support(request, entry), axis_names[axis], from, to, cuts.spacing,
+          is_layer ? "middle" : "face"));
     }
   }
 }

@@ -67,7 +67,7 @@ std::vector<SceneSection> selection_sections() {
        "body, moves there, and the plan of the run says so. In other bodies and regions, and where a layer of the body "
        "beside the boundary is too thin for phyxels on both, the support ends with the phyxels whose centres lie in it.\n\n"
        "Strains end at a box only if one region of space, by one entry or several, holds all axes. One that holds "
-       "some axes, or of which two different boxes together hold all, acts deeper by up to 0.4 spacings: beams that it clamps bend "
+       "some axes, or of which two different boxes together hold all, acts deeper by up to 0.45 spacings: beams that it clamps bend "
        "15% to 20% more, at five phyxels across.\n\n"
        "Of supports that share a face, the phyxels on it follow the one that holds or moves more axes, if these include "
        "the other's; both, if they have no axis in common; and either, if they have the same axes and the same motion. "

@@ -158,6 +158,44 @@ TEST(SharedFaces, RefuseSupportsThatContradictEachOther) {
               HasSubstr("already fixed or moved"));
 }
 
+/// A motion that goes nowhere holds as a fixed entry does.
+TEST(SharedFaces, AreSharedWithMotionsAtRest) {
+  Scene scene = beam({{between(-1, 2)}});
+  scene.bodies[0].motions = {{.select = between(2, 9), .duration = 1}};
+  const Model model = build_model(scene);
+  EXPECT_EQ(common(model.motions[0].phyxels, model.motions[1].phyxels), 0u);
+  EXPECT_GT(model.motions[1].phyxels.size(), 1000u);
+}
+
+/// Of two thin boxes that have moved to one layer, one is left with nothing, and the refusal says
+/// why. A box outside the body is another matter.
+TEST(SharedFaces, LeaveNothingToASecondBoxOnTheirLayer) {
+  const FixRequest thin{between(1.9, 2)}, thinner{between(2, 2.05)}, outside{between(20, 21)};
+  const auto refusal = [](std::vector<FixRequest> fixed) {
+    return refusal_of([&] { build_model(beam(fixed)); });
+  };
+  const auto names_the_face =
+      AllOf(HasSubstr("selects no phyxel"), HasSubstr("leave this entry out"));
+  EXPECT_THAT(refusal({thin, thinner}), names_the_face);
+  EXPECT_THAT(refusal({thinner, thin}), names_the_face);
+  EXPECT_THAT(refusal({thin, outside}), AllOf(HasSubstr("selects no phyxel"),
+                                              ::testing::Not(HasSubstr("leave this entry out"))));
+}
+
+/// Loads act where their boxes are, even if the face of a support with the same box has moved.
+TEST(MovedFaces, AreThoseOfSupportsOnly) {
+  Scene scene = beam({{between(2, 9.93)}});
+  scene.bodies[0].loads = {{.select = between(2, 9.93), .force = {0, 0, 1}}};
+  const Model model = build_model(scene);
+  const auto farthest = [&](const std::vector<Index>& phyxels) {
+    double x = 0;
+    for (const Index i : phyxels) x = std::max(x, model.position[i].x);
+    return x;
+  };
+  EXPECT_DOUBLE_EQ(farthest(model.motions[0].phyxels), 10);
+  EXPECT_LT(farthest(model.loads[0].phyxels), 9.93);
+}
+
 /// A box that ends too near to the layer of another one is held there, and the rest of its faces
 /// where they are; the warning names the entry and both places.
 TEST(MovedFaces, ActAtTheNearestLayer) {
