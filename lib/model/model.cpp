@@ -385,7 +385,7 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
       return first.source.cloud.empty() ? rest_cloud(source.from) : named_cloud(first, named);
     });
     for (const std::size_t b : source.bodies) {
-      Cloud cloud = b == source.bodies.back() ? std::move(rest) : rest;
+      Cloud cloud = rest;
       rest.warnings.clear();  // once is enough
       place(cloud, scene.bodies[b]);
       use(scene.bodies[b], std::move(cloud));
