@@ -351,10 +351,16 @@ BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
     const int bits = axes[entry].bits();
     for (const Index i : choice.chosen[entry]) {
       if (moved[i] & bits) {
+        std::size_t first = 0;
+        while (!(axes[first].bits() & bits) ||
+               !std::ranges::binary_search(choice.chosen[first], i)) {
+          ++first;
+        }
         throw InputError(fmt::format(
-            "{}: phyxel {} of body \"{}\" is already fixed or moved by an earlier entry; allowed: "
-            "one entry for each of its axes",
-            selections[entry]->where, here.number_of(i), request.name));
+            "{}: phyxel {} of body \"{}\" is already fixed or moved by {}; allowed: one motion for "
+            "each of its axes",
+            selections[entry]->where, here.number_of(i), request.name,
+            name_of_support(request, first)));
       }
       moved[i] = static_cast<char>(moved[i] | bits);
     }
@@ -419,10 +425,9 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
     if (counts[entry] > 0) continue;
     const bool shares = entry < first_load && counts[chosen.size() + entry] > 0;
     refuse_selection(*selections[entry], request.name, box,
-                     shares
-                         ? "; those on its face lie on that of another support, too, which holds "
-                           "them: leave this entry out, or let its box reach a spacing farther"
-                         : "");
+                     shares ? ", beside those that another support holds: leave this entry out, or "
+                              "let it select more"
+                            : "");
   }
 }
 

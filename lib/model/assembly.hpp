@@ -137,7 +137,7 @@ std::vector<Axes> axes_of_supports(const BodyRequest& request);
 /// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
-  std::vector<std::vector<Index>> left;    ///< [support], what it leaves to others on a face.
+  std::vector<std::vector<Index>> left;    ///< [support], what it leaves to others.
   std::size_t first_load = 0, first_probe = 0;
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
@@ -145,9 +145,10 @@ struct BoundaryChoice {
   /// Where the faces of the next entry to be chosen are.
   Faces faces_of_next() const { return chosen.size() < first_load ? Faces::laid : Faces::asked; }
 
-  /// Leaves each phyxel on a face that several supports share, and each of its axes, to one of
-  /// these, whatever the order of the entries: to the one that holds or moves more axes, among them
-  /// all of the other's; and of equal ones to the first in space. @param here as in `chosen`
+  /// Leaves each phyxel that several supports share, and each of its axes, to one of these: to the
+  /// one that holds or moves more axes, among them all of the other's; and of equal ones to the
+  /// first in space. Supports at rest share what they both choose; others share faces, along which
+  /// their regions touch. @param here as in `chosen`
   /// @throws InputError for supports that contradict each other there
   void share_boundaries(const BodyRequest& request, const SomePhyxels& here);
   /// Warns of supports whose faces have moved to the layers of a lattice.

@@ -1,4 +1,4 @@
-/// Faces that several supports of a body share, and faces that have moved to layers of a lattice.
+/// Phyxels that several supports of a body share, and faces that have moved to layers of a lattice.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,13 +23,24 @@ std::string names_of(int axes) {
   return names;
 }
 
-/// A support that is given by a region of space.
 struct Support {
-  std::size_t entry;   ///< Its entry, in the order of `selections_of`.
-  SpaceRegion region;  ///< Where it acts.
-  SpaceRegion asked;   ///< Where the scene has it.
-  int axes;            ///< A bit for each axis that it holds or moves.
+  std::size_t entry;           ///< Its entry, in the order of `selections_of`.
+  const Selection* selection;  ///< What the scene selects.
+  /// Where it acts, and where the scene has it; unset unless it is given by a region of space.
+  std::optional<SpaceRegion> region, asked;
+  int axes = 0;             ///< A bit for each axis that it holds or moves.
+  MotionRequest motion;     ///< That of a fixed one is none.
+  bool is_at_rest = false;  ///< True if it moves nothing.
 };
+
+/// The kind of a selection as a number, by which supports with the same axes share phyxels: names
+/// before regions of space, and these before the whole body.
+int kind_of(const Selection& selection) {
+  if (selection.region) return 0;
+  if (selection.indices) return 1;
+  if (!selection.mesh.empty()) return 2;
+  return selection.all ? 4 : 3;
+}
 
 /// True if the regions of two supports touch each other and may share phyxels on their boundaries,
 /// but do not overlap.
@@ -48,26 +59,24 @@ bool may_share_face(const SpaceRegion& a, const SpaceRegion& b, const SupportCut
   return touches;
 }
 
-/// The phyxels of a cloud that two supports choose and that lie on the boundaries of both.
-std::vector<Index> on_both(const Support& a, const Support& b,
-                           const std::vector<std::vector<Index>>& chosen, const Cloud& cloud) {
+/// The phyxels of a cloud that two supports choose and may share: all, if both are at rest, and
+/// else those that lie on the boundaries of both.
+std::vector<Index> shared_by(const Support& a, const Support& b,
+                             const std::vector<std::vector<Index>>& chosen, const Cloud& cloud) {
   std::vector<Index> both;
-  if (!may_share_face(a.region, b.region, cloud.cuts)) return both;
+  const bool rest = a.is_at_rest && b.is_at_rest;
+  if (!rest && (!a.region || !b.region)) return both;
+  if (!rest && !may_share_face(*a.region, *b.region, cloud.cuts)) return both;
   std::set_intersection(chosen[a.entry].begin(), chosen[a.entry].end(), chosen[b.entry].begin(),
                         chosen[b.entry].end(), std::back_inserter(both));
+  if (rest) return both;
   const auto is_inside = [&](const SpaceRegion& region, Vec3d p) {
     return region.distance(p) < -boundary_tolerance(region, p, cloud.cuts);
   };
   std::erase_if(both, [&](Index i) {
-    return is_inside(a.region, cloud.position[i]) || is_inside(b.region, cloud.position[i]);
+    return is_inside(*a.region, cloud.position[i]) || is_inside(*b.region, cloud.position[i]);
   });
   return both;
-}
-
-/// The motion of a support; that of a fixed one is none.
-MotionRequest motion_of(const BodyRequest& request, std::size_t entry) {
-  const std::size_t fixed = request.fixed.size();
-  return entry < fixed ? MotionRequest{} : request.motions[entry - fixed];
 }
 
 /// True if a motion leaves everything where it is.
@@ -77,9 +86,9 @@ bool is_at_rest(const MotionRequest& motion) {
 }
 
 /// True if two supports prescribe the same displacements to phyxels.
-bool move_alike(const BodyRequest& request, const Support& a, const Support& b) {
-  const MotionRequest one = motion_of(request, a.entry), other = motion_of(request, b.entry);
-  if (is_at_rest(one) && is_at_rest(other)) return true;
+bool move_alike(const Support& a, const Support& b) {
+  if (a.is_at_rest && b.is_at_rest) return true;
+  const MotionRequest &one = a.motion, &other = b.motion;
   const bool turns_alike =
       one.rotation == other.rotation && (one.about == other.about || one.rotation == Vec3d{});
   return turns_alike && one.displacement == other.displacement && one.duration == other.duration &&
@@ -87,33 +96,38 @@ bool move_alike(const BodyRequest& request, const Support& a, const Support& b) 
          one.frequency == other.frequency;
 }
 
-/// True if a support leaves the phyxels on a face that it shares to another one.
-bool gives_way(const BodyRequest& request, const Support& a, const Support& to) {
-  if (a.axes == to.axes) {
-    if (!move_alike(request, a, to)) return false;
-    if (comes_before(to.region, a.region) || comes_before(a.region, to.region)) {
-      return comes_before(to.region, a.region);
-    }
-    // Faces of both have moved to the same places.
-    return comes_before(to.asked, a.asked) ||
-           (!comes_before(a.asked, to.asked) && to.entry < a.entry);
+/// True if a support leaves the phyxels that it shares to another one.
+bool gives_way(const Support& a, const Support& to) {
+  if (a.axes != to.axes) return (a.axes & to.axes) == a.axes;
+  if (!move_alike(a, to)) return false;
+  const auto key = [](const Support& support) {
+    return std::pair(kind_of(*support.selection), support.selection->region.value_or(""));
+  };
+  if (key(a) != key(to)) return key(to) < key(a);
+  // Where faces of both have moved to the same places, the regions may be the same.
+  for (const auto region : {&Support::region, &Support::asked}) {
+    const auto &own = a.*region, &other = to.*region;
+    if (!own || !other) break;
+    if (comes_before(*other, *own) || comes_before(*own, *other)) return comes_before(*other, *own);
   }
-  return (a.axes & to.axes) == a.axes;
+  return to.entry < a.entry;
 }
 
 [[noreturn]] void refuse_shared(const BodyRequest& request, const Support& first,
-                                const Support& second, const Selection& select, Index phyxel) {
-  const std::string which = fmt::format("{}: {} of body \"{}\" shares a face with {}", select.where,
-                                        name_of_support(request, second.entry), request.name,
-                                        name_of_support(request, first.entry));
+                                const Support& second, Index phyxel) {
+  const std::string which =
+      fmt::format("{}: {} of body \"{}\" shares {} with {}", second.selection->where,
+                  name_of_support(request, second.entry), request.name,
+                  first.is_at_rest && second.is_at_rest ? "phyxels" : "a face",
+                  name_of_support(request, first.entry));
   if (first.axes == second.axes) {
     throw InputError(
-        fmt::format("{}, and phyxels on it, such as {}, cannot follow both along \"{}\"; allowed: "
+        fmt::format("{}, and those there, such as {}, cannot follow both along \"{}\"; allowed: "
                     "the same motion, or none, in both, or regions a spacing apart",
                     which, phyxel, names_of(first.axes)));
   }
   throw InputError(fmt::format(
-      "{}: axes \"{}\" and \"{}\" found, and phyxels on it, such as {}, would be held twice along "
+      "{}: axes \"{}\" and \"{}\" found, and those there, such as {}, would be held twice along "
       "\"{}\"; allowed: axes of one entry that include the other's, no axis in common, or regions "
       "a spacing apart",
       which, names_of(second.axes), names_of(first.axes), phyxel,
@@ -127,9 +141,11 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
   const std::vector<Axes> axes = axes_of_supports(request);
   std::vector<Support> supports;
   for (std::size_t entry = 0; entry < axes.size(); ++entry) {
-    if (const auto region = acting_region(*selections[entry], here.cloud.cuts)) {
-      supports.push_back({entry, *region, *region_of(*selections[entry]), axes[entry].bits()});
-    }
+    const std::size_t fixed = request.fixed.size();
+    const MotionRequest motion = entry < fixed ? MotionRequest{} : request.motions[entry - fixed];
+    supports.push_back(
+        {entry, selections[entry], acting_region(*selections[entry], here.cloud.cuts),
+         region_of(*selections[entry]), axes[entry].bits(), motion, is_at_rest(motion)});
   }
   const auto visit_pairs = [&](auto&& visit) {
     for (std::size_t second = 1; second < supports.size(); ++second) {
@@ -140,9 +156,9 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
   };
   left.assign(axes.size(), {});
   visit_pairs([&](const Support& a, const Support& b) {
-    const bool first = gives_way(request, a, b);
-    if (!first && !gives_way(request, b, a)) return;
-    const std::vector<Index> both = on_both(a, b, chosen, here.cloud);
+    const bool first = gives_way(a, b);
+    if (!first && !gives_way(b, a)) return;
+    const std::vector<Index> both = shared_by(a, b, chosen, here.cloud);
     std::vector<Index>& to = left[(first ? a : b).entry];
     to.insert(to.end(), both.begin(), both.end());
   });
@@ -153,9 +169,9 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
                   [&](Index i) { return std::binary_search(leaves.begin(), leaves.end(), i); });
   }
   visit_pairs([&](const Support& a, const Support& b) {
-    const std::vector<Index> both = on_both(a, b, chosen, here.cloud);
+    const std::vector<Index> both = shared_by(a, b, chosen, here.cloud);
     if (!both.empty()) {
-      refuse_shared(request, a, b, *selections[b.entry], here.number_of(both[0]));
+      refuse_shared(request, a, b, here.number_of(both[0]));
     }
   });
 }

@@ -69,9 +69,10 @@ std::vector<SceneSection> selection_sections() {
        "Strains end at a box only if one region of space, by one entry or several, holds all axes. One that holds "
        "some axes, or of which two different boxes together hold all, acts deeper by up to 0.45 spacings: beams that it clamps bend "
        "15% to 20% more, at five phyxels across.\n\n"
-       "Of supports that share a face, the phyxels on it follow the one that holds or moves more axes, if these include "
-       "the other's; both, if they have no axis in common; and either, if they have the same axes and the same motion. "
-       "Other pairs are refused, whatever the order of entries, and so are regions that overlap and hold the same axis."},
+       "Phyxels that two supports share are held by the one that holds more axes, if these include the other's; by both, "
+       "if they have no axis in common; and by either, if they have the same axes. Supports that move share only faces, "
+       "along which their boxes or balls touch, and with the same axes only if they move alike. Other pairs are refused, "
+       "whatever the order of entries."},
       {"selection.ball", "ball = {centre = [x, y, z], radius = r}", "", "A ball of a selection."},
   };
 }

@@ -264,12 +264,13 @@ std::vector<Late> late_refusals() {
            "[[body.motion]]\nball = {centre = [9, 0, 0], radius = 0.1}\nvelocity = [1, 0, 0]\n"),
        {":14:", "selects no phyxel"}},
       {with_bar("[[body.load]]\nregion = 'top'\nforce = [1, 0, 0]\n"), {":14:", "\"top\""}},
-      {with_bar("[[body.fixed]]\nall = true\n[[body.fixed]]\nregion = 'x-'\n"),
-       {":16:", "already fixed or moved"}},
-      {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake), {":16:", "already fixed or moved"}},
+      {with_bar("[[body.fixed]]\nindices = [0]\n[[body.fixed]]\nregion = 'x-'\n"),
+       {":14:", "selects no phyxel", "another support holds", "leave this entry out"}},
+      {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake),
+       {":16:", "already fixed or moved by fixed 1"}},
       {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\naxes = 'xy'\n"
                 "[[body.fixed]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\naxes = 'yz'\n"),
-       {":17:", "fixed 2 of body \"beam\" shares a face with fixed 1", "\"xy\"", "\"yz\"",
+       {":17:", "fixed 2 of body \"beam\" shares phyxels with fixed 1", "\"xy\"", "\"yz\"",
         "allowed: "}},
       {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\n"
                 "[[body.motion]]\nbox = [[0.2, -1, -1], [1, 1, 1]]\nvelocity = [1, 0, 0]\n"),

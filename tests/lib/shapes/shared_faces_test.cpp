@@ -138,7 +138,7 @@ TEST(SharedFaces, RefuseSupportsThatContradictEachOther) {
   for (const Scene& scene : {beam({left, right}), beam({right, left})}) {
     EXPECT_THAT(
         refusal_of([&] { build_model(scene); }),
-        AllOf(HasSubstr("test.toml:9:1: fixed 2 of body \"body\" shares a face with fixed 1"),
+        AllOf(HasSubstr("test.toml:9:1: fixed 2 of body \"body\" shares phyxels with fixed 1"),
               HasSubstr("\"xy\""), HasSubstr("\"yz\""), HasSubstr("twice along \"y\""),
               HasSubstr("allowed: ")));
   }
@@ -151,11 +151,49 @@ TEST(SharedFaces, RefuseSupportsThatContradictEachOther) {
   moving.bodies[0].fixed[0].axes = only_y;
   const Model model = build_model(moving);
   EXPECT_EQ(common(model.motions[0].phyxels, model.motions[1].phyxels), 0u);
-  // Boxes that overlap are refused as before.
-  EXPECT_THAT(refusal_of([] {
-                build_model(beam({{between(-1, 2.1)}, {between(2, 11)}}));
+  // Boxes that overlap, one of them moving.
+  moving.bodies[0].fixed = {{between(-1, 2.4)}};
+  EXPECT_THAT(refusal_of([&] { build_model(moving); }),
+              HasSubstr("already fixed or moved by fixed 1"));
+}
+
+/// Supports at rest may overlap anywhere, also those by name and of the whole body: together they
+/// hold what each of them would.
+TEST(SharedFaces, OfSupportsAtRestMayOverlap) {
+  Selection end, bottom, all;
+  end.region = "x+";
+  bottom.region = "z-";
+  all.all = true;
+  const FixRequest clamp{end}, roller{bottom, {false, false, true}}, plane{all, only_y},
+      boxes[] = {{between(-1, 2.4)}, {between(2, 4)}};
+  const auto held = [](const std::vector<FixRequest>& fixed) {
+    const Model model = build_model(beam(fixed));
+    std::vector<int> times(3 * static_cast<std::size_t>(model.size()), 0);
+    for (const Motion& motion : model.motions) {
+      for (const Index i : motion.phyxels) {
+        for (int k = 0; k < 3; ++k) times[3 * i + k] += motion.axes.bits() >> k & 1;
+      }
+    }
+    EXPECT_THAT(times, ::testing::Each(::testing::Le(1)));
+    return times;
+  };
+  EXPECT_EQ(held({clamp, roller, plane}), held({plane, roller, clamp}));
+  const Model model = build_model(beam({clamp, roller, plane}));
+  const std::vector<int> times = held({clamp, roller, plane});
+  for (Index i = 0; i < model.size(); ++i) {
+    const Vec3d p = model.position[i];
+    EXPECT_EQ(times[3 * i], p.x > 9.99);
+    EXPECT_EQ(times[3 * i + 1], 1);
+    EXPECT_EQ(times[3 * i + 2], p.x > 9.99 || p.z < -0.49);
+  }
+  const auto count = [](const std::vector<int>& axes) { return std::ranges::count(axes, 1); };
+  EXPECT_EQ(held({boxes[0], boxes[1]}), held({boxes[1], boxes[0]}));
+  EXPECT_EQ(count(held({boxes[0], boxes[1]})), count(held({{between(-1, 4)}})));
+  EXPECT_THAT(refusal_of([&] {
+                build_model(beam({{end, x_and_y}, {all, y_and_z}}));
               }),
-              HasSubstr("already fixed or moved"));
+              AllOf(HasSubstr("fixed 2 of body \"body\" shares phyxels with fixed 1"),
+                    HasSubstr("twice along \"y\"")));
 }
 
 /// A motion that goes nowhere holds as a fixed entry does.

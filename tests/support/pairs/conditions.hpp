@@ -93,10 +93,9 @@ inline const std::vector<Condition>& conditions() {
          scene.bodies[0].inclusions.push_back({in_box({-9, -9, -9}, {9, 9, 9}), rubber()});
        }},
       {"TwoMotionsOfAnAxis",
-       "two entries of `fixed` and `motion` that hold the same axis of a phyxel",
-       {"is already fixed or moved by an earlier entry", "allowed: one entry for each of its axes"},
-       "two motions of one axis contradict each other; two entries that both fix it do not, but "
-       "are refused alike",
+       "two entries of `fixed` and `motion` that move the same axis of a phyxel otherwise",
+       {"is already fixed or moved by fixed 1", "allowed: one motion for each of its axes"},
+       "two motions of one axis contradict each other",
        [](Scene& scene, Cloud&) {
          scene.bodies[0].motions.push_back(
              {.select = in_box({-1, -1, -1}, {0.07, 1, 1}), .displacement = {0.1, 0, 0}});
