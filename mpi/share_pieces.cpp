@@ -61,7 +61,7 @@ std::vector<std::uint32_t> find_region_sets(const BodyRequest& request, const Cl
       }
     } else if (selection.indices && !choice.chosen.empty()) {
       sets.resize(cloud.position.size(), RegionSets::none);
-      region = add_region(selection.where, choice.chosen[entry], body, sets);
+      region = add_region(selection.where, choice.selected(entry), body, sets);
     }
     if (!choice.chosen.empty()) body.region_of_entry.push_back(region);
   }

@@ -13,6 +13,7 @@
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
+#include "sort_unique.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
 
@@ -385,6 +386,13 @@ void BoundaryChoice::add_planes(const BodyRequest& request, std::span<const Vec3
       moved[i] = static_cast<char>(moved[i] | bit);
     }
   }
+}
+
+std::vector<Index> BoundaryChoice::selected(std::size_t entry) const {
+  std::vector<Index> all = chosen[entry];
+  if (entry < left.size()) all.insert(all.end(), left[entry].begin(), left[entry].end());
+  sort_unique(all);
+  return all;
 }
 
 void BoundaryChoice::renumber(const std::vector<Index>& place) {

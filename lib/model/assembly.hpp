@@ -142,6 +142,9 @@ struct BoundaryChoice {
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
 
+  /// What an entry selects: what it chooses and what it leaves to others, ascending.
+  std::vector<Index> selected(std::size_t entry) const;
+
   /// Where the faces of the next entry to be chosen are.
   Faces faces_of_next() const { return chosen.size() < first_load ? Faces::laid : Faces::asked; }
 

@@ -367,7 +367,14 @@ TEST(Selection, EntriesMayShareAPhyxelAlongOtherAxes) {
   EXPECT_EQ(model.motions.size(), 2u);
   const std::vector<char> held = held_phyxels(model);  // along all axes by one entry
   EXPECT_EQ(std::count(held.begin(), held.end(), 1), 0);
+  // Along z, too, the phyxels are the second entry's, which holds more axes.
   fixed[1].axes.z = true;
+  const Model shared = model_of(scene, cloud);
+  EXPECT_EQ(shared.motions[0].phyxels.size(), 25u);
+  EXPECT_EQ(shared.motions[1].phyxels, (std::vector<Index>{0, 1}));
+  // Neither holds all that the other does.
+  fixed[0].axes.y = true;
+  fixed[1].axes.y = false;
   EXPECT_THROW(model_of(scene, cloud), InputError);
 }
 
