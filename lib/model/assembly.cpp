@@ -13,7 +13,6 @@
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/moment.hpp"
-#include "sort_unique.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
 
@@ -330,11 +329,6 @@ std::vector<Axes> axes_of_supports(const BodyRequest& request) {
   return axes;
 }
 
-std::string name_of_support(const BodyRequest& request, std::size_t entry) {
-  return entry < request.fixed.size() ? entry_name("fixed", entry)
-                                      : entry_name("motion", entry - request.fixed.size());
-}
-
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
   BoundaryChoice choice;
@@ -386,13 +380,6 @@ void BoundaryChoice::add_planes(const BodyRequest& request, std::span<const Vec3
       moved[i] = static_cast<char>(moved[i] | bit);
     }
   }
-}
-
-std::vector<Index> BoundaryChoice::selected(std::size_t entry) const {
-  std::vector<Index> all = chosen[entry];
-  if (entry < left.size()) all.insert(all.end(), left[entry].begin(), left[entry].end());
-  sort_unique(all);
-  return all;
 }
 
 void BoundaryChoice::renumber(const std::vector<Index>& place) {

@@ -9,6 +9,7 @@
 #include "model/selection.hpp"
 #include "phyxel/error.hpp"
 #include "shapes/lattice_cuts.hpp"
+#include "sort_unique.hpp"
 
 namespace phyxel {
 namespace {
@@ -135,6 +136,18 @@ bool gives_way(const Support& a, const Support& to) {
 }
 
 }  // namespace
+
+std::string name_of_support(const BodyRequest& request, std::size_t entry) {
+  return entry < request.fixed.size() ? entry_name("fixed", entry)
+                                      : entry_name("motion", entry - request.fixed.size());
+}
+
+std::vector<Index> BoundaryChoice::selected(std::size_t entry) const {
+  std::vector<Index> all = chosen[entry];
+  if (entry < left.size()) all.insert(all.end(), left[entry].begin(), left[entry].end());
+  sort_unique(all);
+  return all;
+}
 
 void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyxels& here) {
   const std::vector<const Selection*> selections = selections_of(request);
