@@ -35,11 +35,12 @@ endif()
 # PHYXEL_PCH is ON. Builds without it check that each source includes what it uses, and share objects through ccache, for which a
 # precompiled header in another folder is a different compilation.
 function(phyxel_precompile target)
-  if(PHYXEL_PCH STREQUAL "ON")
+  if(PHYXEL_PCH AND NOT PHYXEL_PCH STREQUAL "TESTS")
     phyxel_precompile_always(${target} ${ARGN})
   endif()
 endfunction()
 
+# phyxel_precompile_always: the same, whatever PHYXEL_PCH is.
 function(phyxel_precompile_always target)
   if(ARGV1 STREQUAL "REUSE_FROM")
     target_precompile_headers(${target} REUSE_FROM ${ARGV2})

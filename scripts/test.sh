@@ -53,7 +53,7 @@ have_clang() { command -v clang++ >/dev/null; }
 
 # build <configure preset> <build preset>
 build() {
-  # These share the library's objects through ccache, and precompile the tests' headers alone; the others their own, too.
+  # The three unsanitized builds share the library's objects through ccache, so they precompile headers of tests only.
   local headers=()
   case $1 in cpu | hdf5 | cuda) headers=(-DPHYXEL_PCH=TESTS) ;; esac
   cmake --preset "$1" "${generator[@]}" "${insist[@]}" "${headers[@]}" -DPHYXEL_TESTS=ON &&

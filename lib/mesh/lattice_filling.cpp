@@ -230,7 +230,7 @@ class Skin {
   std::vector<double> volumes(Stage& stage) const {
     const double cell = std::pow(spacing_, 3);
     std::vector<double> sampled = sampled_volumes(stage);
-    // The others have the volumes of lattice cells.
+    // Regular points have the volumes of lattice cells.
     const auto is_irregular = [&](std::size_t k) {
       return k < sites() || clearance_of(k - sites()) < regular_clearance;
     };

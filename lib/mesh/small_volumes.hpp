@@ -15,7 +15,7 @@ namespace phyxel {
 /// hardly any volume: as a mass, it would need tiny time steps. The points within two spacings lose
 /// what a point gains, in proportion to what they have above that least volume.
 /// @param volume of each point [m³]. @param spacing wanted distance between the points
-/// @param may_change tells whether a point's volume may change; null: those of all may
+/// @param may_change tells whether a point's volume may change; null: every volume may
 void raise_small_volumes(std::span<const Vec3d> point, const SupportCuts& cuts,
                          const SpacingField& spacing, std::vector<double>& volume,
                          const std::function<bool(std::size_t)>& may_change = {});

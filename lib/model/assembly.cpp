@@ -420,8 +420,8 @@ void BoundaryChoice::refuse_empty(const BodyRequest& request,
     if (counts[entry] > 0) continue;
     const bool shares = entry < first_load && counts[chosen.size() + entry] > 0;
     refuse_selection(*selections[entry], request.name, box,
-                     shares ? ", beside those that another support holds: leave this entry out, or "
-                              "let it select more"
+                     shares ? "; another support holds all that it would select: leave this entry "
+                              "out, or let it select more"
                             : "");
   }
 }

@@ -137,15 +137,15 @@ std::vector<Axes> axes_of_supports(const BodyRequest& request);
 /// Which phyxels of a cloud each entry of the boundary of its body concerns.
 struct BoundaryChoice {
   std::vector<std::vector<Index>> chosen;  ///< [entry], ascending, counted in the cloud.
-  std::vector<std::vector<Index>> left;    ///< [support], what it leaves to others.
+  std::vector<std::vector<Index>> left;    ///< [support], phyxels that it leaves to others.
   std::size_t first_load = 0, first_probe = 0;
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
 
-  /// What an entry selects: what it chooses and what it leaves to others, ascending.
+  /// The phyxels that an entry selects, with those that it leaves to others, ascending.
   std::vector<Index> selected(std::size_t entry) const;
 
-  /// Where the faces of the next entry to be chosen are.
+  /// The faces by which the next entry selects: those laid for a support, or those asked for.
   Faces faces_of_next() const { return chosen.size() < first_load ? Faces::laid : Faces::asked; }
 
   /// Leaves each phyxel that several supports share, and each of its axes, to one of these: to the

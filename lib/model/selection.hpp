@@ -22,8 +22,7 @@ struct SomePhyxels {
   Index number_of(Index i) const { return number.empty() ? i : number[i]; }
 };
 
-/// Where the faces of a box are: as the scene has them, or, of a support, where layers of a lattice
-/// were laid for them.
+/// The faces of a box: as the scene has them, or as layers of a lattice were laid for a support.
 enum class Faces { asked, laid };
 
 /// The selected phyxels, ascending, counted in the cloud; there may be none.

@@ -24,14 +24,20 @@ std::string names_of(int axes) {
   return names;
 }
 
+/// An entry that holds or moves phyxels.
 struct Support {
   std::size_t entry;           ///< Its entry, in the order of `selections_of`.
   const Selection* selection;  ///< What the scene selects.
   /// Where it acts, and where the scene has it; unset unless it is given by a region of space.
   std::optional<SpaceRegion> region, asked;
-  int axes = 0;             ///< A bit for each axis that it holds or moves.
-  MotionRequest motion;     ///< That of a fixed one is none.
-  bool is_at_rest = false;  ///< True if it moves nothing.
+  int axes = 0;                           ///< A bit for each axis that it holds or moves.
+  const MotionRequest* motion = nullptr;  ///< Null for a fixed entry.
+
+  /// True if it leaves everything where it is.
+  bool is_at_rest() const {
+    return !motion || (motion->displacement == Vec3d{} && motion->rotation == Vec3d{} &&
+                       motion->velocity == Vec3d{} && motion->amplitude == Vec3d{});
+  }
 };
 
 /// The kind of a selection as a number, by which supports with the same axes share phyxels: names
@@ -65,7 +71,7 @@ bool may_share_face(const SpaceRegion& a, const SpaceRegion& b, const SupportCut
 std::vector<Index> shared_by(const Support& a, const Support& b,
                              const std::vector<std::vector<Index>>& chosen, const Cloud& cloud) {
   std::vector<Index> both;
-  const bool rest = a.is_at_rest && b.is_at_rest;
+  const bool rest = a.is_at_rest() && b.is_at_rest();
   if (!rest && (!a.region || !b.region)) return both;
   if (!rest && !may_share_face(*a.region, *b.region, cloud.cuts)) return both;
   std::set_intersection(chosen[a.entry].begin(), chosen[a.entry].end(), chosen[b.entry].begin(),
@@ -80,16 +86,10 @@ std::vector<Index> shared_by(const Support& a, const Support& b,
   return both;
 }
 
-/// True if a motion leaves everything where it is.
-bool is_at_rest(const MotionRequest& motion) {
-  return motion.displacement == Vec3d{} && motion.rotation == Vec3d{} &&
-         motion.velocity == Vec3d{} && motion.amplitude == Vec3d{};
-}
-
 /// True if two supports prescribe the same displacements to phyxels.
 bool move_alike(const Support& a, const Support& b) {
-  if (a.is_at_rest && b.is_at_rest) return true;
-  const MotionRequest &one = a.motion, &other = b.motion;
+  if (a.is_at_rest() || b.is_at_rest()) return a.is_at_rest() && b.is_at_rest();
+  const MotionRequest &one = *a.motion, &other = *b.motion;
   const bool turns_alike =
       one.rotation == other.rotation && (one.about == other.about || one.rotation == Vec3d{});
   return turns_alike && one.displacement == other.displacement && one.duration == other.duration &&
@@ -119,16 +119,16 @@ bool gives_way(const Support& a, const Support& to) {
   const std::string which =
       fmt::format("{}: {} of body \"{}\" shares {} with {}", second.selection->where,
                   name_of_support(request, second.entry), request.name,
-                  first.is_at_rest && second.is_at_rest ? "phyxels" : "a face",
+                  first.is_at_rest() && second.is_at_rest() ? "phyxels" : "a face",
                   name_of_support(request, first.entry));
   if (first.axes == second.axes) {
     throw InputError(
-        fmt::format("{}, and those there, such as {}, cannot follow both along \"{}\"; allowed: "
+        fmt::format("{}, and phyxels there, such as {}, cannot follow both along \"{}\"; allowed: "
                     "the same motion, or none, in both, or regions a spacing apart",
                     which, phyxel, names_of(first.axes)));
   }
   throw InputError(fmt::format(
-      "{}: axes \"{}\" and \"{}\" found, and those there, such as {}, would be held twice along "
+      "{}: axes \"{}\" and \"{}\" found, and phyxels there, such as {}, would be held twice along "
       "\"{}\"; allowed: axes of one entry that include the other's, no axis in common, or regions "
       "a spacing apart",
       which, names_of(second.axes), names_of(first.axes), phyxel,
@@ -155,10 +155,10 @@ void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyx
   std::vector<Support> supports;
   for (std::size_t entry = 0; entry < axes.size(); ++entry) {
     const std::size_t fixed = request.fixed.size();
-    const MotionRequest motion = entry < fixed ? MotionRequest{} : request.motions[entry - fixed];
-    supports.push_back(
-        {entry, selections[entry], acting_region(*selections[entry], here.cloud.cuts),
-         region_of(*selections[entry]), axes[entry].bits(), motion, is_at_rest(motion)});
+    supports.push_back({entry, selections[entry],
+                        acting_region(*selections[entry], here.cloud.cuts),
+                        region_of(*selections[entry]), axes[entry].bits(),
+                        entry < fixed ? nullptr : &request.motions[entry - fixed]});
   }
   const auto visit_pairs = [&](auto&& visit) {
     for (std::size_t second = 1; second < supports.size(); ++second) {
@@ -200,12 +200,11 @@ void BoundaryChoice::warn_of_moved(const BodyRequest& request, const SupportCuts
     const auto asked = ranges_along_axes(*region), found = ranges_along_axes(*acting);
     for (int face = 0; asked && found && face < 6; ++face) {
       const int axis = face / 2, side = face % 2;
-      double from = (*asked)[axis][side];
-      const double to = (*found)[axis][side];
-      const bool is_layer = (*found)[axis][0] == (*found)[axis][1];
-      if (is_layer)
-        from = 0.5 * ((*asked)[axis][0] + (*asked)[axis][1]);  // the layer of a thin box
+      const bool is_layer = (*found)[axis][0] == (*found)[axis][1];  // that of a thin box
       if (is_layer && side == 1) continue;
+      const double from =
+          is_layer ? 0.5 * ((*asked)[axis][0] + (*asked)[axis][1]) : (*asked)[axis][side];
+      const double to = (*found)[axis][side];
       if (std::abs(from - to) <= noticeable * cuts.spacing) continue;
       warnings.push_back(fmt::format(
           "body \"{0}\", {1}: box: its {6} at {2} = {3:g} m acts at {2} = {4:g} m, where the "

@@ -13,6 +13,7 @@
 #include <numbers>
 #include <random>
 
+#include "mesh/small_volumes.hpp"
 #include "model/assembly.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/equilibrium.hpp"
@@ -345,6 +346,18 @@ TEST(Cuts, LeaveNoTinyVolumesInWedges) {
     }
   }
   EXPECT_GT(on_cut, 100);
+}
+
+/// A small volume is raised at the cost of those beside it that may change, and of no other.
+TEST(Cuts, RaiseVolumesFromPointsThatMayChange) {
+  SupportCuts cuts;
+  cuts.list = {{slab, slab}};
+  const Vec3d points[] = {{0.5, 0, 0}, {1.3, 0, 0}, {0.5, 0.9, 0}};
+  std::vector<double> volume{0.01, 1, 1};
+  raise_small_volumes(points, cuts, SpacingField(1), volume, [](std::size_t k) { return k != 1; });
+  EXPECT_NEAR(volume[0], 0.2, 1e-15);
+  EXPECT_EQ(volume[1], 1);
+  EXPECT_NEAR(volume[2], 0.81, 1e-15);
 }
 
 /// A face along which a cut runs keeps its phyxels, however near the cut is: only wedges beside

@@ -265,7 +265,7 @@ std::vector<Late> late_refusals() {
        {":14:", "selects no phyxel"}},
       {with_bar("[[body.load]]\nregion = 'top'\nforce = [1, 0, 0]\n"), {":14:", "\"top\""}},
       {with_bar("[[body.fixed]]\nindices = [0]\n[[body.fixed]]\nregion = 'x-'\n"),
-       {":14:", "selects no phyxel", "another support holds", "leave this entry out"}},
+       {":14:", "selects no phyxel", "another support holds all", "leave this entry out"}},
       {with_bar("[[body.fixed]]\nregion = 'x-'\n" + shake),
        {":16:", "already fixed or moved by fixed 1"}},
       {with_bar("[[body.fixed]]\nbox = [[-1, -1, -1], [0.2, 1, 1]]\naxes = 'xy'\n"

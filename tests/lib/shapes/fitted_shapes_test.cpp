@@ -41,7 +41,9 @@ TEST(FittedShapes, HaveFewSurfelsAllOnTheirSurface) {
       // 3/8 e² of a sphere of radius 1, here at most 1.4 times 2 π / 96.
       EXPECT_NEAR(enclosed_volume(surface) / volume, 1, is_sphere ? 0.0032 : 0.0008);
       const double between = std::min(shape.spacing, 2 * pi / 96);
-      EXPECT_LT(static_cast<double>(surface.position.size()) * between * between, 1.5 * area);
+      const auto surfels = static_cast<double>(surface.position.size());
+      EXPECT_LT(surfels * between * between, 1.5 * area);
+      EXPECT_GT(surfels * shape.spacing * shape.spacing, 0.7 * area);
     }
   }
 }
