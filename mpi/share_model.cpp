@@ -296,9 +296,7 @@ BoundaryChoice choice_of(const ShareSetup& setup, const WholeBodies& whole, cons
     return chosen;
   };
   if (!body.region_of_entry.empty()) {  // its piece has been checked
-    BoundaryChoice choice;
-    choice.first_load = request.fixed.size() + request.motions.size();
-    choice.first_probe = choice.first_load + request.loads.size();
+    BoundaryChoice choice = BoundaryChoice::empty_of(request);
     for (const Selection* selection : selections_of(request)) {
       const int region = body.region_of_entry[choice.chosen.size()];
       choice.chosen.push_back(region >= 0 ? in_region(region)

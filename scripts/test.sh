@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Configures, builds and tests phyxel.
 #
-#   scripts/test.sh                   all stages: cpu, tidy, hdf5, asan, fuzz, tsan and cuda
-#   scripts/test.sh cpu asan          only these
+#   scripts/test.sh                      all stages: cpu, cuda, asan, fuzz, tidy, hdf5 and tsan, in this order
+#   scripts/test.sh cpu asan             only these
+#   scripts/test.sh --start-within 50    those that start within so many minutes; the summary names the others
 #
 # cpu runs all tests; tidy checks the sources by clang-format, scripts/sizes.py and clang-tidy; hdf5 tests output by
 # parallel HDF5; asan repeats the tests under sanitizers, with clang, except those of numerical results; fuzz runs the
@@ -13,9 +14,18 @@
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit 1
 
+start_within=
+if [[ ${1-} == --start-within ]]; then
+  start_within=${2-}
+  if [[ ! $start_within =~ ^[1-9][0-9]{0,5}$ ]]; then
+    echo "scripts/test.sh: --start-within \"$start_within\" found; allowed: a whole number of minutes" >&2
+    exit 2
+  fi
+  shift 2
+fi
 stages=("$@")
 if [[ ${#stages[@]} -eq 0 ]]; then
-  stages=(cpu tidy hdf5 asan fuzz tsan cuda)
+  stages=(cpu cuda asan fuzz tidy hdf5 tsan)
 fi
 for stage in "${stages[@]}"; do
   case $stage in cpu | tidy | hdf5 | asan | tsan | cuda | fuzz) ;; *)
@@ -159,6 +169,11 @@ summary=()
 worst=0
 mapfile -t missing < <(missing_tools)
 for name in "${stages[@]}"; do
+  if [[ -n $start_within && $SECONDS -gt $((60 * start_within)) ]]; then
+    summary+=("$(printf '  %-5s LEFT OUT: %d minutes had passed, more than the %d of --start-within' "$name" \
+      $((SECONDS / 60)) "$start_within")")
+    continue
+  fi
   echo
   echo "=== $name"
   start=$SECONDS

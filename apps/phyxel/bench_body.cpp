@@ -1,5 +1,6 @@
 #include "bench_body.hpp"
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 
 #include "phyxel/law_table.hpp"

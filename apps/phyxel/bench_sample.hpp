@@ -1,7 +1,7 @@
 /// phyxel bench sample: how fast meshes are filled, and how good the clouds are.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "cli_forward.hpp"
 
 namespace phyxel::app {
 

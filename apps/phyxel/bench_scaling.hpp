@@ -1,7 +1,7 @@
 /// phyxel bench scaling: the speed of a body on the ranks that mpirun has started.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "cli_forward.hpp"
 
 namespace phyxel::app {
 

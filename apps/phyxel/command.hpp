@@ -2,7 +2,7 @@
 /// the parser, whose errors (`phyxel::Error`) main() turns into a message and an exit code.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "cli_forward.hpp"
 
 namespace phyxel::app {
 

@@ -1,8 +1,9 @@
 /// Error messages for command lines.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
+
+#include "cli_forward.hpp"
 
 namespace phyxel::app {
 

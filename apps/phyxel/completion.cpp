@@ -1,6 +1,7 @@
 /// phyxel completion: completion scripts for shells, made from the parser's options.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <string>
 #include <vector>

@@ -1,6 +1,7 @@
 /// phyxel export: a trajectory in one file.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"

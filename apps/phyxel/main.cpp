@@ -2,6 +2,8 @@
 /// exit code (program.hpp).
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+
 #include "command.hpp"
 #include "phyxel/error.hpp"
 #include "program.hpp"

@@ -1,8 +1,9 @@
 /// Output of tables of measurements.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <fstream>
 
+#include "cli_forward.hpp"
 #include "csv.hpp"
 
 namespace phyxel::app {

@@ -1,8 +1,9 @@
 /// The common part of main() in phyxel and in phyxel_studies (bench/studies).
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
+
+#include "cli_forward.hpp"
 
 namespace phyxel::app {
 

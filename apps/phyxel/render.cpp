@@ -1,6 +1,7 @@
 /// phyxel render: pictures of a trajectory.
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"

@@ -1,11 +1,11 @@
 /// A scene with the overrides of the command line, and its description.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "cli_forward.hpp"
 #include "phyxel/backend.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"

@@ -331,12 +331,10 @@ std::vector<Axes> axes_of_supports(const BodyRequest& request) {
 
 BoundaryChoice choose_boundary(const BodyRequest& request, const Cloud& cloud,
                                std::span<const Index> number, Index size) {
-  BoundaryChoice choice;
+  BoundaryChoice choice = BoundaryChoice::empty_of(request);
   std::vector<char> moved(cloud.position.size(), 0);  // a bit for each axis
   const std::vector<Axes> axes = axes_of_supports(request);
   const SomePhyxels here{cloud, number, size};
-  choice.first_load = request.fixed.size() + request.motions.size();
-  choice.first_probe = choice.first_load + request.loads.size();
   const std::vector<const Selection*> selections = selections_of(request);
   for (const Selection* selection : selections) {
     choice.chosen.push_back(select(*selection, here, request, choice.faces_of_next()));

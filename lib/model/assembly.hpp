@@ -142,6 +142,9 @@ struct BoundaryChoice {
   std::vector<SymmetryPlane> planes;         ///< Planes of symmetry.
   std::vector<std::vector<Index>> at_plane;  ///< [plane], as `chosen`.
 
+  /// A choice in which no entry of a body has phyxels yet.
+  static BoundaryChoice empty_of(const BodyRequest& request);
+
   /// The phyxels that an entry selects, with those that it leaves to others, ascending.
   std::vector<Index> selected(std::size_t entry) const;
 

@@ -22,7 +22,7 @@ std::optional<Grading> grading_of(const CutSource& from) {
 ShapeRequest shape_of(const CutSource& from, Piece piece) {
   ShapeRequest shape = from.source.shape;
   shape.seed = from.source.seed;
-  shape.supports = from.supports();
+  shape.supports = from.supports;
   shape.grading = grading_of(from);
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
   // So far from the origin, coordinates do not tell a layer from the face that it lies on.
@@ -51,7 +51,7 @@ Cloud rest_cloud(const CutSource& from) {
                                     .seed = source.seed,
                                     .relaxations = source.relaxations,
                                     .on_surface = source.on_surface,
-                                    .cuts = from.cuts,
+                                    .cuts = regions_of(from.supports),
                                     .grading = grading_of(from)},
                                    &report);
       cloud.cuts.shift = from.shift;
@@ -79,7 +79,7 @@ bool is_lattice(const BodySource& source) {
 }
 
 bool has_rooms(const CutSource& from) {
-  if (from.cuts.empty()) return false;
+  if (from.supports.empty()) return false;
   if (!is_lattice(from.source)) return true;
   const ShapeRequest shape = shape_of(from, {});
   return !make_lattice(shape, shape.spacing).rooms.empty();

@@ -142,6 +142,13 @@ std::string name_of_support(const BodyRequest& request, std::size_t entry) {
                                       : entry_name("motion", entry - request.fixed.size());
 }
 
+BoundaryChoice BoundaryChoice::empty_of(const BodyRequest& request) {
+  BoundaryChoice choice;
+  choice.first_load = request.fixed.size() + request.motions.size();
+  choice.first_probe = choice.first_load + request.loads.size();
+  return choice;
+}
+
 std::vector<Index> BoundaryChoice::selected(std::size_t entry) const {
   std::vector<Index> all = chosen[entry];
   if (entry < left.size()) all.insert(all.end(), left[entry].begin(), left[entry].end());

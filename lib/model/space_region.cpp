@@ -113,4 +113,10 @@ bool comes_before(const SpaceRegion& a, const SpaceRegion& b) {
   return key(a) < key(b);
 }
 
+std::vector<SpaceRegion> regions_of(std::span<const SupportRegion> supports) {
+  std::vector<SpaceRegion> regions;
+  for (const SupportRegion& support : supports) regions.push_back(support.region);
+  return regions;
+}
+
 }  // namespace phyxel

@@ -178,22 +178,16 @@ std::vector<SupportRegion> support_regions(const BodyRequest& request) {
   return supports;
 }
 
-std::vector<SupportRegion> CutSource::supports() const {
-  std::vector<SupportRegion> all;
-  for (std::size_t k = 0; k < cuts.size(); ++k) all.push_back({cuts[k], holds_all[k] != 0});
-  return all;
-}
-
 CutSource source_of(const BodyRequest& request) {
-  CutSource made{request.source, {}, {}, {}, 0};
+  CutSource made{request.source, {}, {}, 0};
   const std::string& shape = request.source.shape.name;
   const bool is_shape =
       !shape.empty() && !is_paper_shape(shape) && request.volume_rule != VolumeRule::kernel;
   if (request.source.mesh.empty() && !is_shape) return made;
   const Mat3d rotation = rotation_of(request);
   for (const auto& [region, holds_all] : support_regions(request)) {
-    made.cuts.push_back(region.before_placement(request.scale, rotation, request.translation));
-    made.holds_all.push_back(holds_all);
+    made.supports.push_back(
+        {region.before_placement(request.scale, rotation, request.translation), holds_all});
   }
   for (const FinerRequest& finer : request.finer) {
     made.finer.push_back(
@@ -208,11 +202,13 @@ bool is_same(const CutSource& a, const CutSource& b) {
   const auto equal = [&](const SpaceRegion& one, const SpaceRegion& other) {
     return nearly_equal(one, other, a.shift + b.shift);
   };
+  const auto equal_supports = [&](const SupportRegion& one, const SupportRegion& other) {
+    return one.holds_all == other.holds_all && equal(one.region, other.region);
+  };
   const auto equal_finer = [&](const Grading::Finer& one, const Grading::Finer& other) {
     return one.by == other.by && equal(one.region, other.region);
   };
-  return a.source == b.source && a.holds_all == b.holds_all &&
-         std::ranges::equal(a.cuts, b.cuts, equal) &&
+  return a.source == b.source && std::ranges::equal(a.supports, b.supports, equal_supports) &&
          std::ranges::equal(a.finer, b.finer, equal_finer);
 }
 
@@ -238,9 +234,10 @@ void place_cuts(Cloud& cloud, const BodyRequest& request) {
   const Mat3d rotation = rotation_of(request);
   const auto placed = [&](const std::vector<SupportCut>& cuts) {
     std::vector<SupportCut> all;
-    for (std::size_t k = 0; k < source.cuts.size(); ++k) {
+    for (std::size_t k = 0; k < source.supports.size(); ++k) {
       const auto cut = std::find_if(cuts.begin(), cuts.end(), [&](const SupportCut& c) {
-        return nearly_equal(c.support, source.cuts[k], 2 * source.shift + cloud.cuts.shift);
+        return nearly_equal(c.support, source.supports[k].region,
+                            2 * source.shift + cloud.cuts.shift);
       });
       if (cut == cuts.end()) continue;
       all.push_back(

@@ -31,13 +31,9 @@ std::vector<SupportRegion> support_regions(const BodyRequest& request);
 /// is scaled and moved.
 struct CutSource {
   BodySource source;
-  std::vector<SpaceRegion> cuts;
-  std::vector<char> holds_all;        ///< `SupportRegion::holds_all` of each cut.
+  std::vector<SupportRegion> supports;
   std::vector<Grading::Finer> finer;  ///< Regions in which phyxels are nearer to each other.
-  double shift = 0;  ///< Length of the translation, whose digits the cuts' coordinates lack [m].
-
-  /// The cuts with what they hold.
-  std::vector<SupportRegion> supports() const;
+  double shift = 0;  ///< Length of the translation, whose digits coordinates of supports lack [m].
 };
 CutSource source_of(const BodyRequest& request);
 
@@ -50,7 +46,7 @@ struct SharedSource {
 /// The sources of a scene's bodies, in their order.
 std::vector<SharedSource> shared_sources(const Scene& scene);
 
-/// True if two sources are the same but for the rounding of their cuts, as those of copies of a
+/// True if two sources are the same but for the rounding of their supports, as those of copies of a
 /// body are.
 bool is_same(const CutSource& a, const CutSource& b);
 

@@ -62,33 +62,10 @@ void check_source_keys(const SceneTable& body, const char* kind, const std::stri
 /// Where the phyxels of a body's shape are most accurate (`best_placement`).
 ShapeRequest::Placement placement_for(const BodyRequest& body) {
   ShapeRequest shape = body.source.shape;
-  shape.supports = source_of(body).supports();
+  shape.supports = source_of(body).supports;
   shape.grading = body.source.grading;
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, std::max(1, body.source.phyxels));
   return best_placement(shape, body.closure.value_or(1) > 0 && !body.neighbourhood.one_sided());
-}
-
-/// Refuses placements that a shape cannot have. @param shape as the table `body` asks for it
-void check_lattice(const SceneTable& body, const ShapeRequest& shape) {
-  using Placement = ShapeRequest::Placement;
-  const bool is_sphere = shape.name == "sphere";
-  if (is_sphere && shape.placement == Placement::nodes) {
-    body.refuse("lattice",
-                "\"nodes\" found with shape = \"sphere\", on whose round surface its outer layer "
-                "would not lie; allowed: \"fitted\" or \"cells\"");
-  }
-  if (shape.placement != Placement::fitted) return;
-  const char* lattices = is_sphere ? "\"cells\"" : "\"nodes\" or \"cells\"";
-  if (shape.jitter > 0) {
-    body.refuse("lattice", fmt::format("\"fitted\" found with jitter = {:g}, which moves phyxels "
-                                       "of a lattice; allowed: {}, or jitter = 0",
-                                       shape.jitter, lattices));
-  }
-  if (!shape.surface) {
-    body.refuse("lattice", fmt::format("\"fitted\" found with surfels = false, though its phyxels "
-                                       "are laid along the surface; allowed: {}, or surfels = true",
-                                       lattices));
-  }
 }
 
 }  // namespace
@@ -183,7 +160,11 @@ void choose_placement(const SceneTable& table, BodyRequest& body) {
   const bool kernel = body.volume_rule == VolumeRule::kernel;
   if (kernel && !body.source.on_surface && !body.source.grading) body.source.on_surface = false;
   if (shape.name.empty() || is_paper_shape(shape.name)) return;
-  if (table.has("lattice")) check_lattice(table, shape);
+  if (table.has("lattice")) {
+    if (const std::string objection = objection_to_placement(shape); !objection.empty()) {
+      table.refuse("lattice", objection);
+    }
+  }
   if (!kernel && !table.has("lattice")) shape.placement = placement_for(body);
   if (kernel && shape.placement == ShapeRequest::Placement::fitted) {
     table.refuse("lattice",

@@ -37,11 +37,6 @@ void check_size(const ShapeRequest& request) {
     check_positive(request.name, "size.y", request.size.y);
     check_positive(request.name, "size.z", request.size.z);
   } else {
-    if (request.placement == ShapeRequest::Placement::nodes && request.name == "sphere") {
-      throw InputError(
-          "shape \"sphere\": lattice = \"nodes\" found, whose outer layer would not lie on a round "
-          "surface; allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder");
-    }
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
   }
@@ -77,24 +72,14 @@ void check_request(const ShapeRequest& request) {
     throw InputError(fmt::format("shape \"{}\": jitter = {}: 0 to 0.5 spacings are allowed",
                                  request.name, request.jitter));
   }
-  if (request.placement != ShapeRequest::Placement::fitted) {
-    if (!request.grading) return;
+  if (const std::string objection = objection_to_placement(request); !objection.empty()) {
+    throw InputError(fmt::format("shape \"{}\": lattice = {}", request.name, objection));
+  }
+  if (request.grading && request.placement != ShapeRequest::Placement::fitted) {
     throw InputError(fmt::format(
         "shape \"{}\": lattice = \"{}\" found, which cannot be graded; allowed: \"fitted\", or no "
         "grading",
         request.name, request.placement == ShapeRequest::Placement::nodes ? "nodes" : "cells"));
-  }
-  if (request.jitter > 0) {
-    throw InputError(fmt::format(
-        "shape \"{}\": jitter = {} found with lattice = \"fitted\", which is no lattice; allowed: "
-        "jitter = 0, or lattice = \"nodes\" or \"cells\"",
-        request.name, request.jitter));
-  }
-  if (!request.surface) {
-    throw InputError(
-        fmt::format("shape \"{}\": lattice = \"fitted\" found without surfels; allowed: \"nodes\" "
-                    "or \"cells\", or surfels",
-                    request.name));
   }
 }
 
@@ -102,12 +87,6 @@ void check_request(const ShapeRequest& request) {
 double fitted_phyxels(const ShapeRequest& request) {
   const double volume = make_lattice(request, request.spacing).volume();
   return std::max(1.0, std::round(volume / std::pow(request.spacing, 3)));
-}
-
-std::vector<SpaceRegion> regions_of(std::span<const SupportRegion> supports) {
-  std::vector<SpaceRegion> regions;
-  for (const SupportRegion& support : supports) regions.push_back(support.region);
-  return regions;
 }
 
 /// Fills a shape as a mesh is filled.
@@ -184,6 +163,30 @@ double spacing_for(const ShapeRequest& request, Index phyxels, Piece piece) {
     (count(middle) < phyxels ? few : many) = middle;
   }
   return phyxels - count(few) < count(many) - phyxels ? few : many;
+}
+
+std::string objection_to_placement(const ShapeRequest& request) {
+  using Placement = ShapeRequest::Placement;
+  const bool is_sphere = request.name == "sphere";
+  if (is_sphere && request.placement == Placement::nodes) {
+    return "\"nodes\" found with shape = \"sphere\", on whose round surface its outer layer would "
+           "not lie; allowed: \"fitted\" or \"cells\"";
+  }
+  if (request.placement != Placement::fitted) return {};
+  const char* lattices = is_sphere ? "\"cells\"" : "\"nodes\" or \"cells\"";
+  if (request.jitter > 0) {
+    return fmt::format(
+        "\"fitted\" found with jitter = {:g}, which moves phyxels of a lattice; allowed: {}, or "
+        "jitter = 0",
+        request.jitter, lattices);
+  }
+  if (!request.surface) {
+    return fmt::format(
+        "\"fitted\" found with surfels = false, though its phyxels are laid along the surface; "
+        "allowed: {}, or surfels = true",
+        lattices);
+  }
+  return {};
 }
 
 ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed) {

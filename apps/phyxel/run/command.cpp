@@ -1,6 +1,9 @@
 /// phyxel run: the simulation of a scene.
 #include "command.hpp"
 
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
 #include "profile.hpp"
 #include "run/run.hpp"
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 
 #include "files/trajectory_folder.hpp"
 #include "mpi/watchdog.hpp"

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "outside_text.hpp"
 #include "phyxel/diagnostics.hpp"

@@ -62,6 +62,10 @@ double spacing_for(const ShapeRequest& request, Index phyxels);
 /// @throws InputError as `make_shape`
 ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed = true);
 
+/// Why the phyxels of a shape cannot be placed as asked: what was found and what is allowed, as
+/// messages have it after "lattice = "; empty if they can.
+std::string objection_to_placement(const ShapeRequest& request);
+
 /// Makes a built-in body: phyxels with volumes, surfels, and named regions ("x-", "x+", "y-", ...
 /// for the outermost layer of phyxels on that side of a box; "z-", "z+" for a cylinder; "mouth"
 /// for the dino, "neck" for the alien head, "leg" for the horn bug). The triangles of the flat

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "phyxel/types.hpp"
@@ -47,6 +48,9 @@ struct SupportRegion {
   bool holds_all = true;  ///< True if its phyxels are held or moved along all axes.
   bool operator==(const SupportRegion&) const = default;
 };
+
+/// The regions of supports, in their order.
+std::vector<SpaceRegion> regions_of(std::span<const SupportRegion> supports);
 
 /// The boundaries at which supports part the phyxels of a body: regions inside which all phyxels
 /// are held or moved along all axes.

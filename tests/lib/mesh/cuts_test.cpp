@@ -138,7 +138,7 @@ double clamp_error(double clamp, Index phyxels, bool turned) {
   const Vec3d along = turned ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0};
   scene.gravity = weight * along;
   Cloud cloud = sample_surface(test::box({0, 0, 0}, {1, 0.3, 0.3}),
-                               {.phyxels = phyxels, .cuts = source_of(body).cuts});
+                               {.phyxels = phyxels, .cuts = regions_of(source_of(body).supports)});
   place(cloud, body);
   body.source = {};
   const Model model = build_model(scene, std::span(&cloud, 1));
@@ -169,7 +169,7 @@ TEST(Cuts, LeaveAUniformStrainBeside) {
   body.tractions = {{.select = all, .traction = {1000, 0, 0}, .normal = {1, 0, 0}}};
   body.closure = 1e-4;
   Cloud cloud = sample_surface(test::box({0, 0, 0}, {1, 0.3, 0.3}),
-                               {.phyxels = 1500, .cuts = source_of(body).cuts});
+                               {.phyxels = 1500, .cuts = regions_of(source_of(body).supports)});
   place(cloud, body);
   body.source = {};
   const Model model = build_model(scene, std::span(&cloud, 1));
@@ -210,7 +210,8 @@ struct HeldCube {
       select.box = boxes[k];
       body.fixed.push_back({.select = select, .axes = axes.empty() ? Axes{} : axes[k]});
     }
-    cloud = sample_surface(test::unit_cube(), {.phyxels = 1000, .cuts = source_of(body).cuts});
+    cloud = sample_surface(test::unit_cube(),
+                           {.phyxels = 1000, .cuts = regions_of(source_of(body).supports)});
     place(cloud, body);
     body.source = {};
     model = build_model(scene, std::span(&cloud, 1));
@@ -287,7 +288,8 @@ TEST(Cuts, LeaveStepsAsLongAsWithoutSupports) {
       held.box = Selection::Box{{-9, -9, -9}, {9, *height, 9}};
       body.fixed = {{.select = held}};
     }
-    Cloud cloud = sample_surface(surface, {.phyxels = 600, .cuts = source_of(body).cuts});
+    Cloud cloud =
+        sample_surface(surface, {.phyxels = 600, .cuts = regions_of(source_of(body).supports)});
     place(cloud, body);
     body.source = {};
     return step_limit(build_model(scene, std::span(&cloud, 1)), 1).largest_step;
@@ -436,7 +438,7 @@ TEST(Cuts, OfCopiesAreTheSame) {
     copy.translation += by;
     copy.fixed[0].select.box = {select.box->low + by, select.box->high + by};
     const CutSource other = source_of(copy);
-    rounded += !(other.cuts == first.cuts);
+    rounded += !(other.supports == first.supports);
     EXPECT_TRUE(is_same(first, other));
     copy.fixed[0].select.box->high.x += 1e-9;
     EXPECT_FALSE(is_same(first, source_of(copy)));
