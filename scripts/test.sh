@@ -3,7 +3,7 @@
 #
 #   scripts/test.sh                      all stages: cpu, cuda, asan, fuzz, tidy, hdf5 and tsan, in this order
 #   scripts/test.sh cpu asan             only these
-#   scripts/test.sh --start-within 50    those that start within so many minutes; the summary names the others
+#   scripts/test.sh --start-within 50    only stages that start within 50 minutes; the summary names the stages left out
 #
 # cpu runs all tests; tidy checks the sources by clang-format, scripts/sizes.py and clang-tidy; hdf5 tests output by
 # parallel HDF5; asan repeats the tests under sanitizers, with clang, except those of numerical results; fuzz runs the

@@ -30,6 +30,13 @@ void check_name(const std::string& name) {
                                did_you_mean(name, names), fmt::join(names, ", ")));
 }
 
+/// Refuses a placement that a shape cannot have.
+void check_placement(const ShapeRequest& request) {
+  const std::string objection = objection_to_placement(request);
+  if (objection.empty()) return;
+  throw InputError(fmt::format("shape \"{}\": lattice = {}", request.name, objection));
+}
+
 void check_size(const ShapeRequest& request) {
   check_name(request.name);
   if (request.name == "beam" || request.name == "block") {
@@ -37,6 +44,7 @@ void check_size(const ShapeRequest& request) {
     check_positive(request.name, "size.y", request.size.y);
     check_positive(request.name, "size.z", request.size.z);
   } else {
+    if (request.placement == ShapeRequest::Placement::nodes) check_placement(request);
     check_positive(request.name, "radius", request.radius);
     if (request.name == "cylinder") check_positive(request.name, "length", request.length);
   }
@@ -72,9 +80,7 @@ void check_request(const ShapeRequest& request) {
     throw InputError(fmt::format("shape \"{}\": jitter = {}: 0 to 0.5 spacings are allowed",
                                  request.name, request.jitter));
   }
-  if (const std::string objection = objection_to_placement(request); !objection.empty()) {
-    throw InputError(fmt::format("shape \"{}\": lattice = {}", request.name, objection));
-  }
+  check_placement(request);
   if (request.grading && request.placement != ShapeRequest::Placement::fitted) {
     throw InputError(fmt::format(
         "shape \"{}\": lattice = \"{}\" found, which cannot be graded; allowed: \"fitted\", or no "
@@ -170,7 +176,7 @@ std::string objection_to_placement(const ShapeRequest& request) {
   const bool is_sphere = request.name == "sphere";
   if (is_sphere && request.placement == Placement::nodes) {
     return "\"nodes\" found with shape = \"sphere\", on whose round surface its outer layer would "
-           "not lie; allowed: \"fitted\" or \"cells\"";
+           "not lie; allowed: \"fitted\" or \"cells\", or the shapes beam, block and cylinder";
   }
   if (request.placement != Placement::fitted) return {};
   const char* lattices = is_sphere ? "\"cells\"" : "\"nodes\" or \"cells\"";

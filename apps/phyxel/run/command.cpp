@@ -2,7 +2,6 @@
 #include "command.hpp"
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "profile.hpp"
 #include "run/run.hpp"

@@ -1,8 +1,6 @@
 /// The steps of a run: as long as the stability limit allows, with the progress of Newton's method.
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "run/run.hpp"
 #include "scene/scene_error.hpp"
 #include "stop_signal.hpp"

@@ -62,8 +62,8 @@ double spacing_for(const ShapeRequest& request, Index phyxels);
 /// @throws InputError as `make_shape`
 ShapeRequest::Placement best_placement(const ShapeRequest& request, bool closed = true);
 
-/// Why the phyxels of a shape cannot be placed as asked: what was found and what is allowed, as
-/// messages have it after "lattice = "; empty if they can.
+/// The reason why a shape cannot have its placement, for error messages after "lattice = ": the
+/// values found, and the ones allowed. Empty if the shape can have it.
 std::string objection_to_placement(const ShapeRequest& request);
 
 /// Makes a built-in body: phyxels with volumes, surfels, and named regions ("x-", "x+", "y-", ...

@@ -334,7 +334,8 @@ TEST(Shapes, NodesLieOnFacesEdgesAndCorners) {
   EXPECT_NEAR(spacing_for(request, 33 * 9 * 5), 0.0625, 0.003);
   ShapeRequest ball = sphere();
   ball.placement = ShapeRequest::Placement::nodes;
-  EXPECT_THAT(message_of(ball), AllOf(HasSubstr("nodes"), HasSubstr("allowed: \"fitted\"")));
+  EXPECT_THAT(message_of(ball), AllOf(HasSubstr("nodes"), HasSubstr("beam, block and cylinder")));
+  EXPECT_THROW(spacing_for(ball, 1000), InputError);
 }
 
 // --- Refusals -----------------------------------------------------------------------------------
