@@ -442,6 +442,9 @@ TEST(Cuts, OfCopiesAreTheSame) {
     EXPECT_TRUE(is_same(first, other));
     copy.fixed[0].select.box->high.x += 1e-9;
     EXPECT_FALSE(is_same(first, source_of(copy)));
+    copy.fixed[0].select.box->high.x -= 1e-9;
+    copy.fixed[0].axes = {true, false, false};
+    EXPECT_FALSE(is_same(first, source_of(copy))) << "it holds other axes";
   }
   EXPECT_GT(rounded, 5);
 }
