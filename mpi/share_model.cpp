@@ -401,6 +401,7 @@ void add_boundary(const ShareSetup& setup, WholeBodies& whole, LocalModel& local
         if (entries > 0) {
           choices[b].warn_of_few(request, {count, count + entries}, whole.warnings);
           choices[b].warn_of_moved(request, whole.bodies[b].cuts, whole.warnings);
+          choices[b].warn_of_gaps(request, whole.bodies[b].cuts, whole.boxes[b], whole.warnings);
         }
       });
       count += entries;

@@ -161,6 +161,11 @@ struct BoundaryChoice {
   void warn_of_moved(const BodyRequest& request, const SupportCuts& cuts,
                      std::vector<std::string>& warnings) const;
 
+  /// Warns of supports that move against each other, and between which the body is thinner than a
+  /// spacing. @param box around the body's phyxels
+  void warn_of_gaps(const BodyRequest& request, const SupportCuts& cuts, const Box& box,
+                    std::vector<std::string>& warnings) const;
+
   /// Adds planes of symmetry. A phyxel that another entry, or an earlier plane, holds or moves
   /// along a plane's normal is left to that.
   void add_planes(const BodyRequest& request, std::span<const Vec3d> position,

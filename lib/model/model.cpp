@@ -249,6 +249,7 @@ void add_boundary(Model& model, const BodyRequest& request, const Cloud& given,
   choice.refuse_empty(request, choice.counts(), box);
   choice.warn_of_few(request, choice.counts(), model.warnings);
   choice.warn_of_moved(request, given.cuts, model.warnings);
+  choice.warn_of_gaps(request, given.cuts, box, model.warnings);
   const Vec3d origin = model.position[shift];
   choice.add_to(model, request, shift, choice.load_sums(model, shift, origin), origin,
                 loaded_pieces(request, given.surface));

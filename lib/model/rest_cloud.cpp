@@ -18,6 +18,12 @@ std::optional<Grading> grading_of(const CutSource& from) {
   return grading;
 }
 
+/// True of lattices so far from the origin that coordinates do not tell a layer from the face that
+/// it lies on. @param spacing [m]
+bool is_lattice_far(const CutSource& from, double spacing) {
+  return is_lattice(from.source) && from.shift > 1e8 * spacing;
+}
+
 /// The request of a shape that is no body of the paper's. @param piece that is to be made
 ShapeRequest shape_of(const CutSource& from, Piece piece) {
   ShapeRequest shape = from.source.shape;
@@ -25,9 +31,7 @@ ShapeRequest shape_of(const CutSource& from, Piece piece) {
   shape.supports = from.supports;
   shape.grading = grading_of(from);
   if (shape.spacing == 0) shape.spacing = spacing_for(shape, from.source.phyxels, piece);
-  // So far from the origin, coordinates do not tell a layer from the face that it lies on.
-  const bool is_lattice_far = is_lattice(from.source) && from.shift > 1e8 * shape.spacing;
-  if (is_lattice_far) shape.supports.clear();
+  if (is_lattice_far(from, shape.spacing)) shape.supports.clear();
   return shape;
 }
 
@@ -86,8 +90,16 @@ bool has_rooms(const CutSource& from) {
 }
 
 CloudPiece lattice_piece(const CutSource& from, Piece piece) {
-  CloudPiece made = make_lattice_shape(shape_of(from, piece), piece);
+  const ShapeRequest shape = shape_of(from, piece);
+  CloudPiece made = make_lattice_shape(shape, piece);
   made.cloud.cuts.shift = from.shift;
+  if (is_lattice_far(from, shape.spacing) && !from.supports.empty()) {
+    made.cloud.warnings.push_back(fmt::format(
+        "shape \"{}\": supports end with the phyxels whose centres lie in them, not where they are "
+        "asked to, as the body lies more than 1e8 spacings of {:.4g} m from the origin; nearer to "
+        "it they act where they end",
+        shape.name, shape.spacing));
+  }
   return made;
 }
 

@@ -40,6 +40,30 @@ struct Support {
   }
 };
 
+/// The supports of a body, in the order of their entries.
+std::vector<Support> supports_of(const BodyRequest& request, const SupportCuts& cuts) {
+  const std::vector<const Selection*> selections = selections_of(request);
+  const std::vector<Axes> axes = axes_of_supports(request);
+  std::vector<Support> supports;
+  for (std::size_t entry = 0; entry < axes.size(); ++entry) {
+    const std::size_t fixed = request.fixed.size();
+    supports.push_back({entry, selections[entry], acting_region(*selections[entry], cuts),
+                        region_of(*selections[entry]), axes[entry].bits(),
+                        entry < fixed ? nullptr : &request.motions[entry - fixed]});
+  }
+  return supports;
+}
+
+/// Calls visit(first, second) for each pair of supports that hold or move a common axis.
+template <class Visit>
+void visit_pairs_of(const std::vector<Support>& supports, Visit&& visit) {
+  for (std::size_t second = 1; second < supports.size(); ++second) {
+    for (std::size_t first = 0; first < second; ++first) {
+      if (supports[first].axes & supports[second].axes) visit(supports[first], supports[second]);
+    }
+  }
+}
+
 /// The kind of a selection as a number, by which supports with the same axes share phyxels: names
 /// before regions of space, and these before the whole body.
 int kind_of(const Selection& selection) {
@@ -135,6 +159,30 @@ bool gives_way(const Support& a, const Support& to) {
       names_of(first.axes & second.axes)));
 }
 
+/// The distance between two boxes with parallel edges that face each other inside a body, or of a
+/// ball from another region [m]; unset for others. @param box around the body
+std::optional<double> gap_between(const SpaceRegion& a, const SpaceRegion& b, const Box& box) {
+  if (a.is_ball) return std::max(0.0, b.distance(a.centre) - a.radius);
+  if (b.is_ball) return gap_between(b, a, box);
+  const auto one = ranges_along_axes(a), other = ranges_along_axes(b);
+  if (!one || !other) return std::nullopt;
+  std::optional<double> gap;
+  const Vec3d ends[] = {box.low, box.high};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto& p = (*one)[axis];
+    const auto& q = (*other)[axis];
+    const double begin = std::max(p[0], q[0]), end = std::min(p[1], q[1]);
+    const double from = component(ends[0], axis), to = component(ends[1], axis);
+    if (begin > end) {
+      if (gap || end < from || begin > to) return std::nullopt;
+      gap = begin - end;
+    } else if (begin > to || end < from) {
+      return std::nullopt;
+    }
+  }
+  return gap.value_or(0);
+}
+
 }  // namespace
 
 std::string name_of_support(const BodyRequest& request, std::size_t entry) {
@@ -157,24 +205,9 @@ std::vector<Index> BoundaryChoice::selected(std::size_t entry) const {
 }
 
 void BoundaryChoice::share_boundaries(const BodyRequest& request, const SomePhyxels& here) {
-  const std::vector<const Selection*> selections = selections_of(request);
-  const std::vector<Axes> axes = axes_of_supports(request);
-  std::vector<Support> supports;
-  for (std::size_t entry = 0; entry < axes.size(); ++entry) {
-    const std::size_t fixed = request.fixed.size();
-    supports.push_back({entry, selections[entry],
-                        acting_region(*selections[entry], here.cloud.cuts),
-                        region_of(*selections[entry]), axes[entry].bits(),
-                        entry < fixed ? nullptr : &request.motions[entry - fixed]});
-  }
-  const auto visit_pairs = [&](auto&& visit) {
-    for (std::size_t second = 1; second < supports.size(); ++second) {
-      for (std::size_t first = 0; first < second; ++first) {
-        if (supports[first].axes & supports[second].axes) visit(supports[first], supports[second]);
-      }
-    }
-  };
-  left.assign(axes.size(), {});
+  const std::vector<Support> supports = supports_of(request, here.cloud.cuts);
+  const auto visit_pairs = [&](auto&& visit) { visit_pairs_of(supports, visit); };
+  left.assign(supports.size(), {});
   visit_pairs([&](const Support& a, const Support& b) {
     const bool first = gives_way(a, b);
     if (!first && !gives_way(b, a)) return;
@@ -222,6 +255,22 @@ void BoundaryChoice::warn_of_moved(const BodyRequest& request, const SupportCuts
           is_layer ? "middle" : "face"));
     }
   }
+}
+
+void BoundaryChoice::warn_of_gaps(const BodyRequest& request, const SupportCuts& cuts,
+                                  const Box& box, std::vector<std::string>& warnings) const {
+  visit_pairs_of(supports_of(request, cuts), [&](const Support& a, const Support& b) {
+    if (!a.region || !b.region || (a.is_at_rest() && b.is_at_rest())) return;
+    const std::optional<double> gap = gap_between(*a.region, *b.region, box);
+    constexpr double touching = 1e-6;  // spacings
+    if (!gap || *gap <= touching * cuts.spacing || *gap >= cuts.spacing) return;
+    warnings.push_back(fmt::format(
+        "body \"{}\": {} and {} are {:.3g} m apart, less than a spacing of {:.3g} m: the body "
+        "between them has no phyxels of its own, and the force of one on the other may be several "
+        "times too small; phyxels nearer to each other carry it",
+        request.name, name_of_support(request, a.entry), name_of_support(request, b.entry), *gap,
+        cuts.spacing));
+  });
 }
 
 }  // namespace phyxel

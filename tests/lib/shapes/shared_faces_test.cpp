@@ -20,9 +20,11 @@ namespace {
 
 using namespace phyxel::testing;
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr Axes only_x{true, false, false}, only_y{false, true, false}, x_and_y{true, true, false},
     y_and_z{false, true, true};
@@ -314,6 +316,32 @@ TEST(SharedFaces, OfFewAxesActDeeper) {
   const double sag = rest_of(beam({{between(2, 11), x_and_z}})).sag() / theory(2);
   EXPECT_GT(sag, 1.1);
   EXPECT_LT(sag, 1.2);
+}
+
+/// Between a fixed and a moved support of a body of `placement`, `gap` apart, the scene's warnings.
+std::vector<std::string> warnings_of_gap(double gap, ShapeRequest::Placement placement,
+                                         Vec3d moved = {0, 0, 0.1}) {
+  Scene scene = beam({{.select = between(-1, 4)}}, placement);
+  scene.bodies[0].motions = {
+      {.select = between(4 + gap, 11), .displacement = moved, .duration = 1}};
+  if (moved == Vec3d{}) {
+    scene.bodies[0].motions.clear();
+    scene.bodies[0].fixed.push_back({.select = between(4 + gap, 11)});
+  }
+  return build_model(scene).warnings;
+}
+
+/// A layer between two supports that has no phyxels of its own carries a wrong force from one to
+/// the other. In lattices, faces that are too near become one, and what has moved is said.
+TEST(Gaps, ThinnerThanASpacingAreSaid) {
+  using Placement = ShapeRequest::Placement;
+  for (const double gap : {0.05, 0.19}) {
+    EXPECT_THAT(warnings_of_gap(gap, Placement::fitted),
+                Contains(AllOf(HasSubstr("fixed 1 and motion 1 are"), HasSubstr("m apart"))))
+        << gap;
+  }
+  EXPECT_THAT(warnings_of_gap(0.5, Placement::fitted), Not(Contains(HasSubstr("apart"))));
+  EXPECT_THAT(warnings_of_gap(0.15, Placement::fitted, {}), Not(Contains(HasSubstr("apart"))));
 }
 
 }  // namespace
