@@ -3,12 +3,14 @@
 #include <utility>
 
 #include "model/assembly.hpp"
+#include "model/contact.hpp"
 #include "model/owned_vectors.hpp"
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo_transport.hpp"
 #include "mpi/share_pipeline.hpp"
 #include "parallel_sort.hpp"
 #include "partition/share.hpp"
+#include "phyxel/error.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -78,6 +80,8 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   std::vector<Index> place = own_places(setup, whole, local, share);
   std::vector<Vec3d> areas;
   if (!local.areas.empty()) areas = values_of(share, local.areas);
+  std::vector<double> contact_offset;
+  if (!local.contact_offset.empty()) contact_offset = values_of(share, local.contact_offset);
   share.global_count = whole.size;
   share.global_id = tabulated(share.global_id.size(), [&](std::size_t k) {
     return global_id_of(whole, local, share.global_id[k]);
@@ -97,6 +101,14 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   for (const Surface& surface : whole.surfaces) surfels += surface.position.size();
   built.model.warnings = whole.warnings;
   close_share(whole, built.model, areas, setup.options.close);
+  built.model.obstacles = obstacles_of(setup.scene);
+  if (!built.model.obstacles.empty()) {
+    add_contact_layer(built.model, contact_offset);
+    const std::string problem = overlap_at_start(built.model, setup.scene);
+    setup.ranks.collectively([&] {
+      if (!problem.empty()) throw InputError(problem);
+    });
+  }
   add_warnings(built.model, surfels);
   built.partitioner = cut.partitioner;
   built.quality = cut.quality;

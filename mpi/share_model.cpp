@@ -447,6 +447,7 @@ void complete_model(const ShareSetup& setup, WholeBodies& whole, LocalModel& loc
   add_surfels(setup, whole, local);
   find_areas(setup, whole, local);
   add_tractions(setup, whole, local);
+  find_contact_layer(setup, whole, local);
 }
 
 }  // namespace phyxel

@@ -112,6 +112,8 @@ struct LocalModel {
       surfel_id;  ///< Global ids of the surfels whose first carrier is an own phyxel.
   /// Areas of own phyxels, where gradients are closed (`areas_of_phyxels`) [m²]; empty if none are.
   std::vector<Vec3d> areas;
+  /// Offsets of all phyxels (`contact_offset`) [m]; empty in scenes without obstacles.
+  std::vector<double> contact_offset;
   int rank = 0;  ///< This rank.
 };
 /// True if phyxel i is no ghost.
@@ -149,6 +151,10 @@ void add_surfels(const ShareSetup& setup, const WholeBodies& whole, LocalModel& 
 /// Finds the areas of own phyxels of bodies with closed gradients, and the volumes inside their
 /// surfaces.
 void find_areas(const ShareSetup& setup, WholeBodies& whole, LocalModel& local);
+
+/// Finds the phyxels by which bodies touch obstacles. Collective.
+/// @throws AgreedError for bodies without a surface
+void find_contact_layer(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local);
 
 /// Adds the tractions of all bodies, as forces on own phyxels. Collective.
 void add_tractions(const ShareSetup& setup, const WholeBodies& whole, LocalModel& local);

@@ -63,6 +63,13 @@ class Maker {
         if (here_[i] >= 0) own.phyxels.push_back(here_[i]);
       }
     }
+    m.obstacles = whole_.obstacles;
+    for (std::size_t k = 0; k < whole_.contact.phyxels.size(); ++k) {
+      const Index i = whole_.contact.phyxels[k];
+      if (kind_[i] != owned) continue;
+      m.contact.phyxels.push_back(here_[i]);
+      m.contact.offset.push_back(whole_.contact.offset[k]);
+    }
     m.walls = whole_.walls;
     return std::move(out_);
   }

@@ -9,6 +9,7 @@
 
 #include "device_option.hpp"
 #include "kind.hpp"
+#include "phyxel/contacts.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
@@ -126,6 +127,7 @@ BoundarySize boundary_size(const Model& model) {
   BoundarySize size;
   for (const Motion& motion : model.motions) size.moved += own(motion.phyxels);
   for (const Load& load : model.loads) size.loaded += own(load.phyxels);
+  size.touching = std::ssize(model.contact.phyxels);
   return size;
 }
 
@@ -145,6 +147,36 @@ std::vector<SupportRange> support_ranges(const Model& model) {
   }
   return ranges;
 }
+
+namespace {
+
+/// Lines about obstacles, and how many phyxels touch them.
+std::string describe_obstacles(const Model& model, std::int64_t touching) {
+  std::string text;
+  constexpr std::size_t most = 8;
+  for (std::size_t k = 0; k < std::min(model.obstacles.size(), most); ++k) {
+    const Obstacle& o = model.obstacles[k];
+    text += fmt::format("  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}\n",
+                        o.name, o.hollow ? "hollow " : "", shape_name(o),
+                        o.motion.stands_still() ? "" : ", moving", o.place.x, o.place.y, o.place.z,
+                        o.law.static_friction,
+                        o.law.kinetic_friction < o.law.static_friction
+                            ? fmt::format(", {:g} when sliding", o.law.kinetic_friction)
+                            : "",
+                        o.law.restitution > 0 ? fmt::format(", restitution {:g}", o.law.restitution)
+                                              : "");
+  }
+  if (model.obstacles.size() > most) {
+    text += fmt::format("              and {} more obstacles\n", model.obstacles.size() - most);
+  }
+  if (!model.obstacles.empty()) {
+    text += fmt::format("              {} phyxels of surfaces may touch {}\n", touching,
+                        model.obstacles.size() > 1 ? "them" : "it");
+  }
+  return text;
+}
+
+}  // namespace
 
 std::string describe_model(const Scene& scene, const Model& model, const BoundarySize& boundary,
                            const std::vector<SupportRange>& supports) {
@@ -186,6 +218,7 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
   if (model.loads.size() > most_loads) {
     text += fmt::format("              and {} more loads\n", model.loads.size() - most_loads);
   }
+  text += describe_obstacles(model, boundary.touching);
   for (const std::string& warning : model.warnings)
     text += fmt::format("  warning     {}\n", warning);
   return text;

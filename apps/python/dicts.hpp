@@ -1,10 +1,11 @@
-/// Energies, reactions and gases as Python's dicts.
+/// Energies, reactions, gases and contacts as Python's dicts.
 #pragma once
 
 #include <vector>
 
 #include "arrays.hpp"
 #include "files/frame_file.hpp"
+#include "phyxel/contacts.hpp"
 #include "phyxel/gases.hpp"
 #include "phyxel/probes.hpp"
 #include "phyxel/state.hpp"
@@ -49,6 +50,26 @@ inline py::list dicts_of(const std::vector<GasReading>& gases) {
     values["set"] = gas.set;
     values["pressure"] = gas.pressure;
     values["volume"] = gas.volume;
+    list.append(values);
+  }
+  return list;
+}
+
+/// Returns a dict of each obstacle.
+inline py::list dicts_of(const std::vector<ContactReading>& contacts) {
+  py::list list;
+  for (const ContactReading& contact : contacts) {
+    py::dict values;
+    values["obstacle"] = contact.obstacle;
+    values["force"] = contact.force;
+    values["torque"] = contact.torque;
+    values["impulse"] = contact.impulse;
+    values["angular_impulse"] = contact.angular_impulse;
+    values["work"] = contact.work;
+    values["friction_heat"] = contact.friction_heat;
+    values["impact_loss"] = contact.impact_loss;
+    values["depth"] = contact.depth;
+    values["place"] = contact.place;
     list.append(values);
   }
   return list;

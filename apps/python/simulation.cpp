@@ -65,6 +65,12 @@ void add_simulation(py::module_& module) {
           "Gases in cavities, now: a list of dicts, one for each traction with gas:\n"
           "body, set, pressure [Pa], volume [m^3].")
       .def(
+          "contacts", [](Simulation& s) { return dicts_of(s.contacts()); },
+          "What obstacles do, now and since t = 0: a list of dicts, one for each obstacle:\n"
+          "obstacle, force [N] on the bodies and torque [N m] about place [m], impulse [N s],\n"
+          "angular_impulse [N m s], work [J], friction_heat [J], impact_loss [J],\n"
+          "depth [m] of the phyxel that is deepest inside.")
+      .def(
           "forces", [](Simulation& s) { return taken(s.internal_forces()); },
           "Internal forces [N], (n, 3), a copy.")
       .def(

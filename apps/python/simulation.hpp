@@ -113,13 +113,19 @@ class Simulation {
   Diagnostics energies() {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
-    return diagnose(model_, *backend_, solver_->now());
+    return diagnose(model_, *backend_, *solver_);
   }
 
   std::vector<Reaction> reactions() {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
     return find_reactions(model_, *backend_, *solver_);
+  }
+
+  std::vector<ContactReading> contacts() {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    return find_contacts(model_, *backend_, *solver_);
   }
 
   State state() const {
@@ -264,8 +270,8 @@ class Simulation {
     frame.state = &state;
     frame.diagnostics = look();
     frame.readings = {find_reactions(model_, *backend_, *solver_),
-                      probes().read(*backend_, recovery()),
-                      read_gases(model_, *backend_, *solver_)};
+                      probes().read(*backend_, recovery()), read_gases(model_, *backend_, *solver_),
+                      find_contacts(model_, *backend_, *solver_)};
     SurfelState surfels;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);
@@ -293,7 +299,7 @@ class Simulation {
           return PyErr_CheckSignals() == 0;  // Ctrl-C
         });
     looked_ = solver_->steps();
-    const Diagnostics now = diagnose(model_, *backend_, solver_->now());
+    const Diagnostics now = diagnose(model_, *backend_, *solver_);
     watch_.reset();
     if (backend_->external_forces().empty()) watch_.emplace(model_, now);
   }
@@ -333,7 +339,7 @@ class Simulation {
 
   /// @throws DivergedError
   Diagnostics look() {
-    const Diagnostics now = diagnose(model_, *backend_, solver_->now());
+    const Diagnostics now = diagnose(model_, *backend_, *solver_);
     looked_ = solver_->steps();
     if (watch_) {
       watch_->check(now, &*control_);

@@ -62,7 +62,7 @@ Outcome run(const Scene& scene, const FirstScene& first, const std::vector<Cloud
   }
   Solver solver(model, *backend, begin, Method::verlet);
   StepControl control(model, *backend, plan);
-  StabilityWatch watch(model, diagnose(model, *backend, solver.now()));
+  StabilityWatch watch(model, diagnose(model, *backend, solver));
   const auto start = app::Clock::now();
   try {
     while (solver.steps() < plan.steps && outcome.message.empty()) {
@@ -72,7 +72,7 @@ Outcome run(const Scene& scene, const FirstScene& first, const std::vector<Cloud
       solver.step();
       ++outcome.steps;
       if (solver.steps() % plan.steps_per_frame != 0) continue;
-      const Diagnostics now = diagnose(model, *backend, solver.now());
+      const Diagnostics now = diagnose(model, *backend, solver);
       outcome.inverted = static_cast<double>(now.inverted) / model.size();
       outcome.farthest = now.largest_displacement;
       outcome.ever_inverted = std::max(outcome.ever_inverted, outcome.inverted);

@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "exact_sum.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/device_sums.cuh"
 #include "solver/following.cuh"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel::cuda {
 
@@ -21,22 +21,13 @@ struct AffineField {
 
 /// The work of the support of one motion on a device, in which a step adds a term for each phyxel.
 struct DeviceWork {
-  /// Number of accumulators, among which the phyxels are dealt out so that few threads add to the
-  /// same word at once.
-  static constexpr unsigned accumulators = 1024;
-  const double* inertia = nullptr;      ///< As `support_inertia` [kg/s]; null: no work is counted.
-  AffineField<double> mean_step;        ///< Displacement as of `Motion::mean_step` [m].
-  unsigned long long* words = nullptr;  ///< Words of exact sums, shape [words, accumulators].
+  const double* inertia = nullptr;  ///< As `support_inertia` [kg/s]; null: no work is counted.
+  AffineField<double> mean_step;    ///< Displacement as of `Motion::mean_step` [m].
+  SumWords words;                   ///< One sum.
 
   /// Adds the work on the k-th phyxel, by velocities as for `support_force` [m/s].
   __device__ void add(int k, Vec3<double> x, Vec3<double> prescribed, Vec3<double> free) const {
-    const double work = dot(support_force(inertia[k], prescribed, free), mean_step.at(x));
-    const unsigned own = static_cast<unsigned>(k) % accumulators;
-    ExactSum::split(work, [&](int word, std::int64_t number) {
-      if (number == 0) return;
-      atomicAdd(words + static_cast<unsigned>(word) * accumulators + own,
-                static_cast<unsigned long long>(number));
-    });
+    words.add(0, k, dot(support_force(inertia[k], prescribed, free), mean_step.at(x)));
   }
 };
 
@@ -142,9 +133,9 @@ class Boundary {
       const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
       const Vec3d x = path.origin, there = after.at(x);
       DeviceWork work;
-      if (path.words.size() > 0) {
+      if (!path.words.empty()) {
         const Path mean_step = path.of->mean_step(time, dt);
-        work = {path.inertia.data(), {mean_step.at(x), mean_step.turn}, path.words.data()};
+        work = {path.inertia.data(), {mean_step.at(x), mean_step.turn}, path.words.pointer()};
       }
       set(path.places, path.positions.data(), path.of->axes,
           {to<StateReal>(there), to_real(after.turn)},
@@ -153,18 +144,17 @@ class Boundary {
           work);
     }
   }
-  /// The work of supports so far (`Backend::support_work`). Waits for the steps in progress.
-  std::vector<std::int64_t> support_work() const {
-    SupportWork work = no_support_work(m_.model());
-    if (work.empty()) return {};
+  /// The work of supports so far, of each motion; none if no support moves. Waits for the steps in
+  /// progress.
+  StepSums support_work() const {
+    StepSums work(sums_of_motions(m_.model()));
+    if (work.empty()) return work;
     m_.wait();
     for (const Moved& path : paths_) {
-      if (path.words.size() == 0) continue;
-      const auto m = static_cast<std::size_t>(path.of - m_.model().motions.data());
-      work[m].add(path.earlier);
-      work[m].add(sum_of(path));
+      if (path.words.empty()) continue;
+      work[static_cast<std::size_t>(path.of - m_.model().motions.data())] = path.words.sums()[0];
     }
-    return words_of(std::move(work));
+    return work;
   }
   /// Bytes of the arrays for the work of supports.
   std::size_t work_bytes() const {
@@ -189,9 +179,7 @@ class Boundary {
     DeviceArray<Vec3<StateReal>> positions;
     /// The work of a motion that does not stand still, as of `DeviceWork`.
     DeviceArray<double> inertia{};
-    DeviceArray<unsigned long long> words{};
-    ExactSum earlier{};      ///< The work of steps before the words were last cleared [J].
-    std::int64_t terms = 0;  ///< Largest number of terms in an accumulator.
+    DeviceSums words{};
   };
   struct Loading {
     const Load* of;
@@ -226,8 +214,7 @@ class Boundary {
       paths_.push_back({&motion, origin, sent(at, "moved phyxels"),
                         sent(positions, "positions of moved phyxels")});
       if (!motion.stands_still() && !own.empty()) {
-        paths_.back().words = sent(
-            std::vector<unsigned long long>(ExactSum::words * DeviceWork::accumulators), work_name);
+        paths_.back().words = DeviceSums(1, 1024, work_name);
       }
       moved.resize(m_.places(), 0);
       for (const Index place : at) moved[place] |= motion.axes.bits();
@@ -236,37 +223,17 @@ class Boundary {
     moved_ = sent(moved, "moved phyxels");
   }
   static constexpr const char* work_name = "work of supports";
-  /// Makes inertias for steps of `dt` [s], and room in the accumulators for one step more.
+  /// Makes inertias for steps of `dt` [s], and room in the sums for one step more.
   void prepare_work(double dt) {
-    constexpr std::int64_t most_terms = std::int64_t{1} << 29;  // half of what words hold
     for (Moved& path : paths_) {
-      if (path.words.size() == 0) continue;
+      if (path.words.empty()) continue;
       if (dt != work_step_) {
         m_.wait();  // steps in progress read the inertias
         path.inertia = sent(support_inertia(m_.model(), *path.of, dt), work_name);
       }
-      path.terms += static_cast<std::int64_t>(path.places.size()) / DeviceWork::accumulators + 1;
-      if (path.terms < most_terms) continue;
-      m_.wait();
-      path.earlier.add(sum_of(path));
-      path.words = sent(std::vector<unsigned long long>(path.words.size()), work_name);
-      path.terms = 0;
+      path.words.prepare(path.places.size(), 1, [&] { m_.wait(); });
     }
     work_step_ = dt;
-  }
-  /// The sum of a path's accumulators.
-  static ExactSum sum_of(const Moved& path) {
-    const std::vector<unsigned long long> words = fetched(path.words);
-    ExactSum all;
-    for (unsigned a = 0; a < DeviceWork::accumulators; ++a) {
-      ExactSum one;
-      const std::span<std::int64_t> into = one.ready();
-      for (std::size_t w = 0; w < into.size(); ++w) {
-        into[w] = static_cast<std::int64_t>(words[w * DeviceWork::accumulators + a]);
-      }
-      all.add(one);
-    }
-    return all;
   }
   Vec3d origin_of(const Motion& motion) const {
     for (const Part& part : m_.model().parts) {

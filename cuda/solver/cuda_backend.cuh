@@ -24,8 +24,9 @@ class CudaBackend final : public Backend {
       : m_(model, device),
         halo_(m_.share() ? std::make_unique<DeviceHalo<Real, StateReal>>(m_, transport) : nullptr),
         boundary_(m_),
+        contacts_(m_),
         passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())),
-        path_(choose_path(m_, halo_.get(), boundary_, path)),
+        path_(choose_path(m_, halo_.get(), boundary_, contacts_, path)),
         has_surfels_(!model.surfels.position.empty()) {
     if (m_.share()) has_surfels_ = m_.share()->communicator->largest(has_surfels_) > 0;
   }
@@ -91,6 +92,7 @@ class CudaBackend final : public Backend {
     const SurfelAdvection<Real, StateReal>* surfels =
         move_surfels && has_surfels_ ? &surfels_of_model() : nullptr;
     while (count > 0) {
+      contacts_.prepare(dt, steps_together);
       const int launched = launch_steps(static_cast<double>(first) * dt, count, surfels);
       bound_queue(launched);
       if (halo_) halo_->count_steps(launched);
@@ -98,9 +100,12 @@ class CudaBackend final : public Backend {
       count -= launched;
     }
   }
-  std::vector<std::int64_t> support_work() const override {
+  std::vector<std::int64_t> step_sums() const override {
     m_.use_device();
-    return boundary_.support_work();
+    StepSums sums = boundary_.support_work();
+    const StepSums of_obstacles = contacts_.sums();
+    sums.insert(sums.end(), of_obstacles.begin(), of_obstacles.end());
+    return words_of(std::move(sums));
   }
   int best_steps() const override {
     return path_.residence ? path_.residence->most_steps : path_.recorded ? steps_together : 1;
@@ -257,6 +262,7 @@ class CudaBackend final : public Backend {
     if (boundary_.following().bytes() > 0) {
       list.push_back({"loads that follow the surface", boundary_.following().bytes()});
     }
+    if (contacts_.bytes() > 0) list.push_back({"contact", contacts_.bytes()});
     if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
@@ -327,10 +333,12 @@ class CudaBackend final : public Backend {
     }
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
-    if (fresh_ || boundary_.changes()) {
+    if (fresh_ || boundary_.changes() || contacts_.acts()) {
+      if (contacts_.acts()) contacts_.begin_step();
       passes_->advance(m_.dt());
       boundary_.follow_paths(time, m_.dt());
       if (fresh_) boundary_.put_held_at_rest();
+      contacts_.keep_phyxels_out(time);
       passes_->send_displacements();
     } else {
       passes_->advance_and_send(m_.dt());
@@ -361,6 +369,7 @@ class CudaBackend final : public Backend {
   DeviceModel<Real, StateReal> m_;
   std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // null if the model is whole
   Boundary<Real, StateReal> boundary_;
+  Contacts<Real, StateReal> contacts_;
   std::unique_ptr<Passes<Real, StateReal>> passes_;
   LaunchPath<Real, StateReal> path_;
   std::vector<Vec3d> external_force_;

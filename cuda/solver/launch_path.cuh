@@ -5,6 +5,7 @@
 #include <string>
 
 #include "solver/boundary.cuh"
+#include "solver/contacts.cuh"
 #include "solver/device_halo.cuh"
 #include "solver/residence.cuh"
 
@@ -29,6 +30,7 @@ template <class Real, class StateReal>
 LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& model,
                                         const DeviceHalo<Real, StateReal>* halo,
                                         const Boundary<Real, StateReal>& boundary,
+                                        const Contacts<Real, StateReal>& contacts,
                                         CudaPath wanted) {
   constexpr Index most_recorded = 4'000'000;  // larger models: a step outlasts its launches
   LaunchPath<Real, StateReal> path;
@@ -37,6 +39,10 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
     launches = "as asked";
   } else if (boundary.changes()) {
     launches = "motions, and loads that grow or follow the surface, change from step to step";
+  } else if (contacts.changes()) {
+    launches = "obstacles move from step to step";
+  } else if (contacts.acts() && model.share()) {
+    launches = "phyxels are kept out of obstacles before they are sent";
   } else if (model.size() > most_recorded) {
     launches = "a step of " + model.subject() + " takes longer than its launches";
   } else if (halo && !halo->is_direct()) {
@@ -50,7 +56,9 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
                                      : launches;
     return path;
   }
-  if (wanted == CudaPath::automatic && !boundary.changes()) {
+  if (wanted == CudaPath::automatic && contacts.acts()) {
+    path.reason = "phyxels are kept out of obstacles after each step";
+  } else if (wanted == CudaPath::automatic && !boundary.changes()) {
     auto attempt = Residence<Real, StateReal>::of(model);
     path.residence = std::move(attempt.residence);
     path.reason = std::move(attempt.reason);

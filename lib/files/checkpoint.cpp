@@ -106,7 +106,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-/// The words of exact sums (`State::support_work`) in decimal digits, a line for each sum.
+/// The words of exact sums (`State::step_sums`) in decimal digits, a line for each sum.
 std::string text_of_work(std::span<const std::int64_t> words) {
   std::string text;
   for (std::size_t k = 0; k < words.size(); ++k) {
@@ -197,8 +197,8 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   }
   if (!columns.empty()) out.text("/state/history_columns", columns);
 
-  if (!state.support_work.empty()) {
-    out.text("/state/support_work", text_of_work(state.support_work));
+  if (!state.step_sums.empty()) {
+    out.text("/state/support_work", text_of_work(state.step_sums));
   }
 
   fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
@@ -271,7 +271,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
       in.refuse(fmt::format("history_interval = {} s; allowed: 0 and more, finite",
                             state_.history_interval));
     }
-    state_.support_work = work_in(in, in.text("/state/support_work"));
+    state_.step_sums = work_in(in, in.text("/state/support_work"));
     for (std::string& name : lines_of(in.text("/state/history_columns"))) {
       const std::string path = history_path(name);
       if (const std::size_t other = in.shape(path).rows; other != rows) {

@@ -161,6 +161,7 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
       {"hourglass_energy", "J", [](D d) { return d.hourglass_energy; }},
       {"plastic_work", "J", [](D d) { return d.plastic_work; }},
       {"viscous_work", "J", [](D d) { return d.viscous_work; }},
+      {"contact_loss", "J", [](D d) { return d.contact_loss; }},
       {"gravity_energy", "J", [](D d) { return d.gravity_energy; }},
       {"load_energy", "J", [](D d) { return d.load_energy; }},
       {"total_energy", "J", [](D d) { return d.total_energy(); }},

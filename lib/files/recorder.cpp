@@ -174,6 +174,10 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
   if (has_gas(model)) {
     gases_.emplace(directory_ / gas_name, header_of("step,time [s],body,set", gas_columns()));
   }
+  if (!model.obstacles.empty()) {
+    contacts_.emplace(directory_ / contacts_name,
+                      header_of("step,time [s],obstacle,shape", contact_columns()));
+  }
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -248,9 +252,15 @@ void Recorder::create_files() {
   if (writes_surface_) surface_.create(directory_ / "surface.hdf.series", {});
   write_whole_file(directory_ / log_name, log_header(), Durable::no);
   log_size_ = log_header().size();
-  if (reactions_) reactions_->create();
-  if (probes_) probes_->create();
-  if (gases_) gases_->create();
+  for (FrameLog* log : logs()) log->create();
+}
+
+std::vector<FrameLog*> Recorder::logs() {
+  std::vector<FrameLog*> all;
+  for (std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_}) {
+    if (*log) all.push_back(&**log);
+  }
+  return all;
 }
 
 void Recorder::continue_after(const Continuation& point, bool overwrite) {
@@ -271,9 +281,8 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   };
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
-  const std::string reactions = reactions_ ? reactions_->kept(log.last_step) : "",
-                    probes = probes_ ? probes_->kept(log.last_step) : "",
-                    gases = gases_ ? gases_->kept(log.last_step) : "";
+  std::vector<std::string> kept_lines;
+  for (const FrameLog* one : logs()) kept_lines.push_back(one->kept(log.last_step));
   // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
   fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run
@@ -283,9 +292,7 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   }
   write_whole_file(directory_ / log_name, log.text, Durable::no);
   log_size_ = log.text.size();
-  if (reactions_) reactions_->create(reactions);
-  if (probes_) probes_->create(probes);
-  if (gases_) gases_->create(gases);
+  for (std::size_t k = 0; k < kept_lines.size(); ++k) logs()[k]->create(kept_lines[k]);
 }
 
 void Recorder::write(const Frame& frame) {
@@ -325,6 +332,11 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
       return cell_of(r.body) + "," + cell_of(r.set);
     }));
   }
+  if (contacts_ && !readings.contacts.empty()) {
+    contacts_->append(lines_of(
+        diagnostics, readings.contacts, contact_columns(),
+        [](const ContactReading& r) { return cell_of(r.obstacle) + "," + cell_of(r.shape); }));
+  }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
@@ -347,9 +359,9 @@ std::vector<fs::path> Recorder::files() const {
   if (writes_phyxels_) files.push_back(phyxels_.file());
   if (writes_surface_) files.push_back(surface_.file());
   files.push_back(directory_ / log_name);
-  if (reactions_) files.push_back(reactions_->file());
-  if (probes_) files.push_back(probes_->file());
-  if (gases_) files.push_back(gases_->file());
+  for (const std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_}) {
+    if (*log) files.push_back((*log)->file());
+  }
   return files;
 }
 

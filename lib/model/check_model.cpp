@@ -226,6 +226,9 @@ void check_boundary(const Model& m) {
       }
     }
   }
+  check_indices("contact.phyxels", m.contact.phyxels, m.size());
+  check_size("contact.offset", m.contact.offset.size(), m.contact.phyxels.size(), "phyxels");
+  for (const double offset : m.contact.offset) check_finite("contact.offset", offset);
   for (std::size_t k = 0; k < m.probes.size(); ++k) {
     check_indices(fmt::format("probes[{}].phyxels", k), m.probes[k].phyxels, m.size());
     check_finite(fmt::format("probes[{}].points", k), m.probes[k].points);

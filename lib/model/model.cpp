@@ -11,6 +11,7 @@
 #include "model/box.hpp"
 #include "model/closing_areas.hpp"
 #include "model/closure.hpp"
+#include "model/contact.hpp"
 #include "model/device_setup.hpp"
 #include "model/following.hpp"
 #include "model/host_memory.hpp"
@@ -400,6 +401,7 @@ void finish(Model& model, const Scene& scene, const ClosingSearch& close) {
   find_moments(model);
   close_gradients(model, close ? close : search_on_host);
   find_following(model);
+  add_contact(model, scene);
   add_warnings(model, model.surfels.position.size());
 }
 

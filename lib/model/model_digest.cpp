@@ -42,6 +42,16 @@ void add_surface(XXH3_state_t* state, const Model& model, const Part& part,
   }
 }
 
+void add_path(XXH3_state_t* state, const Motion& motion) {
+  const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
+  add(state, std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z, motion.duration,
+                                 motion.frequency});
+  if (motion.rotation != Vec3d{}) {
+    const Vec3d &r = motion.rotation, &c = motion.about;
+    add(state, std::vector<double>{r.x, r.y, r.z, c.x, c.y, c.z});
+  }
+}
+
 /// A sum over phyxels, so that ranks may each add theirs.
 std::uint64_t digest_of_phyxels(const Model& model) {
   std::uint64_t sum = 0;
@@ -102,13 +112,7 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
     if (part.closure > 0) add_surface(state.get(), model, part, surfaces);
   }
   for (const Motion& motion : model.motions) {
-    const Vec3d &d = motion.displacement, &v = motion.velocity, &a = motion.amplitude;
-    add(state.get(), std::vector<double>{d.x, d.y, d.z, v.x, v.y, v.z, a.x, a.y, a.z,
-                                         motion.duration, motion.frequency});
-    if (motion.rotation != Vec3d{}) {
-      const Vec3d &r = motion.rotation, &c = motion.about;
-      add(state.get(), std::vector<double>{r.x, r.y, r.z, c.x, c.y, c.z});
-    }
+    add_path(state.get(), motion);
     if (!motion.axes.all()) {
       add(state.get(), std::vector<char>{motion.axes.x, motion.axes.y, motion.axes.z});
     }
@@ -117,6 +121,15 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
     add(state.get(), std::vector<Vec3d>{load.total, load.density});
     add(state.get(), numbers_of(load.curve));
     if (load.follows) add(state.get(), std::vector<double>{1, load.gas.value_or(-1)});
+  }
+  for (const Obstacle& obstacle : model.obstacles) {
+    add(state.get(), std::vector<double>{static_cast<double>(obstacle.shape), obstacle.lengths[0],
+                                         obstacle.lengths[1], obstacle.lengths[2],
+                                         obstacle.hollow ? 1.0 : 0.0, obstacle.law.static_friction,
+                                         obstacle.law.kinetic_friction, obstacle.law.restitution});
+    add(state.get(), std::vector<Mat3d>{obstacle.turn});
+    add(state.get(), std::vector<Vec3d>{obstacle.place});
+    add_path(state.get(), obstacle.motion);
   }
   return XXH3_64bits_digest(state.get());
 }

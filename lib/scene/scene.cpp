@@ -12,6 +12,7 @@
 #include "phyxel/error.hpp"
 #include "scene/scene_body.hpp"
 #include "scene/scene_error.hpp"
+#include "scene/scene_obstacles.hpp"
 #include "scene/scene_probes.hpp"
 #include "scene/scene_table.hpp"
 #include "scene/upright.hpp"
@@ -178,6 +179,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
   scene.render = render_of(root, scene.gravity);
   scene.bodies = naming(scene, [&] { return read_bodies(root); });
+  scene.obstacles = read_obstacles(root);
   naming(scene, [&] { read_probes(root, scene.bodies); });
   return scene;
 }

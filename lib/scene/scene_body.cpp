@@ -112,28 +112,7 @@ MotionRequest read_motion(const SceneTable& table) {
   MotionRequest motion;
   motion.select = read_selection(table);
   motion.axes = read_axes(table);
-  if (table.has("rotation")) {
-    table.expect_together("rotation", "duration");
-  } else {
-    table.expect_together("displacement", "duration");
-  }
-  if (table.has("displacement")) table.expect_together("displacement", "duration");
-  if (table.has("about")) table.expect_together("about", "rotation");
-  table.expect_together("amplitude", "frequency");
-  if (!table.has("displacement") && !table.has("rotation") && !table.has("velocity") &&
-      !table.has("amplitude")) {
-    throw InputError(
-        fmt::format("{}: body.motion: a key is missing; needed: at least one of: "
-                    "displacement, rotation, velocity, amplitude",
-                    table.where()));
-  }
-  table.read("displacement", motion.displacement);
-  table.read("rotation", motion.rotation);
-  table.read("about", motion.about);
-  table.read("duration", motion.duration);
-  table.read("velocity", motion.velocity);
-  table.read("amplitude", motion.amplitude);
-  table.read("frequency", motion.frequency);
+  read_path(table, motion);
   return motion;
 }
 
@@ -315,6 +294,31 @@ Selection read_selection(const SceneTable& table) {
     }
   }
   return select;
+}
+
+void read_path(const SceneTable& table, MotionRequest& motion) {
+  if (table.has("rotation")) {
+    table.expect_together("rotation", "duration");
+  } else {
+    table.expect_together("displacement", "duration");
+  }
+  if (table.has("displacement")) table.expect_together("displacement", "duration");
+  if (table.has("about")) table.expect_together("about", "rotation");
+  table.expect_together("amplitude", "frequency");
+  if (!table.has("displacement") && !table.has("rotation") && !table.has("velocity") &&
+      !table.has("amplitude")) {
+    throw InputError(
+        fmt::format("{}: {}: a key is missing; needed: at least one of: "
+                    "displacement, rotation, velocity, amplitude",
+                    table.where(), table.path()));
+  }
+  table.read("displacement", motion.displacement);
+  table.read("rotation", motion.rotation);
+  table.read("about", motion.about);
+  table.read("duration", motion.duration);
+  table.read("velocity", motion.velocity);
+  table.read("amplitude", motion.amplitude);
+  table.read("frequency", motion.frequency);
 }
 
 double default_hourglass(const BodyRequest& body) {

@@ -13,6 +13,10 @@ constexpr std::size_t most_bodies = 10000;
 /// A selection of phyxels. @throws InputError unless the table has exactly one of its keys
 Selection read_selection(const SceneTable& table);
 
+/// Reads the path of something that moves: all of a motion but its selection and its axes.
+/// @throws InputError unless the table has a term of it, and the keys that go with that
+void read_path(const SceneTable& table, MotionRequest& motion);
+
 /// One request, or one for each copy of an array.
 std::vector<BodyRequest> body_requests(const SceneTable& body);
 

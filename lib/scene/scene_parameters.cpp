@@ -100,6 +100,7 @@ std::string in_words(const char* section, const char* name, Word word) {
 std::string name_of(const ParameterOwner& owner, const std::string& section,
                     const std::string& key) {
   std::string name = section.empty() ? key : section + "." + key;
+  if (!owner.body && owner.entry > 0) name += fmt::format(" of {} {}", owner.list, owner.entry);
   if (!owner.body) return name;
   if (section.starts_with("selection")) name = fmt::format("body.{}.{}", owner.list, name);
   name += fmt::format(" of body {} ({})", owner.number, on_one_line(owner.body->name));

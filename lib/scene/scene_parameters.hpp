@@ -15,7 +15,7 @@ namespace phyxel {
 
 /// Which body of a scene a value belongs to, and which entry of one of its lists.
 struct ParameterOwner {
-  const BodyRequest* body = nullptr;   ///< Null: the scene itself.
+  const BodyRequest* body = nullptr;   ///< Null: the scene itself, or one of its obstacles.
   std::size_t number = 0;              ///< Of the body, counted from 1.
   const char* list = "";               ///< "motion", "load", ...; "": the body itself.
   std::size_t entry = 0;               ///< In that list, counted from 1.
@@ -106,16 +106,41 @@ void visit_material(const char* section, const BodyRequest& body, const Material
   visit(section, "viscosity", m.viscosity);
 }
 
+/// Visits the keys of a path, in the section of what moves along it.
+template <class Visit>
+void visit_path(const char* section, const MotionRequest& motion, Visit&& visit) {
+  visit(section, "displacement", motion.displacement);
+  visit(section, "rotation", motion.rotation);
+  visit(section, "about", motion.about);
+  if (motion.duration != 0) visit(section, "duration", motion.duration);
+  visit(section, "velocity", motion.velocity);
+  visit(section, "amplitude", motion.amplitude);
+  if (motion.frequency != 0) visit(section, "frequency", motion.frequency);
+}
+
 template <class Visit>
 void visit_motion(const MotionRequest& motion, Visit&& visit) {
-  visit("body.motion", "displacement", motion.displacement);
-  visit("body.motion", "rotation", motion.rotation);
-  visit("body.motion", "about", motion.about);
-  if (motion.duration != 0) visit("body.motion", "duration", motion.duration);
-  visit("body.motion", "velocity", motion.velocity);
-  visit("body.motion", "amplitude", motion.amplitude);
-  if (motion.frequency != 0) visit("body.motion", "frequency", motion.frequency);
+  visit_path("body.motion", motion, visit);
   visit("body.motion", "axes", axes_in_words(motion.axes));
+}
+
+template <class Visit>
+void visit_obstacle(const ObstacleRequest& obstacle, Visit&& visit) {
+  visit("obstacle", "name", obstacle.name);
+  visit("obstacle", "shape", obstacle.shape);
+  if (obstacle.size != Vec3d{}) visit("obstacle", "size", obstacle.size);
+  if (obstacle.radius != 0) visit("obstacle", "radius", obstacle.radius);
+  if (obstacle.length != 0) visit("obstacle", "length", obstacle.length);
+  if (obstacle.normal) visit("obstacle", "normal", *obstacle.normal);
+  visit("obstacle", "hollow", obstacle.hollow);
+  visit("obstacle", "rotation", obstacle.rotation);
+  visit("obstacle", "translation", obstacle.translation);
+  visit("obstacle", "friction", obstacle.friction);
+  if (obstacle.kinetic_friction) {
+    visit("obstacle", "kinetic_friction", *obstacle.kinetic_friction);
+  }
+  visit("obstacle", "restitution", obstacle.restitution);
+  visit_path("obstacle.motion", obstacle.motion, visit);
 }
 
 template <class Visit>
@@ -239,6 +264,10 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
     };
   };
   detail::visit_run(scene, of({}));
+  for (std::size_t k = 0; k < scene.obstacles.size(); ++k) {
+    const ObstacleRequest& obstacle = scene.obstacles[k];
+    detail::visit_obstacle(obstacle, of({nullptr, 0, "obstacle", k + 1, &obstacle.where}));
+  }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyRequest& body = scene.bodies[b];
     detail::visit_body(body, of({&body, b + 1, "", 0, &body.where}));

@@ -44,6 +44,18 @@ std::vector<SceneSection> boundary_sections() {
        "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
        "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
        "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},
+      {"obstacle", "[[obstacle]]", "",
+       "A rigid body that others cannot enter: a floor, a wall, a bin, a punch. `shape` needs its lengths: `size` of a box, "
+       "`radius` of a sphere, `radius` and `length` of a cylinder or capsule. It is turned, then moved into place, and rests "
+       "there or moves along a path. The phyxels on the surface of each body, or, where none lie there, those beside it, are kept "
+       "out of it by forces that act where a step would lead them, and that shorten no step. Bodies need a surface, and may touch "
+       "obstacles at the start but not overlap them; what is held or moved along all axes may be inside. Each frame adds a line for each "
+       "obstacle to `contacts.csv`: force [N] and torque [N m] on the bodies at that time, and, since t = 0, impulse [N s], "
+       "angular impulse [N m s], work of the obstacle on the bodies [J], heat of friction [J] and loss in impacts [J]. Torques are "
+       "taken about the obstacle's place at rest, the last three columns."},
+      {"obstacle.motion", "[obstacle.motion]", "",
+       "The path of the obstacle above, as that of a `[[body.motion]]`. At least one of `displacement`, `rotation`, `velocity` and "
+       "`amplitude` is needed."},
       {"probe", "[[probe]]", "selection",
        "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
        "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "

@@ -54,6 +54,9 @@ class SceneTable {
   std::string where() const;
   std::string where(const char* name) const;
 
+  /// "body.motion": what the table is called in messages.
+  const std::string& path() const { return path_; }
+
   /// Throws an InputError: "scene.toml:12:3: key body.material.young: <problem>".
   [[noreturn]] void refuse(const char* name, const std::string& problem) const;
   /// Throws unless exactly one of `names` is there.

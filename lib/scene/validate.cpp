@@ -7,6 +7,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
+#include "scene/scene_obstacles.hpp"
 #include "scene/scene_parameters.hpp"
 #include "scene/scene_schema.hpp"
 
@@ -43,8 +44,9 @@ std::string place_of(const ParameterOwner& owner, const SceneKey& key) {
   const std::string path = key.section.empty() ? key.name : key.section + "." + key.name;
   const std::string where =
       owner.where && !owner.where->empty() ? *owner.where + ": " : std::string();
-  return owner.body ? fmt::format("{}key {} of body \"{}\"", where, path, owner.body->name)
-                    : fmt::format("{}key {}", where, path);
+  if (owner.body) return fmt::format("{}key {} of body \"{}\"", where, path, owner.body->name);
+  return owner.entry > 0 ? fmt::format("{}key {} of {} {}", where, path, owner.list, owner.entry)
+                         : fmt::format("{}key {}", where, path);
 }
 
 void check_number(const ParameterOwner& owner, const SceneKey* key, double value) {
@@ -115,6 +117,7 @@ void validate(const Scene& scene) {
       check_number(owner, key_of(section, name), static_cast<double>(value));
     }
   });
+  for (const ObstacleRequest& obstacle : scene.obstacles) check_obstacle(obstacle);
   for (const BodyRequest& body : scene.bodies) {
     check_law(body, body.material, body.where);
     for (const InclusionRequest& inclusion : body.inclusions) {

@@ -11,6 +11,7 @@
 #include "solver/cpu_passes.hpp"
 #include "solver/cpu_surfels.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/step_contacts.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -81,7 +82,11 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     }
   }
 
-  std::vector<std::int64_t> support_work() const override { return words_of(support_work_.sums()); }
+  std::vector<std::int64_t> step_sums() const override {
+    StepSums sums = support_work_.sums();
+    sums.insert(sums.end(), contacts_.sums().begin(), contacts_.sums().end());
+    return words_of(std::move(sums));
+  }
 
   void put_displacements(std::span<const Vec3d> displacement) override {
     check_displacements(displacement, model_.size());
@@ -182,6 +187,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
       list.push_back({"loads that follow the surface", followed_force_.size() * sizeof(Vec3d)});
     }
     if (support_work_.bytes() > 0) list.push_back({"work of supports", support_work_.bytes()});
+    if (contacts_.bytes() > 0) list.push_back({"contact", contacts_.bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -189,6 +195,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
 
  private:
   using Passes::applied_;
+  using Passes::boundary_;
   using Passes::boundary_runs_;
   using Passes::closing_;
   using Passes::displacement_;
@@ -214,13 +221,26 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   void advance(double time, double dt) {
     const Phase phase("forces, motion");
     apply_loads(time);
+    contacts_.begin_step(time, dt, [&](Index i) { return velocity_of(i); });
     this->pass(this->displacement_records(), [&](const std::vector<Run>& runs) {
       for (const Run& run : runs) this->advance_run(run, dt);
-      if (&runs == &boundary_runs_) this->follow_motions(time, dt, true);  // before they are sent
+      if (&runs == &boundary_runs_) end_step(time, dt, true);  // before they are sent
     });
-    this->follow_motions(time, dt, false);
+    end_step(time, dt, false);
     this->clear_padding();
   }
+  /// Moves phyxels along prescribed paths and out of obstacles, either those of the boundary or the
+  /// others.
+  void end_step(double time, double dt, bool of_boundary) {
+    this->follow_motions(time, dt, of_boundary);
+    contacts_.keep_out(
+        [&](Index i) { return (!boundary_.empty() && boundary_[i]) == of_boundary; },
+        [&](Index i) {
+          return Touched{this->get3(displacement_, layout_.slot(i)), velocity_of(i)};
+        },
+        [&](Index i, const Touched& to) { this->set_state(i, to.displacement, to.velocity); });
+  }
+  Vec3d velocity_of(Index i) const { return this->get3(velocity_, layout_.slot(i)); }
   /// Sums the forces that are applied at `time` [s]. Repeated calls sum again only while a load
   /// still changes or follows the surface.
   void apply_loads(double time) {
@@ -246,6 +266,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
                   [&](Index i, Vec3d) { add(i, std::exchange(followed_force_[i], Vec3d{})); });
   }
 
+  StepContacts contacts_{model_, threads_};
   std::vector<Vec3d> external_force_;
   FollowingLoads following_{model_};
   // Forces of loads that follow the surface [N], shape [n], zero but while they are summed; empty

@@ -20,7 +20,7 @@
 #include "solver/boundary_conditions.hpp"
 #include "solver/cpu_arrays.hpp"
 #include "solver/first_error.hpp"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 

@@ -17,6 +17,7 @@
 #include "solver/following_loads.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
+#include "solver/step_sums.hpp"
 #include "solver/totals.hpp"
 
 namespace phyxel {
@@ -129,6 +130,21 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   d->step = now.step;
   d->time = now.time;
   return *d;
+}
+
+Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver) {
+  Diagnostics d = diagnose(model, backend, solver.now());
+  if (model.obstacles.empty()) return d;
+  StepSums all = no_step_sums(model);
+  add_words(all, solver.step_sums());
+  ExactSum loss;
+  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+    const std::size_t first = sums_of_motions(model) + o * ContactTerms::count;
+    loss.add(all[first + ContactTerms::friction_heat].value());
+    loss.add(all[first + ContactTerms::impact_loss].value());
+  }
+  d.contact_loss = loss.value();
+  return d;
 }
 
 std::string describe_phyxel(const Model& model, Index global_id) {

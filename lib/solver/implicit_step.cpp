@@ -21,7 +21,7 @@ ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
     : model_(model),
       backend_(backend),
       newton_(model, backend, most_newton_steps),
-      support_work_(no_support_work(model)) {
+      support_work_(no_step_sums(model)) {
   const OwnedVectors& vectors = newton_.vectors();
   balance_.target = vectors.make();
   balance_.centre = vectors.make();
@@ -83,7 +83,7 @@ ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vecto
 }
 
 void ImplicitStep::add_support_work(const SupportInstant& now) {
-  for (std::size_t m = 0; m < support_work_.size(); ++m) {
+  for (std::size_t m = 0; m < sums_of_motions(model_); ++m) {
     const Motion& motion = model_.motions[m];
     if (motion.stands_still()) continue;
     const Path mean_step = motion.mean_step(now.time, now.dt);

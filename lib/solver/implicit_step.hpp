@@ -3,7 +3,7 @@
 #pragma once
 
 #include "solver/newton.hpp"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 
@@ -29,8 +29,8 @@ class ImplicitStep {
   /// All forces but those of supports [N] at the end of the last step, shape [n]; empty before the
   /// first step, and without supports.
   const std::vector<Vec3d>& end_force() const { return end_force_; }
-  /// Work of supports [J] by the rule of `Solver::support_work`, on the phyxels of this rank.
-  const SupportWork& support_work() const { return support_work_; }
+  /// Work of supports [J] by the rule of `Solver::step_sums`, on the phyxels of this rank.
+  const StepSums& step_sums() const { return support_work_; }
 
  private:
   using Vector = Newton::Vector;
@@ -50,7 +50,7 @@ class ImplicitStep {
   std::vector<double> damping_;  ///< Damping [1/s], shape [n]; empty if there is none.
   NewtonReport work_;
   Vector end_force_;
-  SupportWork support_work_;
+  StepSums support_work_;
 };
 
 }  // namespace phyxel

@@ -8,7 +8,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/following_loads.hpp"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 

@@ -4,7 +4,7 @@
 
 #include "rank_sums.hpp"
 #include "solver/present_forces.hpp"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 namespace {
@@ -42,7 +42,7 @@ std::vector<Vec3d> centres_of(const Model& model) {
 }
 
 /// Returns the displacement that the reactions of an instant have to be multiplied by to complete
-/// the work of earlier steps (`Solver::support_work`).
+/// the work of earlier steps (`Solver::step_sums`).
 Path rest_of_work(const Motion& motion, const Solver& solver) {
   const double time = solver.time(), dt = solver.dt();
   Path rest = motion.last_step(time, dt);
@@ -75,8 +75,8 @@ std::vector<Reaction> find_reactions(const Model& model, Backend& backend, const
     });
   }
   add_each_over_ranks(model, sums);
-  SupportWork work = no_support_work(model);
-  add_words(work, solver.support_work());
+  StepSums work = no_step_sums(model);
+  add_words(work, solver.step_sums());
   std::vector<Reaction> reactions;
   for (std::size_t m = 0; m < model.motions.size(); ++m) {
     const Motion& motion = model.motions[m];

@@ -13,7 +13,7 @@
 #include "solver/boundary_conditions.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/newton.hpp"
-#include "solver/support_work.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 
@@ -74,8 +74,8 @@ Solver::Solver(Backend& backend, const State& start)
       first_step_(start.step),
       dt_(start.dt),
       looks_(start.looks),
-      work_before_(start.support_work),
-      work_of_backend_(backend.support_work()) {
+      work_before_(start.step_sums),
+      work_of_backend_(backend.step_sums()) {
   check_times(start);
   backend_.upload(start);
 }
@@ -84,11 +84,17 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
-  const std::size_t words = words_of(no_support_work(model)).size();
-  if (!start.support_work.empty() && start.support_work.size() != words) {
+  if (method != Method::verlet && !model.obstacles.empty()) {
     throw InputError(fmt::format(
-        "support_work of a state has {} words; allowed for the supports of this model: {} or none",
-        start.support_work.size(), words));
+        "solver.method = \"{}\" found with obstacles; allowed with obstacles: \"verlet\"",
+        method_name(method)));
+  }
+  const std::size_t words = words_of(no_step_sums(model)).size();
+  if (!start.step_sums.empty() && start.step_sums.size() != words) {
+    throw InputError(
+        fmt::format("step_sums of a state has {} words; allowed for the supports and obstacles of "
+                    "this model: {} or none",
+                    start.step_sums.size(), words));
   }
   model_ = &model;
   method_ = method;
@@ -165,7 +171,7 @@ State Solver::state() const {
   state.dt = dt_;
   state.time = time();
   state.looks = looks_;
-  state.support_work = support_work();
+  state.step_sums = step_sums();
   return state;
 }
 
@@ -174,12 +180,12 @@ std::span<const Vec3d> Solver::end_force() const {
   return implicit_->end_force();
 }
 
-std::vector<std::int64_t> Solver::support_work() const {
-  SupportWork work;
-  add_words(work, backend_.support_work());
+std::vector<std::int64_t> Solver::step_sums() const {
+  StepSums work;
+  add_words(work, backend_.step_sums());
   add_words(work, work_of_backend_, -1);
   add_words(work, work_of_changes_);
-  if (implicit_) add_words(work, words_of(implicit_->support_work()));
+  if (implicit_) add_words(work, words_of(implicit_->step_sums()));
   if (model_ && !work.empty()) add_over_ranks(*model_, work);
   add_words(work, work_before_);
   return words_of(std::move(work));

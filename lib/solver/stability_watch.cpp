@@ -20,10 +20,11 @@ double largest_over_ranks(const Model& model, double value) {
 }
 
 /// Upper bound of the speeds that a motion prescribes [m/s]. Of a share: collective.
-double largest_speed(const Model& model, const Motion& motion) {
+/// @param phyxels that it moves or touches
+double largest_speed(const Model& model, const Motion& motion, std::span<const Index> phyxels) {
   double arm = 0;
   if (motion.rotation != Vec3d{}) {
-    for (const Index i : motion.phyxels) {
+    for (const Index i : phyxels) {
       arm = std::max(arm, norm(model.position[i] - motion.about));
     }
     arm = largest_over_ranks(model, arm);
@@ -62,6 +63,9 @@ bool is_conservative(const Model& model) {
   for (const Motion& motion : model.motions) {
     if (!motion.stands_still()) return false;
   }
+  for (const Obstacle& obstacle : model.obstacles) {
+    if (!obstacle.motion.stands_still()) return false;
+  }
   return true;
 }
 
@@ -80,7 +84,10 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start,
   if (std::isnan(watched_.start_speed)) watched_.start_speed = start.largest_speed;
   driving_speed_ = watched_.start_speed;
   for (const Motion& motion : model.motions) {
-    driving_speed_ += largest_speed(model, motion);
+    driving_speed_ += largest_speed(model, motion, motion.phyxels);
+  }
+  for (const Obstacle& obstacle : model.obstacles) {
+    driving_speed_ += largest_speed(model, obstacle.motion, model.contact.phyxels);
   }
   check(start);
 }

@@ -144,15 +144,15 @@ void Solver::change_step(std::int64_t steps, double dt) {
   const double step_before = dt_;
   state.dt = dt_ = dt;
   backend_.put(state);
-  change_support_work(step_before, dt);
+  change_step_sums(step_before, dt);
 }
 
-void Solver::change_support_work(double before, double after) {
+void Solver::change_step_sums(double before, double after) {
   if (!has_moving_supports(*model_)) return;
-  SupportWork work = no_support_work(*model_);
+  StepSums work = no_step_sums(*model_);
   add_words(work, work_of_changes_);
   const PresentForces present(*model_, backend_, *this);
-  for (std::size_t m = 0; m < work.size(); ++m) {
+  for (std::size_t m = 0; m < sums_of_motions(*model_); ++m) {
     const Motion& motion = model_->motions[m];
     if (motion.stands_still()) continue;
     // The next step takes the one before for a step of its own size.

@@ -130,7 +130,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     Looks looks;
   };
   Header now{};
-  std::vector<std::int64_t> support_work;
+  std::vector<std::int64_t> step_sums;
   ranks_.collectively([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time; allowed: 1 or more", length));
@@ -140,7 +140,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     }
     const State header = checkpoint->state(0, 0);
     now = {header.step, header.time, header.dt, header.history_interval, header.looks};
-    support_work = header.support_work;
+    step_sums = header.step_sums;
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -151,7 +151,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.dt = now.dt;
   state.history_interval = now.history_interval;
   state.looks = now.looks;
-  state.support_work = ranks_.communicator().broadcast(support_work);
+  state.step_sums = ranks_.communicator().broadcast(step_sums);
   return state;
 }
 

@@ -80,7 +80,7 @@ TEST_F(ReactionsOfRuns, AreTheSameBytesAfterAStopAndAResumedRun) {
               75);
     const auto middle = latest_checkpoint(folder_ / parts);
     ASSERT_TRUE(middle.has_value());
-    EXPECT_FALSE(read_checkpoint(*middle).state.support_work.empty());
+    EXPECT_FALSE(read_checkpoint(*middle).state.step_sums.empty());
     ASSERT_EQ(
         run({"run", "beam.toml", "--out", parts, "--precision", precision, "--resume", "auto"})
             .code,

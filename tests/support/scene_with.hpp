@@ -20,7 +20,8 @@ inline std::string scene_with(const SceneKey& key, const std::string& text) {
   if (section == "body") return time_section + "[[body]]\n" + line;
   if (section == "selection") return after_beam("[[body.fixed]]\n" + line);
   if (section == "selection.ball") return after_beam("[[body.fixed]]\n[body.fixed.ball]\n" + line);
-  const std::string& header = scene_section(section).header;
+  std::string header = scene_section(section).header;
+  if (section == "obstacle.motion") header = "[[obstacle]]\nshape = 'plane'\n" + header;
   return time_section + "[[body]]\nshape = 'dino'\n" +
          (section == "body.material" ? "" : material) + header + "\n" + line;
 }

@@ -80,7 +80,7 @@ Solution taylor(const Discretisation& d) {
                     .neighbours = static_cast<double>(model.pairs()) / model.size(),
                     .setup_seconds = seconds_since(begin)};
   const auto start = Clock::now();
-  const Diagnostics before = diagnose(model, *backend, solver.now());
+  const Diagnostics before = diagnose(model, *backend, solver);
   while (solver.steps() < plan.steps) {
     plan.halve(control.look(solver, plan.halvings));
     const std::int64_t until = std::min(plan.steps, control.next_look(solver));
@@ -88,7 +88,7 @@ Solution taylor(const Discretisation& d) {
     solver.step(until - solver.steps());
   }
   solution.seconds = seconds_since(start);
-  const Diagnostics after = diagnose(model, *backend, solver.now());
+  const Diagnostics after = diagnose(model, *backend, solver);
 
   double top = 0, foot = 0, spread = 0, strain = 0;
   int at_top = 0, at_foot = 0;

@@ -37,12 +37,12 @@ class Trial {
   template <class Look>
   void run(const State& start, int looks, std::int64_t steps, Look&& look) {
     Solver solver(*backend_, start);
-    first_ = diagnose(model_, *backend_, solver.now());
+    first_ = diagnose(model_, *backend_, solver);
     StabilityWatch watch(model_, first_);
     for (int k = 1; k <= looks; ++k) {
       const std::int64_t until = steps * k / looks;
       solver.step(until - solver.steps());
-      const Diagnostics now = diagnose(model_, *backend_, solver.now());
+      const Diagnostics now = diagnose(model_, *backend_, solver);
       watch.check(now);
       look(solver.state(), now);
     }

@@ -40,7 +40,7 @@ Run::Run(const RunOptions& options)
       solver_(model(), *backend_, first_state(), scene_.solver.method),
       control_(model(), *backend_, plan_),
       first_step_(solver_.steps()),
-      start_diagnostics_(diagnose(model(), *backend_, solver_.now())) {
+      start_diagnostics_(diagnose(model(), *backend_, solver_)) {
   StopSignal::work_begins();
   // Last, since it replaces the files of an earlier run: everything that could fail has been done.
   ranks().collectively([&] {
@@ -54,7 +54,8 @@ Run::Run(const RunOptions& options)
   if (device_.gpu) gpus_ = ranks().gathered(std::span<const int>(&device_.gpu->index, 1));
   supports_ = support_ranges(model());
   const BoundarySize boundary = boundary_size(model());
-  boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded)};
+  boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded),
+               ranks().sum(boundary.touching)};
   setup_seconds_ = seconds_since(start_);
 }
 
@@ -168,7 +169,7 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
     step_seconds_ += seconds_since(stepping_since);
     if (frame) writer_.wait_for_room();
     const auto look_start = Clock::now();
-    now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_.now()); });
+    now_ = spent_.timed("energies", [&] { return diagnose(model(), *backend_, solver_); });
     if (frame) readings_ = read_off();
     watch.check(now_, &control_);
     control_.see(solver_);
@@ -200,9 +201,14 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
 
 Readings Run::read_off() {
   return spent_.timed("energies", [&] {
-    return Readings{find_reactions(model(), *backend_, solver_),
-                    probes_.read(*backend_, recovery_.get()),
-                    read_gases(model(), *backend_, solver_)};
+    Readings found{
+        find_reactions(model(), *backend_, solver_), probes_.read(*backend_, recovery_.get()),
+        read_gases(model(), *backend_, solver_), find_contacts(model(), *backend_, solver_)};
+    deepest_.resize(found.contacts.size());
+    for (std::size_t k = 0; k < deepest_.size(); ++k) {
+      deepest_[k] = std::max(deepest_[k], found.contacts[k].depth);
+    }
+    return found;
   });
 }
 

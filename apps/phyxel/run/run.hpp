@@ -168,6 +168,8 @@ class Run {
                                     const Traffic& traffic) const;
 
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
+  /// Prints what obstacles do at the end, and have done.
+  void say_contacts() const;
   /// Prints the reactions at the end.
   void say_reactions() const;
   /// Prints what probes read at the end.
@@ -200,6 +202,8 @@ class Run {
   std::int64_t first_step_ = 0;
   int halvings_told_ = plan_.halvings;  // largest number of halvings printed so far
   Diagnostics start_diagnostics_, now_;
+  /// Depth of the deepest phyxel in each obstacle at the frames of this run [m].
+  std::vector<double> deepest_;
   Readings readings_;                      // of the start, or the last frame
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // transport between ranks

@@ -67,7 +67,7 @@ void Run::show_progress(Progress& progress, const Diagnostics& now) const {
 }
 
 std::string Run::stopped_in_search(const InterruptedError& error, Progress& progress) {
-  good_ = good_state(diagnose(model(), *backend_, solver_.now()));
+  good_ = good_state(diagnose(model(), *backend_, solver_));
   write_state();
   writer_.finish();
   progress.finish();

@@ -70,6 +70,27 @@ nlohmann::ordered_json json_of(const std::vector<GasReading>& gases) {
   return list;
 }
 
+nlohmann::ordered_json json_of(const std::vector<ContactReading>& contacts,
+                               const std::vector<double>& deepest) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const ContactReading& contact = contacts[k];
+    list.push_back({{"obstacle", contact.obstacle},
+                    {"shape", contact.shape},
+                    {"force_n", json_of(contact.force)},
+                    {"torque_n_m", json_of(contact.torque)},
+                    {"impulse_n_s", json_of(contact.impulse)},
+                    {"angular_impulse_n_m_s", json_of(contact.angular_impulse)},
+                    {"work_j", contact.work},
+                    {"friction_heat_j", contact.friction_heat},
+                    {"impact_loss_j", contact.impact_loss},
+                    {"depth_m", contact.depth},
+                    {"deepest_m", deepest[k]},
+                    {"place_m", json_of(contact.place)}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json json_of(const std::vector<ProbeReading>& readings) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ProbeReading& r : readings) {
@@ -221,6 +242,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"reactions", json_of(readings_.reactions)},
             {"probes", json_of(readings_.probes)},
             {"gases", json_of(readings_.gases)},
+            {"contacts", json_of(readings_.contacts, deepest_)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
@@ -251,6 +273,22 @@ void Run::say_gases() const {
   }
   if (printed < readings_.gases.size()) {
     fmt::print("              {} more: gas.csv\n", readings_.gases.size() - printed);
+  }
+}
+
+void Run::say_contacts() const {
+  const std::size_t printed = std::min(readings_.contacts.size(), most_printed);
+  for (std::size_t k = 0; k < printed; ++k) {
+    const ContactReading& c = readings_.contacts[k];
+    fmt::print(
+        "  contact     {}: force on the bodies ({:.4g}, {:.4g}, {:.4g}) N; since t = 0 impulse "
+        "({:.4g}, {:.4g}, {:.4g}) N s, work {:.4g} J, heat of friction {:.4g} J, loss in impacts "
+        "{:.4g} J; deepest {:.2g} m\n",
+        c.obstacle, c.force.x, c.force.y, c.force.z, c.impulse.x, c.impulse.y, c.impulse.z, c.work,
+        c.friction_heat, c.impact_loss, deepest_[k]);
+  }
+  if (printed < readings_.contacts.size()) {
+    fmt::print("              {} more: contacts.csv\n", readings_.contacts.size() - printed);
   }
 }
 
@@ -321,6 +359,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
   say_reactions();
   say_probes();
   say_gases();
+  say_contacts();
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

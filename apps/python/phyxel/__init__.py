@@ -130,8 +130,8 @@ class _Family:
 
 class Trajectory:
     """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
-    energy.csv, `reactions`, those of reactions.csv, `probes`, those of probes.csv, and `gases`,
-    those of gas.csv.
+    energy.csv, `reactions`, those of reactions.csv, `probes`, those of probes.csv, `gases`,
+    those of gas.csv, and `contacts`, those of contacts.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -169,6 +169,12 @@ class Trajectory:
         """{(body, set): {column: values}}, one for each frame; pressure [Pa] and volume [m^3] of the
         gases in cavities, by tractions, e.g. ("ball", "traction 1"). Empty without any."""
         return self._log("gas.csv", str)
+
+    @property
+    def contacts(self):
+        """{obstacle: {column: values}}, one for each frame; forces [N], torques [N m], impulses [N s],
+        angular impulses [N m s], work, heat and loss [J]. Empty without any."""
+        return {name: columns for (name, _), columns in self._log("contacts.csv", str).items()}
 
     @property
     def probes(self):

@@ -118,11 +118,12 @@ class Backend {
   /// @param move_surfels whether surfels are brought along after each step (`update_surfels`)
   virtual void step(std::int64_t first, double dt, int count = 1, bool move_surfels = false) = 0;
 
-  /// Work [J] that the support of each motion has done on the phyxels of this rank, in all steps
-  /// that this backend has taken: words of exact sums, shape [motions, words]. A step from t to
+  /// What supports and obstacles have done to the phyxels of this rank, in all steps that this
+  /// backend has taken: words of exact sums. First the work [J] of each motion, shape [motions,
+  /// words], then the sums of each obstacle (`ContactTerms`). A step from t to
   /// t + dt adds its reactions times half the displacements over both steps beside t. Empty if no
   /// phyxel moves on a prescribed path, and then steps cost nothing more.
-  virtual std::vector<std::int64_t> support_work() const { return {}; }
+  virtual std::vector<std::int64_t> step_sums() const { return {}; }
 
   /// The most steps that one call of `step` makes cheaper: a device is busy with them while the
   /// caller does something else.

@@ -10,10 +10,15 @@
 
 namespace phyxel {
 
+class Solver;
+
 /// Energies, conserved quantities and a finiteness check of a backend's present state. Sums run in
 /// double and exactly, so they do not depend on the number of threads or ranks; a device that sums
 /// itself has its own. Of a share, those of the whole model: collective.
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now);
+/// The same at the present instant of a solver, with what contact has lost since t = 0. Of a share:
+/// for a solver that was made with the model.
+Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver);
 /// Diagnostics after `step` Verlet steps of size `dt` [s].
 inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {
   return diagnose(model, backend, {step, static_cast<double>(step) * dt, dt / 2});

@@ -1,6 +1,7 @@
 /// Everything about a scene that does not change while it runs.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <memory>
@@ -12,6 +13,7 @@
 #include "phyxel/cloud.hpp"
 #include "phyxel/load_curve.hpp"
 #include "phyxel/neighbourhood.hpp"
+#include "phyxel/physics/contact.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/share.hpp"
 #include "phyxel/space_region.hpp"
@@ -108,6 +110,29 @@ struct Motion {
   }
 };
 
+/// A rigid body that phyxels cannot enter, at rest or on a path.
+struct Obstacle {
+  std::string name;
+  int shape = 0;                                        ///< Index in `ObstacleShapes`.
+  std::array<double, most_obstacle_lengths> lengths{};  ///< Of the shape, in its order [m].
+  bool hollow = false;                                  ///< True if phyxels are kept inside.
+  Mat3d turn{};                                         ///< Its rotation into place at rest.
+  Vec3d place;                                          ///< Where its origin is at rest [m].
+  ContactLaw law;
+  Motion motion;  ///< Its path; no phyxels follow it.
+
+  /// Where it is at the end of the step of `dt` [s] that begins at `time` [s], and how it moves.
+  ObstacleStep step_from(double time, double dt) const;
+};
+
+/// The phyxels by which bodies touch obstacles: those on or beside their surfaces that are not held
+/// or moved along all axes. Of a share: those that this rank steps. None in models without
+/// obstacles.
+struct ContactLayer {
+  std::vector<Index> phyxels;  ///< Ascending.
+  std::vector<double> offset;  ///< Distance of each from its body's surface [m]; 0: it lies on it.
+};
+
 /// Forces on some phyxels, times the factor of a curve. Their directions are constant, unless they
 /// follow the surface.
 struct Load {
@@ -177,6 +202,8 @@ struct Model {
   Surfels surfels;
   std::vector<Motion> motions;  ///< Fixed and prescribed phyxels.
   std::vector<Load> loads;
+  std::vector<Obstacle> obstacles;
+  ContactLayer contact;
   std::vector<Following> following;  ///< Of loads that follow the surface, in their order.
   std::vector<Probe> probes;
   std::vector<Walls> walls;  ///< Of each body.

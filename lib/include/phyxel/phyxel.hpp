@@ -7,6 +7,7 @@
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/chunked_source.hpp"
 #include "phyxel/cloud.hpp"
+#include "phyxel/contacts.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/device.hpp"
 #include "phyxel/diagnostics.hpp"

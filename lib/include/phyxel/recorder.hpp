@@ -11,6 +11,7 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
+#include "phyxel/contacts.hpp"
 #include "phyxel/gases.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/point_fields.hpp"
@@ -22,9 +23,10 @@ namespace phyxel {
 
 /// What is read off at each frame.
 struct Readings {
-  std::vector<Reaction> reactions;   ///< Of supports (`find_reactions`), or none.
-  std::vector<ProbeReading> probes;  ///< Of the scene's probes (`Probes::read`), or none.
-  std::vector<GasReading> gases;     ///< Of gases in cavities (`read_gases`), or none.
+  std::vector<Reaction> reactions;       ///< Of supports (`find_reactions`), or none.
+  std::vector<ProbeReading> probes;      ///< Of the scene's probes (`Probes::read`), or none.
+  std::vector<GasReading> gases;         ///< Of gases in cavities (`read_gases`), or none.
+  std::vector<ContactReading> contacts;  ///< Of obstacles (`find_contacts`), or none.
 };
 
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
@@ -128,7 +130,8 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   reactions.csv                              of a scene with supports: one line a frame and set
 ///   probes.csv                                 of a scene with probes: one line a frame and point
 ///   gas.csv                                    of a scene with gases: one line a frame and gas
-///   run.json                                   at the end, what `write_summary` is given
+///   contacts.csv                               of a scene with obstacles: one line a frame and
+///   obstacle run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
 class Recorder {
@@ -180,8 +183,11 @@ class Recorder {
   SeriesFile phyxels_, surface_;
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
-  // Set if the model has supports, probes, and gases.
-  std::optional<FrameLog> reactions_, probes_, gases_;
+  // Set if the model has supports, probes, gases, and obstacles.
+  std::optional<FrameLog> reactions_, probes_, gases_, contacts_;
+
+  /// Those of them that are set.
+  std::vector<FrameLog*> logs();
 };
 
 /// The content of a frame.

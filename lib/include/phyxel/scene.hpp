@@ -201,6 +201,25 @@ struct BodyRequest {
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
+/// A rigid body that others cannot enter, at rest or on a given path.
+struct ObstacleRequest {
+  std::string name;
+  std::string shape;            ///< A name in `ObstacleShapes` (phyxel/physics/obstacles.hpp).
+  Vec3d size;                   ///< Extents of a box [m].
+  double radius = 0;            ///< Of a sphere, cylinder or capsule [m].
+  double length = 0;            ///< Of a cylinder, or between the centres of a capsule's ends [m].
+  std::optional<Vec3d> normal;  ///< Direction that a plane faces; unset: z, turned by `rotation`.
+  bool hollow = false;          ///< True if bodies are kept inside instead of outside.
+  Vec3d rotation;               ///< Axis times angle [degrees], applied first.
+  Vec3d translation;            ///< [m], applied last.
+  double friction = 0;          ///< Coulomb's coefficient of points at rest on it.
+  std::optional<double> kinetic_friction;  ///< The same of sliding points; unset: `friction`.
+  double restitution = 0;  ///< Speed of a surface point after an impact over that before.
+  /// How it moves, but for the selection and the axes; nothing set: it is at rest.
+  MotionRequest motion;
+  std::string where;  ///< "scene.toml:30:1", for errors.
+};
+
 /// Simulated time and step size.
 struct TimeRequest {
   double end = 0;  ///< Simulated time [s].
@@ -252,6 +271,7 @@ struct Scene {
   OutputRequest output;
   RenderRequest render;
   std::vector<BodyRequest> bodies;
+  std::vector<ObstacleRequest> obstacles;
 };
 
 /// Default strength of hourglass control: 0.1, the most accurate value (docs/accuracy.md); 0 for

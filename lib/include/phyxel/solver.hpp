@@ -152,20 +152,21 @@ class Solver {
   /// All forces but those of supports [N] at the end of the last implicit step, shape [n]; empty
   /// before the first one, for other methods, and without supports.
   std::span<const Vec3d> end_force() const;
-  /// Work [J] that the support of each motion has done since t = 0: words of exact sums over all
-  /// ranks, shape [motions, words]; empty if no support moves. Each step adds the reactions at its
-  /// start, after Verlet's steps, or at its end, after implicit ones, times the mean of the
-  /// displacements over the steps before and after: trapezoids, but for the last half
+  /// Sums over all steps since t = 0 and all ranks, as words of exact sums. First the work [J] that
+  /// the support of each motion has done, shape [motions, words]; none if no support moves. Then
+  /// what each obstacle has done (`ContactTerms`), shape [obstacles, 9, words]. Each step adds the
+  /// reactions at its start, after Verlet's steps, or at its end, after implicit ones, times the
+  /// mean of the displacements over the steps before and after: trapezoids, but for the last half
   /// (`find_reactions` completes them). A search for equilibrium adds nothing. Collective on a
   /// share, for a solver that was made with the model.
-  std::vector<std::int64_t> support_work() const;
+  std::vector<std::int64_t> step_sums() const;
 
  private:
   void step_by_newton();
   /// Goes on by steps of dt [s], of which the time so far is `steps`.
   void change_step(std::int64_t steps, double dt);
   /// Corrects the work of supports for a step that changes from `before` to `after` [s].
-  void change_support_work(double before, double after);
+  void change_step_sums(double before, double after);
 
   const Model* model_ = nullptr;  ///< Of a method that needs it.
   Backend& backend_;

@@ -63,9 +63,9 @@ struct State {
   std::int64_t step = 0;
   double dt = 0;  ///< [s]
   Looks looks;
-  /// Work that the support of each motion has done in earlier steps, by the rule of
-  /// `Solver::support_work`: words of exact sums over all ranks. Empty if nothing moves.
-  std::vector<std::int64_t> support_work;
+  /// What supports and obstacles have done in earlier steps, by the rule of `Solver::step_sums`:
+  /// words of exact sums over all ranks. Empty if no support moves and there is no obstacle.
+  std::vector<std::int64_t> step_sums;
 };
 
 /// Time level of a backend's state. Velocities are stored at `time - lag` (lag is dt/2 for
@@ -114,6 +114,7 @@ struct Diagnostics {
   double hourglass_energy = 0;  ///< [J], of hourglass control.
   double plastic_work = 0;      ///< [J], turned into heat since the virgin state.
   double viscous_work = 0;      ///< [J], turned into heat by viscosity since the start.
+  double contact_loss = 0;      ///< [J], lost in impacts and by friction on obstacles since t = 0.
   double gravity_energy = 0;    ///< [J], zero at rest.
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// Energy of the deformation [J].
@@ -123,8 +124,8 @@ struct Diagnostics {
   /// Total energy [J], with what has become heat: constant in a scene without mass-proportional
   /// damping, motions and changing loads (`is_conservative`).
   double total_energy() const {
-    return kinetic_and_elastic_energy() + plastic_work + viscous_work + gravity_energy +
-           load_energy;
+    return kinetic_and_elastic_energy() + plastic_work + viscous_work + contact_loss +
+           gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

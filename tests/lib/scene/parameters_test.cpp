@@ -247,6 +247,31 @@ body = 'third'
 from = [0, 0, 0] # probe.from => from = [0, 0, 1]
 to = [0, 1, 0] # probe.to => to = [0, 2, 0]
 points = 3 # probe.points => points = 4
+[[obstacle]]
+name = 'post' # obstacle.name => name = 'pillar'
+shape = 'cylinder' # obstacle.shape => shape = 'capsule'
+radius = 1 # obstacle.radius => radius = 2
+length = 3 # obstacle.length => length = 4
+hollow = false # obstacle.hollow => hollow = true
+rotation = [0, 90, 0] # obstacle.rotation => rotation = [0, 80, 0]
+translation = [9, 0, 0] # obstacle.translation => translation = [8, 0, 0]
+friction = 0.5 # obstacle.friction => friction = 0.6
+kinetic_friction = 0.4 # obstacle.kinetic_friction => kinetic_friction = 0.3
+restitution = 0.1 # obstacle.restitution => restitution = 0.2
+[obstacle.motion]
+displacement = [1, 0, 0] # obstacle.motion.displacement => displacement = [2, 0, 0]
+rotation = [0, 0, 9] # obstacle.motion.rotation => rotation = [0, 0, 8]
+about = [0, 1, 0] # obstacle.motion.about => about = [0, 2, 0]
+duration = 1 # obstacle.motion.duration => duration = 2
+velocity = [1, 0, 0] # obstacle.motion.velocity => velocity = [2, 0, 0]
+amplitude = [0, 1, 0] # obstacle.motion.amplitude => amplitude = [0, 2, 0]
+frequency = 5 # obstacle.motion.frequency => frequency = 6
+[[obstacle]]
+shape = 'box'
+size = [1, 2, 3] # obstacle.size => size = [1, 2, 4]
+[[obstacle]]
+shape = 'plane'
+normal = [0, 0, 1] # obstacle.normal => normal = [0, 1, 1]
 )";
 
 /// The text with the value of one key changed, or of none.

@@ -283,7 +283,7 @@ TEST(Reactions, HaveTheSameBitsOnAnyNumberOfThreadsAndAfterARestart) {
       EXPECT_EQ(a[k].work, b[k].work);
     }
     EXPECT_NE(a[1].work, 0);
-    EXPECT_EQ(one.solver.support_work(), resumed.support_work());
+    EXPECT_EQ(one.solver.step_sums(), resumed.step_sums());
   }
 }
 
@@ -299,18 +299,18 @@ TEST(Reactions, CostNothingWithoutSupportsAndNoMemoryWhereNoneMoves) {
   for (Way* way : {&free, &held}) {
     way->solver.step(2);
     EXPECT_FALSE(counts_work(*way->backend));
-    EXPECT_THAT(way->solver.state().support_work, IsEmpty());
+    EXPECT_THAT(way->solver.state().step_sums, IsEmpty());
   }
   moved.solver.step(2);
   EXPECT_TRUE(counts_work(*moved.backend));
   State state = moved.solver.state();
-  EXPECT_FALSE(state.support_work.empty());
-  state.support_work.pop_back();
+  EXPECT_FALSE(state.step_sums.empty());
+  state.step_sums.pop_back();
   try {
     Solver(moved.model, *moved.backend, state, Method::verlet);
     ADD_FAILURE() << "work of another model was taken";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("allowed for the supports of this model"));
+    EXPECT_THAT(error.what(), HasSubstr("allowed for the supports and obstacles of this model"));
   }
 }
 

@@ -46,7 +46,7 @@ inline Course course_of(const Combination& row, const Model& model, Backend& bac
   solver.step();
   course.after = solver.state();
   backend.internal_forces(course.force);
-  course.energies = diagnose(model, backend, solver.now());
+  course.energies = diagnose(model, backend, solver);
   course.reactions = find_reactions(model, backend, solver);
   return course;
 }

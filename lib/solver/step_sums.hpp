@@ -1,5 +1,5 @@
-/// Forces of supports, and the work of those that move, summed over steps and phyxels without
-/// rounding.
+/// Sums over steps and phyxels, without rounding: the work of supports that move, and what
+/// obstacles have done.
 #pragma once
 
 #include <algorithm>
@@ -20,16 +20,22 @@ inline bool has_moving_supports(const Model& model) {
                      [](const Motion& motion) { return !motion.stands_still(); });
 }
 
-/// Exact sums of the work of each motion [J], shape [motions]; empty if no support moves.
-using SupportWork = std::vector<ExactSum>;
+/// Exact sums of the work of each motion [J], none if no support moves; then those of each obstacle
+/// (`ContactTerms`).
+using StepSums = std::vector<ExactSum>;
 
-/// Returns sums of zero for each motion; none if no support moves.
-inline SupportWork no_support_work(const Model& model) {
-  return SupportWork(has_moving_supports(model) ? model.motions.size() : 0);
+/// Returns the number of sums of motions, after which those of obstacles begin.
+inline std::size_t sums_of_motions(const Model& model) {
+  return has_moving_supports(model) ? model.motions.size() : 0;
+}
+
+/// Returns sums of zero.
+inline StepSums no_step_sums(const Model& model) {
+  return StepSums(sums_of_motions(model) + ContactTerms::count * model.obstacles.size());
 }
 
 /// Returns the words of exact sums, as backends and checkpoints hold them.
-inline std::vector<std::int64_t> words_of(SupportWork work) {
+inline std::vector<std::int64_t> words_of(StepSums work) {
   std::vector<std::int64_t> words;
   for (ExactSum& sum : work) {
     const std::span<const std::int64_t> ready = sum.ready();
@@ -39,7 +45,7 @@ inline std::vector<std::int64_t> words_of(SupportWork work) {
 }
 
 /// Adds words of exact sums, `sign` (1 or -1) times. No words are sums of zero.
-inline void add_words(SupportWork& work, std::span<const std::int64_t> words, int sign = 1) {
+inline void add_words(StepSums& work, std::span<const std::int64_t> words, int sign = 1) {
   work.resize(std::max(work.size(), words.size() / ExactSum::words));
   for (std::size_t k = 0; k < words.size(); ++k) {
     work[k / ExactSum::words].ready()[k % ExactSum::words] += sign * words[k];
@@ -104,7 +110,7 @@ class StepWork {
  public:
   /// @param model must outlive this
   explicit StepWork(const Model& model)
-      : model_(model), sums_(no_support_work(model)), inertia_(sums_.size()) {}
+      : model_(model), sums_(sums_of_motions(model)), inertia_(sums_.size()) {}
 
   /// Prepares for a step of `dt` [s].
   void begin_step(double dt) {
@@ -123,7 +129,7 @@ class StepWork {
     sums_[m].add(dot(support_force(inertia_[m][k], prescribed, free), mean_step));
   }
   /// The sums so far.
-  const SupportWork& sums() const { return sums_; }
+  const StepSums& sums() const { return sums_; }
   /// Bytes of its arrays.
   std::size_t bytes() const {
     std::size_t count = 0;
@@ -133,7 +139,7 @@ class StepWork {
 
  private:
   const Model& model_;
-  SupportWork sums_;
+  StepSums sums_;
   std::vector<std::vector<double>> inertia_;  // [kg/s], by motion and owned phyxel
   double dt_ = 0;                             // step of `inertia_` [s]
 };

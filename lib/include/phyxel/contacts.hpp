@@ -1,0 +1,48 @@
+/// Forces and work of obstacles.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/solver.hpp"
+
+namespace phyxel {
+
+/// What an obstacle does to the bodies, now and since t = 0.
+struct ContactReading {
+  std::string obstacle;      ///< Its name.
+  std::string shape;         ///< The name of its shape, e.g. "plane".
+  Vec3d force, torque;       ///< On the bodies [N], and about `place` [N m], over the next step.
+  Vec3d impulse;             ///< On the bodies since t = 0 [N s].
+  Vec3d angular_impulse;     ///< The same about `place` [N m s].
+  double work = 0;           ///< Of the obstacle on the bodies since t = 0 [J].
+  double friction_heat = 0;  ///< What friction has turned into heat since t = 0 [J].
+  double impact_loss = 0;    ///< What surface points have lost in impacts since t = 0 [J].
+  double depth = 0;          ///< Of the phyxel of a surface that is deepest inside, now [m].
+  Vec3d place;               ///< The obstacle's place at rest [m].
+};
+
+/// The name of an obstacle's shape in scenes.
+const char* shape_name(const Obstacle& obstacle);
+
+/// What each obstacle of a model does, in their order; none, at no cost, for a model without
+/// obstacles. Forces are those of the step of Verlet's method from the solver's present state,
+/// found from one evaluation of the forces, without taking it. Sums are exact: they do not depend
+/// on the number of threads and ranks. Of a share: those of the whole model; collective, for a
+/// solver that was made with the model.
+std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
+                                          const Solver& solver);
+
+/// A number of a reading: a column of `contacts.csv`.
+struct ContactColumn {
+  const char* name;
+  const char* unit;
+  double (*value)(const ContactReading&);
+};
+/// The numbers of a reading, in the order of the columns.
+std::span<const ContactColumn> contact_columns();
+
+}  // namespace phyxel

@@ -1,0 +1,158 @@
+/// Contact of a point with a rigid obstacle: impulses at predicted positions.
+///
+/// A step first moves all points as if nothing were in their way. Points that then lie inside an
+/// obstacle are moved onto its surface, and their velocities change by as much over the step: the
+/// force acts where the point would be, so that the stable step does not shrink, and nothing has to
+/// be tuned. Friction is Coulomb's: a sticking point has its slip taken away in each step, so that
+/// no spring has to be remembered, and a block rests on a slope for ever.
+#pragma once
+
+#include <cmath>
+
+#include "phyxel/physics/obstacle.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// How two surfaces rub and bounce.
+struct ContactLaw {
+  double static_friction = 0;   ///< μ_s: largest tangential over normal force of a point at rest.
+  double kinetic_friction = 0;  ///< μ_d: the same of a point that slides.
+  /// Speed of a point of the surface after an impact over the one before; what a body as a whole
+  /// returns comes from its elasticity.
+  double restitution = 0;
+};
+
+/// A point of a body at the end of a step, before contact.
+struct ContactPoint {
+  Vec3<double>
+      velocity;         ///< Relative to the obstacle's surface there, after all other forces [m/s].
+  Vec3<double> before;  ///< Relative velocity at the start of the step [m/s].
+  Vec3<double> free;    ///< 1 along axes on which the point is free, 0 along prescribed ones.
+};
+
+/// The changes of a point's velocity by contact over a step [m/s].
+struct ContactChange {
+  Vec3<double> normal, tangential;
+};
+
+/// The change of velocity that brings a point at a distance g < 0 from an obstacle onto its surface
+/// at the end of the step,
+///
+///   Δv_n = max(-g/Δt, -(1 + e) n · v⁻) n,   Δv_t = -v_t/|v_t| min(μ Δv_n, |v_t|),
+///
+/// where v⁻ is the relative velocity before the step, and v_t the tangential one after all other
+/// forces. Along prescribed axes nothing changes.
+/// @param gap with a negative distance. @param dt size of the step [s]
+PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point,
+                                       const ContactLaw& law, double dt) {
+  const auto freed = [&](Vec3<double> v) {
+    return Vec3<double>{v.x * point.free.x, v.y * point.free.y, v.z * point.free.z};
+  };
+  const Vec3<double> n = gap.normal, way = freed(n);
+  const double share = dot(way, n);  // of the obstacle's push that the free axes feel
+  if (!(share > 1e-6)) return {};
+  double rate = -gap.distance / dt;
+  const double approach = -dot(n, point.before);
+  if (law.restitution > 0 && approach > 0) {
+    const double rebound = (1 + law.restitution) * approach;
+    rate = rate < rebound ? rebound : rate;
+  }
+  const double push = rate / share;  // force times Δt/m
+  ContactChange change{push * way, {}};
+  if (!(law.static_friction > 0)) return change;
+  const Vec3<double> after = point.velocity + change.normal;
+  const Vec3<double> slip = freed(after - dot(after, n) * n);
+  const double speed = std::sqrt(dot(slip, slip));
+  if (!(speed > 0)) return change;
+  const bool sticks = speed <= law.static_friction * push;
+  const double hold = law.kinetic_friction * push;
+  const double part = sticks || hold > speed ? 1.0 : hold / speed;
+  change.tangential = -part * slip;
+  return change;
+}
+
+/// Where an obstacle is at the end of a step, and how it has moved, in double: what a kernel knows
+/// of it. A point y of the shape's own coordinates is at p = turn_at_rest y + place_at_rest at
+/// rest, and at turn y + place at the end of the step.
+struct ObstacleStep {
+  Mat3<double> turn;   ///< At the end of the step.
+  Vec3<double> place;  ///< Likewise [m].
+  Mat3<double> turn_at_rest;
+  Vec3<double> place_at_rest;  ///< [m]
+  /// Velocity of the obstacle over the step, and its mean over this and the step before, where a
+  /// point p at rest is: velocity + slope (p - place_at_rest) [m/s].
+  Vec3<double> velocity, mean_velocity;
+  Mat3<double> slope, mean_slope;  ///< [1/s]
+  bool hollow = false;             ///< True if points belong inside.
+  ContactLaw law;
+  double dt = 0;  ///< Size of the step [s].
+};
+
+/// The distance of a point from an obstacle of a shape, at the end of a step [m].
+template <class Shape>
+PHYXEL_HD Gap gap_to(const Shape& shape, const ObstacleStep& obstacle, Vec3<double> x) {
+  Gap gap = shape.gap(transpose(obstacle.turn) * (x - obstacle.place));
+  gap.normal = obstacle.turn * gap.normal;
+  if (obstacle.hollow) gap = {-gap.distance, -gap.normal};
+  return gap;
+}
+
+/// What contact with an obstacle adds to its sums over steps.
+struct ContactTerms {
+  /// Indices of the terms: impulse on the point [N s]; angular impulse about the obstacle's place at
+  /// rest [N m s]; work of the obstacle on the point, heat of friction, loss in the impact [J].
+  enum { impulse = 0, moment = 3, work = 6, friction_heat, impact_loss, count };
+  double value[count] = {};
+};
+
+/// A point that may touch an obstacle, at the end of a step.
+struct TouchingPoint {
+  Vec3<double> position;  ///< At the end of the step [m].
+  Vec3<double> velocity;  ///< Over the step [m/s].
+  Vec3<double> before;    ///< Velocity at the start of the step [m/s].
+  Vec3<double> free;      ///< As of `ContactPoint`.
+  double offset = 0;      ///< Its distance from its body's surface [m].
+  double inertia = 0;     ///< Mass over the gain of the step (`DampedFlow`) [kg/s].
+};
+
+/// Keeps a point out of an obstacle: changes its velocity and position, and returns true, if it
+/// would be inside.
+/// @param terms receives what is added to the obstacle's sums
+template <class Shape>
+PHYXEL_HD bool touch(const Shape& shape, const ObstacleStep& obstacle, TouchingPoint& point,
+                     ContactTerms& terms) {
+  Gap gap = gap_to(shape, obstacle, point.position);
+  gap.distance -= point.offset;
+  if (!(gap.distance < 0)) return false;
+  // The point of the obstacle that is there at the end of the step, from its place at rest.
+  const Vec3<double> arm =
+      obstacle.turn_at_rest * (transpose(obstacle.turn) * (point.position - obstacle.place));
+  const Vec3<double> surface = obstacle.velocity + obstacle.slope * arm;
+  const Vec3<double> mean = obstacle.mean_velocity + obstacle.mean_slope * arm;
+  const Vec3<double> before = 2.0 * mean - surface;  // velocity of the surface in the step before
+  const ContactChange change =
+      contact_change(gap, {point.velocity - surface, point.before - before, point.free},
+                     obstacle.law, obstacle.dt);
+  const Vec3<double> all = change.normal + change.tangential;
+  const Vec3<double> start = point.position - obstacle.dt * point.velocity;
+  point.velocity += all;
+  point.position += obstacle.dt * all;
+  const double mass = point.inertia * obstacle.dt;
+  const Vec3<double> impulse = mass * all;
+  const Vec3<double> moment = cross(start - obstacle.place_at_rest, impulse);
+  const Vec3<double> relative = 0.5 * (point.before + point.velocity) - mean;
+  const double sums[] = {impulse.x,
+                         impulse.y,
+                         impulse.z,
+                         moment.x,
+                         moment.y,
+                         moment.z,
+                         dot(impulse, mean),
+                         -mass * dot(change.tangential, relative),
+                         -mass * dot(change.normal, relative)};
+  for (int k = 0; k < ContactTerms::count; ++k) terms.value[k] = sums[k];
+  return true;
+}
+
+}  // namespace phyxel

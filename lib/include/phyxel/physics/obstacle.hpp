@@ -1,0 +1,102 @@
+/// The interface of an obstacle's shape: a rigid body with a signed distance. A shape is a struct
+/// in a file of its own under `physics/obstacles/`, named once in the list of
+/// `physics/obstacles.hpp`. In its own coordinates, before it is turned and moved, it has
+///
+///   static constexpr const char* name, *meaning;    its name in scenes, and one sentence for users
+///   static constexpr ObstacleLength lengths[];      the lengths that a user gives
+///   the same lengths, in their order, as the only data members [m], each a `double`
+///   gap(x)                       distance of a point from the surface, and the direction away from
+///   it
+#pragma once
+
+#include <cmath>
+#include <cstring>
+#include <type_traits>
+
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// The place of a point beside the surface of an obstacle.
+struct Gap {
+  double distance = 0;    ///< From the surface [m]; negative inside the obstacle.
+  Vec3<double> normal{};  ///< Unit vector away from the obstacle, the gradient of the distance.
+};
+
+/// One length of an obstacle's shape, as users give it.
+struct ObstacleLength {
+  const char* name;     ///< The key in scenes.
+  const char* meaning;  ///< One sentence for the reference of scenes.
+};
+
+/// Keys of lengths. The three components of `size` are three lengths of a shape.
+inline constexpr ObstacleLength obstacle_size[] = {
+    {"size", "along x"}, {"size", "along y"}, {"size", "along z"}};
+inline constexpr ObstacleLength obstacle_radius{"radius", "Radius."};
+inline constexpr ObstacleLength obstacle_length{"length", "Length along z."};
+
+/// The largest number of lengths of a shape.
+inline constexpr int most_obstacle_lengths = 3;
+
+/// The distance from a convex shape given by a point's distances beyond its faces along two or
+/// three orthogonal directions [m], negative inside: that to the nearest point of an edge or corner
+/// if the point is beyond several faces, that to the nearest face inside.
+/// @param beyond distance beyond the face along each direction. @param direction unit vectors
+template <int n>
+PHYXEL_HD Gap gap_of_faces(const double (&beyond)[n], const Vec3<double> (&direction)[n]) {
+  double square = 0;
+  Vec3<double> way{};
+  int nearest = 0;
+  for (int k = 0; k < n; ++k) {
+    if (beyond[k] > beyond[nearest]) nearest = k;
+    if (beyond[k] <= 0) continue;
+    square += beyond[k] * beyond[k];
+    way += beyond[k] * direction[k];
+  }
+  if (square == 0) return {beyond[nearest], direction[nearest]};
+  const double distance = std::sqrt(square);
+  return {distance, (1 / distance) * way};
+}
+
+/// The distance from a sphere about the origin. At its centre, where no direction is nearest, z is.
+PHYXEL_HD Gap gap_of_sphere(Vec3<double> x, double radius) {
+  const double r = std::sqrt(dot(x, x));
+  return {r - radius, r > 0 ? (1 / r) * x : Vec3<double>{0, 0, 1}};
+}
+
+/// The shapes of obstacles: `with` selects one at run time by its index.
+template <class... Shapes>
+struct ObstacleList {
+  static constexpr int count = sizeof...(Shapes);
+
+  /// Calls visit(std::type_identity<Shape>{}) for each shape, in the order of the list.
+  template <class Visit>
+  static void for_each(Visit&& visit) {
+    (visit(std::type_identity<Shapes>{}), ...);
+  }
+  /// Returns apply(shape) for the shape of an index, made from its lengths [m].
+  template <class Apply>
+  static auto with(int index, const double* lengths, Apply&& apply) {
+    return with_from<0, Apply, Shapes...>(index, lengths, apply);
+  }
+
+ private:
+  template <class Shape>
+  static Shape made(const double* lengths) {
+    Shape shape{};
+    if constexpr (!std::is_empty_v<Shape>) {
+      static_assert(std::is_trivially_copyable_v<Shape>);
+      std::memcpy(&shape, lengths, sizeof(Shape));
+    }
+    return shape;
+  }
+  template <int first, class Apply, class Here, class... Rest>
+  static auto with_from(int index, const double* lengths, Apply& apply) {
+    if constexpr (sizeof...(Rest) > 0) {
+      if (index != first) return with_from<first + 1, Apply, Rest...>(index, lengths, apply);
+    }
+    return apply(made<Here>(lengths));
+  }
+};
+
+}  // namespace phyxel

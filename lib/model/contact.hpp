@@ -1,0 +1,54 @@
+/// Obstacles of a scene, and the phyxels by which bodies touch them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// The obstacles of a scene, in its order.
+std::vector<Obstacle> obstacles_of(const Scene& scene);
+
+/// Refuses a body that cannot touch anything: one without a surface.
+/// @throws InputError naming the body and what is allowed
+void check_touches(const BodyRequest& request, std::span<const Triangle> triangles);
+
+/// The distance of each phyxel of a body from the body's surface, as far as that counts for contact
+/// [m]; infinity for phyxels that are farther inside.
+/// @param spacing distance between phyxels near each [m], shape [n]
+/// @param first the number of the surface's first vertex in `triangles`
+std::vector<double> distances_from_surface(std::span<const Vec3d> position,
+                                           std::span<const double> spacing,
+                                           std::span<const Vec3d> surface,
+                                           std::span<const Triangle> triangles, Index first);
+
+/// How many phyxels of a body lie on its surface, and how many beside it.
+struct LayerCounts {
+  std::int64_t on = 0, beside = 0;
+  void add(double distance, double spacing);
+  /// True if the phyxels on the surface are enough to touch with, so that others do not count.
+  bool has_layer() const { return 2 * on >= beside; }
+};
+
+/// The distance of a phyxel that touches from its body's surface [m]; negative for one that does
+/// not. @param has_layer `LayerCounts::has_layer` of its body
+double contact_offset(double distance, double spacing, bool has_layer);
+
+/// Adds the obstacles of a scene to a model that is no share, and the phyxels that touch them.
+/// @throws InputError for bodies without a surface, and for those inside an obstacle at the start
+void add_contact(Model& model, const Scene& scene);
+
+/// Makes the contact layer of a model from the offsets of all its phyxels (`contact_offset`), but
+/// for ghosts, and for those that are held or moved along all axes.
+void add_contact_layer(Model& model, std::span<const double> offset);
+
+/// The error of a model whose bodies are inside an obstacle at the start: what overlaps would be
+/// pushed out in one step, and fly away. Empty if none is. Of a share: collective, and empty on all
+/// ranks but one.
+std::string overlap_at_start(const Model& model, const Scene& scene);
+
+}  // namespace phyxel

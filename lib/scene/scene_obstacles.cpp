@@ -1,0 +1,127 @@
+#include "scene/scene_obstacles.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "phyxel/error.hpp"
+#include "phyxel/physics/obstacles.hpp"
+#include "scene/scene_body.hpp"
+
+namespace phyxel {
+namespace {
+
+/// The keys of the lengths that a shape has; nothing for an unknown one.
+std::optional<std::set<std::string>> keys_of_shape(const std::string& shape) {
+  std::optional<std::set<std::string>> keys;
+  ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
+    if (shape != Shape::name) return;
+    keys.emplace();
+    for (const ObstacleLength& length : Shape::lengths) keys->insert(length.name);
+  });
+  return keys;
+}
+
+constexpr const char* keys_of_lengths[] = {"size", "radius", "length"};
+
+/// Refuses lengths that an obstacle's shape does not have, and asks for those that it needs.
+void check_lengths(const SceneTable& table, const std::string& shape) {
+  const std::set<std::string> needed = *keys_of_shape(shape);
+  for (const char* name : keys_of_lengths) {
+    if (table.has(name) && !needed.contains(name)) {
+      table.refuse(
+          name,
+          fmt::format("found, but shape = \"{}\" does not use it; allowed with it: {}", shape,
+                      needed.empty() ? "no length" : fmt::format("{}", fmt::join(needed, ", "))));
+    }
+    if (!table.has(name) && needed.contains(name)) {
+      throw InputError(fmt::format("{}: key obstacle.{}: missing; shape = \"{}\" needs it",
+                                   table.where("shape"), name, shape));
+    }
+  }
+}
+
+ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number) {
+  ObstacleRequest obstacle{.name = fmt::format("obstacle {}", number), .where = table.where()};
+  table.read("name", obstacle.name);
+  table.read("shape", obstacle.shape);
+  check_lengths(table, obstacle.shape);
+  table.read("size", obstacle.size);
+  table.read("radius", obstacle.radius);
+  table.read("length", obstacle.length);
+  if (table.has("normal")) {
+    if (obstacle.shape != PlaneObstacle::name) {
+      table.refuse("normal", fmt::format("found with shape = \"{}\"; allowed with \"{}\" only",
+                                         obstacle.shape, PlaneObstacle::name));
+    }
+    table.expect_apart("normal", "rotation");
+  }
+  table.read("normal", obstacle.normal);
+  table.read("hollow", obstacle.hollow);
+  table.read("rotation", obstacle.rotation);
+  table.read("translation", obstacle.translation);
+  table.read("friction", obstacle.friction);
+  table.read("kinetic_friction", obstacle.kinetic_friction);
+  table.read("restitution", obstacle.restitution);
+  if (table.has("motion")) read_path(table.table("motion"), obstacle.motion);
+  check_obstacle(obstacle);
+  return obstacle;
+}
+
+}  // namespace
+
+std::vector<ObstacleRequest> read_obstacles(const SceneTable& root) {
+  std::vector<ObstacleRequest> obstacles;
+  std::map<std::string, std::string> places;  // of each name
+  for (const SceneTable& table : root.tables("obstacle")) {
+    ObstacleRequest obstacle = read_obstacle(table, obstacles.size() + 1);
+    const auto [earlier, is_new] = places.emplace(obstacle.name, obstacle.where);
+    if (!is_new) {
+      table.refuse("name", fmt::format("{} found, the name of the obstacle at {} too; allowed: a "
+                                       "name of its own for each obstacle",
+                                       in_quotes(obstacle.name), earlier->second));
+    }
+    if (obstacles.size() == most_obstacles) {
+      throw InputError(fmt::format("{}: obstacle: more than {} found; allowed: at most {}",
+                                   obstacle.where, most_obstacles, most_obstacles));
+    }
+    obstacles.push_back(std::move(obstacle));
+  }
+  return obstacles;
+}
+
+void check_obstacle(const ObstacleRequest& obstacle) {
+  const auto refuse = [&](const std::string& key, const std::string& problem) {
+    throw InputError(fmt::format("{}{}key obstacle.{} of obstacle \"{}\": {}", obstacle.where,
+                                 obstacle.where.empty() ? "" : ": ", key, obstacle.name, problem));
+  };
+  const auto keys = keys_of_shape(obstacle.shape);
+  if (!keys) {
+    std::vector<std::string> names;
+    ObstacleShapes::for_each(
+        [&]<class Shape>(std::type_identity<Shape>) { names.emplace_back(Shape::name); });
+    refuse("shape",
+           fmt::format("{} found; allowed: {}", in_quotes(obstacle.shape), fmt::join(names, ", ")));
+  }
+  const auto needs_positive = [&](const char* key, double value) {
+    if (keys->contains(key) && !(value > 0)) {
+      refuse(key, fmt::format("{:g} found; allowed: a length above 0 m", value));
+    }
+  };
+  needs_positive("size", std::min({obstacle.size.x, obstacle.size.y, obstacle.size.z}));
+  needs_positive("radius", obstacle.radius);
+  needs_positive("length", obstacle.length);
+  if (obstacle.normal && *obstacle.normal == Vec3d{}) {
+    refuse("normal", "[0, 0, 0] found; allowed: a direction");
+  }
+  if (obstacle.kinetic_friction && *obstacle.kinetic_friction > obstacle.friction) {
+    refuse("kinetic_friction", fmt::format("{:g} found, above a friction of {:g}; allowed: at most "
+                                           "that of a point at rest",
+                                           *obstacle.kinetic_friction, obstacle.friction));
+  }
+}
+
+}  // namespace phyxel

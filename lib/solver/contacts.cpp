@@ -1,0 +1,133 @@
+#include "phyxel/contacts.hpp"
+
+#include <algorithm>
+
+#include "phyxel/physics/obstacles.hpp"
+#include "rank_sums.hpp"
+#include "solver/present_forces.hpp"
+#include "solver/step_contacts.hpp"
+
+namespace phyxel {
+namespace {
+
+/// The sums of each obstacle over the step from an instant, on this rank, as `StepContacts` would
+/// add them.
+StepSums sums_of_next_step(const Model& model, const SupportInstant& now, const State& state) {
+  StepContacts contacts(model, 1);
+  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
+  const std::vector<Vec3d> free = free_axes(model);
+  State next{.displacement = state.displacement, .velocity = state.velocity};
+  for (const Index i : model.contact.phyxels) {
+    const DampedFlow flow = damped_flow(part_of(model, i).material.damping, now.dt);
+    Vec3d& v = next.velocity[i];
+    v = flow.keep * v + (flow.gain / model.mass[i]) * now.other_force[i];
+    if (!free.empty()) v = by_components(free[i], v);
+    next.displacement[i] += now.dt * v;
+  }
+  std::vector<Vec3d> prescribed = next.displacement;
+  prescribe_displacements(model, now.time + now.dt, prescribed);
+  if (!free.empty()) {
+    for (const Index i : model.contact.phyxels) {
+      const Vec3d way = prescribed[i] - state.displacement[i];
+      next.velocity[i] += (1 / now.dt) * (way - by_components(free[i], way));
+      next.displacement[i] = prescribed[i];
+    }
+  }
+  contacts.keep_out([](Index) { return true; },
+                    [&](Index i) {
+                      return Touched{next.displacement[i], next.velocity[i]};
+                    },
+                    [&](Index i, const Touched& to) {
+                      next.displacement[i] = to.displacement;
+                      next.velocity[i] = to.velocity;
+                    });
+  return contacts.sums();
+}
+
+Vec3d vector_of(std::span<const ExactSum> sums) {
+  return {sums[0].value(), sums[1].value(), sums[2].value()};
+}
+
+/// Depth of the deepest phyxel of a contact layer in an obstacle [m], 0 if none is inside. Of a
+/// share: collective.
+double depth_in(const Model& model, const Obstacle& obstacle, double time, const State& state) {
+  const ContactLayer& layer = model.contact;
+  const ObstacleStep here = obstacle.step_from(time, 0);
+  double deepest = 0;
+  ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+    for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
+      const Index i = layer.phyxels[k];
+      const Gap gap = gap_to(shape, here, model.position[i] + state.displacement[i]);
+      deepest = std::max(deepest, layer.offset[k] - gap.distance);
+    }
+  });
+  return model.share ? model.share->communicator->largest(deepest) : deepest;
+}
+
+}  // namespace
+
+const char* shape_name(const Obstacle& obstacle) {
+  return ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [](const auto& shape) {
+    return std::decay_t<decltype(shape)>::name;
+  });
+}
+
+std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
+                                          const Solver& solver) {
+  check_fits(model, backend);
+  if (model.obstacles.empty()) return {};
+  const PresentForces present(model, backend, solver);
+  const SupportInstant now = present.instant();
+  StepSums next = sums_of_next_step(model, now, present.state());
+  add_over_ranks(model, next);
+  StepSums all = no_step_sums(model);
+  add_words(all, solver.step_sums());
+  std::vector<ContactReading> readings;
+  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+    constexpr std::size_t count = ContactTerms::count;
+    const std::span<const ExactSum> step = std::span(next).subspan(o * count, count);
+    const std::span<const ExactSum> sums =
+        std::span(all).subspan(sums_of_motions(model) + o * count, count);
+    const Obstacle& obstacle = model.obstacles[o];
+    readings.push_back({.obstacle = obstacle.name,
+                        .shape = shape_name(obstacle),
+                        .force = vector_of(step.subspan(ContactTerms::impulse, 3)) / now.dt,
+                        .torque = vector_of(step.subspan(ContactTerms::moment, 3)) / now.dt,
+                        .impulse = vector_of(sums.subspan(ContactTerms::impulse, 3)),
+                        .angular_impulse = vector_of(sums.subspan(ContactTerms::moment, 3)),
+                        .work = sums[ContactTerms::work].value(),
+                        .friction_heat = sums[ContactTerms::friction_heat].value(),
+                        .impact_loss = sums[ContactTerms::impact_loss].value(),
+                        .depth = depth_in(model, obstacle, now.time, present.state()),
+                        .place = obstacle.place});
+  }
+  return readings;
+}
+
+std::span<const ContactColumn> contact_columns() {
+  using R = const ContactReading&;
+  static const ContactColumn columns[] = {
+      {"force_x", "N", [](R r) { return r.force.x; }},
+      {"force_y", "N", [](R r) { return r.force.y; }},
+      {"force_z", "N", [](R r) { return r.force.z; }},
+      {"torque_x", "N m", [](R r) { return r.torque.x; }},
+      {"torque_y", "N m", [](R r) { return r.torque.y; }},
+      {"torque_z", "N m", [](R r) { return r.torque.z; }},
+      {"impulse_x", "N s", [](R r) { return r.impulse.x; }},
+      {"impulse_y", "N s", [](R r) { return r.impulse.y; }},
+      {"impulse_z", "N s", [](R r) { return r.impulse.z; }},
+      {"angular_impulse_x", "N m s", [](R r) { return r.angular_impulse.x; }},
+      {"angular_impulse_y", "N m s", [](R r) { return r.angular_impulse.y; }},
+      {"angular_impulse_z", "N m s", [](R r) { return r.angular_impulse.z; }},
+      {"work", "J", [](R r) { return r.work; }},
+      {"friction_heat", "J", [](R r) { return r.friction_heat; }},
+      {"impact_loss", "J", [](R r) { return r.impact_loss; }},
+      {"depth", "m", [](R r) { return r.depth; }},
+      {"place_x", "m", [](R r) { return r.place.x; }},
+      {"place_y", "m", [](R r) { return r.place.y; }},
+      {"place_z", "m", [](R r) { return r.place.z; }},
+  };
+  return columns;
+}
+
+}  // namespace phyxel
