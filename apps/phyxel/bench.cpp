@@ -16,6 +16,7 @@
 #include "cantilever.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
+#include "model/box.hpp"
 #include "phyxel/phyxel.hpp"
 #include "printed_table.hpp"
 #include "setup.hpp"
@@ -176,11 +177,15 @@ void bench_step(const BenchOptions& options) {
     copy.push_back(device.gpu ? cuda_copy_bandwidth() : copy_bandwidth(threads));
   }
   for (const auto& [terms, size, factor] : step_cases(options)) {
-    const Scene scene = bench_scene(terms, factor, options.bodies);
+    Scene scene = bench_scene(terms, factor, options.bodies);
     std::vector<Cloud> clouds;
     const bool surfels = terms == "surfels";
-    // Closed gradients need a surface, which then is not moved.
-    clouds.push_back(bench_cloud(options.shape, size, surfels || terms == "closure"));
+    // Closed gradients and contact need a surface, which then is not moved.
+    const bool has_surface = surfels || terms == "closure" || terms == "obstacle";
+    clouds.push_back(bench_cloud(options.shape, size, has_surface));
+    for (ObstacleRequest& floor : scene.obstacles) {
+      floor.translation.z = box_around(clouds[0].surface.position).low.z;
+    }
     clouds.resize(scene.bodies.size(), clouds[0]);
     const Model model = build_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);

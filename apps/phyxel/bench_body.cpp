@@ -23,7 +23,7 @@ std::vector<std::string> bench_terms() {
   std::vector<std::string> terms;
   for (const LawEntry& law : law_table()) terms.push_back(term_of(law));
   for (const char* term :
-       {"volume", "hourglass", "closure", "damping", "load", "adaptive", "surfels"}) {
+       {"volume", "hourglass", "closure", "damping", "load", "adaptive", "obstacle", "surfels"}) {
     terms.emplace_back(term);
   }
   return terms;
@@ -63,6 +63,7 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   if (terms == "damping") body.material.damping = 0.1;
   if (terms == "load") body.loads.push_back({.select = {.all = true}, .force = {1, 0, 0}});
   if (terms == "adaptive") body.neighbourhood.support = NeighbourhoodRule::Support::adaptive;
+  if (terms == "obstacle") scene.obstacles.push_back({.name = "floor", .shape = "plane"});
   body.neighbourhood.factor = factor;
   scene.bodies.assign(static_cast<std::size_t>(bodies), body);
   return scene;

@@ -7,6 +7,7 @@
 
 #include "check.hpp"
 #include "exact_sum.hpp"
+#include "setup/primitives.cuh"
 #include "solver/host_arrays.cuh"
 
 namespace phyxel::cuda {

@@ -110,18 +110,23 @@ std::vector<Obstacle> obstacles_of(const Scene& scene) {
   return all;
 }
 
-ObstacleStep Obstacle::step_from(double time, double dt) const {
+ObstacleStep Obstacle::step_between(const Path& before, const Path& after, double dt) const {
   ObstacleStep step{.turn_at_rest = turn, .place_at_rest = place};
-  const Path before = motion.path_at(time), after = motion.path_at(time + dt);
   step.turn = (identity<double>() + after.turn) * turn;
   step.place = place + after.at(place);
   step.hollow = hollow;
   step.law = law;
   step.dt = dt;
   if (dt == 0 || motion.stands_still()) return step;
-  const Path mean = motion.mean_step(time, dt);
   step.velocity = (after.at(place) - before.at(place)) / dt;
   step.slope = (1 / dt) * (after.turn - before.turn);
+  return step;
+}
+
+ObstacleStep Obstacle::step_from(double time, double dt) const {
+  ObstacleStep step = step_between(motion.path_at(time), motion.path_at(time + dt), dt);
+  if (dt == 0 || motion.stands_still()) return step;
+  const Path mean = motion.mean_step(time, dt);
   step.mean_velocity = mean.at(place) / dt;
   step.mean_slope = (1 / dt) * mean.turn;
   return step;

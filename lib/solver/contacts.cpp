@@ -4,6 +4,7 @@
 
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
+#include "solver/contact_penalty.hpp"
 #include "solver/present_forces.hpp"
 #include "solver/step_contacts.hpp"
 
@@ -48,11 +49,43 @@ Vec3d vector_of(std::span<const ExactSum> sums) {
   return {sums[0].value(), sums[1].value(), sums[2].value()};
 }
 
+/// What obstacles do over a time, as sums of each (`ContactTerms`) on this rank.
+struct ContactRates {
+  StepSums sums;
+  double span = 1;  ///< [s]
+};
+
+/// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by the
+/// penalties of implicit steps and searches for equilibrium.
+/// @param state receives the present displacements and velocities
+ContactRates rates_now(const Model& model, Backend& backend, const Solver& solver, State& state) {
+  if (solver.method() == Method::verlet) {
+    const PresentForces present(model, backend, solver);
+    const SupportInstant now = present.instant();
+    state = present.state();
+    return {sums_of_next_step(model, now, state), now.dt};
+  }
+  backend.download(state);
+  const std::span<const ExactSum> known = solver.end_contact();
+  if (!known.empty()) return {StepSums(known.begin(), known.end())};
+  const ContactPenalty penalty(model);
+  const PlacedObstacles at =
+      solver.method() == Method::equilibrium
+          ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
+          : obstacles_over(model, solver.time(), solver.dt());
+  ContactRates rates{StepSums(ContactTerms::count * model.obstacles.size())};
+  penalty.add_to(at, state.displacement, state.velocity, rates.span, rates.sums);
+  return rates;
+}
+
 /// Depth of the deepest phyxel of a contact layer in an obstacle [m], 0 if none is inside. Of a
 /// share: collective.
-double depth_in(const Model& model, const Obstacle& obstacle, double time, const State& state) {
+double depth_in(const Model& model, std::size_t o, const Solver& solver, const State& state) {
+  const Obstacle& obstacle = model.obstacles[o];
   const ContactLayer& layer = model.contact;
-  const ObstacleStep here = obstacle.step_from(time, 0);
+  const ObstacleStep here = solver.method() == Method::equilibrium
+                                ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)[o]
+                                : obstacle.step_from(solver.time(), 0);
   double deepest = 0;
   ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
     for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
@@ -76,29 +109,28 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver) {
   check_fits(model, backend);
   if (model.obstacles.empty()) return {};
-  const PresentForces present(model, backend, solver);
-  const SupportInstant now = present.instant();
-  StepSums next = sums_of_next_step(model, now, present.state());
-  add_over_ranks(model, next);
+  State state;
+  ContactRates rates = rates_now(model, backend, solver, state);
+  add_over_ranks(model, rates.sums);
   StepSums all = no_step_sums(model);
   add_words(all, solver.step_sums());
   std::vector<ContactReading> readings;
   for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     constexpr std::size_t count = ContactTerms::count;
-    const std::span<const ExactSum> step = std::span(next).subspan(o * count, count);
+    const std::span<const ExactSum> step = std::span(rates.sums).subspan(o * count, count);
     const std::span<const ExactSum> sums =
         std::span(all).subspan(sums_of_motions(model) + o * count, count);
     const Obstacle& obstacle = model.obstacles[o];
     readings.push_back({.obstacle = obstacle.name,
                         .shape = shape_name(obstacle),
-                        .force = vector_of(step.subspan(ContactTerms::impulse, 3)) / now.dt,
-                        .torque = vector_of(step.subspan(ContactTerms::moment, 3)) / now.dt,
+                        .force = vector_of(step.subspan(ContactTerms::impulse, 3)) / rates.span,
+                        .torque = vector_of(step.subspan(ContactTerms::moment, 3)) / rates.span,
                         .impulse = vector_of(sums.subspan(ContactTerms::impulse, 3)),
                         .angular_impulse = vector_of(sums.subspan(ContactTerms::moment, 3)),
                         .work = sums[ContactTerms::work].value(),
                         .friction_heat = sums[ContactTerms::friction_heat].value(),
                         .impact_loss = sums[ContactTerms::impact_loss].value(),
-                        .depth = depth_in(model, obstacle, now.time, present.state()),
+                        .depth = depth_in(model, o, solver, state),
                         .place = obstacle.place});
   }
   return readings;

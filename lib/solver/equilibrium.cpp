@@ -23,13 +23,15 @@ Balance whole_balance(const Model& model, const Newton& newton) {
   balance.target = vectors.make();
   balance.free = free_axes(model);
   balance.free.resize(balance.target.size(), {1, 1, 1});
-  for (const Motion& motion : model.motions) {
+  const auto refuse_endless = [](const Motion& motion) {
     if (motion.velocity != Vec3d{} || motion.amplitude != Vec3d{}) {
       throw InputError(
           "a motion with a velocity or an amplitude never ends: allowed in a search for "
           "equilibrium are fixed phyxels and motions by a displacement");
     }
-  }
+  };
+  for (const Motion& motion : model.motions) refuse_endless(motion);
+  for (const Obstacle& obstacle : model.obstacles) refuse_endless(obstacle.motion);
   newton.set_applied(full_loads, balance);
   return balance;
 }
@@ -49,6 +51,7 @@ void set_targets(const Model& model, double share, Balance& balance) {
 int stages_of(const Model& model) {
   double angle = 0;
   for (const Motion& motion : model.motions) angle = std::max(angle, norm(motion.rotation));
+  for (const Obstacle& o : model.obstacles) angle = std::max(angle, norm(o.motion.rotation));
   return std::max(1, static_cast<int>(std::ceil(angle / (std::numbers::pi / 4) - 1e-9)));
 }
 
@@ -110,7 +113,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   newton.observe(options.observer);
   const OwnedVectors& vectors = newton.vectors();
   Balance balance = whole_balance(model, newton);
-  refuse_unsupported_bodies(model, balance);
+  if (model.obstacles.empty()) refuse_unsupported_bodies(model, balance);  // else they may hold
   Equilibrium found;
   backend.set_history_interval(0);
   backend.download(found.state);
@@ -123,6 +126,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
       options.start ? stage_of(model, vectors, balance, stages, found.state.displacement) : 1;
   for (int stage = first; stage <= stages; ++stage) {
     set_targets(model, static_cast<double>(stage) / stages, balance);
+    balance.obstacles = obstacles_after(model, static_cast<double>(stage) / stages);
     const bool last = stage == stages;
     const double tolerance = last ? options.tolerance : std::max(options.tolerance, on_the_way);
     report = newton.solve(balance, tolerance, found.state.displacement);

@@ -49,6 +49,7 @@ ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vecto
     balance_.weight[i] = model_.mass[i] * slowed(i) / (s * s);
     balance_.centre[i] = from[i] + (s / slowed(i)) * v[i];
   });
+  balance_.obstacles = obstacles_over(model_, time, s);
   const Vector inner = newton_.inner_forces(u);
   balance_.scale = std::sqrt(vectors.product(inner, inner)) + std::sqrt(vectors.sum([&](Index i) {
                      const Vec3d force =
@@ -93,12 +94,20 @@ void ImplicitStep::add_support_work(const SupportInstant& now) {
   }
 }
 
+void ImplicitStep::add_contact(const Vector& u, const Vector& v, double time,
+                               StepSums& sums) const {
+  newton_.contact().add_to(balance_.obstacles, u, v, time,
+                           std::span(sums).subspan(sums_of_motions(model_)));
+}
+
 void ImplicitStep::take(State& state) {
   const State before = state;
+  const StepSums sums = support_work_;
   try {
     take_both_stages(state);
   } catch (...) {
     state = before;
+    support_work_ = sums;
     throw;
   }
 }
@@ -112,12 +121,14 @@ void ImplicitStep::take_both_stages(State& state) {
   Vector& u2 = state.displacement;
   Vector& v2 = state.velocity;
   Vector first_force;
-  if (state.step == 0 && !support_work_.empty()) {
+  if (state.step == 0 && sums_of_motions(model_) > 0) {
     newton_.set_applied(begin, balance_);
+    balance_.obstacles = obstacles_over(model_, begin, 0);
     first_force = newton_.acting_forces(balance_, u);
   }
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);
+  add_contact(u2, v2, rest, support_work_);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
   // step.
   Vector from = vectors.make();
@@ -128,6 +139,9 @@ void ImplicitStep::take_both_stages(State& state) {
   });
   backend_.set_history_interval(dt);
   Vector force = take_stage(end, s, from, u2, v2);
+  add_contact(u2, v2, s, support_work_);
+  end_contact_ = no_step_sums(model_);
+  add_contact(u2, v2, 1, end_contact_);
   Vector before = vectors.make(), after = vectors.make();
   prescribe_displacements(model_, begin, before);
   prescribe_displacements(model_, end, after);

@@ -29,8 +29,15 @@ class ImplicitStep {
   /// All forces but those of supports [N] at the end of the last step, shape [n]; empty before the
   /// first step, and without supports.
   const std::vector<Vec3d>& end_force() const { return end_force_; }
-  /// Work of supports [J] by the rule of `Solver::step_sums`, on the phyxels of this rank.
+  /// Work of supports and sums of obstacles, by the rule of `Solver::step_sums`, on the phyxels of
+  /// this rank.
   const StepSums& step_sums() const { return support_work_; }
+  /// What the obstacles would do in a second at the end of the last step, on the phyxels of this
+  /// rank (`ContactTerms`); empty before the first step.
+  std::span<const ExactSum> end_contact() const {
+    if (end_contact_.empty()) return {};
+    return std::span(end_contact_).subspan(sums_of_motions(model_));
+  }
 
  private:
   using Vector = Newton::Vector;
@@ -42,6 +49,8 @@ class ImplicitStep {
   void take_both_stages(State& state);
   /// Adds the work of supports at an instant.
   void add_support_work(const SupportInstant& now);
+  /// Adds what contact does over a time [s] at the end of a stage.
+  void add_contact(const Vector& u, const Vector& v, double time, StepSums& sums) const;
 
   const Model& model_;
   Backend& backend_;
@@ -51,6 +60,7 @@ class ImplicitStep {
   NewtonReport work_;
   Vector end_force_;
   StepSums support_work_;
+  StepSums end_contact_;
 };
 
 }  // namespace phyxel

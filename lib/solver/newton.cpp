@@ -42,6 +42,7 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       most_steps_(most_steps),
       vectors_(model, std::max(1, backend.threads())),
       following_(model),
+      contact_(model),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
 NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
@@ -51,11 +52,14 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
   double smallest = std::numeric_limits<double>::infinity();
   int without_gain = 0, exhausted = 0;
   find_stiffness(balance);
-  Vector force = forces(balance, u), step = vectors_.make(), next = vectors_.make();
-  double energy = potential(balance, u);
+  // Forces and energies without contact, whose stiffness is known and needs no differences.
+  Vector force = forces_without_contact(balance, u), step = vectors_.make(), next = vectors_.make();
+  double plain_energy = potential(balance, u);
   for (;;) {
-    report.residual = residual(balance, u, force);
-    report.evaluations = evaluations_;
+    contact_.linearise(balance.obstacles, u);
+    const Vector all = with_contact(balance, u, force);
+    const double energy = plain_energy + contact_.energy(balance.obstacles, u);
+    report.residual = residual(balance, u, all);
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
     report.found = report.residual <= tolerance && to_move == 0;
@@ -85,7 +89,7 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     }
     ++report.steps;
 
-    const Inner inner = find_step(balance, u, force, step);
+    const Inner inner = find_step(balance, u, force, all, step);
     exhausted = inner == Inner::exhausted ? exhausted + 1 : 0;
     if (inner == Inner::interrupted) {
       report.interrupted = true;
@@ -101,15 +105,18 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
               by_components(balance.free[i], next[i]) + held_part(balance, i, balance.target[i]);
         }
       });
-      force = forces(balance, next);
-      const double now = potential(balance, next);
+      force = forces_without_contact(balance, next);
+      const double plain = potential(balance, next);
+      const double now = plain + contact_.energy(balance.obstacles, next);
       // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
       // that follows the surface has an energy only nearly: there, smaller residuals do as well.
       const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
       const bool falls = rise <= rounding ||
-                         (!following_.empty() && residual(balance, next, force) < report.residual);
+                         (!following_.empty() &&
+                          residual(balance, next, with_contact(balance, next, force)) <
+                              report.residual);
       if (std::isfinite(now) && (to_move > 0 || falls || attempt == most_cuts)) {
-        energy = now;
+        plain_energy = plain;
         break;
       }
       if (attempt > 2 * most_cuts) {
@@ -147,7 +154,7 @@ void Newton::set_applied(double time, Balance& balance) const {
   balance.scale = std::sqrt(vectors_.product(rest, rest));
 }
 
-Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
+Newton::Vector Newton::acting_without_contact(const Balance& balance, const Vector& u) {
   Vector force = inner_forces(u);
   vectors_.for_each([&](Index i) { force[i] += balance.applied[i]; });
   following_.add(
@@ -155,9 +162,18 @@ Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
   return force;
 }
 
-/// The sum of all forces at u, those of inertia included [N].
-Newton::Vector Newton::forces(const Balance& balance, const Vector& u) {
-  Vector force = acting_forces(balance, u);
+Newton::Vector Newton::with_contact(const Balance& balance, const Vector& u, Vector force) const {
+  if (!contact_.empty()) contact_.add(balance.obstacles, u, force);
+  return force;
+}
+
+Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
+  return with_contact(balance, u, acting_without_contact(balance, u));
+}
+
+/// The sum of all forces at u but those of contact, those of inertia included [N].
+Newton::Vector Newton::forces_without_contact(const Balance& balance, const Vector& u) {
+  Vector force = acting_without_contact(balance, u);
   if (!balance.weight.empty()) {
     vectors_.for_each([&](Index i) {
       force[i] -= balance.weight[i] * by_components(balance.free[i], u[i] - balance.centre[i]);
@@ -172,7 +188,8 @@ void Newton::put(const Vector& u) {
   backend_.put_displacements(placed_);
 }
 
-/// The potential energy [J] at u. Call right after `forces` at the same u.
+/// The potential energy [J] at u without that of contact. Call right after
+/// `forces_without_contact` at the same u.
 double Newton::potential(const Balance& balance, const Vector& u) {
   // Includes the incremental potentials of plastic and viscous stresses over one step.
   const Diagnostics now = diagnose(model_, backend_, 0, 1);
@@ -198,7 +215,7 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
   const double reactions =
       vectors_.sum([&](Index i) { return dot(held_part(balance, i, force[i]), force[i]); });
   const double scale = std::sqrt(vectors_.product(balance.applied, balance.applied)) +
-                       std::sqrt(reactions) + balance.scale +
+                       std::sqrt(reactions) + std::sqrt(contact_.squared_size()) + balance.scale +
                        rounding_share * std::sqrt(vectors_.sum([&](Index i) {
                          return stiffness_[i] * stiffness_[i] * dot(u[i], u[i]);
                        }));
@@ -219,18 +236,18 @@ double Newton::steepest(const Vector& step) {
   return std::max(most, 1e-300);
 }
 
-/// Computes out = (K + weight) v on free axes, with K v by a difference of forces. @param force
-/// total force at u [N]
+/// Computes out = (K + weight) v on free axes, with K v by a difference of forces, and the stiffness
+/// of contact added. @param force at u without contact [N]
 void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                              const Vector& v, Vector& out) {
   const double size = vectors_.largest([&](Index i) { return norm(v[i]); });
   const double scale = size > 0 ? difference_ / size : 1;
   Vector there(u.size());
   vectors_.for_each([&](Index i) { there[i] = u[i] + scale * v[i]; });
-  const Vector changed = forces(balance, there);
-  vectors_.for_each([&](Index i) {
-    out[i] = by_components(balance.free[i], (1 / scale) * (force[i] - changed[i]));
-  });
+  const Vector changed = forces_without_contact(balance, there);
+  vectors_.for_each([&](Index i) { out[i] = (1 / scale) * (force[i] - changed[i]); });
+  contact_.add_stiffness_times(v, out);
+  vectors_.for_each([&](Index i) { out[i] = by_components(balance.free[i], out[i]); });
 }
 
 /// Estimates the stiffness of each phyxel against its neighbours [N/m]. Without inertia only ratios
@@ -261,23 +278,27 @@ bool Newton::asked_to_stop(int iteration, double inner_residual) {
 }
 
 /// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate
-/// gradients preconditioned with `stiffness_`. They stop at the first direction of negative
-/// stiffness.
+/// gradients preconditioned with `stiffness_` and that of contact. They stop at the first direction
+/// of negative stiffness. @param force,all forces at u without and with contact [N]
 Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const Vector& force,
-                                Vector& step) {
+                                const Vector& all, Vector& step) {
   Vector rest = vectors_.make(), image = vectors_.make();
   vectors_.for_each([&](Index i) { step[i] = held_part(balance, i, balance.target[i] - u[i]); });
   const bool moves = vectors_.largest([&](Index i) { return norm(step[i]); }) > 0;
   if (moves) stiffness_times(balance, u, force, step, image);
   vectors_.for_each([&](Index i) {
-    rest[i] = by_components(balance.free[i], force[i]);
+    rest[i] = by_components(balance.free[i], all[i]);
     if (moves) rest[i] -= image[i];
   });
 
-  Vector way(u.size());
-  const auto preconditioned = [&](Index i) { return (1 / stiffness_[i]) * rest[i]; };
-  vectors_.for_each([&](Index i) { way[i] = preconditioned(i); });
-  double product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
+  Vector way(u.size()), preconditioned(u.size());
+  const auto precondition = [&] {
+    vectors_.for_each([&](Index i) { preconditioned[i] = (1 / stiffness_[i]) * rest[i]; });
+    contact_.precondition(stiffness_, balance.free, rest, preconditioned);
+  };
+  precondition();
+  vectors_.for_each([&](Index i) { way[i] = preconditioned[i]; });
+  double product = vectors_.product(rest, preconditioned);
   const double start = product;
   const int most = most_inner_here();
   for (int k = 0; product > inner_tolerance * inner_tolerance * start; ++k) {
@@ -295,9 +316,10 @@ Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const V
       rest[i] -= length * image[i];
     });
     const double before = product;
-    product = vectors_.sum([&](Index i) { return dot(rest[i], preconditioned(i)); });
+    precondition();
+    product = vectors_.product(rest, preconditioned);
     const double share = product / before;
-    vectors_.for_each([&](Index i) { way[i] = preconditioned(i) + share * way[i]; });
+    vectors_.for_each([&](Index i) { way[i] = preconditioned[i] + share * way[i]; });
   }
   return Inner::converged;
 }

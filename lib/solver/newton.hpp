@@ -10,6 +10,7 @@
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/state.hpp"
+#include "solver/contact_penalty.hpp"
 #include "solver/following_loads.hpp"
 
 namespace phyxel {
@@ -21,7 +22,7 @@ namespace phyxel {
 void check_precision(const Backend& backend, Method method);
 
 /// A balance of forces: displacements u that satisfy, along every free axis of each phyxel,
-///   f(u) + applied + following(u) - weight (u - centre) = 0.
+///   f(u) + applied + following(u) + contact(u) - weight (u - centre) = 0.
 /// Without loads that follow the surface, that is the derivative of minus the energy
 /// E(u) - applied · u + ½ Σ weight |u - centre|².
 struct Balance {
@@ -31,6 +32,7 @@ struct Balance {
   Vector applied;              ///< Gravity, constant loads and the caller's forces [N].
   std::vector<double> weight;  ///< Inertia [kg/s²], shape [n]; empty without inertia.
   Vector centre;               ///< Displacement that inertia alone leads to [m]; empty likewise.
+  PlacedObstacles obstacles;   ///< At the time of the balance.
   double time = 0;             ///< Time of loads that follow the surface and grow [s].
   double scale = 0;  ///< Force added to the applied forces as the reference of residuals [N].
 };
@@ -69,14 +71,19 @@ class Newton {
 
   /// Returns the internal forces [N] at u.
   Vector inner_forces(const Vector& u);
-  /// Returns the sum of internal, applied and following forces [N] at u, without inertia.
+  /// Returns the sum of internal, applied, following and contact forces [N] at u, without inertia.
   Vector acting_forces(const Balance& balance, const Vector& u);
+  /// Contact with obstacles, as it was when the last search ended.
+  const ContactPenalty& contact() const { return contact_; }
   const OwnedVectors& vectors() const { return vectors_; }
   /// Sets the forces of gravity, loads and the caller. @param time of loads that grow [s]
   void set_applied(double time, Balance& balance) const;
 
  private:
-  Vector forces(const Balance& balance, const Vector& u);
+  Vector acting_without_contact(const Balance& balance, const Vector& u);
+  Vector forces_without_contact(const Balance& balance, const Vector& u);
+  /// Adds the forces of contact at u to those without.
+  Vector with_contact(const Balance& balance, const Vector& u, Vector force) const;
   void put(const Vector& u);
   double potential(const Balance& balance, const Vector& u);
   double residual(const Balance& balance, const Vector& u, const Vector& force) const;
@@ -86,7 +93,8 @@ class Newton {
   void find_stiffness(const Balance& balance);
   /// The outcome of conjugate gradients.
   enum class Inner { converged, indefinite, exhausted, interrupted };
-  Inner find_step(const Balance& balance, const Vector& u, const Vector& force, Vector& step);
+  Inner find_step(const Balance& balance, const Vector& u, const Vector& force, const Vector& all,
+                  Vector& step);
   /// Limit of conjugate gradient iterations in one step.
   int most_inner_here() const;
   /// Calls the observer. @returns true if it, or that of another rank, asks to stop
@@ -97,6 +105,7 @@ class Newton {
   int most_steps_;
   OwnedVectors vectors_;
   FollowingLoads following_;
+  ContactPenalty contact_;
   double difference_;              ///< Largest displacement in differences of forces [m].
   std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;

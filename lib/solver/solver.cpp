@@ -66,6 +66,19 @@ void check_times(const State& state) {
   }
 }
 
+/// Refuses friction and restitution of obstacles to methods that know neither.
+void refuse_friction(const Model& model, Method method) {
+  for (const Obstacle& obstacle : model.obstacles) {
+    const bool rubs = obstacle.law.static_friction > 0;
+    const double found = rubs ? obstacle.law.static_friction : obstacle.law.restitution;
+    if (!(found > 0)) continue;
+    throw InputError(fmt::format(
+        "obstacle.{} = {:g} of obstacle \"{}\" found with solver.method = \"{}\"; allowed with this "
+        "method: 0",
+        rubs ? "friction" : "restitution", found, obstacle.name, method_name(method)));
+  }
+}
+
 }  // namespace
 
 Solver::Solver(Backend& backend, const State& start)
@@ -84,11 +97,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
-  if (method != Method::verlet && !model.obstacles.empty()) {
-    throw InputError(fmt::format(
-        "solver.method = \"{}\" found with obstacles; allowed with obstacles: \"verlet\"",
-        method_name(method)));
-  }
+  if (method != Method::verlet) refuse_friction(model, method);
   const std::size_t words = words_of(no_step_sums(model)).size();
   if (!start.step_sums.empty() && start.step_sums.size() != words) {
     throw InputError(
@@ -178,6 +187,11 @@ State Solver::state() const {
 std::span<const Vec3d> Solver::end_force() const {
   if (!implicit_) return {};
   return implicit_->end_force();
+}
+
+std::span<const ExactSum> Solver::end_contact() const {
+  if (!implicit_) return {};
+  return implicit_->end_contact();
 }
 
 std::vector<std::int64_t> Solver::step_sums() const {

@@ -160,6 +160,10 @@ TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
     EXPECT_EQ(here_.motions[m].phyxels, expected.motions[m].phyxels);
     EXPECT_TRUE(here_.motions[m].velocity == expected.motions[m].velocity);
   }
+  EXPECT_EQ(here_.obstacles.size(), expected.obstacles.size());
+  EXPECT_EQ(here_.contact.phyxels, expected.contact.phyxels);
+  EXPECT_EQ(here_.contact.offset, expected.contact.offset);
+  EXPECT_EQ(whole_.contact.phyxels.empty(), whole_.obstacles.empty());
   ASSERT_EQ(here_.loads.size(), expected.loads.size());
   for (std::size_t l = 0; l < here_.loads.size(); ++l) {
     const Load &load = here_.loads[l], &other = expected.loads[l];

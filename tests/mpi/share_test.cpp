@@ -8,6 +8,7 @@
 #include "device.hpp"
 #include "mpi/halo_transport.hpp"
 #include "partition/partition.hpp"
+#include "phyxel/contacts.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/solver.hpp"
 #include "ranks.hpp"
@@ -64,6 +65,34 @@ Model custom() {
   return testing::model_of(scene, testing::lattice(9, 8, 7, 0.1, 0.3));
 }
 
+/// Two bodies, cut by one obstacle that rests and one that moves.
+Model touching() {
+  Scene scene;
+  for (const char* shape : {"beam", "block"}) {
+    BodyRequest body;
+    body.name = shape;
+    body.where = "test";
+    body.source.shape = {.name = shape, .size = {0.6, 0.4, 0.4}, .spacing = 0.05};
+    body.translation = {0, scene.bodies.empty() ? 0.0 : 0.5, 0};
+    body.material = testing::rubber();
+    body.velocity = {1, 0, -2};
+    scene.bodies.push_back(body);
+  }
+  scene.gravity = {0, 0, -9.81};
+  scene.obstacles = {{.name = "floor",
+                      .shape = "plane",
+                      .translation = {0, 0, -0.2001},
+                      .friction = 0.4,
+                      .restitution = 0.5},
+                     {.name = "ball",
+                      .shape = "sphere",
+                      .radius = 0.5,
+                      .translation = {0.3, 0.2, 0.701},
+                      .friction = 0.2,
+                      .motion = {.velocity = {0, 0, -2}}}};
+  return build_model(scene);
+}
+
 struct ShareCase {
   const char* name;
   Model (*make)();
@@ -72,7 +101,8 @@ const std::vector<ShareCase>& share_cases() {
   static const std::vector<ShareCase> cases{{"Cube", testing::cube},     {"Coil", testing::coil},
                                             {"Thread", testing::thread}, {"Apart", testing::apart},
                                             {"Tiny", testing::tiny},     {"Everything", everything},
-                                            {"Controlled", controlled},  {"Custom", custom}};
+                                            {"Controlled", controlled},  {"Custom", custom},
+                                            {"Touching", touching}};
   return cases;
 }
 
@@ -171,7 +201,8 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
                       precision == Precision::single && !PHYXEL_SANITIZED;
     const int steps = many ? 1000 : 30;
     const auto alone = backend(whole_, precision), here = backend(model_, precision);
-    Solver whole(*alone, start_of_whole), share(*here, start_of_share);
+    Solver whole(whole_, *alone, start_of_whole, Method::verlet),
+        share(model_, *here, start_of_share, Method::verlet);
     for (int s = 0; s < steps; ++s) {
       if (whole_.parts[0].material.custom_law) {
         const std::vector<Vec3d> force = callers_forces(whole_, s);
@@ -197,6 +228,16 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
     EXPECT_THAT(different, ::testing::IsEmpty());
     EXPECT_EQ(world().sum(std::int64_t{owned}), whole_.size());
 
+    const std::vector<ContactReading> touched = find_contacts(whole_, *alone, whole),
+                                      here_too = find_contacts(model_, *here, share);
+    for (std::size_t o = 0; o < touched.size(); ++o) {
+      EXPECT_EQ(touched[o].force, here_too[o].force);
+      EXPECT_EQ(touched[o].impulse, here_too[o].impulse);
+      EXPECT_EQ(touched[o].angular_impulse, here_too[o].angular_impulse);
+      EXPECT_EQ(touched[o].friction_heat, here_too[o].friction_heat);
+      EXPECT_EQ(touched[o].depth, here_too[o].depth);
+      EXPECT_GT(norm(touched[o].impulse), 0);
+    }
     const Diagnostics d = diagnose(whole_, *alone, steps, dt),
                       e = diagnose(model_, *here, steps, dt);
     EXPECT_EQ(d.total_energy(), e.total_energy());

@@ -123,6 +123,9 @@ struct Obstacle {
 
   /// Where it is at the end of the step of `dt` [s] that begins at `time` [s], and how it moves.
   ObstacleStep step_from(double time, double dt) const;
+  /// Where it is at the end of a step between two places on its path, and how it moves.
+  /// @param dt size of the step [s]; 0: it is at the later place, and does not move
+  ObstacleStep step_between(const Path& before, const Path& after, double dt) const;
 };
 
 /// The phyxels by which bodies touch obstacles: those on or beside their surfaces that are not held

@@ -95,6 +95,7 @@ struct SolverWork {
   double residual = 0;  ///< Largest force that Newton's method has left, of what acts.
 };
 
+class ExactSum;
 class ImplicitStep;
 
 /// Advances a state through a backend by steps of fixed size. Time is always step × dt, so that a
@@ -152,6 +153,10 @@ class Solver {
   /// All forces but those of supports [N] at the end of the last implicit step, shape [n]; empty
   /// before the first one, for other methods, and without supports.
   std::span<const Vec3d> end_force() const;
+  /// What the obstacles would do to the phyxels of this rank in a second at the end of the last
+  /// implicit step, as exact sums (`ContactTerms`); empty before the first one, and for other
+  /// methods.
+  std::span<const ExactSum> end_contact() const;
   /// Sums over all steps since t = 0 and all ranks, as words of exact sums. First the work [J] that
   /// the support of each motion has done, shape [motions, words]; none if no support moves. Then
   /// what each obstacle has done (`ContactTerms`), shape [obstacles, 9, words]. Each step adds the

@@ -98,12 +98,45 @@ PHYXEL_HD Gap gap_to(const Shape& shape, const ObstacleStep& obstacle, Vec3<doub
   return gap;
 }
 
+/// Velocities of a point of an obstacle.
+struct SurfaceVelocity {
+  Vec3<double> now;   ///< Over the step [m/s].
+  Vec3<double> mean;  ///< Mean over the step and the one before [m/s].
+};
+
+/// The velocity of the point of an obstacle that is at x [m] at the end of a step.
+PHYXEL_HD SurfaceVelocity velocity_of_surface(const ObstacleStep& obstacle, Vec3<double> x) {
+  // The place at rest of that point, from the obstacle's own.
+  const Vec3<double> arm = obstacle.turn_at_rest * (transpose(obstacle.turn) * (x - obstacle.place));
+  return {obstacle.velocity + obstacle.slope * arm,
+          obstacle.mean_velocity + obstacle.mean_slope * arm};
+}
+
 /// What contact with an obstacle adds to its sums over steps.
 struct ContactTerms {
   /// Indices of the terms: impulse on the point [N s]; angular impulse about the obstacle's place at
   /// rest [N m s]; work of the obstacle on the point, heat of friction, loss in the impact [J].
   enum { impulse = 0, moment = 3, work = 6, friction_heat, impact_loss, count };
   double value[count] = {};
+
+  /// Sets the terms of an impulse, `normal` and `tangential` [N s], on a point.
+  /// @param arm from the obstacle's place at rest to where the impulse acts [m]
+  /// @param surface,relative velocity of the obstacle's surface there, and that of the point
+  /// relative to it, in the mean of the impulse's time [m/s]
+  PHYXEL_HD void set(Vec3<double> normal, Vec3<double> tangential, Vec3<double> arm,
+                     Vec3<double> surface, Vec3<double> relative) {
+    const Vec3<double> all = normal + tangential, turning = cross(arm, all);
+    const double terms[] = {all.x,
+                            all.y,
+                            all.z,
+                            turning.x,
+                            turning.y,
+                            turning.z,
+                            dot(all, surface),
+                            -dot(tangential, relative),
+                            -dot(normal, relative)};
+    for (int k = 0; k < count; ++k) value[k] = terms[k];
+  }
 };
 
 /// A point that may touch an obstacle, at the end of a step.
@@ -125,11 +158,7 @@ PHYXEL_HD bool touch(const Shape& shape, const ObstacleStep& obstacle, TouchingP
   Gap gap = gap_to(shape, obstacle, point.position);
   gap.distance -= point.offset;
   if (!(gap.distance < 0)) return false;
-  // The point of the obstacle that is there at the end of the step, from its place at rest.
-  const Vec3<double> arm =
-      obstacle.turn_at_rest * (transpose(obstacle.turn) * (point.position - obstacle.place));
-  const Vec3<double> surface = obstacle.velocity + obstacle.slope * arm;
-  const Vec3<double> mean = obstacle.mean_velocity + obstacle.mean_slope * arm;
+  const auto [surface, mean] = velocity_of_surface(obstacle, point.position);
   const Vec3<double> before = 2.0 * mean - surface;  // velocity of the surface in the step before
   const ContactChange change =
       contact_change(gap, {point.velocity - surface, point.before - before, point.free},
@@ -139,19 +168,8 @@ PHYXEL_HD bool touch(const Shape& shape, const ObstacleStep& obstacle, TouchingP
   point.velocity += all;
   point.position += obstacle.dt * all;
   const double mass = point.inertia * obstacle.dt;
-  const Vec3<double> impulse = mass * all;
-  const Vec3<double> moment = cross(start - obstacle.place_at_rest, impulse);
-  const Vec3<double> relative = 0.5 * (point.before + point.velocity) - mean;
-  const double sums[] = {impulse.x,
-                         impulse.y,
-                         impulse.z,
-                         moment.x,
-                         moment.y,
-                         moment.z,
-                         dot(impulse, mean),
-                         -mass * dot(change.tangential, relative),
-                         -mass * dot(change.normal, relative)};
-  for (int k = 0; k < ContactTerms::count; ++k) terms.value[k] = sums[k];
+  terms.set(mass * change.normal, mass * change.tangential, start - obstacle.place_at_rest, mean,
+            0.5 * (point.before + point.velocity) - mean);
   return true;
 }
 

@@ -16,6 +16,7 @@ struct BoxObstacle {
 
   double size_x, size_y, size_z;
 
+  /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const {
     const double beyond[] = {std::fabs(x.x) - 0.5 * size_x, std::fabs(x.y) - 0.5 * size_y,
                              std::fabs(x.z) - 0.5 * size_z};

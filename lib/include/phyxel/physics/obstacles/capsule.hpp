@@ -14,6 +14,7 @@ struct CapsuleObstacle {
 
   double radius, length;
 
+  /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const {
     const double half = 0.5 * length;
     const double along = x.z < -half ? -half : x.z > half ? half : x.z;

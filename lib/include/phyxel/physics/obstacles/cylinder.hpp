@@ -15,6 +15,7 @@ struct CylinderObstacle {
 
   double radius, length;
 
+  /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const {
     const Gap side = gap_of_sphere({x.x, x.y, 0}, radius);
     const double beyond[] = {side.distance, std::fabs(x.z) - 0.5 * length};

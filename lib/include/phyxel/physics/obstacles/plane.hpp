@@ -13,6 +13,7 @@ struct PlaneObstacle {
   static constexpr const char* meaning = "all that lies below z = 0";
   static constexpr std::array<ObstacleLength, 0> lengths{};
 
+  /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const { return {x.z, {0, 0, 1}}; }
 };
 

@@ -13,6 +13,7 @@ struct SphereObstacle {
 
   double radius;
 
+  /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const { return gap_of_sphere(x, radius); }
 };
 

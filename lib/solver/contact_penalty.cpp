@@ -1,0 +1,131 @@
+#include "solver/contact_penalty.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+
+#include "model/parts.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/physics/obstacles.hpp"
+#include "rank_sums.hpp"
+#include "solver/boundary_conditions.hpp"
+
+namespace phyxel {
+namespace {
+
+// Times the stiffness of a phyxel against its neighbours. A layer of phyxels on a face, s apart,
+// then is as stiff as a fifth of s of the body.
+constexpr double share = 40;
+
+}  // namespace
+
+PlacedObstacles obstacles_after(const Model& model, double share) {
+  PlacedObstacles placed;
+  for (const Obstacle& obstacle : model.obstacles) {
+    placed.push_back(obstacle.step_between({}, obstacle.motion.path_after(share), 0));
+  }
+  return placed;
+}
+
+PlacedObstacles obstacles_over(const Model& model, double time, double span) {
+  PlacedObstacles placed;
+  for (const Obstacle& obstacle : model.obstacles) {
+    const Motion& motion = obstacle.motion;
+    placed.push_back(
+        obstacle.step_between(motion.path_at(time - span), motion.path_at(time), span));
+  }
+  return placed;
+}
+
+ContactPenalty::ContactPenalty(const Model& model)
+    : model_(model), blocks_(model.contact.phyxels.size()) {
+  for (const Index i : model.contact.phyxels) {
+    const double c = pressure_wave_speed(part_of(model, i).material);
+    const double crossings = c / model.neighbourhood.support[i];
+    stiffness_.push_back(share * model.mass[i] * crossings * crossings);
+  }
+}
+
+template <class Each>
+void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const {
+  const ContactLayer& layer = model_.contact;
+  for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
+    const Obstacle& obstacle = model_.obstacles[o];
+    ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+      for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
+        const Vec3d x = model_.position[layer.phyxels[k]] + u[layer.phyxels[k]];
+        Gap gap = gap_to(shape, at[o], x);
+        gap.distance -= layer.offset[k];
+        if (gap.distance < 0) each(k, o, penalty_force(gap, stiffness_[k]), x);
+      }
+    });
+  }
+}
+
+void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u) {
+  std::fill(blocks_.begin(), blocks_.end(), Mat3d{});
+  normal_forces_ = 0;
+  for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
+    blocks_[k] += f.stiffness;
+    normal_forces_ += dot(f.force, f.force);
+  });
+}
+
+void ContactPenalty::add(const PlacedObstacles& at, const Vector& u, Vector& force) const {
+  for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
+        force[model_.contact.phyxels[k]] += f.force;
+      });
+}
+
+double ContactPenalty::energy(const PlacedObstacles& at, const Vector& u) const {
+  if (empty()) return 0;
+  ExactSum sum;
+  for_each_force(at, u, [&](std::size_t, std::size_t, const PenaltyForce& f, Vec3d) { sum.add(f.energy); });
+  if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
+  return sum.value();
+}
+
+double ContactPenalty::squared_size() const {
+  if (empty()) return 0;
+  ExactSum sum;
+  sum.add(normal_forces_);
+  if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
+  return sum.value();
+}
+
+void ContactPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    const Index i = model_.contact.phyxels[k];
+    out[i] += blocks_[k] * v[i];
+  }
+}
+
+void ContactPenalty::precondition(std::span<const double> s, const Vector& free, const Vector& a,
+                                  Vector& x) const {
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    if (!(blocks_[k](0, 0) + blocks_[k](1, 1) + blocks_[k](2, 2) > 0)) continue;
+    const Index i = model_.contact.phyxels[k];
+    const double of_axis[] = {free[i].x, free[i].y, free[i].z};
+    Eigen::Matrix3d all = s[i] * Eigen::Matrix3d::Identity();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) all(r, c) += of_axis[r] * of_axis[c] * blocks_[k](r, c);
+    }
+    const Eigen::Vector3d solved = all.llt().solve(Eigen::Vector3d(a[i].x, a[i].y, a[i].z));
+    x[i] = {solved[0], solved[1], solved[2]};
+  }
+}
+
+void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity,
+                            double time, std::span<ExactSum> sums) const {
+  for_each_force(at, u, [&](std::size_t k, std::size_t o, const PenaltyForce& f, Vec3d x) {
+        const ObstacleStep& step = at[o];
+        const Vec3d surface = velocity_of_surface(step, x).now;
+        const Vec3d relative = velocity[model_.contact.phyxels[k]] - surface;
+        ContactTerms terms;
+        terms.set(time * f.force, {}, x - step.place_at_rest, surface, relative);
+        for (int t = 0; t < ContactTerms::count; ++t) {
+          sums[o * ContactTerms::count + t].add(terms.value[t]);
+        }
+      });
+}
+
+}  // namespace phyxel
