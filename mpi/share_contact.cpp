@@ -39,6 +39,13 @@ void find_contact_layer(const ShareSetup& setup, const WholeBodies& whole, Local
     }
   });
   setup.ranks.add(counts);
+  setup.ranks.collectively([&] {
+    for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
+      if (whole.bodies[b].size > 0) {
+        check_layer(setup.scene.bodies[b], {counts[2 * b], counts[2 * b + 1]});
+      }
+    }
+  });
   for (std::size_t b = 0; b < whole.bodies.size(); ++b) {
     const bool has_layer = LayerCounts{counts[2 * b], counts[2 * b + 1]}.has_layer();
     for (std::size_t k = 0; k < distances[b].size(); ++k) {

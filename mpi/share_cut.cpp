@@ -104,6 +104,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   built.model.obstacles = obstacles_of(setup.scene);
   if (!built.model.obstacles.empty()) {
     add_contact_layer(built.model, contact_offset);
+    warn_of_small_obstacles(built.model);
     const std::string problem = overlap_at_start(built.model, setup.scene);
     setup.ranks.collectively([&] {
       if (!problem.empty()) throw InputError(problem);

@@ -156,15 +156,14 @@ std::string describe_obstacles(const Model& model, std::int64_t touching) {
   constexpr std::size_t most = 8;
   for (std::size_t k = 0; k < std::min(model.obstacles.size(), most); ++k) {
     const Obstacle& o = model.obstacles[k];
-    text += fmt::format("  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}\n",
-                        o.name, o.hollow ? "hollow " : "", shape_name(o),
-                        o.motion.stands_still() ? "" : ", moving", o.place.x, o.place.y, o.place.z,
-                        o.law.static_friction,
-                        o.law.kinetic_friction < o.law.static_friction
-                            ? fmt::format(", {:g} when sliding", o.law.kinetic_friction)
-                            : "",
-                        o.law.restitution > 0 ? fmt::format(", restitution {:g}", o.law.restitution)
-                                              : "");
+    text += fmt::format(
+        "  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}\n", o.name,
+        o.hollow ? "hollow " : "", shape_name(o), o.motion.stands_still() ? "" : ", moving",
+        o.place.x, o.place.y, o.place.z, o.law.static_friction,
+        o.law.kinetic_friction < o.law.static_friction
+            ? fmt::format(", {:g} when sliding", o.law.kinetic_friction)
+            : "",
+        o.law.restitution > 0 ? fmt::format(", restitution {:g}", o.law.restitution) : "");
   }
   if (model.obstacles.size() > most) {
     text += fmt::format("              and {} more obstacles\n", model.obstacles.size() - most);

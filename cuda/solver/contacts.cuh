@@ -23,18 +23,19 @@ struct LayerArrays {
   int count = 0;
 };
 
-/// Remembers the velocities at the start of a step. One thread per phyxel of the layer.
+/// Keeps the velocities at the start of a step. One thread per phyxel of the layer.
 template <class Real, class StateReal>
-__global__ void remember_velocities(Fields<Real, StateReal> f, LayerArrays<StateReal> layer) {
+__global__ void keep_velocities(Fields<Real, StateReal> f, LayerArrays<StateReal> layer) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k < layer.count) layer.before[k] = column3(f.velocity, f.places, layer.place[k]);
 }
 
 /// Moves phyxels that a step has led into an obstacle out of it, and adds to the obstacle's sums.
-/// One thread per phyxel of the layer.
+/// One thread per phyxel of the layer. @param is_last true of the last obstacle, which leaves the
+/// velocities behind with which the next step starts
 template <class Shape, class Real, class StateReal>
 __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer, Shape shape,
-                         ObstacleStep obstacle, SumWords sums) {
+                         ObstacleStep obstacle, SumWords sums, bool is_last) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k >= layer.count) return;
   const Index at = layer.place[k];
@@ -45,19 +46,20 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
   } else {
     displacement = column3(f.displacement, f.places, at);
   }
-  const Vec3<double> u = to<double>(displacement),
-                     v = to<double>(column3(f.velocity, f.places, at));
+  const Vec3<StateReal> velocity = column3(f.velocity, f.places, at);
+  const Vec3<double> u = to<double>(displacement), v = to<double>(velocity);
+  const Vec3<StateReal> before = layer.before[k];
+  if (is_last) layer.before[k] = velocity;
   const auto free = [&](int axis) { return layer.prescribed[k] >> axis & 1 ? 0.0 : 1.0; };
-  TouchingPoint point{layer.position[k] + u,
-                      v,
-                      to<double>(layer.before[k]),
-                      {free(0), free(1), free(2)},
-                      layer.offset[k],
-                      layer.inertia[k]};
+  TouchingPoint point{layer.position[k] + u, v,
+                      to<double>(before),    {free(0), free(1), free(2)},
+                      layer.offset[k],       layer.inertia[k]};
   ContactTerms terms;
   if (!touch(shape, obstacle, point, terms)) return;
   displacement = to<StateReal>(u + obstacle.dt * (point.velocity - v));
-  set_column3(f.velocity, f.places, at, to<StateReal>(point.velocity));
+  const Vec3<StateReal> changed = to<StateReal>(point.velocity);
+  set_column3(f.velocity, f.places, at, changed);
+  if (is_last) layer.before[k] = changed;
   if constexpr (!std::is_same_v<Real, StateReal>) {
     set_column3(f.displacement, f.places, at, displacement);
   }
@@ -114,11 +116,12 @@ class Contacts {
       sums.prepare(place_.size(), count, [&] { m_.wait(); });
     }
   }
-  /// Remembers the velocities at the start of a step.
-  void begin_step() {
+  /// Remembers the velocities at the start of a step that does not follow another one at once.
+  void remember_velocities() {
+    if (!acts()) return;
     const LayerArrays<StateReal> layer = arrays();
-    m_.launch_each("remember_velocities", remember_velocities<Real, StateReal>, layer.count,
-                   m_.fields(), layer);
+    m_.launch_each("keep_velocities", keep_velocities<Real, StateReal>, layer.count, m_.fields(),
+                   layer);
   }
   /// Moves phyxels out of the obstacles, one obstacle after the other, after a step from `time`
   /// [s].
@@ -130,7 +133,7 @@ class Contacts {
       const SumWords words = sums_[o].pointer();
       ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
         m_.launch_each("keep_out", keep_out<std::decay_t<decltype(shape)>, Real, StateReal>,
-                       layer.count, m_.fields(), layer, shape, step, words);
+                       layer.count, m_.fields(), layer, shape, step, words, o + 1 == sums_.size());
       });
     }
   }

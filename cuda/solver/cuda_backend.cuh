@@ -310,7 +310,7 @@ class CudaBackend final : public Backend {
     }
     if (alike && left >= steps_together && graph_serves(surfels)) {
       graphs_[surfels != nullptr].launch(m_.stream(), [&] {
-        for (int s = 0; s < steps_together; ++s) launch_step(time, surfels);
+        for (int s = 0; s < steps_together; ++s) launch_step(time, surfels, s > 0);
       });
       return steps_together;
     }
@@ -325,7 +325,8 @@ class CudaBackend final : public Backend {
     return !halo_ || halo_->is_under_way(Sent::displacements);
   }
   /// Launches one step of the present size from a time [s].
-  void launch_step(double time, const Advection* surfels) {
+  /// @param follows true right after another step of the same graph
+  void launch_step(double time, const Advection* surfels, bool follows = false) {
     boundary_.sum_loads(time);
     if (!boundary_.following().empty()) {
       passes_->receive_displacements();
@@ -334,7 +335,7 @@ class CudaBackend final : public Backend {
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
     if (fresh_ || boundary_.changes() || contacts_.acts()) {
-      if (contacts_.acts()) contacts_.begin_step();
+      if (!follows) contacts_.remember_velocities();
       passes_->advance(m_.dt());
       boundary_.follow_paths(time, m_.dt());
       if (fresh_) boundary_.put_held_at_rest();

@@ -46,7 +46,8 @@ class DeviceSums {
   std::size_t bytes() const { return words_.bytes(); }
   /// What kernels add to.
   SumWords pointer() const { return {words_.data(), accumulators_}; }
-  /// Makes room for `times` terms more of each of `points`. @param wait waits for kernels in progress
+  /// Makes room for `times` terms more of each of `points`. @param wait waits for kernels in
+  /// progress
   template <class Wait>
   void prepare(std::size_t points, int times, Wait&& wait) {
     constexpr std::int64_t most_terms = std::int64_t{1} << 29;  // half of what words hold

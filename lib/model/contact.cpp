@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "mesh/face_relaxation.hpp"
 #include "model/assembly.hpp"
+#include "model/box.hpp"
 #include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
 #include "model/symmetry.hpp"
@@ -82,9 +84,31 @@ void visit_parts(Vec3d a, Vec3d b, Vec3d c, double longest, Visit&& visit) {
 /// The phyxel that is deepest inside an obstacle.
 struct Deepest {
   double depth = 0;  ///< [m]
-  std::size_t at = 0, obstacle = 0;
+  Index phyxel = 0;
+  std::size_t obstacle = 0;
 };
 
+/// The phyxel of a part that is nearest to a point, and its distance [m]; infinite if the point is
+/// outside the box around the part's phyxels of this rank.
+std::pair<Index, double> nearest_in(const Model& model, const Part& part, Vec3d point) {
+  const auto first = static_cast<std::size_t>(part.begin);
+  const auto count = static_cast<std::size_t>(part.owned_end()) - first;
+  if (count == 0) return {0, HUGE_VAL};
+  const Box box = box_around(std::span(model.position).subspan(first, count));
+  const auto is_between = [](double low, double x, double high) { return low <= x && x <= high; };
+  if (!is_between(box.low.x, point.x, box.high.x) || !is_between(box.low.y, point.y, box.high.y) ||
+      !is_between(box.low.z, point.z, box.high.z)) {
+    return {0, HUGE_VAL};
+  }
+  std::pair<Index, double> nearest{0, HUGE_VAL};
+  for (Index i = part.begin; i < part.owned_end(); ++i) {
+    const double distance = norm(model.position[i] - point);
+    if (distance < nearest.second) nearest = {i, distance};
+  }
+  return nearest;
+}
+
+/// Finds it among the phyxels of the surface, and where the middle of an obstacle is inside a body.
 Deepest deepest_of(const Model& model) {
   Deepest found;
   const ContactLayer& layer = model.contact;
@@ -95,11 +119,29 @@ Deepest deepest_of(const Model& model) {
       for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
         const Gap gap = gap_to(shape, rest, model.position[layer.phyxels[k]]);
         const double depth = layer.offset[k] - gap.distance;
-        if (depth > found.depth) found = {depth, k, o};
+        if (depth > found.depth) found = {depth, layer.phyxels[k], o};
       }
     });
+    if (obstacle.hollow || !obstacle.is_bounded()) continue;
+    for (const Part& part : model.parts) {
+      const auto [i, distance] = nearest_in(model, part, rest.place);
+      const bool is_inside = distance < 0.5 * model.neighbourhood.support[i];
+      const double depth = obstacle.inner_radius();
+      if (is_inside && depth > found.depth) found = {depth, i, o};
+    }
   }
   return found;
+}
+
+/// Sets the rigid motion of a step.
+/// @param change of the path over `span` [s], about the instant at which it is at `middle`
+/// @param end place on the path at the end of the step
+void set_rigid_motion(ObstacleStep& step, const Path& change, double span, const Path& middle,
+                      const Path& end) {
+  step.drift = change.displacement / span;
+  step.centre = end.about + end.displacement;
+  const Mat3d rate = (1 / span) * (change.turn * transpose(identity<double>() + middle.turn));
+  step.spin = 0.5 * (rate - transpose(rate));
 }
 
 }  // namespace
@@ -124,12 +166,40 @@ ObstacleStep Obstacle::step_between(const Path& before, const Path& after, doubl
 }
 
 ObstacleStep Obstacle::step_from(double time, double dt) const {
-  ObstacleStep step = step_between(motion.path_at(time), motion.path_at(time + dt), dt);
+  const Path after = motion.path_at(time + dt);
+  ObstacleStep step = step_between(motion.path_at(time), after, dt);
   if (dt == 0 || motion.stands_still()) return step;
-  const Path mean = motion.mean_step(time, dt);
-  step.mean_velocity = mean.at(place) / dt;
-  step.mean_slope = (1 / dt) * mean.turn;
+  set_rigid_motion(step, motion.mean_step(time, dt), dt, motion.path_at(time), after);
   return step;
+}
+
+ObstacleStep Obstacle::stage_to(double time, double span) const {
+  const Path now = motion.path_at(time);
+  ObstacleStep step = step_between(motion.path_at(time - span), now, span);
+  if (span == 0 || motion.stands_still()) return step;
+  const Path before = motion.path_at(time - span / 2), after = motion.path_at(time + span / 2);
+  const Path change{after.displacement - before.displacement, after.turn - before.turn, now.about};
+  set_rigid_motion(step, change, span, now, now);
+  return step;
+}
+
+bool Obstacle::is_bounded() const {
+  return ObstacleShapes::with(shape, lengths.data(),
+                              [](const auto& s) { return std::size(s.lengths) > 0; });
+}
+
+double Obstacle::inner_radius() const {
+  if (hollow || !is_bounded()) return HUGE_VAL;
+  return ObstacleShapes::with(shape, lengths.data(), [](const auto& s) {
+    return -s.gap(Vec3d{}).distance;  // its centre is its deepest point
+  });
+}
+
+double Obstacle::largest_speed(const ObstacleStep& step) const {
+  const Vec3d turning{step.spin(2, 1), step.spin(0, 2), step.spin(1, 0)};
+  double reach = norm(step.place - step.centre);
+  for (const double length : lengths) reach += length;
+  return norm(step.drift) + norm(turning) * reach;
 }
 
 void check_touches(const BodyRequest& request, std::span<const Triangle> triangles) {
@@ -141,6 +211,15 @@ void check_touches(const BodyRequest& request, std::span<const Triangle> triangl
                   request.where, request.where.empty() ? "" : ": ", request.name));
 }
 
+void check_layer(const BodyRequest& request, const LayerCounts& counts) {
+  if (counts.on + counts.beside > 0) return;
+  throw InputError(
+      fmt::format("{}{}body \"{}\" has no phyxel within {:g} spacings of its surface with which to "
+                  "touch the scene's obstacles; allowed: phyxels that fill the surface, or no "
+                  "obstacle",
+                  request.where, request.where.empty() ? "" : ": ", request.name, beside_surface));
+}
+
 std::vector<double> distances_from_surface(std::span<const Vec3d> position,
                                            std::span<const double> spacing,
                                            std::span<const Vec3d> surface,
@@ -148,6 +227,7 @@ std::vector<double> distances_from_surface(std::span<const Vec3d> position,
   std::vector<double> distance(position.size(), HUGE_VAL);
   if (position.empty()) return distance;
   const double largest = *std::max_element(spacing.begin(), spacing.end());
+  if (!(largest > 0)) return distance;  // phyxels without neighbours
   const double reach = beside_surface * largest;
   const SpatialHash hash(position, 2 * largest);
   for (const Triangle& t : triangles) {
@@ -202,8 +282,8 @@ std::string overlap_at_start(const Model& model, const Scene& scene) {
   const double depth = largest(found.depth);
   // The rounding of coordinates, and of surfaces in files in float.
   constexpr double rounding = 1e-6;
-  const Index i = model.contact.phyxels.empty() ? 0 : model.contact.phyxels[found.at];
-  const double support = model.contact.phyxels.empty() ? 0 : model.neighbourhood.support[i];
+  const Index i = found.phyxel;
+  const double support = found.depth > 0 ? model.neighbourhood.support[i] : 0;
   const bool is_here = found.depth == depth && depth > rounding * support;
   // Of several ranks with equal depths, the first phyxel counts.
   const double id = is_here ? static_cast<double>(model.global_id(i)) : HUGE_VAL;
@@ -217,6 +297,22 @@ std::string overlap_at_start(const Model& model, const Scene& scene) {
       "{:.6g}) m; allowed: to touch it, or to begin {}",
       where, where.empty() ? "" : ": ", part_of(model, i).name, depth, obstacle.name, x.x, x.y, x.z,
       obstacle.hollow ? "inside, as it is hollow" : "outside");
+}
+
+void warn_of_small_obstacles(Model& model) {
+  double support = 0;
+  for (const Index i : model.contact.phyxels) {
+    support = std::max(support, model.neighbourhood.support[i]);
+  }
+  if (model.share) support = model.share->communicator->largest(support);
+  for (const Obstacle& obstacle : model.obstacles) {
+    const double radius = obstacle.inner_radius();
+    if (radius >= support) continue;
+    model.warnings.push_back(fmt::format(
+        "obstacle \"{}\" is {:.3g} m thick, less than two supports of {:.3g} m of the bodies' "
+        "phyxels: it may pass between them, or through a body that is fast",
+        obstacle.name, 2 * radius, support));
+  }
 }
 
 void add_contact(Model& model, const Scene& scene) {
@@ -240,12 +336,14 @@ void add_contact(Model& model, const Scene& scene) {
         triangles, part->surfel_begin);
     LayerCounts counts;
     for (std::size_t k = 0; k < count; ++k) counts.add(distance[k], spacing[k]);
+    if (count > 0) check_layer(request, counts);
     for (std::size_t k = 0; k < count; ++k) {
       offset[begin + k] = contact_offset(distance[k], spacing[k], counts.has_layer());
     }
     part = next;
   }
   add_contact_layer(model, offset);
+  warn_of_small_obstacles(model);
   if (const std::string problem = overlap_at_start(model, scene); !problem.empty()) {
     throw InputError(problem);
   }

@@ -34,6 +34,10 @@ struct LayerCounts {
   bool has_layer() const { return 2 * on >= beside; }
 };
 
+/// Refuses a body none of whose phyxels are on or beside its surface.
+/// @throws InputError naming the body
+void check_layer(const BodyRequest& request, const LayerCounts& counts);
+
 /// The distance of a phyxel that touches from its body's surface [m]; negative for one that does
 /// not. @param has_layer `LayerCounts::has_layer` of its body
 double contact_offset(double distance, double spacing, bool has_layer);
@@ -45,6 +49,10 @@ void add_contact(Model& model, const Scene& scene);
 /// Makes the contact layer of a model from the offsets of all its phyxels (`contact_offset`), but
 /// for ghosts, and for those that are held or moved along all axes.
 void add_contact_layer(Model& model, std::span<const double> offset);
+
+/// Warns of obstacles that are so thin beside the distances of phyxels that they are not felt well.
+/// Of a share: collective.
+void warn_of_small_obstacles(Model& model);
 
 /// The error of a model whose bodies are inside an obstacle at the start: what overlaps would be
 /// pushed out in one step, and fly away. Empty if none is. Of a share: collective, and empty on all

@@ -5,35 +5,16 @@
 #include <cstdint>
 
 #include "phyxel/law_table.hpp"
-#include "phyxel/physics/obstacles.hpp"
 #include "phyxel/point_fields.hpp"
-#include "scene/scene_schema.hpp"
+#include "scene/key_parts.hpp"
 
 namespace phyxel {
 namespace {
 
+using namespace ranges;
+
 // One line for each field would make the table twice as long.
 // clang-format off
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double largest_index = std::numeric_limits<std::int32_t>::max();
-
-// What a scene may hold, so that products of its values (energies, volumes, moments) stay numbers
-// in double precision: far beyond anything that bends.
-constexpr double longest = 1e12;      // lengths [m], and how far from the origin
-constexpr double shortest = 1e-12;    // [m]
-constexpr double stiffest = 1e18;     // moduli [Pa]
-constexpr double fastest = 1e9;       // speeds [m/s] and spins [rad/s]
-constexpr double largest_angle = 1e9; // [degrees]
-constexpr double largest_force = 1e24;  // [N], [N/m^3]
-constexpr double largest_factor = 1e12; // of loads
-
-Range at_least(double low) { return {low, infinity, false}; }
-Range between(double low, double high) { return {low, high, false}; }
-Range strictly_between(double low, double high) { return {low, high, true}; }
-Range within(double size) { return {-size, size, false}; }
-Range length() { return {shortest, longest, false}; }
-Range time_span() { return {1e-18, 1e9, false}; }
 
 std::vector<std::string> law_names() {
   std::vector<std::string> names;
@@ -50,20 +31,6 @@ std::string law_meanings() {
 std::string default_laws() {
   return fmt::format("\"{}\"; \"{}\" for the paper's bodies", usual_law,
                      StVenantKirchhoff<double>::name);
-}
-
-std::vector<std::string> obstacle_names() {
-  std::vector<std::string> names;
-  ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) { names.emplace_back(Shape::name); });
-  return names;
-}
-
-std::string obstacle_meanings() {
-  std::string all = "The obstacle's shape, before it is turned and moved.";
-  ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
-    all += fmt::format(" \"{}\": {}.", Shape::name, Shape::meaning);
-  });
-  return all;
 }
 
 std::vector<std::string> field_names() {
@@ -376,60 +343,6 @@ std::vector<SceneKey> grading_keys() {
        .meaning = "Regions in which phyxels are nearer to each other."},
       {.section = "body.grading.finer", .name = "by", .otherwise = "`ratio`", .range = between(1, 10),
        .meaning = "Largest distance between neighbours over the one in the region; at most `ratio`."},
-  };
-}
-
-/// The keys of a path, in the section of what moves along it.
-std::vector<SceneKey> path_keys(const std::string& section) {
-  return {
-      {.section = section, .name = "displacement", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Reached after `duration`, then kept."},
-      {.section = section, .name = "rotation", .type = KeyType::vector, .unit = "degrees",
-       .fallback = "[0, 0, 0]",
-       .range = within(largest_angle), .meaning = "Axis times angle, reached after `duration`, then kept: [1080, 0, 0] is three "
-           "turns about x."},
-      {.section = section, .name = "about", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "A point of the axis of `rotation`."},
-      {.section = section, .name = "duration", .unit = "s", .otherwise = "none",
-       .range = time_span(), .meaning = "Time to reach `displacement` and `rotation`."},
-      {.section = section, .name = "velocity", .type = KeyType::vector, .unit = "m/s",
-       .fallback = "[0, 0, 0]", .range = within(fastest), .meaning = "Of a steady motion."},
-      {.section = section, .name = "amplitude", .type = KeyType::vector, .unit = "m",
-       .fallback = "[0, 0, 0]", .range = within(longest), .meaning = "Of an oscillation."},
-      {.section = section, .name = "frequency", .unit = "Hz", .otherwise = "none",
-       .range = between(1e-9, 1e18), .meaning = "Of the oscillation."},
-  };
-}
-
-std::vector<SceneKey> obstacle_keys() {
-  return {
-      {.section = "obstacle", .name = "name", .type = KeyType::text, .otherwise = "\"obstacle 1\", \"obstacle 2\", ...",
-       .meaning = "The obstacle's name in `contacts.csv`."},
-      {.section = "obstacle", .name = "shape", .type = KeyType::choice, .required = true,
-       .words = obstacle_names(), .meaning = obstacle_meanings()},
-      {.section = "obstacle", .name = "size", .type = KeyType::vector, .unit = "m", .otherwise = "none",
-       .range = length(), .meaning = "Extents of a box along x, y and z."},
-      {.section = "obstacle", .name = "radius", .unit = "m", .otherwise = "none", .range = length(),
-       .meaning = "Of a sphere, cylinder or capsule."},
-      {.section = "obstacle", .name = "length", .unit = "m", .otherwise = "none", .range = length(),
-       .meaning = "Of a cylinder; of a capsule, between the centres of its ends."},
-      {.section = "obstacle", .name = "normal", .type = KeyType::vector, .otherwise = "[0, 0, 1], turned by `rotation`",
-       .range = within(longest), .meaning = "Direction that a plane faces; not together with `rotation`."},
-      {.section = "obstacle", .name = "hollow", .type = KeyType::boolean, .fallback = "false",
-       .meaning = "Whether bodies are kept inside the obstacle, as in a bin, instead of outside."},
-      {.section = "obstacle", .name = "rotation", .type = KeyType::vector, .unit = "degrees", .fallback = "[0, 0, 0]",
-       .range = within(largest_angle), .meaning = "Axis times angle, applied first."},
-      {.section = "obstacle", .name = "translation", .type = KeyType::vector, .unit = "m", .fallback = "[0, 0, 0]",
-       .range = within(longest), .meaning = "Applied last. A plane goes through this point."},
-      {.section = "obstacle", .name = "friction", .fallback = "0", .range = between(0, 1e6),
-       .meaning = "Coulomb's coefficient: largest tangential over normal force of a point at rest on the obstacle."},
-      {.section = "obstacle", .name = "kinetic_friction", .otherwise = "`friction`", .range = between(0, 1e6),
-       .meaning = "The same of a point that slides; at most `friction`."},
-      {.section = "obstacle", .name = "restitution", .fallback = "0", .range = between(0, 1),
-       .meaning = "Speed of a point of a surface after an impact over that before. What a body as a whole gives back "
-           "comes from its elasticity: 0 is right for most."},
-      {.section = "obstacle", .name = "motion", .type = KeyType::table, .otherwise = "at rest",
-       .meaning = "How the obstacle moves."},
   };
 }
 

@@ -51,8 +51,9 @@ std::vector<SceneSection> boundary_sections() {
        "out of it by forces that act where a step would lead them, and that shorten no step. Bodies need a surface, and may touch "
        "obstacles at the start but not overlap them; what is held or moved along all axes may be inside. Each frame adds a line for each "
        "obstacle to `contacts.csv`: force [N] and torque [N m] on the bodies at that time, and, since t = 0, impulse [N s], "
-       "angular impulse [N m s], work of the obstacle on the bodies [J], heat of friction [J] and loss in impacts [J]. Torques are "
-       "taken about the obstacle's place at rest, the last three columns."},
+       "angular impulse [N m s], work of the obstacle on the bodies [J], heat of friction [J] and loss in impacts [J]; then the depth [m] of "
+       "the phyxel that is deepest inside, and the obstacle's place at rest, about which torques are taken. A run stops if phyxels "
+       "and an obstacle move by more than half the obstacle's inner radius, or half a support, against each other in a step."},
       {"obstacle.motion", "[obstacle.motion]", "",
        "The path of the obstacle above, as that of a `[[body.motion]]`. At least one of `displacement`, `rotation`, `velocity` and "
        "`amplitude` is needed."},

@@ -29,9 +29,7 @@ PlacedObstacles obstacles_after(const Model& model, double share) {
 PlacedObstacles obstacles_over(const Model& model, double time, double span) {
   PlacedObstacles placed;
   for (const Obstacle& obstacle : model.obstacles) {
-    const Motion& motion = obstacle.motion;
-    placed.push_back(
-        obstacle.step_between(motion.path_at(time - span), motion.path_at(time), span));
+    placed.push_back(obstacle.stage_to(time, span));
   }
   return placed;
 }
@@ -72,14 +70,15 @@ void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u) {
 
 void ContactPenalty::add(const PlacedObstacles& at, const Vector& u, Vector& force) const {
   for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
-        force[model_.contact.phyxels[k]] += f.force;
-      });
+    force[model_.contact.phyxels[k]] += f.force;
+  });
 }
 
 double ContactPenalty::energy(const PlacedObstacles& at, const Vector& u) const {
   if (empty()) return 0;
   ExactSum sum;
-  for_each_force(at, u, [&](std::size_t, std::size_t, const PenaltyForce& f, Vec3d) { sum.add(f.energy); });
+  for_each_force(
+      at, u, [&](std::size_t, std::size_t, const PenaltyForce& f, Vec3d) { sum.add(f.energy); });
   if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
   return sum.value();
 }
@@ -114,18 +113,25 @@ void ContactPenalty::precondition(std::span<const double> s, const Vector& free,
   }
 }
 
-void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity,
-                            double time, std::span<ExactSum> sums) const {
-  for_each_force(at, u, [&](std::size_t k, std::size_t o, const PenaltyForce& f, Vec3d x) {
-        const ObstacleStep& step = at[o];
-        const Vec3d surface = velocity_of_surface(step, x).now;
-        const Vec3d relative = velocity[model_.contact.phyxels[k]] - surface;
-        ContactTerms terms;
-        terms.set(time * f.force, {}, x - step.place_at_rest, surface, relative);
-        for (int t = 0; t < ContactTerms::count; ++t) {
-          sums[o * ContactTerms::count + t].add(terms.value[t]);
-        }
-      });
+double ContactPenalty::largest_depth(const PlacedObstacles& at, const Vector& u) const {
+  double deepest = 0;
+  for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
+    const double support = model_.neighbourhood.support[model_.contact.phyxels[k]];
+    deepest = std::max(deepest, norm(f.force) / (stiffness_[k] * support));
+  });
+  return model_.share ? model_.share->communicator->largest(deepest) : deepest;
+}
+
+void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, double time,
+                            std::span<ExactSum> sums) const {
+  for_each_force(at, u, [&](std::size_t, std::size_t o, const PenaltyForce& f, Vec3d x) {
+    const ObstacleStep& step = at[o];
+    ContactTerms terms;  // an energy loses nothing
+    terms.set(time * f.force, {}, x - step.place_at_rest, rigid_velocity(step, x), {});
+    for (int t = 0; t < ContactTerms::count; ++t) {
+      sums[o * ContactTerms::count + t].add(terms.value[t]);
+    }
+  });
 }
 
 }  // namespace phyxel

@@ -44,9 +44,12 @@ class ContactPenalty {
   /// @param s stiffness of each phyxel [N/m]. @param free 1 along free axes, 0 along others
   void precondition(std::span<const double> s, const Vector& free, const Vector& a,
                     Vector& x) const;
+  /// The depth of the deepest phyxel at displacements u, as a share of its support. Collective on a
+  /// share.
+  double largest_depth(const PlacedObstacles& at, const Vector& u) const;
   /// Adds to the sums of each obstacle what its forces at u do over a time [s] (`ContactTerms`).
-  /// @param velocity of the phyxels [m/s]. @param sums of the obstacles, one after the other
-  void add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity, double time,
+  /// @param sums of the obstacles, one after the other
+  void add_to(const PlacedObstacles& at, const Vector& u, double time,
               std::span<ExactSum> sums) const;
 
  private:

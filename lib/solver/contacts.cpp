@@ -1,7 +1,11 @@
 #include "phyxel/contacts.hpp"
 
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
 #include "solver/contact_penalty.hpp"
@@ -55,8 +59,8 @@ struct ContactRates {
   double span = 1;  ///< [s]
 };
 
-/// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by the
-/// penalties of implicit steps and searches for equilibrium.
+/// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by
+/// the penalties of implicit steps and searches for equilibrium.
 /// @param state receives the present displacements and velocities
 ContactRates rates_now(const Model& model, Backend& backend, const Solver& solver, State& state) {
   if (solver.method() == Method::verlet) {
@@ -69,12 +73,11 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   const std::span<const ExactSum> known = solver.end_contact();
   if (!known.empty()) return {StepSums(known.begin(), known.end())};
   const ContactPenalty penalty(model);
-  const PlacedObstacles at =
-      solver.method() == Method::equilibrium
-          ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
-          : obstacles_over(model, solver.time(), solver.dt());
+  const PlacedObstacles at = solver.method() == Method::equilibrium
+                                 ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
+                                 : obstacles_over(model, solver.time(), solver.dt());
   ContactRates rates{StepSums(ContactTerms::count * model.obstacles.size())};
-  penalty.add_to(at, state.displacement, state.velocity, rates.span, rates.sums);
+  penalty.add_to(at, state.displacement, rates.span, rates.sums);
   return rates;
 }
 
@@ -97,7 +100,58 @@ double depth_in(const Model& model, std::size_t o, const Solver& solver, const S
   return model.share ? model.share->communicator->largest(deepest) : deepest;
 }
 
+/// The smallest support of the phyxels that touch obstacles [m]. Of a share: collective.
+double smallest_support(const Model& model) {
+  double smallest = HUGE_VAL;
+  for (const Index i : model.contact.phyxels) {
+    smallest = std::min(smallest, model.neighbourhood.support[i]);
+  }
+  return model.share ? model.share->communicator->smallest(smallest) : smallest;
+}
+
+/// Ends a run, on all ranks alike.
+[[noreturn]] void say_wrong(const Model& model, const std::string& why) {
+  if (model.share) throw AgreedError(ExitCode::diverged, why);
+  throw DivergedError(why);
+}
+
+/// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
+/// hold.
+void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
+  constexpr double deepest = 0.25;
+  const double support = smallest_support(model);
+  for (const ContactReading& reading : readings) {
+    if (!(reading.depth > deepest * support)) continue;
+    say_wrong(model,
+              fmt::format("phyxels are {:.3g} m deep in obstacle \"{}\", a quarter of a support of "
+                          "{:.3g} m is allowed: another obstacle presses them into it, or they are "
+                          "too fast for the step",
+                          reading.depth, reading.obstacle, support));
+  }
+}
+
 }  // namespace
+
+void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed) {
+  if (model.obstacles.empty() || solver.method() == Method::equilibrium) return;
+  const double dt = solver.dt(), support = smallest_support(model);
+  for (const Obstacle& obstacle : model.obstacles) {
+    const double of_obstacle = obstacle.largest_speed(obstacle.step_from(solver.time(), dt));
+    const double speed = largest_speed + of_obstacle;
+    const double most = 0.5 * std::min(obstacle.inner_radius(), support);
+    if (!(speed * dt > most)) continue;
+    say_wrong(
+        model,
+        fmt::format("phyxels move at up to {:.3g} m/s and obstacle \"{}\" at {:.3g} m/s, {:.3g} "
+                    "m against each other in a step of {:.3g} s: they might pass through each "
+                    "other unseen; allowed: {:.3g} m, half of {}, by a step of at most {:.3g} s "
+                    "(time.step, time.safety), lower speeds, or a thicker obstacle",
+                    largest_speed, obstacle.name, of_obstacle, speed * dt, dt, most,
+                    obstacle.inner_radius() < support ? "the obstacle's inner radius"
+                                                      : "a support of the phyxels",
+                    most / speed));
+  }
+}
 
 const char* shape_name(const Obstacle& obstacle) {
   return ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [](const auto& shape) {
@@ -133,6 +187,7 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                         .depth = depth_in(model, o, solver, state),
                         .place = obstacle.place});
   }
+  check_depths(model, readings);
   return readings;
 }
 

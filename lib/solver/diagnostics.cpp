@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "phyxel/contacts.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/physics/hourglass.hpp"
@@ -144,6 +145,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver)
     loss.add(all[first + ContactTerms::impact_loss].value());
   }
   d.contact_loss = loss.value();
+  check_contact_speeds(model, solver, d.largest_speed);
   return d;
 }
 

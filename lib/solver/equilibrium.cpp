@@ -23,15 +23,25 @@ Balance whole_balance(const Model& model, const Newton& newton) {
   balance.target = vectors.make();
   balance.free = free_axes(model);
   balance.free.resize(balance.target.size(), {1, 1, 1});
-  const auto refuse_endless = [](const Motion& motion) {
-    if (motion.velocity != Vec3d{} || motion.amplitude != Vec3d{}) {
-      throw InputError(
-          "a motion with a velocity or an amplitude never ends: allowed in a search for "
-          "equilibrium are fixed phyxels and motions by a displacement");
-    }
+  const auto is_endless = [](const Motion& motion) {
+    return motion.velocity != Vec3d{} || motion.amplitude != Vec3d{};
   };
-  for (const Motion& motion : model.motions) refuse_endless(motion);
-  for (const Obstacle& obstacle : model.obstacles) refuse_endless(obstacle.motion);
+  for (const Motion& motion : model.motions) {
+    if (!is_endless(motion)) continue;
+    throw InputError(
+        "a motion with a velocity or an amplitude never ends: allowed in a search for "
+        "equilibrium are fixed phyxels and motions by a displacement");
+  }
+  for (const Obstacle& obstacle : model.obstacles) {
+    if (!is_endless(obstacle.motion)) continue;
+    const std::string why = fmt::format(
+        "obstacle.motion of obstacle \"{}\" has a velocity or an amplitude, and never ends: "
+        "allowed "
+        "in a search for equilibrium are obstacles at rest and motions by a displacement",
+        obstacle.name);
+    if (model.share) throw AgreedError(ExitCode::bad_input, why);
+    throw InputError(why);
+  }
   newton.set_applied(full_loads, balance);
   return balance;
 }
@@ -47,12 +57,35 @@ void set_targets(const Model& model, double share, Balance& balance) {
 }
 
 /// Number of stages of a search: a rotation is followed by an eighth of a turn at a time, since
-/// straight paths to the target would flatten the body.
-int stages_of(const Model& model) {
-  double angle = 0;
+/// straight paths to the target would flatten the body, and an obstacle by half a support, since it
+/// would pass the surface that it is to push.
+int stages_of(const Model& model, const OwnedVectors& vectors) {
+  double angle = 0, way = 0;
   for (const Motion& motion : model.motions) angle = std::max(angle, norm(motion.rotation));
-  for (const Obstacle& o : model.obstacles) angle = std::max(angle, norm(o.motion.rotation));
-  return std::max(1, static_cast<int>(std::ceil(angle / (std::numbers::pi / 4) - 1e-9)));
+  for (const Obstacle& o : model.obstacles) {
+    angle = std::max(angle, norm(o.motion.rotation));
+    way = std::max(way, norm(o.motion.displacement));
+  }
+  constexpr double share_of_support = 0.5;
+  constexpr double most = 10'000;
+  const double by_turns = std::ceil(angle / (std::numbers::pi / 4) - 1e-9);
+  const double by_way =
+      way > 0 ? std::ceil(way / (share_of_support * vectors.smallest_support()) - 1e-9) : 0;
+  return static_cast<int>(std::clamp(std::max(by_turns, by_way), 1.0, most));
+}
+
+/// Refuses a state in which an obstacle is deeper in a body than pressures push it.
+void check_depth(const Model& model, const Newton& newton, const Balance& balance,
+                 const Newton::Vector& u) {
+  constexpr double deepest = 0.25;
+  const double depth = newton.contact().largest_depth(balance.obstacles, u);
+  if (!(depth > deepest)) return;
+  const std::string why = fmt::format(
+      "no equilibrium was found: phyxels are up to {:.2g} supports deep in an obstacle, {:.2g} is "
+      "allowed; what presses them is stronger than the body",
+      depth, deepest);
+  if (model.share) throw AgreedError(ExitCode::diverged, why);
+  throw DivergedError(why);
 }
 
 /// Sum of squared distances of prescribed phyxels from the straight paths between the targets of
@@ -96,9 +129,11 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
   const std::string why = fmt::format(
       "no equilibrium was found in {} steps of Newton's method and {} evaluations of the forces "
       "({}): the residual force is {:.2g} of what is applied, {:.2g} is needed; nothing may hold a "
-      "part of the body, or it buckles: allowed are more support, smaller loads, or a run in time "
+      "part of the body{}, or it buckles: allowed are more support, smaller loads, or a run in "
+      "time "
       "with damping",
-      found.steps, found.evaluations, report.why, report.residual, tolerance);
+      found.steps, found.evaluations, report.why, report.residual, tolerance,
+      model.obstacles.empty() ? "" : ", or it does not touch the obstacle that is to hold it yet");
   if (model.share) throw AgreedError(ExitCode::diverged, why);
   throw DivergedError(why);
 }
@@ -121,7 +156,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   found.state.velocity = vectors.make();
   check_state(found.state, model.size());  // of the caller's start
   NewtonReport report;
-  const int stages = stages_of(model);
+  const int stages = stages_of(model, vectors);
   const int first =
       options.start ? stage_of(model, vectors, balance, stages, found.state.displacement) : 1;
   for (int stage = first; stage <= stages; ++stage) {
@@ -132,7 +167,10 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     report = newton.solve(balance, tolerance, found.state.displacement);
     found.steps += report.steps;
     found.evaluations += report.evaluations;
-    if (report.found) continue;
+    if (report.found) {
+      if (!model.obstacles.empty()) check_depth(model, newton, balance, found.state.displacement);
+      continue;
+    }
     vectors.refresh_ghosts(found.state.displacement);
     backend.put(found.state);
     if (report.interrupted) {

@@ -45,6 +45,23 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       contact_(model),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
+/// The reason to give a search up, or nothing. @param exhausted number of steps in a row whose
+/// linear equations stayed unsolved
+std::string Newton::why_to_end(const NewtonReport& report, int without_gain, int exhausted) const {
+  if (!std::isfinite(report.residual)) return "forces are not finite";
+  if (report.steps == most_steps_) {
+    return fmt::format("{} steps are all that is allowed", most_steps_);
+  }
+  if (without_gain == most_without_gain) {
+    return fmt::format("{} steps in a row have gained nothing", without_gain);
+  }
+  if (exhausted < most_exhausted) return {};
+  return fmt::format(
+      "the linear equations of {} steps in a row have no solution that conjugate gradients "
+      "find in {} iterations",
+      exhausted, most_inner_here());
+}
+
 NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
   NewtonReport report;
   evaluations_ = 0;
@@ -60,6 +77,7 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     const Vector all = with_contact(balance, u, force);
     const double energy = plain_energy + contact_.energy(balance.obstacles, u);
     report.residual = residual(balance, u, all);
+    report.evaluations = evaluations_;
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
     report.found = report.residual <= tolerance && to_move == 0;
@@ -67,18 +85,7 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     const bool gained = to_move > 0 || report.residual < 0.9 * smallest;
     smallest = std::min(smallest, report.residual);
     without_gain = gained ? 0 : without_gain + 1;
-    if (!std::isfinite(report.residual)) {
-      report.why = "forces are not finite";
-    } else if (report.steps == most_steps_) {
-      report.why = fmt::format("{} steps are all that is allowed", most_steps_);
-    } else if (without_gain == most_without_gain) {
-      report.why = fmt::format("{} steps in a row have gained nothing", without_gain);
-    } else if (exhausted == most_exhausted) {
-      report.why = fmt::format(
-          "the linear equations of {} steps in a row have no solution that conjugate gradients "
-          "find in {} iterations",
-          exhausted, most_inner_here());
-    }
+    report.why = why_to_end(report, without_gain, exhausted);
     if (!report.why.empty()) return report;
     progress_.step = report.steps;
     progress_.residual = report.residual;
@@ -111,10 +118,10 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
       // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
       // that follows the surface has an energy only nearly: there, smaller residuals do as well.
       const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
-      const bool falls = rise <= rounding ||
-                         (!following_.empty() &&
-                          residual(balance, next, with_contact(balance, next, force)) <
-                              report.residual);
+      const bool falls =
+          rise <= rounding ||
+          (!following_.empty() &&
+           residual(balance, next, with_contact(balance, next, force)) < report.residual);
       if (std::isfinite(now) && (to_move > 0 || falls || attempt == most_cuts)) {
         plain_energy = plain;
         break;
@@ -236,8 +243,8 @@ double Newton::steepest(const Vector& step) {
   return std::max(most, 1e-300);
 }
 
-/// Computes out = (K + weight) v on free axes, with K v by a difference of forces, and the stiffness
-/// of contact added. @param force at u without contact [N]
+/// Computes out = (K + weight) v on free axes, with K v by a difference of forces, and the
+/// stiffness of contact added. @param force at u without contact [N]
 void Newton::stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                              const Vector& v, Vector& out) {
   const double size = vectors_.largest([&](Index i) { return norm(v[i]); });

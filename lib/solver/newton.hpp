@@ -80,6 +80,7 @@ class Newton {
   void set_applied(double time, Balance& balance) const;
 
  private:
+  std::string why_to_end(const NewtonReport& report, int without_gain, int exhausted) const;
   Vector acting_without_contact(const Balance& balance, const Vector& u);
   Vector forces_without_contact(const Balance& balance, const Vector& u);
   /// Adds the forces of contact at u to those without.

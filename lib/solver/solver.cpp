@@ -72,10 +72,13 @@ void refuse_friction(const Model& model, Method method) {
     const bool rubs = obstacle.law.static_friction > 0;
     const double found = rubs ? obstacle.law.static_friction : obstacle.law.restitution;
     if (!(found > 0)) continue;
-    throw InputError(fmt::format(
-        "obstacle.{} = {:g} of obstacle \"{}\" found with solver.method = \"{}\"; allowed with this "
+    const std::string why = fmt::format(
+        "obstacle.{} = {:g} of obstacle \"{}\" found with solver.method = \"{}\"; allowed with "
+        "this "
         "method: 0",
-        rubs ? "friction" : "restitution", found, obstacle.name, method_name(method)));
+        rubs ? "friction" : "restitution", found, obstacle.name, method_name(method));
+    if (model.share) throw AgreedError(ExitCode::bad_input, why);
+    throw InputError(why);
   }
 }
 

@@ -98,11 +98,10 @@ struct ShareCase {
   Model (*make)();
 };
 const std::vector<ShareCase>& share_cases() {
-  static const std::vector<ShareCase> cases{{"Cube", testing::cube},     {"Coil", testing::coil},
-                                            {"Thread", testing::thread}, {"Apart", testing::apart},
-                                            {"Tiny", testing::tiny},     {"Everything", everything},
-                                            {"Controlled", controlled},  {"Custom", custom},
-                                            {"Touching", touching}};
+  static const std::vector<ShareCase> cases{
+      {"Cube", testing::cube},    {"Coil", testing::coil}, {"Thread", testing::thread},
+      {"Apart", testing::apart},  {"Tiny", testing::tiny}, {"Everything", everything},
+      {"Controlled", controlled}, {"Custom", custom},      {"Touching", touching}};
   return cases;
 }
 

@@ -201,6 +201,16 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
         "conserves energy: do not trust the result; a smaller time.safety may help",
         100 * energy_drift(now)));
   }
+  for (const ContactReading& contact : readings_.contacts) {
+    if (contact.impact_loss < -0.01 * peak_energy_ &&
+        -contact.impact_loss > rounding_energy(model())) {
+      warnings.push_back(fmt::format(
+          "contact with obstacle \"{}\" has made {:.3g} J, {:.2g}% of the largest kinetic + "
+          "elastic "
+          "energy: do not trust the result; a smaller time.safety may help",
+          contact.obstacle, -contact.impact_loss, -100 * contact.impact_loss / peak_energy_));
+    }
+  }
   return warnings;
 }
 

@@ -33,8 +33,15 @@ const char* shape_name(const Obstacle& obstacle);
 /// found from one evaluation of the forces, without taking it. Sums are exact: they do not depend
 /// on the number of threads and ranks. Of a share: those of the whole model; collective, for a
 /// solver that was made with the model.
+/// @throws DivergedError if a phyxel is deeper in an obstacle than a quarter of a support
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver);
+
+/// Refuses speeds at which phyxels and obstacles might pass through each other in a step: more than
+/// half of the obstacle's inner radius, or of a support. Of a share: collective.
+/// @param largest_speed of the phyxels of all ranks [m/s]
+/// @throws DivergedError naming the obstacle, the speeds, and the largest step allowed
+void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed);
 
 /// A number of a reading: a column of `contacts.csv`.
 struct ContactColumn {

@@ -18,6 +18,7 @@ class Solver;
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now);
 /// The same at the present instant of a solver, with what contact has lost since t = 0. Of a share:
 /// for a solver that was made with the model.
+/// @throws DivergedError as `check_contact_speeds`
 Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver);
 /// Diagnostics after `step` Verlet steps of size `dt` [s].
 inline Diagnostics diagnose(const Model& model, Backend& backend, std::int64_t step, double dt) {

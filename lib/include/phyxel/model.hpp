@@ -126,6 +126,17 @@ struct Obstacle {
   /// Where it is at the end of a step between two places on its path, and how it moves.
   /// @param dt size of the step [s]; 0: it is at the later place, and does not move
   ObstacleStep step_between(const Path& before, const Path& after, double dt) const;
+  /// Where it is at the end of a stage of `span` [s] of an implicit step that ends at `time` [s],
+  /// and how it moves then.
+  ObstacleStep stage_to(double time, double span) const;
+  /// True if it has an end on all sides, as all shapes have but planes.
+  bool is_bounded() const;
+  /// Radius of the largest ball inside what bodies cannot enter [m]; infinite for a plane, and for
+  /// what is hollow.
+  double inner_radius() const;
+  /// Upper bound of the speeds of its points at the start of a step [m/s]; of a plane, at its
+  /// place.
+  double largest_speed(const ObstacleStep& step) const;
 };
 
 /// The phyxels by which bodies touch obstacles: those on or beside their surfaces that are not held

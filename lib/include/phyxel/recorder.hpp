@@ -130,8 +130,8 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   reactions.csv                              of a scene with supports: one line a frame and set
 ///   probes.csv                                 of a scene with probes: one line a frame and point
 ///   gas.csv                                    of a scene with gases: one line a frame and gas
-///   contacts.csv                               of a scene with obstacles: one line a frame and
-///   obstacle run.json                                   at the end, what `write_summary` is given
+///   contacts.csv                               one line a frame and obstacle, if there are any
+///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
 class Recorder {

@@ -200,18 +200,21 @@ std::vector<Late> refused_obstacles() {
   const std::string ball = one + "shape = 'sphere'\n", far = "translation = [0, 0, -9]\n";
   return {
       {with_bar(one), {":13:", "obstacle.shape", "missing"}},
-      {with_bar(one + "shape = 'cone'\n"), {":14:", "cone", R"("plane", "sphere", "box", "cylinder", "capsule")"}},
+      {with_bar(one + "shape = 'cone'\n"),
+       {":14:", "cone", R"("plane", "sphere", "box", "cylinder", "capsule")"}},
       {with_bar(ball + far), {":14:", "obstacle.radius", "missing", "shape = \"sphere\" needs it"}},
       {with_bar(ball + far + "radius = 0\n"), {":16:", "radius", "0 found"}},
       {with_bar(ball + far + "radius = -1\n"), {":16:", "radius", "-1 found"}},
       {with_bar(ball + far + "radius = 1\nlength = 2\n"),
        {":17:", "length", "shape = \"sphere\" does not use it", "allowed with it: radius"}},
-      {with_bar(floor + far + "size = [1, 1, 1]\n"), {":16:", "size", "allowed with it: no length"}},
+      {with_bar(floor + far + "size = [1, 1, 1]\n"),
+       {":16:", "size", "allowed with it: no length"}},
       {with_bar(one + "shape = 'box'\nsize = [1, 0, 1]\n" + far), {":15:", "size"}},
       {with_bar(ball + far + "radius = 1\nnormal = [0, 0, 1]\n"),
        {":17:", "normal", "shape = \"sphere\"", "\"plane\""}},
       {with_bar(floor + far + "normal = [0, 0, 0]\n"), {":13:", "normal", "a direction"}},
-      {with_bar(floor + far + "normal = [0, 0, 1]\nrotation = [9, 0, 0]\n"), {"normal", "rotation"}},
+      {with_bar(floor + far + "normal = [0, 0, 1]\nrotation = [9, 0, 0]\n"),
+       {"normal", "rotation"}},
       {with_bar(floor + far + "friction = -0.1\n"), {":16:", "friction", "-0.1 found"}},
       {with_bar(floor + far + "restitution = 1.1\n"), {":16:", "restitution", "1.1 found"}},
       {with_bar(floor + far + "friction = 0.1\nkinetic_friction = 0.2\n"),
@@ -219,9 +222,11 @@ std::vector<Late> refused_obstacles() {
       {with_bar(floor + far + "[obstacle.motion]\n"), {":16:", "motion"}},
       {with_bar(floor + far + "name = 'a'\n" + floor + far + "name = 'a'\n"),
        {":20:", "\"a\" found", "a name of its own"}},
-      {with_bar(floor), {":13:1", "body \"beam\" is", "m deep in obstacle \"obstacle 1\"",
-                         "allowed: to touch it, or to begin outside"}},
-      {still + bar + "surfels = false\n" + material + floor + far, {":5:1", "body \"beam\" has no surface"}}};
+      {with_bar(floor),
+       {":13:1", "body \"beam\" is", "m deep in obstacle \"obstacle 1\"",
+        "allowed: to touch it, or to begin outside"}},
+      {still + bar + "surfels = false\n" + material + floor + far,
+       {":5:1", "body \"beam\" has no surface"}}};
 }
 
 /// Gradings of bodies that cannot have them, and finer regions.
@@ -351,9 +356,9 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   bare.volume.clear();
   write_body(folder_ / "bare.h5", bare, false);
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
-  for (const std::vector<Late>& refusals : {late_refusals(), refused_bodies(), refused_gradings(),
-                                            refused_loads(), refused_planes(), refused_probes(),
-                                            refused_obstacles()}) {
+  for (const std::vector<Late>& refusals :
+       {late_refusals(), refused_bodies(), refused_gradings(), refused_loads(), refused_planes(),
+        refused_probes(), refused_obstacles()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);

@@ -54,7 +54,9 @@ TEST(Layers, LieOnPlanesAndShareTheLength) {
       if (on_end[0]) wanted.insert(-1);
       if (on_end[1]) wanted.insert(layers.place(n - 1));
       EXPECT_EQ(laid, wanted);
-      if (on_end[1]) EXPECT_NEAR(layers.place(n - 1), 1.2, 1e-14);
+      if (on_end[1]) {
+        EXPECT_NEAR(layers.place(n - 1), 1.2, 1e-14);
+      }
     }
   }
 }

@@ -80,11 +80,18 @@ struct ObstacleStep {
   Vec3<double> place;  ///< Likewise [m].
   Mat3<double> turn_at_rest;
   Vec3<double> place_at_rest;  ///< [m]
-  /// Velocity of the obstacle over the step, and its mean over this and the step before, where a
-  /// point p at rest is: velocity + slope (p - place_at_rest) [m/s].
-  Vec3<double> velocity, mean_velocity;
-  Mat3<double> slope, mean_slope;  ///< [1/s]
-  bool hollow = false;             ///< True if points belong inside.
+  /// Velocity of the obstacle over the step where a point p at rest is: velocity +
+  /// slope (p - place_at_rest) [m/s].
+  Vec3<double> velocity;
+  Mat3<double> slope;  ///< [1/s]
+  /// Velocity at the start of the step of a rigid rotation about a centre [m/s], its antisymmetric
+  /// gradient [1/s], and that centre at the end of the step [m]: a point x then moves with
+  /// drift + spin (x - centre), of which a surface of revolution about its axis sees nothing along
+  /// its normals.
+  Vec3<double> drift;
+  Mat3<double> spin;
+  Vec3<double> centre;
+  bool hollow = false;  ///< True if points belong inside.
   ContactLaw law;
   double dt = 0;  ///< Size of the step [s].
 };
@@ -98,24 +105,24 @@ PHYXEL_HD Gap gap_to(const Shape& shape, const ObstacleStep& obstacle, Vec3<doub
   return gap;
 }
 
-/// Velocities of a point of an obstacle.
-struct SurfaceVelocity {
-  Vec3<double> now;   ///< Over the step [m/s].
-  Vec3<double> mean;  ///< Mean over the step and the one before [m/s].
-};
-
-/// The velocity of the point of an obstacle that is at x [m] at the end of a step.
-PHYXEL_HD SurfaceVelocity velocity_of_surface(const ObstacleStep& obstacle, Vec3<double> x) {
+/// The velocity over a step of the point of an obstacle that is at x [m] at its end [m/s].
+PHYXEL_HD Vec3<double> surface_velocity(const ObstacleStep& obstacle, Vec3<double> x) {
   // The place at rest of that point, from the obstacle's own.
-  const Vec3<double> arm = obstacle.turn_at_rest * (transpose(obstacle.turn) * (x - obstacle.place));
-  return {obstacle.velocity + obstacle.slope * arm,
-          obstacle.mean_velocity + obstacle.mean_slope * arm};
+  const Vec3<double> arm =
+      obstacle.turn_at_rest * (transpose(obstacle.turn) * (x - obstacle.place));
+  return obstacle.velocity + obstacle.slope * arm;
+}
+
+/// The velocity at the start of a step of the rigid motion of an obstacle, at a point x [m] at its
+/// end [m/s].
+PHYXEL_HD Vec3<double> rigid_velocity(const ObstacleStep& obstacle, Vec3<double> x) {
+  return obstacle.drift + obstacle.spin * (x - obstacle.centre);
 }
 
 /// What contact with an obstacle adds to its sums over steps.
 struct ContactTerms {
-  /// Indices of the terms: impulse on the point [N s]; angular impulse about the obstacle's place at
-  /// rest [N m s]; work of the obstacle on the point, heat of friction, loss in the impact [J].
+  /// Indices of the terms: impulse on the point [N s]; angular impulse about the obstacle's place
+  /// at rest [N m s]; work of the obstacle on the point, heat of friction, loss in the impact [J].
   enum { impulse = 0, moment = 3, work = 6, friction_heat, impact_loss, count };
   double value[count] = {};
 
@@ -158,11 +165,10 @@ PHYXEL_HD bool touch(const Shape& shape, const ObstacleStep& obstacle, TouchingP
   Gap gap = gap_to(shape, obstacle, point.position);
   gap.distance -= point.offset;
   if (!(gap.distance < 0)) return false;
-  const auto [surface, mean] = velocity_of_surface(obstacle, point.position);
-  const Vec3<double> before = 2.0 * mean - surface;  // velocity of the surface in the step before
-  const ContactChange change =
-      contact_change(gap, {point.velocity - surface, point.before - before, point.free},
-                     obstacle.law, obstacle.dt);
+  const Vec3<double> surface = surface_velocity(obstacle, point.position);
+  const Vec3<double> mean = rigid_velocity(obstacle, point.position);
+  const ContactChange change = contact_change(
+      gap, {point.velocity - surface, point.before - mean, point.free}, obstacle.law, obstacle.dt);
   const Vec3<double> all = change.normal + change.tangential;
   const Vec3<double> start = point.position - obstacle.dt * point.velocity;
   point.velocity += all;
