@@ -196,10 +196,11 @@ double Obstacle::inner_radius() const {
 }
 
 double Obstacle::largest_speed(const ObstacleStep& step) const {
-  const Vec3d turning{step.spin(2, 1), step.spin(0, 2), step.spin(1, 0)};
-  double reach = norm(step.place - step.centre);
+  double square = 0;  // of the change of the rotation, whose rate is 1/sqrt(2) of it
+  for (int e = 0; e < 9; ++e) square += step.slope(e / 3, e % 3) * step.slope(e / 3, e % 3);
+  double reach = 0;
   for (const double length : lengths) reach += length;
-  return norm(step.drift) + norm(turning) * reach;
+  return norm(step.velocity) + std::sqrt(0.5 * square) * reach;
 }
 
 void check_touches(const BodyRequest& request, std::span<const Triangle> triangles) {
