@@ -70,6 +70,12 @@ double CameraFit::extent() const {
   return empty() ? 0 : std::max({high_x_ - low_x_, high_y_ - low_y_, farthest_ - nearest_});
 }
 
+Vec3d CameraFit::middle() const {
+  if (empty()) return {};
+  return 0.5 * ((low_x_ + high_x_) * camera_.right + (low_y_ + high_y_) * camera_.up +
+                (nearest_ + farthest_) * camera_.forward);
+}
+
 Camera CameraFit::camera() const {
   Camera fitted = camera_;
   if (empty()) return fitted;

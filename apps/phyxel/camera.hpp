@@ -19,6 +19,10 @@ struct Camera {
     double x, y, depth;
   };  ///< [px], [px], [m] along `forward`.
   Place project(Vec3d point) const;
+  /// The direction from the eye through a place on the image [px], 1 m along `forward`.
+  Vec3d ray(double x, double y) const {
+    return forward + ((x - 0.5 * width) / focal) * right + ((0.5 * height - y) / focal) * up;
+  }
 };
 
 /// Fit of the nearest camera with a given direction that sees all points.
@@ -34,6 +38,7 @@ class CameraFit {
   void include(std::span<const Vec3d> points);
   bool empty() const { return !(nearest_ <= farthest_); }
   double extent() const;  ///< Largest extent of the points along the camera's axes [m].
+  Vec3d middle() const;   ///< Of the box around the points along the camera's axes [m].
   Camera camera() const;
 
  private:

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "draw_obstacles.hpp"
 #include "label.hpp"
+#include "shadow.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -23,9 +25,92 @@ std::vector<Colour> colours(const FrameData& frame, Colour (*of_body)(Index)) {
   return colour;
 }
 
-std::span<const Index> bodies(const FrameData& frame) {
+std::span<const Index> body_numbers(const FrameData& frame) {
   if (frame.body.size() != frame.point.size()) return {};
   return frame.body;
+}
+
+/// The bodies of a frame, ready to be drawn from any side: surfaces, or else phyxels.
+class Bodies {
+ public:
+  Bodies(const FrameData* surface, const FrameData* phyxels, const Setting& setting)
+      : surface_(surface),
+        frame_(surface != nullptr ? surface : phyxels),
+        radius_(0.42 * setting.spacing) {
+    if (frame_ == nullptr) return;
+    colour_ = colours(*frame_, body_colour);
+    if (surface != nullptr && surface->normal.size() != surface->point.size()) {
+      made_normal_ = vertex_normals(surface->point, surface->triangle);
+    }
+  }
+
+  bool any() const { return frame_ != nullptr; }
+  std::span<const Vec3d> points() const { return frame_->point; }
+  double time() const { return frame_->time; }  ///< [s]
+
+  void draw(Rasteriser& rasteriser) const {
+    if (surface_ != nullptr) {
+      rasteriser.draw_surface(surface_->point,
+                              made_normal_.empty() ? surface_->normal : made_normal_,
+                              surface_->triangle, colour_, body_numbers(*surface_));
+    } else {
+      const Camera& camera = rasteriser.camera();
+      const DotStyle style{.radius = radius_,
+                           .largest = 0.04 * std::min(camera.width, camera.height)};
+      rasteriser.draw_spheres(frame_->point, colour_, body_numbers(*frame_), style);
+    }
+  }
+
+ private:
+  const FrameData *surface_, *frame_;
+  double radius_;  // of phyxels without a surface [m]
+  std::vector<Colour> colour_;
+  std::vector<Vec3d> made_normal_;  // unless the frame has some
+};
+
+/// Adds the extents of an obstacle across the light, up to a distance from the middle: those of a
+/// shape are where a faraway point is nearest to it.
+void include_obstacle(ShadowBounds& bounds, const PlacedObstacle& obstacle, Vec3d middle,
+                      double reach) {
+  const double far = 100 * reach;
+  for (const int k : {0, 1}) {
+    const Vec3d axis = bounds.axis(k);
+    const auto extent = [&](double sign) {
+      const double found = far - obstacle.distance(middle + (sign * far) * axis);
+      return sign * std::clamp(found, -reach, reach);
+    };
+    bounds.include(k, dot(middle, axis) + extent(-1), dot(middle, axis) + extent(1));
+  }
+}
+
+/// Adds the obstacles at the time of the bodies, and shadows, to a picture of the bodies.
+void add_obstacles(Rasteriser& rasteriser, const Bodies& bodies, const Setting& setting) {
+  constexpr Colour black{0, 0, 0};
+  const std::vector<PlacedObstacle> all = placed(setting.obstacles, bodies.time());
+  const Fade fade{setting.middle, 1.0 * setting.extent, 4.0 * setting.extent};
+  const Vec3d light = light_direction(setting.camera, setting.up);
+  ShadowBounds bounds(setting.camera, light);
+  bounds.include(bodies.points());
+  std::vector<PlacedObstacle> casting;
+  for (const PlacedObstacle& obstacle : all) {
+    if (!obstacle.bounded || obstacle.step.hollow) continue;
+    casting.push_back(obstacle);
+    include_obstacle(bounds, obstacle, setting.middle, fade.end);
+  }
+  if (bounds.empty()) {
+    draw_obstacles(rasteriser, all, fade, [](Vec3d, Index) { return 1.0f; });
+    return;
+  }
+  Rasteriser seen(bounds.camera(setting.middle, fade.end), setting.up, black, black, 1);
+  bodies.draw(seen);
+  draw_obstacles(seen, casting, fade, [](Vec3d, Index) { return 1.0f; });
+  const Shadows shadows(seen);
+  rasteriser.darken([&](Vec3d place, Index body) {
+    constexpr float strength = 0.45f;
+    return 1 - strength * (1 - shadows.light_at(place, body));
+  });
+  draw_obstacles(rasteriser, all, fade,
+                 [&](Vec3d place, Index body) { return shadows.light_at(place, body); });
 }
 
 }  // namespace
@@ -53,35 +138,26 @@ double typical_spacing(const std::vector<Vec3d>& point) {
 
 Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Setting& setting) {
   Rasteriser rasteriser(setting.camera, setting.up, background_top, background_bottom);
-  if (surface != nullptr) {
-    const bool has_normals = surface->normal.size() == surface->point.size();
-    const auto normal =
-        has_normals ? surface->normal : vertex_normals(surface->point, surface->triangle);
-    rasteriser.draw_surface(surface->point, normal, surface->triangle,
-                            colours(*surface, body_colour), bodies(*surface));
-    rasteriser.shade_hollows(0.05 * setting.extent);
+  const Bodies bodies(surface, phyxels, setting);
+  if (bodies.any()) {
+    bodies.draw(rasteriser);
+    if (!setting.obstacles.empty()) add_obstacles(rasteriser, bodies, setting);
+    rasteriser.shade_hollows(surface != nullptr ? 0.05 * setting.extent : 1.5 * setting.spacing);
   }
-  if (phyxels != nullptr) {
+  if (surface != nullptr && phyxels != nullptr) {
     DotStyle style;
     style.largest = 0.04 * std::min(setting.camera.width, setting.camera.height);
-    if (surface != nullptr) {
-      style.radius = 0.20 * setting.spacing;
-      style.fade = std::max(3 * setting.spacing, 0.04 * setting.extent);
-      rasteriser.draw_dots(phyxels->point, colours(*phyxels, dot_colour), bodies(*phyxels), style);
-    } else {
-      style.radius = 0.42 * setting.spacing;
-      rasteriser.draw_spheres(phyxels->point, colours(*phyxels, body_colour), bodies(*phyxels),
-                              style);
-      rasteriser.shade_hollows(1.5 * setting.spacing);
-    }
+    style.radius = 0.20 * setting.spacing;
+    style.fade = std::max(3 * setting.spacing, 0.04 * setting.extent);
+    rasteriser.draw_dots(phyxels->point, colours(*phyxels, dot_colour), body_numbers(*phyxels),
+                         style);
   }
   Image image = rasteriser.resolve();
-  const FrameData* timed = surface != nullptr ? surface : phyxels;
-  if (timed != nullptr && setting.time_decimals >= 0) {
+  if (bodies.any() && setting.time_decimals >= 0) {
     const double scale = text_scale(image);
     const int margin = static_cast<int>(9 * scale);
     draw_text(image, margin, image.height - margin - static_cast<int>(7 * scale), scale,
-              fmt::format("t = {:.{}f} s", timed->time, setting.time_decimals));
+              fmt::format("t = {:.{}f} s", bodies.time(), setting.time_decimals));
   }
   return image;
 }

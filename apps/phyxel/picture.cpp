@@ -6,21 +6,41 @@
 #include <optional>
 
 #include "files/atomic_file.hpp"
+#include "model/contact.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
+#include "scene/parse_obstacles.hpp"
 
 namespace phyxel::app {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The picture settings of the scene in a frame; the defaults if it cannot be parsed.
-RenderRequest pictures_of(const fs::path& file) {
+/// The text of the scene in a frame; empty if there is none.
+std::string scene_text(const fs::path& file) {
   try {
-    return parse_render(read_frame(file, true).scene, file);
+    return read_frame(file, true).scene;
   } catch (const InputError&) {
-    return {};  // the frame has no scene text, or one of another version
+    return {};
   }
+}
+
+/// What a scene's text says, as `parse` reads it; `otherwise` if it cannot be parsed.
+template <class Parse, class Said>
+Said said(const std::string& scene, const fs::path& file, const Parse& parse, Said otherwise) {
+  try {
+    return parse(scene, file);
+  } catch (const InputError&) {
+    return otherwise;  // the frame has no scene text, or one of another version
+  }
+}
+
+/// The obstacles of a scene. An equilibrium has them at the ends of their paths.
+std::vector<Obstacle> obstacles_in(const Scene& scene) {
+  std::vector<Obstacle> obstacles = obstacles_of(scene);
+  if (scene.solver.method != Method::equilibrium) return obstacles;
+  for (Obstacle& obstacle : obstacles) obstacle.motion.duration = 0;
+  return obstacles;
 }
 
 /// Fits the camera to all frames, so that it sees the whole motion.
@@ -28,10 +48,13 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   Setting setting;
   setting.time_decimals = time_decimals(shots);
   const Shot& first = shots.front();
-  const RenderRequest said = pictures_of(first.surface.empty() ? first.phyxels : first.surface);
-  setting.up = request.up.value_or(said.up);
+  const fs::path& start = first.surface.empty() ? first.phyxels : first.surface;
+  const std::string scene = scene_text(start);
+  const RenderRequest asked = said(scene, start, parse_render, RenderRequest{});
+  setting.obstacles = obstacles_in(said(scene, start, parse_obstacles, Scene{}));
+  setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
-  CameraFit fit(request.width, request.height, request.view.value_or(said.view), setting.up);
+  CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);
   for (const Shot& shot : shots) {
     for (const fs::path& file : {shot.surface, shot.phyxels}) {
       if (const auto frame = read_if_any(file)) fit.include(frame->point);
@@ -42,6 +65,7 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   if (phyxels) setting.spacing = typical_spacing(phyxels->point);
   setting.camera = fit.camera();
   setting.extent = fit.extent();
+  setting.middle = fit.middle();
   return setting;
 }
 

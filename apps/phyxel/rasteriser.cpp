@@ -46,9 +46,9 @@ struct Rasteriser::Disc {
   float depth, bulge;  // depth of the centre, and how much nearer the front of the sphere is [m]
 };
 
-Rasteriser::Rasteriser(const Camera& camera, Vec3d up, Colour top, Colour bottom)
+Rasteriser::Rasteriser(const Camera& camera, Vec3d up, Colour top, Colour bottom, int samples)
     : camera_(camera),
-      samples_(choose_samples(camera)),
+      samples_(samples > 0 ? samples : choose_samples(camera)),
       width_(camera.width * samples_),
       height_(camera.height * samples_),
       centre_x_(0.5f * static_cast<float>(width_)),
@@ -84,23 +84,36 @@ Rasteriser::Vertex Rasteriser::vertex(Vec3d point, Vec3d normal, Colour colour) 
   return v;
 }
 
-Colour Rasteriser::shade(Colour colour, Vec3f n, float x, float y) const {
-  const Vec3f viewer = unit({(centre_x_ - x) * per_focal_, (y - centre_y_) * per_focal_, 1.0f});
+Colour Rasteriser::lit(Colour colour, Vec3f n, float key) const {
   const float up = 0.5f + 0.5f * dot(n, sky_);
   Colour light = (1 - up) * ground_colour + up * sky_colour;
   // Lambert shading wrapped by a tenth, for the soft shadow edge of soft material.
   const auto lambert = [&](Vec3f direction) {
     return std::max(0.0f, (dot(n, direction) + 0.1f) / 1.1f);
   };
-  light += lambert(key_light) * key_colour;
+  light += (key * lambert(key_light)) * key_colour;
   light += lambert(fill_light) * fill_colour;
+  float gloss = std::max(0.0f, dot(n, key_halfway));
+  for (int k = 0; k < 5; ++k) gloss *= gloss;  // Blinn-Phong, exponent 32
+  return times(colour, light) + (0.10f * key * gloss) * Colour{1, 1, 1};
+}
+
+Colour Rasteriser::shade(Colour colour, Vec3f n, float x, float y) const {
+  const Vec3f viewer = unit({(centre_x_ - x) * per_focal_, (y - centre_y_) * per_focal_, 1.0f});
   const float facing = std::clamp(dot(n, viewer), 0.0f, 1.0f);
   // Contours are darkened.
   const float rim = 1 - facing;
   const float contour = 1 - 0.55f * rim * rim * rim * rim;
-  float gloss = std::max(0.0f, dot(n, key_halfway));
-  for (int k = 0; k < 5; ++k) gloss *= gloss;  // Blinn-Phong, exponent 32
-  return contour * (times(colour, light) + (0.10f * gloss) * Colour{1, 1, 1});
+  return contour * lit(colour, n, 1);
+}
+
+void Rasteriser::blend(int x, int y, const Fragment& fragment) {
+  const std::size_t s = at(x, y);
+  if (!(fragment.nearness > nearness_[s])) return;
+  colour_[s] = (1 - fragment.opacity) * colour_[s] + fragment.opacity * fragment.colour;
+  if (fragment.opacity <= 0.5f) return;
+  nearness_[s] = fragment.nearness;
+  body_[s] = fragment.body;
 }
 
 void Rasteriser::draw_triangle(const Vertex& a, const Vertex& b, const Vertex& c, Index body) {
@@ -177,6 +190,17 @@ void Rasteriser::shade_hollows(double reach) {
   constexpr int directions = 6, rings = 4;
   constexpr float strength = 0.62f;
   if (!(reach > 0)) return;
+  struct Direction {
+    float x, y;
+  };
+  std::array<Direction, directions * rings> around;
+  for (int ring = 0; ring < rings; ++ring) {
+    for (int k = 0; k < directions; ++k) {
+      const float angle =
+          3.14159265f * (static_cast<float>(k) + 0.25f * static_cast<float>(ring)) / directions;
+      around[ring * directions + k] = {std::cos(angle), std::sin(angle)};
+    }
+  }
   std::vector<float> darker(static_cast<std::size_t>(camera_.width) *
                             static_cast<std::size_t>(camera_.height));
   const float reach_in_samples = static_cast<float>(reach * camera_.focal * samples_);
@@ -190,23 +214,33 @@ void Rasteriser::shade_hollows(double reach) {
       const float per_size = 1 / (here * here * size);  // d(depth) = d(nearness) / nearness^2
       // Height of a neighbour above this sample in units of the reach; one far in front belongs to
       // another object.
-      const auto rise = [&](int u, int v) {
+      const auto height = [&](int u, int v) {
         const int nx = std::clamp(u, 0, width_ - 1), ny = std::clamp(v, 0, height_ - 1);
-        const float height = (nearness_[at(nx, ny)] - here) * per_size;
-        return height > 1 ? std::max(0.0f, 2 - height) : std::max(-1.0f, height);
+        return (nearness_[at(nx, ny)] - here) * per_size;
       };
+      const auto rise = [](float step) {
+        return step > 1 ? std::max(0.0f, 2 - step) : std::max(-1.0f, step);
+      };
+      const bool is_obstacle = body_[at(x, y)] < -1;
       float sum = 0;
       for (int ring = 0; ring < rings; ++ring) {
         // The order of the arguments also bounds NaN.
         const float wanted = reach_in_samples * here * static_cast<float>(ring + 1) / rings;
         const float radius = wanted < farthest ? wanted : farthest;
         for (int k = 0; k < directions; ++k) {
-          const float angle =
-              3.14159265f * (static_cast<float>(k) + 0.25f * static_cast<float>(ring)) / directions;
-          const int u = static_cast<int>(std::lround(radius * std::cos(angle)));
-          const int v = static_cast<int>(std::lround(radius * std::sin(angle)));
-          const float hollow = rise(x + u, y + v) + rise(x - u, y - v);
-          sum += std::clamp(hollow * rings / static_cast<float>(ring + 1), 0.0f, 1.0f);
+          const Direction& way = around[ring * directions + k];
+          const int u = static_cast<int>(std::lround(radius * way.x));
+          const int v = static_cast<int>(std::lround(radius * way.y));
+          const float one = height(x + u, y + v), other = height(x - u, y - v);
+          const float hollow = rise(one) + rise(other);
+          float dark = std::clamp(hollow * rings / static_cast<float>(ring + 1), 0.0f, 1.0f);
+          if (is_obstacle && dark > 0) {
+            // Far away, planes rise steeply: without its opposite a sample says nothing of them.
+            const int most = std::max(std::abs(u), std::abs(v));
+            if (x < most || y < most || x + most >= width_ || y + most >= height_) continue;
+            dark *= std::clamp(2 - std::max(one, other), 0.0f, 1.0f);
+          }
+          sum += dark;
         }
       }
       darker[p] = strength * sum / (directions * rings);

@@ -30,12 +30,24 @@ struct DotStyle {
   double faintest = 0.12;  ///< Smallest opacity.
 };
 
+/// A piece of an obstacle's surface over a sample.
+struct Fragment {
+  float nearness = 0;  ///< 1 / depth [1/m].
+  Colour colour;
+  float opacity = 1;
+  Index body = 0;
+};
+
 /// A picture being drawn: `samples`² samples per pixel, each with colour, depth and body. Drawing
 /// is serial and in the caller's order, so that equal input gives equal pictures.
 class Rasteriser {
  public:
   /// @param up direction from which the soft light comes
-  Rasteriser(const Camera& camera, Vec3d up, Colour top, Colour bottom);
+  /// @param samples number per pixel and axis; 0: as many as a picture needs
+  Rasteriser(const Camera& camera, Vec3d up, Colour top, Colour bottom, int samples = 0);
+
+  const Camera& camera() const { return camera_; }
+  int samples() const { return samples_; }  ///< Per pixel and axis.
 
   /// Draws smoothly shaded triangles. Triangles that reach behind the camera, or beyond the image
   /// by many widths, are skipped; both sides are drawn, a back side with its normals inverted.
@@ -55,6 +67,24 @@ class Rasteriser {
   /// Draws spheres that show through the surface of their own body; other bodies hide them.
   void draw_dots(std::span<const Vec3d> centre, std::span<const Colour> colour,
                  std::span<const Index> body, const DotStyle& style);
+
+  /// Blends a fragment with what lies behind it; nearer samples hide it. It hides what comes later
+  /// if it is more opaque than not. @param x,y [samples]
+  void blend(int x, int y, const Fragment& fragment);
+
+  /// Multiplies what was drawn by factor(place [m], body), which is found once for each pixel.
+  template <class Factor>
+  void darken(const Factor& factor);
+
+  /// The colour of a surface in the light of the bodies, without their dark contours.
+  /// @param normal in the camera's axes: right, up, towards the viewer
+  /// @param key share of the strongest light that reaches it
+  Colour lit(Colour colour, Vec3<float> normal, float key) const;
+
+  /// 1 / depth of a sample [1/m]; 0 where nothing was drawn.
+  float nearness(int x, int y) const { return nearness_[at(x, y)]; }
+  /// The body of a sample; -1 where nothing was drawn.
+  Index body(int x, int y) const { return body_[at(x, y)]; }
 
   Image resolve() const;
 
@@ -80,5 +110,25 @@ class Rasteriser {
   std::vector<Colour> colour_;
   std::vector<Index> body_;
 };
+
+template <class Factor>
+void Rasteriser::darken(const Factor& factor) {
+  for (int y = 0; y < height_; y += samples_) {
+    for (int x = 0; x < width_; x += samples_) {
+      Index known = -1;
+      float share = 1;
+      for (int k = 0; k < samples_ * samples_; ++k) {
+        const std::size_t s = at(x + k % samples_, y + k / samples_);
+        if (nearness_[s] == 0) continue;
+        if (body_[s] != known) {
+          const Vec3d ray =
+              camera_.ray((x + k % samples_ + 0.5) / samples_, (y + k / samples_ + 0.5) / samples_);
+          share = factor(camera_.eye + (1.0 / nearness_[s]) * ray, known = body_[s]);
+        }
+        colour_[s] = share * colour_[s];
+      }
+    }
+  }
+}
 
 }  // namespace phyxel::app

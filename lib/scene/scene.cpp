@@ -10,6 +10,7 @@
 
 #include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
+#include "scene/parse_obstacles.hpp"
 #include "scene/scene_body.hpp"
 #include "scene/scene_error.hpp"
 #include "scene/scene_obstacles.hpp"
@@ -190,6 +191,15 @@ RenderRequest parse_render(const std::string& text, const std::filesystem::path&
   Vec3d gravity;
   root.read("gravity", gravity);
   return render_of(root, gravity);
+}
+
+Scene parse_obstacles(const std::string& text, const std::filesystem::path& file) {
+  const toml::table parsed = parse_toml(text, file);
+  const SceneTable root(parsed, file);
+  Scene scene;
+  if (root.has("solver")) scene.solver = read_solver(root.table("solver"));
+  scene.obstacles = read_obstacles(root);
+  return scene;
 }
 
 bool OutputRequest::wants(std::string_view field) const {
