@@ -23,6 +23,17 @@ constexpr double degree = std::numbers::pi / 180;
 
 }  // namespace
 
+Motion motion_along(const MotionRequest& request) {
+  return {.phyxels = {},
+          .displacement = request.displacement,
+          .rotation = degree * request.rotation,
+          .about = request.about,
+          .duration = request.duration,
+          .velocity = request.velocity,
+          .amplitude = request.amplitude,
+          .frequency = request.frequency};
+}
+
 Mat3d rotation_by(Vec3d radians) {
   const double angle = norm(radians);
   if (angle == 0) return identity<double>();
@@ -458,17 +469,12 @@ void BoundaryChoice::add_to(Model& model, const BodyRequest& request, Index shif
                              .set = numbered("fixed", fix, request.fixed)});
   }
   for (const MotionRequest& m : request.motions) {
-    model.motions.push_back({.phyxels = next(),
-                             .displacement = m.displacement,
-                             .rotation = degree * m.rotation,
-                             .about = m.about,
-                             .duration = m.duration,
-                             .velocity = m.velocity,
-                             .amplitude = m.amplitude,
-                             .frequency = m.frequency,
-                             .axes = m.axes,
-                             .body = request.name,
-                             .set = numbered("motion", m, request.motions)});
+    Motion motion = motion_along(m);
+    motion.phyxels = next();
+    motion.axes = m.axes;
+    motion.body = request.name;
+    motion.set = numbered("motion", m, request.motions);
+    model.motions.push_back(std::move(motion));
   }
   for (std::size_t k = 0; k < planes.size(); ++k) {
     model.motions.push_back({.phyxels = in_model(at_plane[k]),

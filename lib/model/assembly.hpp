@@ -18,6 +18,9 @@
 
 namespace phyxel {
 
+/// The motion along the path of a request, without phyxels, axes and names.
+Motion motion_along(const MotionRequest& request);
+
 /// True if the neighbour lists of a body cannot be left to a device, which can close gradients.
 bool needs_lists_on_host(const BodyRequest& request);
 /// True likewise, for a body whose cloud the caller has made.

@@ -15,7 +15,7 @@
 #include "model/spatial_hash.hpp"
 #include "model/symmetry.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/physics/obstacles.hpp"
+#include "scene/scene_error.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -54,15 +54,7 @@ Obstacle obstacle_of(const ObstacleRequest& request) {
       request.normal ? turn_of_normal(*request.normal) : rotation_by(degree * request.rotation);
   made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
               request.restitution};
-  const MotionRequest& m = request.motion;
-  made.motion = {.phyxels = {},
-                 .displacement = m.displacement,
-                 .rotation = degree * m.rotation,
-                 .about = m.about,
-                 .duration = m.duration,
-                 .velocity = m.velocity,
-                 .amplitude = m.amplitude,
-                 .frequency = m.frequency};
+  made.motion = motion_along(request.motion);
   return made;
 }
 
@@ -112,15 +104,12 @@ std::pair<Index, double> nearest_in(const Model& model, const Part& part, Vec3d 
 Deepest deepest_of(const Model& model) {
   Deepest found;
   const ContactLayer& layer = model.contact;
+  const auto unmoved = [](Index) { return Vec3d{}; };
   for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     const ObstacleStep rest = obstacle.step_from(0, 0);
-    ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
-      for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
-        const Gap gap = gap_to(shape, rest, model.position[layer.phyxels[k]]);
-        const double depth = layer.offset[k] - gap.distance;
-        if (depth > found.depth) found = {depth, layer.phyxels[k], o};
-      }
+    for_each_gap(model, obstacle, rest, unmoved, [&](std::size_t k, Vec3d, const Gap& gap) {
+      if (-gap.distance > found.depth) found = {-gap.distance, layer.phyxels[k], o};
     });
     if (obstacle.hollow || !obstacle.is_bounded()) continue;
     for (const Part& part : model.parts) {
@@ -205,20 +194,21 @@ double Obstacle::largest_speed(const ObstacleStep& step) const {
 
 void check_touches(const BodyRequest& request, std::span<const Triangle> triangles) {
   if (!triangles.empty()) return;
-  throw InputError(
-      fmt::format("{}{}body \"{}\" has no surface with which to touch the scene's obstacles; "
-                  "allowed: a mesh, a "
-                  "shape with surfels, a file with a surface, or no obstacle",
-                  request.where, request.where.empty() ? "" : ": ", request.name));
+  throw InputError(named(
+      request, fmt::format("body \"{}\" has no surface with which to touch the scene's obstacles; "
+                           "allowed: a mesh, a shape with surfels, a file with a surface, or no "
+                           "obstacle",
+                           request.name)));
 }
 
 void check_layer(const BodyRequest& request, const LayerCounts& counts) {
   if (counts.on + counts.beside > 0) return;
   throw InputError(
-      fmt::format("{}{}body \"{}\" has no phyxel within {:g} spacings of its surface with which to "
-                  "touch the scene's obstacles; allowed: phyxels that fill the surface, or no "
-                  "obstacle",
-                  request.where, request.where.empty() ? "" : ": ", request.name, beside_surface));
+      named(request,
+            fmt::format("body \"{}\" has no phyxel within {:g} spacings of its surface with which "
+                        "to touch the scene's obstacles; allowed: phyxels that fill the surface, "
+                        "or no obstacle",
+                        request.name, beside_surface)));
 }
 
 std::vector<double> distances_from_surface(std::span<const Vec3d> position,

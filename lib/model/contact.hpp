@@ -7,11 +7,30 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "phyxel/physics/obstacles.hpp"
 
 namespace phyxel {
 
 /// The obstacles of a scene, in its order.
 std::vector<Obstacle> obstacles_of(const Scene& scene);
+
+/// Calls each(k, x, gap) for the phyxels of a contact layer: k counts them, x is where each is [m],
+/// and gap that of its body's surface there to an obstacle.
+/// @param displacement returns that of a phyxel [m]
+template <class Displacement, class Each>
+void for_each_gap(const Model& model, const Obstacle& obstacle, const ObstacleStep& at,
+                  Displacement&& displacement, Each&& each) {
+  const ContactLayer& layer = model.contact;
+  ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+    for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
+      const Index i = layer.phyxels[k];
+      const Vec3d x = model.position[i] + displacement(i);
+      Gap gap = gap_to(shape, at, x);
+      gap.distance -= layer.offset[k];
+      each(k, x, gap);
+    }
+  });
+}
 
 /// Refuses a body that cannot touch anything: one without a surface.
 /// @throws InputError naming the body and what is allowed

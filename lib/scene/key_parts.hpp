@@ -38,6 +38,9 @@ inline Range time_span() { return {1e-18, 1e9, false}; }
 /// The keys of a path, in the section of what moves along it.
 std::vector<SceneKey> path_keys(const std::string& section);
 
+/// The names of the shapes of obstacles.
+std::vector<std::string> obstacle_names();
+
 /// The keys of obstacles, but for those of their paths.
 std::vector<SceneKey> obstacle_keys();
 

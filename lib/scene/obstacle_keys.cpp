@@ -11,13 +11,13 @@ using namespace ranges;
 // One line for each field would make the table twice as long.
 // clang-format off
 
-namespace {
-
 std::vector<std::string> obstacle_names() {
   std::vector<std::string> names;
   ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) { names.emplace_back(Shape::name); });
   return names;
 }
+
+namespace {
 
 std::string obstacle_meanings() {
   std::string all = "The obstacle's shape, before it is turned and moved.";

@@ -9,6 +9,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
+#include "scene/key_parts.hpp"
 #include "scene/scene_body.hpp"
 
 namespace phyxel {
@@ -100,11 +101,8 @@ void check_obstacle(const ObstacleRequest& obstacle) {
   };
   const auto keys = keys_of_shape(obstacle.shape);
   if (!keys) {
-    std::vector<std::string> names;
-    ObstacleShapes::for_each(
-        [&]<class Shape>(std::type_identity<Shape>) { names.emplace_back(Shape::name); });
-    refuse("shape",
-           fmt::format("{} found; allowed: {}", in_quotes(obstacle.shape), fmt::join(names, ", ")));
+    refuse("shape", fmt::format("{} found; allowed: {}", in_quotes(obstacle.shape),
+                                fmt::join(obstacle_names(), ", ")));
   }
   const auto needs_positive = [&](const char* key, double value) {
     if (keys->contains(key) && !(value > 0)) {

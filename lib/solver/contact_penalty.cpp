@@ -3,9 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 
+#include "model/contact.hpp"
 #include "model/parts.hpp"
 #include "phyxel/diagnostics.hpp"
-#include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
 
@@ -14,7 +14,7 @@ namespace {
 
 // Times the stiffness of a phyxel against its neighbours. A layer of phyxels on a face, s apart,
 // then is as stiff as a fifth of s of the body.
-constexpr double share = 40;
+constexpr double share_of_stiffness = 40;
 
 }  // namespace
 
@@ -39,23 +39,18 @@ ContactPenalty::ContactPenalty(const Model& model)
   for (const Index i : model.contact.phyxels) {
     const double c = pressure_wave_speed(part_of(model, i).material);
     const double crossings = c / model.neighbourhood.support[i];
-    stiffness_.push_back(share * model.mass[i] * crossings * crossings);
+    stiffness_.push_back(share_of_stiffness * model.mass[i] * crossings * crossings);
   }
 }
 
 template <class Each>
 void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const {
-  const ContactLayer& layer = model_.contact;
+  const auto displacement = [&](Index i) { return u[i]; };
   for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
-    const Obstacle& obstacle = model_.obstacles[o];
-    ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
-      for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
-        const Vec3d x = model_.position[layer.phyxels[k]] + u[layer.phyxels[k]];
-        Gap gap = gap_to(shape, at[o], x);
-        gap.distance -= layer.offset[k];
-        if (gap.distance < 0) each(k, o, penalty_force(gap, stiffness_[k]), x);
-      }
-    });
+    for_each_gap(model_, model_.obstacles[o], at[o], displacement,
+                 [&](std::size_t k, Vec3d x, const Gap& gap) {
+                   if (gap.distance < 0) each(k, o, penalty_force(gap, stiffness_[k]), x);
+                 });
   }
 }
 

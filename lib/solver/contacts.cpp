@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/contact.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
@@ -85,18 +86,13 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
 /// share: collective.
 double depth_in(const Model& model, std::size_t o, const Solver& solver, const State& state) {
   const Obstacle& obstacle = model.obstacles[o];
-  const ContactLayer& layer = model.contact;
   const ObstacleStep here = solver.method() == Method::equilibrium
                                 ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)[o]
                                 : obstacle.step_from(solver.time(), 0);
   double deepest = 0;
-  ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
-    for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
-      const Index i = layer.phyxels[k];
-      const Gap gap = gap_to(shape, here, model.position[i] + state.displacement[i]);
-      deepest = std::max(deepest, layer.offset[k] - gap.distance);
-    }
-  });
+  for_each_gap(
+      model, obstacle, here, [&](Index i) { return state.displacement[i]; },
+      [&](std::size_t, Vec3d, const Gap& gap) { deepest = std::max(deepest, -gap.distance); });
   return model.share ? model.share->communicator->largest(deepest) : deepest;
 }
 

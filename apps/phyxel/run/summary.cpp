@@ -260,6 +260,11 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
   return j;
 }
 
+/// Says how many of `count` readings were not printed. @param where "more: probes.csv"
+void say_left_out(std::size_t count, const char* where) {
+  if (count > most_printed) fmt::print("              {} {}\n", count - most_printed, where);
+}
+
 void Run::say_probes() const {
   const std::size_t printed = std::min(readings_.probes.size(), most_printed);
   for (std::size_t k = 0; k < printed; ++k) {
@@ -269,9 +274,7 @@ void Run::say_probes() const {
         r.probe, r.number > 0 ? fmt::format(", point {}", r.number + 1) : "", r.displacement.x,
         r.displacement.y, r.displacement.z, r.von_mises);
   }
-  if (printed < readings_.probes.size()) {
-    fmt::print("              {} more: probes.csv\n", readings_.probes.size() - printed);
-  }
+  say_left_out(readings_.probes.size(), "more: probes.csv");
 }
 
 void Run::say_gases() const {
@@ -281,9 +284,7 @@ void Run::say_gases() const {
     fmt::print("  gas         {}, {}: pressure {:.6g} Pa, volume {:.6g} m^3\n", gas.body, gas.set,
                gas.pressure, gas.volume);
   }
-  if (printed < readings_.gases.size()) {
-    fmt::print("              {} more: gas.csv\n", readings_.gases.size() - printed);
-  }
+  say_left_out(readings_.gases.size(), "more: gas.csv");
 }
 
 void Run::say_contacts() const {
@@ -297,9 +298,7 @@ void Run::say_contacts() const {
         c.obstacle, c.force.x, c.force.y, c.force.z, c.impulse.x, c.impulse.y, c.impulse.z, c.work,
         c.friction_heat, c.impact_loss, deepest_[k]);
   }
-  if (printed < readings_.contacts.size()) {
-    fmt::print("              {} more: contacts.csv\n", readings_.contacts.size() - printed);
-  }
+  say_left_out(readings_.contacts.size(), "more: contacts.csv");
 }
 
 void Run::say_reactions() const {
@@ -314,9 +313,7 @@ void Run::say_reactions() const {
         r.centre.x, r.centre.y, r.centre.z,
         std::isnan(r.work) || r.work == 0 ? "" : fmt::format(", work {:.4g} J", r.work));
   }
-  if (printed < readings_.reactions.size()) {
-    fmt::print("              {} more sets: reactions.csv\n", readings_.reactions.size() - printed);
-  }
+  say_left_out(readings_.reactions.size(), "more sets: reactions.csv");
 }
 
 void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const {

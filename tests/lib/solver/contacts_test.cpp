@@ -406,6 +406,18 @@ TEST(Contacts, AtRestFollowAnObstacleIntoABody) {
   EXPECT_LT(more, 2 * some);
 }
 
+TEST(Contacts, OfPhyxelsBesideASurfaceActAtTheSurface) {
+  // In cells, the lowest phyxels lie half a spacing above the face on which the block stands.
+  std::string text = slope(0, 0);
+  text.replace(text.find("'nodes'"), 7, "'cells'");
+  Way way(text, dt);
+  const double start = way.centre().z;
+  way.solver.step(2000);
+  EXPECT_NEAR(way.contacts()[0].force.z, way.mass() * 9.81, 1e-3 * way.mass() * 9.81);
+  // It sinks by the half of its compression, g ρ h² / (2 E) = 2 mm (seen: 0.7 mm).
+  EXPECT_LE(start - way.centre().z, 0.002);
+}
+
 TEST(Contacts, KeepABodyInsideAHollowBox) {
   Way way("gravity = [0, 0, -9.81]\n" + end +
               obstacle("shape = 'box'\nsize = [0.5, 0.4, 0.6]\nhollow = true\nfriction = 0.3\n") +
