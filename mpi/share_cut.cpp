@@ -101,10 +101,10 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   for (const Surface& surface : whole.surfaces) surfels += surface.position.size();
   built.model.warnings = whole.warnings;
   close_share(whole, built.model, areas, setup.options.close);
-  built.model.obstacles = obstacles_of(setup.scene);
+  setup.ranks.collectively([&] { built.model.obstacles = obstacles_of(setup.scene); });
   if (!built.model.obstacles.empty()) {
     add_contact_layer(built.model, contact_offset);
-    warn_of_small_obstacles(built.model);
+    set_fields(built.model);
     const std::string problem = overlap_at_start(built.model, setup.scene);
     setup.ranks.collectively([&] {
       if (!problem.empty()) throw InputError(problem);

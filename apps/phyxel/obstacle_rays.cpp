@@ -13,7 +13,7 @@ constexpr int most_steps = 256;
 /// Returns apply(gap), where gap(x) is the distance of a place from an obstacle.
 template <class Apply>
 auto with_gap(const PlacedObstacle& obstacle, Apply&& apply) {
-  return ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+  return ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
     return apply([&](Vec3d x) { return gap_to(shape, obstacle.step, x); });
   });
 }
@@ -27,10 +27,7 @@ double PlacedObstacle::distance(Vec3d x) const {
 std::vector<PlacedObstacle> placed(const std::vector<Obstacle>& obstacles, double time) {
   std::vector<PlacedObstacle> all;
   for (const Obstacle& obstacle : obstacles) {
-    const bool bounded =
-        ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(),
-                             [](const auto& shape) { return std::size(shape.lengths) > 0; });
-    all.push_back({obstacle.shape, obstacle.lengths, obstacle.step_from(time, 0), bounded,
+    all.push_back({obstacle.form, obstacle.step_from(time, 0), obstacle.is_bounded(),
                    static_cast<Index>(all.size())});
   }
   return all;

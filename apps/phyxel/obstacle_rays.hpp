@@ -11,10 +11,9 @@ namespace phyxel::app {
 
 /// An obstacle where it is at a time.
 struct PlacedObstacle {
-  int shape = 0;                                        ///< Index in `ObstacleShapes`.
-  std::array<double, most_obstacle_lengths> lengths{};  ///< Of the shape, in its order [m].
+  ObstacleForm form;  ///< Of an obstacle that must outlive this.
   ObstacleStep step;
-  bool bounded = false;  ///< False if its shape has no lengths, and so no size.
+  bool bounded = false;  ///< False if its shape has no end.
   Index number = 0;      ///< Among the obstacles of the scene.
 
   /// The distance of a place from its surface [m].

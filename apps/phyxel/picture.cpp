@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
 #include "scene/parse_obstacles.hpp"
+#include "terminal.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -35,8 +36,18 @@ Said said(const std::string& scene, const fs::path& file, const Parse& parse, Sa
   }
 }
 
-/// The obstacles of a scene. An equilibrium has them at the ends of their paths.
-std::vector<Obstacle> obstacles_in(const Scene& scene) {
+/// The obstacles of a scene, but for those whose meshes are gone. An equilibrium has them at the
+/// ends of their paths.
+std::vector<Obstacle> obstacles_in(Scene scene) {
+  std::erase_if(scene.obstacles, [](const ObstacleRequest& obstacle) {
+    if (obstacle.mesh.empty() || fs::exists(obstacle.mesh)) return false;
+    fmt::print(
+        stderr,
+        "phyxel: {}obstacle \"{}\" is not in the pictures: there is no {}; --scene-folder names "
+        "the scene's folder\n",
+        warning_word(), obstacle.name, obstacle.mesh.string());
+    return true;
+  });
   std::vector<Obstacle> obstacles = obstacles_of(scene);
   if (scene.solver.method != Method::equilibrium) return obstacles;
   for (Obstacle& obstacle : obstacles) obstacle.motion.duration = 0;
@@ -51,7 +62,8 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   const fs::path& start = first.surface.empty() ? first.phyxels : first.surface;
   const std::string scene = scene_text(start);
   const RenderRequest asked = said(scene, start, parse_render, RenderRequest{});
-  setting.obstacles = obstacles_in(said(scene, start, parse_obstacles, Scene{}));
+  setting.obstacles =
+      obstacles_in(said(scene, request.scene_folder / "scene.toml", parse_obstacles, Scene{}));
   setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
   CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);
@@ -66,6 +78,10 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   setting.camera = fit.camera();
   setting.extent = fit.extent();
   setting.middle = fit.middle();
+  for (Obstacle& obstacle : setting.obstacles) {
+    const double spacing = std::max(0.5 * setting.spacing, setting.extent / 256);
+    obstacle.set_field(spacing, 4 * spacing);
+  }
   return setting;
 }
 
@@ -98,9 +114,10 @@ std::vector<fs::path> render(const fs::path& input, const fs::path& folder,
   return files;
 }
 
-std::vector<fs::path> render_directory(const fs::path& out, const RenderRequest& request,
-                                       bool overwrite) {
+std::vector<fs::path> render_directory(const fs::path& out, const Scene& scene, bool overwrite) {
+  const RenderRequest& request = scene.render;
   PictureRequest pictures;
+  pictures.scene_folder = scene.file.parent_path();
   pictures.width = request.width;
   pictures.height = request.height;
   pictures.view = request.view;

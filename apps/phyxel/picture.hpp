@@ -18,6 +18,8 @@ struct PictureRequest {
   std::optional<Vec3d> view, up;
   bool phyxels = true, surface = true;  ///< Families that are drawn, if they exist.
   FrameChoice choice;
+  /// Folder of the scene, from which it names meshes; empty: the current one.
+  std::filesystem::path scene_folder = {};
 };
 
 /// Draws the frames of a run's folder (phyxels and surface), a series file or a frame file, with
@@ -30,9 +32,9 @@ std::vector<std::filesystem::path> render(const std::filesystem::path& input,
                                           const std::filesystem::path& folder,
                                           const PictureRequest& request, bool overwrite);
 
-/// Draws `request.count` frames of a run's folder into `out`/pictures at the end of the run. With
-/// `overwrite`, pictures of an earlier run are removed.
+/// Draws some frames of a run's folder, as its scene asks, into `out`/pictures at the end of the
+/// run. With `overwrite`, pictures of an earlier run are removed.
 std::vector<std::filesystem::path> render_directory(const std::filesystem::path& out,
-                                                    const RenderRequest& request, bool overwrite);
+                                                    const Scene& scene, bool overwrite);
 
 }  // namespace phyxel::app

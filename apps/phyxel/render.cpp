@@ -94,6 +94,9 @@ void add_render(CLI::App& program) {
                    "Vertical direction of the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
+  command->add_option("--scene-folder", request.scene_folder,
+                      "Folder of the scene, with the meshes of its obstacles (default: the current "
+                      "one)");
   command->add_flag("--no-phyxels", options->no_phyxels, "Draw the surface only");
   command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
   command->add_flag("--force", options->force, "Replace existing pictures");

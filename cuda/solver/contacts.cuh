@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "mesh/distance_field.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
@@ -68,6 +69,27 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
   for (int s = 0; s < ContactTerms::count; ++s) sums.add(s, k, terms.value[s]);
 }
 
+/// The shape of an obstacle, with what it reads in device memory.
+class DeviceForm {
+ public:
+  DeviceForm(const Obstacle& obstacle, const std::string& name) : form_(obstacle.form) {
+    if (!obstacle.distances) return;
+    brick_ = sent(obstacle.distances->brick, name);
+    coarse_ = sent(obstacle.distances->coarse, name);
+    fine_ = sent(obstacle.distances->fine, name);
+    form_.field.brick = brick_.data();
+    form_.field.coarse = coarse_.data();
+    form_.field.fine = fine_.data();
+  }
+  const ObstacleForm& form() const { return form_; }
+  std::size_t bytes() const { return brick_.bytes() + coarse_.bytes() + fine_.bytes(); }
+
+ private:
+  ObstacleForm form_;
+  DeviceArray<std::int32_t> brick_;
+  DeviceArray<float> coarse_, fine_;
+};
+
 /// Contact of a model's bodies with its obstacles.
 template <class Real, class StateReal>
 class Contacts {
@@ -90,8 +112,9 @@ class Contacts {
     prescribed_ = sent(prescribed, name);
     offset_ = sent(layer.offset, name);
     before_ = sent(std::vector<Vec3<StateReal>>(places.size()), name);
-    for (std::size_t o = 0; o < m_.model().obstacles.size(); ++o) {
+    for (const Obstacle& obstacle : m_.model().obstacles) {
       sums_.emplace_back(ContactTerms::count, accumulators, name);
+      fields_.emplace_back(obstacle, name);
     }
   }
 
@@ -131,7 +154,7 @@ class Contacts {
       const Obstacle& obstacle = m_.model().obstacles[o];
       const ObstacleStep step = obstacle.step_from(time, dt_);
       const SumWords words = sums_[o].pointer();
-      ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+      ObstacleShapes::with(fields_[o].form(), [&](const auto& shape) {
         m_.launch_each("keep_out", keep_out<std::decay_t<decltype(shape)>, Real, StateReal>,
                        layer.count, m_.fields(), layer, shape, step, words, o + 1 == sums_.size());
       });
@@ -151,6 +174,7 @@ class Contacts {
     std::size_t bytes = place_.bytes() + position_.bytes() + prescribed_.bytes() + offset_.bytes() +
                         before_.bytes() + inertia_.bytes();
     for (const DeviceSums& sums : sums_) bytes += sums.bytes();
+    for (const DeviceForm& form : fields_) bytes += form.bytes();
     return bytes;
   }
 
@@ -174,7 +198,8 @@ class Contacts {
   DeviceArray<double> offset_, inertia_;
   DeviceArray<Vec3<StateReal>> before_;
   std::vector<DeviceSums> sums_;
-  double dt_ = 0;  // step for which inertias were made [s]
+  std::vector<DeviceForm> fields_;  // of each obstacle
+  double dt_ = 0;                   // step for which inertias were made [s]
 };
 
 }  // namespace phyxel::cuda

@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 
+#include "mesh/distance_field.hpp"
 #include "mesh/face_relaxation.hpp"
 #include "model/assembly.hpp"
 #include "model/box.hpp"
@@ -23,40 +22,6 @@ namespace {
 
 constexpr double on_surface = 0.1;       // spacings
 constexpr double beside_surface = 0.75;  // spacings: in cells, phyxels lie half of one below it
-constexpr double degree = std::numbers::pi / 180;
-
-/// The rotation that turns z to a direction.
-Mat3d turn_of_normal(Vec3d direction) {
-  const Vec3d n = normalised(direction), axis = cross({0, 0, 1}, n);
-  const double sine = norm(axis);
-  // Opposite directions have no axis in common: x serves.
-  if (sine < 1e-15) return rotation_by(n.z < 0 ? Vec3d{std::numbers::pi, 0, 0} : Vec3d{});
-  return rotation_by((std::atan2(sine, n.z) / sine) * axis);
-}
-
-Obstacle obstacle_of(const ObstacleRequest& request) {
-  Obstacle made{.name = request.name, .hollow = request.hollow, .place = request.translation};
-  int index = 0;
-  ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
-    if (request.shape == Shape::name) {
-      made.shape = index;
-      int component = 0;
-      for (std::size_t k = 0; k < std::size(Shape::lengths); ++k) {
-        const std::string name = Shape::lengths[k].name;
-        made.lengths[k] = name == "size"     ? phyxel::component(request.size, component++)
-                          : name == "radius" ? request.radius
-                                             : request.length;
-      }
-    }
-    ++index;
-  });
-  made.turn =
-      request.normal ? turn_of_normal(*request.normal) : rotation_by(degree * request.rotation);
-  made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
-              request.restitution};
-  made.motion = motion_along(request.motion);
-  return made;
-}
 
 /// Calls visit(a, b, c) for the parts of a triangle halved until no edge is longer than `longest`.
 template <class Visit>
@@ -113,7 +78,8 @@ Deepest deepest_of(const Model& model) {
     });
     if (obstacle.hollow || !obstacle.is_bounded()) continue;
     for (const Part& part : model.parts) {
-      const auto [i, distance] = nearest_in(model, part, rest.place);
+      const auto [i, distance] =
+          nearest_in(model, part, rest.turn * obstacle.middle() + rest.place);
       const bool is_inside = distance < 0.5 * model.neighbourhood.support[i];
       const double depth = obstacle.inner_radius();
       if (is_inside && depth > found.depth) found = {depth, i, o};
@@ -122,75 +88,21 @@ Deepest deepest_of(const Model& model) {
   return found;
 }
 
-/// Sets the rigid motion of a step.
-/// @param change of the path over `span` [s], about the instant at which it is at `middle`
-/// @param end place on the path at the end of the step
-void set_rigid_motion(ObstacleStep& step, const Path& change, double span, const Path& middle,
-                      const Path& end) {
-  step.drift = change.displacement / span;
-  step.centre = end.about + end.displacement;
-  const Mat3d rate = (1 / span) * (change.turn * transpose(identity<double>() + middle.turn));
-  step.spin = 0.5 * (rate - transpose(rate));
+/// Finds the distances from the surface of a mesh, as finely as phyxels are spaced.
+/// @param support the smallest one of phyxels that touch [m]
+void set_field_for(Obstacle& obstacle, double support, std::vector<std::string>& warnings) {
+  constexpr double share_of_support = 0.25;  // about half a spacing
+  const double extent = box_around(obstacle.surface->position).extent();
+  const double wanted = std::min(share_of_support * support, extent / 32);
+  const double made = obstacle.set_field(wanted, support < HUGE_VAL ? support : 0);
+  if (made <= 1.01 * wanted) return;
+  warnings.push_back(fmt::format(
+      "the surface of obstacle \"{}\" is rounded to {:.3g} m, coarser than the {:.3g} m that the "
+      "bodies' phyxels resolve: finer would take more than {:.0f} MB",
+      obstacle.name, made, wanted, most_field_nodes * sizeof(float) / 1e6));
 }
 
 }  // namespace
-
-std::vector<Obstacle> obstacles_of(const Scene& scene) {
-  std::vector<Obstacle> all;
-  for (const ObstacleRequest& request : scene.obstacles) all.push_back(obstacle_of(request));
-  return all;
-}
-
-ObstacleStep Obstacle::step_between(const Path& before, const Path& after, double dt) const {
-  ObstacleStep step{.turn_at_rest = turn, .place_at_rest = place};
-  step.turn = (identity<double>() + after.turn) * turn;
-  step.place = place + after.at(place);
-  step.hollow = hollow;
-  step.law = law;
-  step.dt = dt;
-  if (dt == 0 || motion.stands_still()) return step;
-  step.velocity = (after.at(place) - before.at(place)) / dt;
-  step.slope = (1 / dt) * (after.turn - before.turn);
-  return step;
-}
-
-ObstacleStep Obstacle::step_from(double time, double dt) const {
-  const Path after = motion.path_at(time + dt);
-  ObstacleStep step = step_between(motion.path_at(time), after, dt);
-  if (dt == 0 || motion.stands_still()) return step;
-  set_rigid_motion(step, motion.mean_step(time, dt), dt, motion.path_at(time), after);
-  return step;
-}
-
-ObstacleStep Obstacle::stage_to(double time, double span) const {
-  const Path now = motion.path_at(time);
-  ObstacleStep step = step_between(motion.path_at(time - span), now, span);
-  if (span == 0 || motion.stands_still()) return step;
-  const Path before = motion.path_at(time - span / 2), after = motion.path_at(time + span / 2);
-  const Path change{after.displacement - before.displacement, after.turn - before.turn, now.about};
-  set_rigid_motion(step, change, span, now, now);
-  return step;
-}
-
-bool Obstacle::is_bounded() const {
-  return ObstacleShapes::with(shape, lengths.data(),
-                              [](const auto& s) { return std::size(s.lengths) > 0; });
-}
-
-double Obstacle::inner_radius() const {
-  if (hollow || !is_bounded()) return HUGE_VAL;
-  return ObstacleShapes::with(shape, lengths.data(), [](const auto& s) {
-    return -s.gap(Vec3d{}).distance;  // its centre is its deepest point
-  });
-}
-
-double Obstacle::largest_speed(const ObstacleStep& step) const {
-  double square = 0;  // of the change of the rotation, whose rate is 1/sqrt(2) of it
-  for (int e = 0; e < 9; ++e) square += step.slope(e / 3, e % 3) * step.slope(e / 3, e % 3);
-  double reach = 0;
-  for (const double length : lengths) reach += length;
-  return norm(step.velocity) + std::sqrt(0.5 * square) * reach;
-}
 
 void check_touches(const BodyRequest& request, std::span<const Triangle> triangles) {
   if (!triangles.empty()) return;
@@ -290,13 +202,18 @@ std::string overlap_at_start(const Model& model, const Scene& scene) {
       obstacle.hollow ? "inside, as it is hollow" : "outside");
 }
 
-void warn_of_small_obstacles(Model& model) {
-  double support = 0;
+void set_fields(Model& model) {
+  double least = HUGE_VAL, support = 0;  // of the phyxels that touch [m]
   for (const Index i : model.contact.phyxels) {
+    least = std::min(least, model.neighbourhood.support[i]);
     support = std::max(support, model.neighbourhood.support[i]);
   }
-  if (model.share) support = model.share->communicator->largest(support);
-  for (const Obstacle& obstacle : model.obstacles) {
+  if (model.share) {
+    least = model.share->communicator->smallest(least);
+    support = model.share->communicator->largest(support);
+  }
+  for (Obstacle& obstacle : model.obstacles) {
+    if (obstacle.surface) set_field_for(obstacle, least, model.warnings);
     const double radius = obstacle.inner_radius();
     if (radius >= support) continue;
     model.warnings.push_back(fmt::format(
@@ -334,7 +251,7 @@ void add_contact(Model& model, const Scene& scene) {
     part = next;
   }
   add_contact_layer(model, offset);
-  warn_of_small_obstacles(model);
+  set_fields(model);
   if (const std::string problem = overlap_at_start(model, scene); !problem.empty()) {
     throw InputError(problem);
   }

@@ -21,7 +21,7 @@ template <class Displacement, class Each>
 void for_each_gap(const Model& model, const Obstacle& obstacle, const ObstacleStep& at,
                   Displacement&& displacement, Each&& each) {
   const ContactLayer& layer = model.contact;
-  ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+  ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
     for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
       const Index i = layer.phyxels[k];
       const Vec3d x = model.position[i] + displacement(i);
@@ -69,9 +69,10 @@ void add_contact(Model& model, const Scene& scene);
 /// for ghosts, and for those that are held or moved along all axes.
 void add_contact_layer(Model& model, std::span<const double> offset);
 
-/// Warns of obstacles that are so thin beside the distances of phyxels that they are not felt well.
+/// Finds the distances from the surfaces of obstacles that are meshes, as finely as phyxels are
+/// spaced, and warns of obstacles that are so thin beside that spacing that they are not felt well.
 /// Of a share: collective.
-void warn_of_small_obstacles(Model& model);
+void set_fields(Model& model);
 
 /// The error of a model whose bodies are inside an obstacle at the start: what overlaps would be
 /// pushed out in one step, and fly away. Empty if none is. Of a share: collective, and empty on all

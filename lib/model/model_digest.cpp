@@ -123,10 +123,15 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
     if (load.follows) add(state.get(), std::vector<double>{1, load.gas.value_or(-1)});
   }
   for (const Obstacle& obstacle : model.obstacles) {
-    add(state.get(), std::vector<double>{static_cast<double>(obstacle.shape), obstacle.lengths[0],
-                                         obstacle.lengths[1], obstacle.lengths[2],
-                                         obstacle.hollow ? 1.0 : 0.0, obstacle.law.static_friction,
-                                         obstacle.law.kinetic_friction, obstacle.law.restitution});
+    add(state.get(),
+        std::vector<double>{static_cast<double>(obstacle.form.shape), obstacle.form.lengths[0],
+                            obstacle.form.lengths[1], obstacle.form.lengths[2],
+                            obstacle.hollow ? 1.0 : 0.0, obstacle.law.static_friction,
+                            obstacle.law.kinetic_friction, obstacle.law.restitution});
+    if (obstacle.surface) {
+      add(state.get(), obstacle.surface->position);
+      add(state.get(), obstacle.surface->triangle);
+    }
     add(state.get(), std::vector<Mat3d>{obstacle.turn});
     add(state.get(), std::vector<Vec3d>{obstacle.place});
     add_path(state.get(), obstacle.motion);

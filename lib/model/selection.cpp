@@ -4,12 +4,11 @@
 
 #include <algorithm>
 
-#include "mesh/surface_topology.hpp"
 #include "mesh/winding_number.hpp"
 #include "model/assembly.hpp"
 #include "model/box.hpp"
+#include "model/closed_mesh.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/mesh.hpp"
 #include "sort_unique.hpp"
 #include "tabulated.hpp"
 
@@ -58,15 +57,7 @@ std::vector<Index> of_indices(const Selection& selection, const SomePhyxels& bod
 /// The phyxels inside a closed surface or on it.
 std::vector<Index> inside_mesh(const Selection& selection, const Cloud& cloud,
                                const BodyRequest& request) {
-  Surface surface = read_mesh(selection.mesh);
-  const SurfaceDefects defects = inspect_surface(surface);
-  if (!connect(surface).closed) {
-    throw InputError(
-        fmt::format("{}: {}: the surface is not closed ({}), so that nothing lies inside; allowed: "
-                    "a closed one",
-                    selection.where, selection.mesh.string(), defects.describe()));
-  }
-  orient(surface);
+  Surface surface = read_closed_mesh(selection.mesh, selection.where);
   place(surface.position, request);
   // On a flat face the number is a half, on the edge of a cube a quarter, at its corner an eighth;
   // outside it is zero but for an error of about a hundredth.

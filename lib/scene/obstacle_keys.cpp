@@ -62,6 +62,11 @@ std::vector<SceneKey> obstacle_keys() {
        .meaning = "Of a sphere, cylinder or capsule."},
       {.section = "obstacle", .name = "length", .unit = "m", .otherwise = "none", .range = length(),
        .meaning = "Of a cylinder; of a capsule, between the centres of its ends."},
+      {.section = "obstacle", .name = "mesh", .type = KeyType::path, .otherwise = "none",
+       .meaning = "A file with a closed surface (OBJ, PLY or STL), of the shape \"mesh\". Resolved from the scene file's folder. What touches "
+           "it sees edges that are rounded to about half a spacing of the phyxels."},
+      {.section = "obstacle", .name = "scale", .fallback = "1", .range = length(),
+       .meaning = "Of that surface, about its origin."},
       {.section = "obstacle", .name = "normal", .type = KeyType::vector, .otherwise = "[0, 0, 1], turned by `rotation`",
        .range = within(longest), .meaning = "Direction that a plane faces; not together with `rotation`."},
       {.section = "obstacle", .name = "hollow", .type = KeyType::boolean, .fallback = "false",

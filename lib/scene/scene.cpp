@@ -180,7 +180,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   if (scene.output.directory.empty()) scene.output.directory = default_directory(file);
   scene.render = render_of(root, scene.gravity);
   scene.bodies = naming(scene, [&] { return read_bodies(root); });
-  scene.obstacles = read_obstacles(root);
+  scene.obstacles = read_obstacles(root, FilesOf::run);
   naming(scene, [&] { read_probes(root, scene.bodies); });
   return scene;
 }
@@ -198,7 +198,7 @@ Scene parse_obstacles(const std::string& text, const std::filesystem::path& file
   const SceneTable root(parsed, file);
   Scene scene;
   if (root.has("solver")) scene.solver = read_solver(root.table("solver"));
-  scene.obstacles = read_obstacles(root);
+  scene.obstacles = read_obstacles(root, FilesOf::picture);
   return scene;
 }
 

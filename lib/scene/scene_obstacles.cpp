@@ -11,6 +11,7 @@
 #include "phyxel/physics/obstacles.hpp"
 #include "scene/key_parts.hpp"
 #include "scene/scene_body.hpp"
+#include "scene/scene_source.hpp"
 
 namespace phyxel {
 namespace {
@@ -22,11 +23,12 @@ std::optional<std::set<std::string>> keys_of_shape(const std::string& shape) {
     if (shape != Shape::name) return;
     keys.emplace();
     for (const ObstacleLength& length : Shape::lengths) keys->insert(length.name);
+    if constexpr (requires(Shape s) { s.field; }) keys->insert("mesh");
   });
   return keys;
 }
 
-constexpr const char* keys_of_lengths[] = {"size", "radius", "length"};
+constexpr const char* keys_of_lengths[] = {"size", "radius", "length", "mesh"};
 
 /// Refuses lengths that an obstacle's shape does not have, and asks for those that it needs.
 void check_lengths(const SceneTable& table, const std::string& shape) {
@@ -45,7 +47,7 @@ void check_lengths(const SceneTable& table, const std::string& shape) {
   }
 }
 
-ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number) {
+ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number, FilesOf files) {
   ObstacleRequest obstacle{.name = fmt::format("obstacle {}", number), .where = table.where()};
   table.read("name", obstacle.name);
   table.read("shape", obstacle.shape);
@@ -53,6 +55,15 @@ ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number) {
   table.read("size", obstacle.size);
   table.read("radius", obstacle.radius);
   table.read("length", obstacle.length);
+  table.read("mesh", obstacle.mesh);
+  if (table.has("mesh") && files == FilesOf::run) {
+    check_file_exists(table, "mesh", obstacle.mesh);
+  }
+  if (table.has("scale") && !table.has("mesh")) {
+    table.refuse("scale", fmt::format("found with shape = \"{}\"; allowed with a mesh only",
+                                      obstacle.shape));
+  }
+  table.read("scale", obstacle.scale);
   if (table.has("normal")) {
     if (obstacle.shape != PlaneObstacle::name) {
       table.refuse("normal", fmt::format("found with shape = \"{}\"; allowed with \"{}\" only",
@@ -74,11 +85,11 @@ ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number) {
 
 }  // namespace
 
-std::vector<ObstacleRequest> read_obstacles(const SceneTable& root) {
+std::vector<ObstacleRequest> read_obstacles(const SceneTable& root, FilesOf files) {
   std::vector<ObstacleRequest> obstacles;
   std::map<std::string, std::string> places;  // of each name
   for (const SceneTable& table : root.tables("obstacle")) {
-    ObstacleRequest obstacle = read_obstacle(table, obstacles.size() + 1);
+    ObstacleRequest obstacle = read_obstacle(table, obstacles.size() + 1, files);
     const auto [earlier, is_new] = places.emplace(obstacle.name, obstacle.where);
     if (!is_new) {
       table.refuse("name", fmt::format("{} found, the name of the obstacle at {} too; allowed: a "
@@ -112,6 +123,9 @@ void check_obstacle(const ObstacleRequest& obstacle) {
   needs_positive("size", std::min({obstacle.size.x, obstacle.size.y, obstacle.size.z}));
   needs_positive("radius", obstacle.radius);
   needs_positive("length", obstacle.length);
+  if (keys->contains("mesh") && obstacle.mesh.empty()) {
+    refuse("mesh", fmt::format("missing; shape = \"{}\" needs it", obstacle.shape));
+  }
   if (obstacle.normal && *obstacle.normal == Vec3d{}) {
     refuse("normal", "[0, 0, 0] found; allowed: a direction");
   }

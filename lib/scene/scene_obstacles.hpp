@@ -10,9 +10,14 @@ namespace phyxel {
 
 constexpr std::size_t most_obstacles = 1000;
 
+/// Whether the files that a scene names have to be there.
+enum class FilesOf { run, picture };
+
 /// Reads the obstacles of a scene.
-/// @throws InputError for lengths that a shape lacks or does not have, and names found twice
-std::vector<ObstacleRequest> read_obstacles(const SceneTable& root);
+/// @param files whether their meshes have to be there
+/// @throws InputError for lengths that a shape lacks or does not have, names found twice, and
+///   meshes that are not there
+std::vector<ObstacleRequest> read_obstacles(const SceneTable& root, FilesOf files);
 
 /// Checks what the table of keys cannot say of an obstacle made in code or read from a file.
 /// @throws InputError naming the obstacle and what is allowed

@@ -131,6 +131,8 @@ void visit_obstacle(const ObstacleRequest& obstacle, Visit&& visit) {
   if (obstacle.size != Vec3d{}) visit("obstacle", "size", obstacle.size);
   if (obstacle.radius != 0) visit("obstacle", "radius", obstacle.radius);
   if (obstacle.length != 0) visit("obstacle", "length", obstacle.length);
+  if (!obstacle.mesh.empty()) visit("obstacle", "mesh", obstacle.mesh.string());
+  visit("obstacle", "scale", obstacle.scale);
   if (obstacle.normal) visit("obstacle", "normal", *obstacle.normal);
   visit("obstacle", "hollow", obstacle.hollow);
   visit("obstacle", "rotation", obstacle.rotation);

@@ -150,9 +150,8 @@ void check_contact_speeds(const Model& model, const Solver& solver, double large
 }
 
 const char* shape_name(const Obstacle& obstacle) {
-  return ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [](const auto& shape) {
-    return std::decay_t<decltype(shape)>::name;
-  });
+  return ObstacleShapes::with(
+      obstacle.form, [](const auto& shape) { return std::decay_t<decltype(shape)>::name; });
 }
 
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,

@@ -76,7 +76,7 @@ class StepContacts {
       const Obstacle& obstacle = model_.obstacles[o];
       const std::span<ExactSum> all =
           std::span(sums_).subspan(o * ContactTerms::count, ContactTerms::count);
-      ObstacleShapes::with(obstacle.shape, obstacle.lengths.data(), [&](const auto& shape) {
+      ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
 #pragma omp parallel num_threads(threads_here())
         {
           StepSums own(ContactTerms::count);

@@ -198,7 +198,7 @@ TEST(Obstacles, AreOfTheSceneThatNamesThem) {
       "[[obstacle]]\nshape = \"sphere\"\nradius = 2\n"
       "[[obstacle]]\nshape = \"plane\"");
   ASSERT_EQ(found.size(), 2u);
-  EXPECT_EQ(found[0].lengths[0], 2);
+  EXPECT_EQ(found[0].form.lengths[0], 2);
   EXPECT_TRUE(obstacles("").empty());
 }
 

@@ -1,6 +1,9 @@
 /// One answer: a body stepped by several ranks moves as by one, to the last bit.
 #include <gmock/gmock.h>
+#include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <random>
 
@@ -90,7 +93,19 @@ Model touching() {
                       .translation = {0.3, 0.2, 0.701},
                       .friction = 0.2,
                       .motion = {.velocity = {0, 0, -2}}}};
-  return build_model(scene);
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("phyxel_touching_" + std::to_string(getpid()) + ".obj");
+  std::ofstream(file) << "v 0.2 0.4 0\nv 0.6 0.4 0\nv 0.4 0.8 0\nv 0.4 0.5 0.4\n"
+                         "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  scene.obstacles.push_back({.name = "spike",
+                             .shape = "mesh",
+                             .mesh = file,
+                             .translation = {0, 0, 0.71},
+                             .friction = 0.2,
+                             .motion = {.velocity = {0, 0, -1}}});
+  Model model = build_model(scene);
+  std::filesystem::remove(file);
+  return model;
 }
 
 struct ShareCase {

@@ -220,9 +220,8 @@ bool Run::summary_is_missing() const {
 void Run::draw_and_sum_up() {
   ranks().collectively([&] {
     if (leads() && scene_.render.pictures && !options_.no_pictures) {
-      pictures_ = spent_.timed("pictures", [&] {
-        return render_directory(recorder_->directory(), scene_.render, true);
-      });
+      pictures_ = spent_.timed(
+          "pictures", [&] { return render_directory(recorder_->directory(), scene_, true); });
     }
   });
   std::int64_t bytes = 0;

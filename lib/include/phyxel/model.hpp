@@ -110,14 +110,19 @@ struct Motion {
   }
 };
 
+struct DistanceArrays;
+
 /// A rigid body that phyxels cannot enter, at rest or on a path.
 struct Obstacle {
   std::string name;
-  int shape = 0;                                        ///< Index in `ObstacleShapes`.
-  std::array<double, most_obstacle_lengths> lengths{};  ///< Of the shape, in its order [m].
-  bool hollow = false;                                  ///< True if phyxels are kept inside.
-  Mat3d turn{};                                         ///< Its rotation into place at rest.
-  Vec3d place;                                          ///< Where its origin is at rest [m].
+  ObstacleForm form;
+  /// Surface of a mesh, in its own coordinates; null for other shapes.
+  std::shared_ptr<const Surface> surface;
+  /// What `form.field` reads; null before `set_field`, and for other shapes.
+  std::shared_ptr<const DistanceArrays> distances;
+  bool hollow = false;  ///< True if phyxels are kept inside.
+  Mat3d turn{};         ///< Its rotation into place at rest.
+  Vec3d place;          ///< Where its origin is at rest [m].
   ContactLaw law;
   Motion motion;  ///< Its path; no phyxels follow it.
 
@@ -129,13 +134,19 @@ struct Obstacle {
   /// Where it is at the end of a stage of `span` [s] of an implicit step that ends at `time` [s],
   /// and how it moves then.
   ObstacleStep stage_to(double time, double span) const;
+  /// Finds the distances from the surface of a mesh, without which it cannot be touched.
+  /// @param spacing of nodes near the surface [m]; they are farther apart if that would be too many
+  /// @param band distance from the surface up to which they are as near [m]
+  /// @returns the spacing of the nodes [m], or 0 for other shapes
+  double set_field(double spacing, double band);
   /// True if it has an end on all sides, as all shapes have but planes.
   bool is_bounded() const;
   /// Radius of the largest ball inside what bodies cannot enter [m]; infinite for a plane, and for
   /// what is hollow.
   double inner_radius() const;
-  /// Upper bound of the speeds of its points at the start of a step [m/s]; of a plane, at its
-  /// place.
+  /// The middle of that ball in the shape's own coordinates [m].
+  Vec3d middle() const;
+  /// Upper bound of the speeds of its points over a step [m/s]; of a plane, at its place.
   double largest_speed(const ObstacleStep& step) const;
 };
 

@@ -205,6 +205,8 @@ struct BodyRequest {
 struct ObstacleRequest {
   std::string name;
   std::string shape;            ///< A name in `ObstacleShapes` (phyxel/physics/obstacles.hpp).
+  std::filesystem::path mesh;   ///< A file with a closed surface, for the shape "mesh".
+  double scale = 1;             ///< Of that surface, about its origin.
   Vec3d size;                   ///< Extents of a box [m].
   double radius = 0;            ///< Of a sphere, cylinder or capsule [m].
   double length = 0;            ///< Of a cylinder, or between the centres of a capsule's ends [m].

@@ -272,6 +272,10 @@ size = [1, 2, 3] # obstacle.size => size = [1, 2, 4]
 [[obstacle]]
 shape = 'plane'
 normal = [0, 0, 1] # obstacle.normal => normal = [0, 1, 1]
+[[obstacle]]
+shape = 'mesh'
+mesh = 'a.obj' # obstacle.mesh => mesh = 'b.obj'
+scale = 2 # obstacle.scale => scale = 3
 )";
 
 /// The text with the value of one key changed, or of none.

@@ -4,24 +4,21 @@
 ///
 ///   static constexpr const char* name, *meaning;    its name in scenes, and one sentence for users
 ///   static constexpr ObstacleLength lengths[];      the lengths that a user gives
-///   the same lengths, in their order, as the only data members [m], each a `double`
+///   the same lengths, in their order, as the only data members [m], each a `double`; or, for a
+///                                                   surface from a file, its `DistanceField`
 ///   gap(x)                       distance of a point from the surface, and the direction away from
 ///   it
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <type_traits>
 
+#include "phyxel/physics/distance_field.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
-
-/// The place of a point beside the surface of an obstacle.
-struct Gap {
-  double distance = 0;    ///< From the surface [m]; negative inside the obstacle.
-  Vec3<double> normal{};  ///< Unit vector away from the obstacle, the gradient of the distance.
-};
 
 /// One length of an obstacle's shape, as users give it.
 struct ObstacleLength {
@@ -37,6 +34,13 @@ inline constexpr ObstacleLength obstacle_length{"length", "Length along z."};
 
 /// The largest number of lengths of a shape.
 inline constexpr int most_obstacle_lengths = 3;
+
+/// An obstacle's shape, chosen at run time.
+struct ObstacleForm {
+  int shape = 0;                                        ///< Index in `ObstacleShapes`.
+  std::array<double, most_obstacle_lengths> lengths{};  ///< Of the shape, in its order [m].
+  DistanceField field{};                                ///< Of a surface from a file.
+};
 
 /// The distance from a convex shape given by a point's distances beyond its faces along two or
 /// three orthogonal directions [m], negative inside: that to the nearest point of an edge or corner
@@ -74,28 +78,30 @@ struct ObstacleList {
   static void for_each(Visit&& visit) {
     (visit(std::type_identity<Shapes>{}), ...);
   }
-  /// Returns apply(shape) for the shape of an index, made from its lengths [m].
+  /// Returns apply(shape) for a shape.
   template <class Apply>
-  static auto with(int index, const double* lengths, Apply&& apply) {
-    return with_from<0, Apply, Shapes...>(index, lengths, apply);
+  static auto with(const ObstacleForm& form, Apply&& apply) {
+    return with_from<0, Apply, Shapes...>(form, apply);
   }
 
  private:
   template <class Shape>
-  static Shape made(const double* lengths) {
+  static Shape made(const ObstacleForm& form) {
     Shape shape{};
-    if constexpr (!std::is_empty_v<Shape>) {
+    if constexpr (requires { shape.field; }) {
+      shape.field = form.field;
+    } else if constexpr (!std::is_empty_v<Shape>) {
       static_assert(std::is_trivially_copyable_v<Shape>);
-      std::memcpy(&shape, lengths, sizeof(Shape));
+      std::memcpy(&shape, form.lengths.data(), sizeof(Shape));
     }
     return shape;
   }
   template <int first, class Apply, class Here, class... Rest>
-  static auto with_from(int index, const double* lengths, Apply& apply) {
+  static auto with_from(const ObstacleForm& form, Apply& apply) {
     if constexpr (sizeof...(Rest) > 0) {
-      if (index != first) return with_from<first + 1, Apply, Rest...>(index, lengths, apply);
+      if (form.shape != first) return with_from<first + 1, Apply, Rest...>(form, apply);
     }
-    return apply(made<Here>(lengths));
+    return apply(made<Here>(form));
   }
 };
 

@@ -1,0 +1,145 @@
+/// Obstacles: their shapes and their paths.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "mesh/distance_field.hpp"
+#include "model/assembly.hpp"
+#include "model/closed_mesh.hpp"
+#include "model/contact.hpp"
+#include "model/symmetry.hpp"
+#include "phyxel/error.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+
+/// The rotation that turns z to a direction.
+Mat3d turn_of_normal(Vec3d direction) {
+  const Vec3d n = normalised(direction), axis = cross({0, 0, 1}, n);
+  const double sine = norm(axis);
+  // Opposite directions have no axis in common: x serves.
+  if (sine < 1e-15) return rotation_by(n.z < 0 ? Vec3d{std::numbers::pi, 0, 0} : Vec3d{});
+  return rotation_by((std::atan2(sine, n.z) / sine) * axis);
+}
+
+/// The surface of a mesh, scaled.
+std::shared_ptr<const Surface> surface_of(const ObstacleRequest& request) {
+  Surface surface = read_closed_mesh(request.mesh, request.where);
+  for (Vec3d& x : surface.position) x = request.scale * x;
+  return std::make_shared<const Surface>(std::move(surface));
+}
+
+Obstacle obstacle_of(const ObstacleRequest& request) {
+  Obstacle made{.name = request.name, .hollow = request.hollow, .place = request.translation};
+  int index = 0;
+  ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
+    if (request.shape == Shape::name) {
+      made.form.shape = index;
+      int component = 0;
+      for (std::size_t k = 0; k < std::size(Shape::lengths); ++k) {
+        const std::string name = Shape::lengths[k].name;
+        made.form.lengths[k] = name == "size"     ? phyxel::component(request.size, component++)
+                               : name == "radius" ? request.radius
+                                                  : request.length;
+      }
+    }
+    ++index;
+  });
+  if (!request.mesh.empty()) made.surface = surface_of(request);
+  made.turn =
+      request.normal ? turn_of_normal(*request.normal) : rotation_by(degree * request.rotation);
+  made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
+              request.restitution};
+  made.motion = motion_along(request.motion);
+  return made;
+}
+
+/// Sets the rigid motion of a step.
+/// @param change of the path over `span` [s], about the instant at which it is at `middle`
+/// @param end place on the path at the end of the step
+void set_rigid_motion(ObstacleStep& step, const Path& change, double span, const Path& middle,
+                      const Path& end) {
+  step.drift = change.displacement / span;
+  step.centre = end.about + end.displacement;
+  const Mat3d rate = (1 / span) * (change.turn * transpose(identity<double>() + middle.turn));
+  step.spin = 0.5 * (rate - transpose(rate));
+}
+
+}  // namespace
+
+std::vector<Obstacle> obstacles_of(const Scene& scene) {
+  std::vector<Obstacle> all;
+  for (const ObstacleRequest& request : scene.obstacles) all.push_back(obstacle_of(request));
+  return all;
+}
+
+ObstacleStep Obstacle::step_between(const Path& before, const Path& after, double dt) const {
+  ObstacleStep step{.turn_at_rest = turn, .place_at_rest = place};
+  step.turn = (identity<double>() + after.turn) * turn;
+  step.place = place + after.at(place);
+  step.hollow = hollow;
+  step.law = law;
+  step.dt = dt;
+  if (dt == 0 || motion.stands_still()) return step;
+  step.velocity = (after.at(place) - before.at(place)) / dt;
+  step.slope = (1 / dt) * (after.turn - before.turn);
+  return step;
+}
+
+ObstacleStep Obstacle::step_from(double time, double dt) const {
+  const Path after = motion.path_at(time + dt);
+  ObstacleStep step = step_between(motion.path_at(time), after, dt);
+  if (dt == 0 || motion.stands_still()) return step;
+  set_rigid_motion(step, motion.mean_step(time, dt), dt, motion.path_at(time), after);
+  return step;
+}
+
+ObstacleStep Obstacle::stage_to(double time, double span) const {
+  const Path now = motion.path_at(time);
+  ObstacleStep step = step_between(motion.path_at(time - span), now, span);
+  if (span == 0 || motion.stands_still()) return step;
+  const Path before = motion.path_at(time - span / 2), after = motion.path_at(time + span / 2);
+  const Path change{after.displacement - before.displacement, after.turn - before.turn, now.about};
+  set_rigid_motion(step, change, span, now, now);
+  return step;
+}
+
+double Obstacle::set_field(double spacing, double band) {
+  if (!surface) return 0;
+  distances = std::make_shared<const DistanceArrays>(distances_from(*surface, spacing, band));
+  form.field = distances->view();
+  return form.field.spacing;
+}
+
+bool Obstacle::is_bounded() const {
+  return surface ||
+         ObstacleShapes::with(form, [](const auto& s) { return std::size(s.lengths) > 0; });
+}
+
+double Obstacle::inner_radius() const {
+  if (hollow || !is_bounded()) return HUGE_VAL;
+  if (surface) return distances->depth;
+  return ObstacleShapes::with(form, [](const auto& s) {
+    return -s.gap(Vec3d{}).distance;  // its centre is its deepest point
+  });
+}
+
+Vec3d Obstacle::middle() const { return surface ? distances->deepest : Vec3d{}; }
+
+double Obstacle::largest_speed(const ObstacleStep& step) const {
+  double square = 0;  // of the change of the rotation, whose rate is 1/sqrt(2) of it
+  for (int e = 0; e < 9; ++e) square += step.slope(e / 3, e % 3) * step.slope(e / 3, e % 3);
+  double reach = 0;
+  for (const double length : form.lengths) reach += length;
+  if (surface) {
+    for (const Vec3d x : surface->position) reach = std::max(reach, norm(x));
+  }
+  return norm(step.velocity) + std::sqrt(0.5 * square) * reach;
+}
+
+}  // namespace phyxel
