@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "model/assembly.hpp"
+#include "model/body_contact.hpp"
 #include "model/contact.hpp"
 #include "model/owned_vectors.hpp"
 #include "model/space_filling_curve.hpp"
@@ -58,6 +59,24 @@ std::vector<Index> own_places(const ShareSetup& setup, const WholeBodies& whole,
   return place;
 }
 
+/// Adds what the bodies of a share may touch. @param offset of its phyxels (`contact_offset`) [m]
+void add_contact(const ShareSetup& setup, const WholeBodies& whole, std::span<const double> offset,
+                 Model& model) {
+  add_contact_layer(model, offset);
+  set_fields(model);
+  const std::vector<LayerSupports> supports = add_body_layer(model, setup.scene, offset);
+  setup.ranks.collectively([&] {
+    add_body_surfaces(model, setup.scene, supports,
+                      [&](std::size_t body) { return whole.surfaces[body]; });
+  });
+  for (const std::string& problem :
+       {overlap_at_start(model, setup.scene), bodies_overlap_at_start(model, setup.scene)}) {
+    setup.ranks.collectively([&] {
+      if (!problem.empty()) throw InputError(problem);
+    });
+  }
+}
+
 }  // namespace
 
 BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& cut,
@@ -102,14 +121,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   built.model.warnings = whole.warnings;
   close_share(whole, built.model, areas, setup.options.close);
   setup.ranks.collectively([&] { built.model.obstacles = obstacles_of(setup.scene); });
-  if (!built.model.obstacles.empty()) {
-    add_contact_layer(built.model, contact_offset);
-    set_fields(built.model);
-    const std::string problem = overlap_at_start(built.model, setup.scene);
-    setup.ranks.collectively([&] {
-      if (!problem.empty()) throw InputError(problem);
-    });
-  }
+  if (!contact_offset.empty()) add_contact(setup, whole, contact_offset, built.model);
   add_warnings(built.model, surfels);
   built.partitioner = cut.partitioner;
   built.quality = cut.quality;

@@ -64,12 +64,9 @@ class Maker {
       }
     }
     m.obstacles = whole_.obstacles;
-    for (std::size_t k = 0; k < whole_.contact.phyxels.size(); ++k) {
-      const Index i = whole_.contact.phyxels[k];
-      if (kind_[i] != owned) continue;
-      m.contact.phyxels.push_back(here_[i]);
-      m.contact.offset.push_back(whole_.contact.offset[k]);
-    }
+    m.contact = owned_part(whole_.contact);
+    m.body_contact = whole_.body_contact;
+    m.body_contact.layer = owned_part(whole_.body_contact.layer);
     m.walls = whole_.walls;
     return std::move(out_);
   }
@@ -78,6 +75,17 @@ class Maker {
   void mark(const std::vector<Index>& phyxels, Kind kind) {
 #pragma omp parallel for schedule(static)
     for (std::size_t k = 0; k < phyxels.size(); ++k) kind_[phyxels[k]] = kind;
+  }
+  /// The part of a contact layer that this rank steps.
+  ContactLayer owned_part(const ContactLayer& whole) const {
+    ContactLayer own;
+    for (std::size_t k = 0; k < whole.phyxels.size(); ++k) {
+      const Index i = whole.phyxels[k];
+      if (kind_[i] != owned) continue;
+      own.phyxels.push_back(here_[i]);
+      own.offset.push_back(whole.offset[k]);
+    }
+    return own;
   }
   bool has_surfel(Index s) const { return kind_[whole_.surfels.carriers.row(s).front()] == owned; }
   Index present() const { return static_cast<Index>(out_.share.global_id.size()); }

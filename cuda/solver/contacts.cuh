@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "mesh/distance_field.hpp"
 #include "phyxel/physics/obstacles.hpp"
+#include "solver/device_distances.cuh"
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
 #include "solver/step_contacts.hpp"
@@ -74,20 +74,15 @@ class DeviceForm {
  public:
   DeviceForm(const Obstacle& obstacle, const std::string& name) : form_(obstacle.form) {
     if (!obstacle.distances) return;
-    brick_ = sent(obstacle.distances->brick, name);
-    coarse_ = sent(obstacle.distances->coarse, name);
-    fine_ = sent(obstacle.distances->fine, name);
-    form_.field.brick = brick_.data();
-    form_.field.coarse = coarse_.data();
-    form_.field.fine = fine_.data();
+    distances_ = DeviceDistances(*obstacle.distances, name);
+    form_.field = distances_.view();
   }
   const ObstacleForm& form() const { return form_; }
-  std::size_t bytes() const { return brick_.bytes() + coarse_.bytes() + fine_.bytes(); }
+  std::size_t bytes() const { return distances_.bytes(); }
 
  private:
   ObstacleForm form_;
-  DeviceArray<std::int32_t> brick_;
-  DeviceArray<float> coarse_, fine_;
+  DeviceDistances distances_;
 };
 
 /// Contact of a model's bodies with its obstacles.

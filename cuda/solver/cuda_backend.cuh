@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "solver/body_contacts.cuh"
 #include "solver/cuda_backend.hpp"
 #include "solver/launch_path.cuh"
 #include "solver/passes.cuh"
@@ -25,6 +26,7 @@ class CudaBackend final : public Backend {
         halo_(m_.share() ? std::make_unique<DeviceHalo<Real, StateReal>>(m_, transport) : nullptr),
         boundary_(m_),
         contacts_(m_),
+        body_contacts_(m_),
         passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())),
         path_(choose_path(m_, halo_.get(), boundary_, contacts_, path)),
         has_surfels_(!model.surfels.position.empty()) {
@@ -105,6 +107,8 @@ class CudaBackend final : public Backend {
     StepSums sums = boundary_.support_work();
     const StepSums of_obstacles = contacts_.sums();
     sums.insert(sums.end(), of_obstacles.begin(), of_obstacles.end());
+    const StepSums of_bodies = body_contacts_.sums();
+    sums.insert(sums.end(), of_bodies.begin(), of_bodies.end());
     return words_of(std::move(sums));
   }
   int best_steps() const override {
@@ -262,7 +266,9 @@ class CudaBackend final : public Backend {
     if (boundary_.following().bytes() > 0) {
       list.push_back({"loads that follow the surface", boundary_.following().bytes()});
     }
-    if (contacts_.bytes() > 0) list.push_back({"contact", contacts_.bytes()});
+    if (const std::size_t bytes = contacts_.bytes() + body_contacts_.bytes(); bytes > 0) {
+      list.push_back({"contact", bytes});
+    }
     if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
@@ -334,11 +340,13 @@ class CudaBackend final : public Backend {
     }
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
-    if (fresh_ || boundary_.changes() || contacts_.acts()) {
+    if (fresh_ || boundary_.changes() || contacts_.acts() || body_contacts_.acts()) {
       if (!follows) contacts_.remember_velocities();
+      body_contacts_.begin_step(m_.dt(), *passes_);
       passes_->advance(m_.dt());
       boundary_.follow_paths(time, m_.dt());
       if (fresh_) boundary_.put_held_at_rest();
+      body_contacts_.keep_apart();
       contacts_.keep_phyxels_out(time);
       passes_->send_displacements();
     } else {
@@ -371,6 +379,7 @@ class CudaBackend final : public Backend {
   std::unique_ptr<DeviceHalo<Real, StateReal>> halo_;  // null if the model is whole
   Boundary<Real, StateReal> boundary_;
   Contacts<Real, StateReal> contacts_;
+  DeviceBodyContacts<Real, StateReal> body_contacts_;
   std::unique_ptr<Passes<Real, StateReal>> passes_;
   LaunchPath<Real, StateReal> path_;
   std::vector<Vec3d> external_force_;

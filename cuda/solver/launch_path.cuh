@@ -41,6 +41,8 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
     launches = "motions, and loads that grow or follow the surface, change from step to step";
   } else if (contacts.changes()) {
     launches = "obstacles move from step to step";
+  } else if (model.model().body_contact.acts()) {
+    launches = "points that may touch change from step to step";
   } else if (contacts.acts() && model.share()) {
     launches = "phyxels are kept out of obstacles before they are sent";
   } else if (model.size() > most_recorded) {
@@ -56,7 +58,9 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
                                      : launches;
     return path;
   }
-  if (wanted == CudaPath::automatic && contacts.acts()) {
+  if (wanted == CudaPath::automatic && model.model().body_contact.acts()) {
+    path.reason = "bodies that touch each other are kept apart after each step";
+  } else if (wanted == CudaPath::automatic && contacts.acts()) {
     path.reason = "phyxels are kept out of obstacles after each step";
   } else if (wanted == CudaPath::automatic && !boundary.changes()) {
     auto attempt = Residence<Real, StateReal>::of(model);

@@ -174,7 +174,7 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
   if (has_gas(model)) {
     gases_.emplace(directory_ / gas_name, header_of("step,time [s],body,set", gas_columns()));
   }
-  if (!model.obstacles.empty()) {
+  if (!model.obstacles.empty() || model.body_contact.acts()) {
     contacts_.emplace(directory_ / contacts_name,
                       header_of("step,time [s],obstacle,shape", contact_columns()));
   }

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "bulk.hpp"
 #include "phyxel/cloud.hpp"
 #include "phyxel/physics/distance_field.hpp"
 
@@ -14,7 +13,7 @@ namespace phyxel {
 struct DistanceArrays {
   DistanceField shape;  ///< Without pointers.
   std::vector<std::int32_t> brick;
-  Bulk<float> coarse, fine;
+  std::vector<float> coarse, fine;
   double depth = 0;  ///< Largest distance inside the surface at a corner or node [m].
   Vec3d deepest;     ///< Where that is [m].
 

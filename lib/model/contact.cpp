@@ -9,6 +9,7 @@
 #include "mesh/distance_field.hpp"
 #include "mesh/face_relaxation.hpp"
 #include "model/assembly.hpp"
+#include "model/body_contact.hpp"
 #include "model/box.hpp"
 #include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
@@ -102,14 +103,29 @@ void set_field_for(Obstacle& obstacle, double support, std::vector<std::string>&
       obstacle.name, made, wanted, most_field_nodes * sizeof(float) / 1e6));
 }
 
+/// The surface of a body of a whole model, at rest.
+Surface surface_of_body(const Model& model, std::size_t body) {
+  Surface surface;
+  const auto part = std::find_if(model.parts.begin(), model.parts.end(), [&](const Part& p) {
+    return static_cast<std::size_t>(p.body) == body;
+  });
+  surface.position.assign(model.surfels.position.begin() + part->surfel_begin,
+                          model.surfels.position.begin() + part->surfel_end);
+  for (const Triangle& t : model.surfels.triangles_of(*part)) {
+    const Index first = part->surfel_begin;
+    surface.triangle.push_back({t[0] - first, t[1] - first, t[2] - first});
+  }
+  return surface;
+}
+
 }  // namespace
 
 void check_touches(const BodyRequest& request, std::span<const Triangle> triangles) {
   if (!triangles.empty()) return;
   throw InputError(named(
-      request, fmt::format("body \"{}\" has no surface with which to touch the scene's obstacles; "
-                           "allowed: a mesh, a shape with surfels, a file with a surface, or no "
-                           "obstacle",
+      request, fmt::format("body \"{}\" has no surface with which to touch the scene's obstacles "
+                           "or other bodies; allowed: a mesh, a shape with surfels, a file with a "
+                           "surface, or nothing to touch",
                            request.name)));
 }
 
@@ -118,8 +134,8 @@ void check_layer(const BodyRequest& request, const LayerCounts& counts) {
   throw InputError(
       named(request,
             fmt::format("body \"{}\" has no phyxel within {:g} spacings of its surface with which "
-                        "to touch the scene's obstacles; allowed: phyxels that fill the surface, "
-                        "or no obstacle",
+                        "to touch the scene's obstacles or other bodies; allowed: phyxels that "
+                        "fill the surface, or nothing to touch",
                         request.name, beside_surface)));
 }
 
@@ -176,22 +192,25 @@ void add_contact_layer(Model& model, std::span<const double> offset) {
   }
 }
 
-std::string overlap_at_start(const Model& model, const Scene& scene) {
-  if (model.obstacles.empty()) return {};
-  const Deepest found = deepest_of(model);
+bool is_deepest_overlap(const Model& model, double depth, Index phyxel, double tolerance) {
   const auto largest = [&](double value) {
     return model.share ? model.share->communicator->largest(value) : value;
   };
-  const double depth = largest(found.depth);
+  const double support = depth > 0 ? model.neighbourhood.support[phyxel] : 0;
+  const bool is_here = depth == largest(depth) && depth > tolerance * support;
+  // Of several ranks with equal depths, the first phyxel counts.
+  const double id = is_here ? static_cast<double>(model.global_id(phyxel)) : HUGE_VAL;
+  return id == -largest(-id) && is_here;
+}
+
+std::string overlap_at_start(const Model& model, const Scene& scene) {
+  if (model.obstacles.empty()) return {};
+  const Deepest found = deepest_of(model);
   // The rounding of coordinates, and of surfaces in files in float.
   constexpr double rounding = 1e-6;
+  if (!is_deepest_overlap(model, found.depth, found.phyxel, rounding)) return {};
   const Index i = found.phyxel;
-  const double support = found.depth > 0 ? model.neighbourhood.support[i] : 0;
-  const bool is_here = found.depth == depth && depth > rounding * support;
-  // Of several ranks with equal depths, the first phyxel counts.
-  const double id = is_here ? static_cast<double>(model.global_id(i)) : HUGE_VAL;
-  const double first = -largest(-id);
-  if (!is_here || id != first) return {};
+  const double depth = found.depth;
   const Obstacle& obstacle = model.obstacles[found.obstacle];
   const Vec3d x = model.position[i];
   const std::string& where = scene.obstacles[found.obstacle].where;
@@ -223,17 +242,26 @@ void set_fields(Model& model) {
   }
 }
 
+bool touches_anything(const Scene& scene, std::size_t body) {
+  return !scene.obstacles.empty() || touches_bodies(scene, body);
+}
+
 void add_contact(Model& model, const Scene& scene) {
   model.obstacles = obstacles_of(scene);
-  if (model.obstacles.empty()) return;
+  if (model.obstacles.empty() && !scene.contact) return;
   std::vector<double> offset(model.position.size(), -1);
   for (auto part = model.parts.begin(); part != model.parts.end();) {
     const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
-    const BodyRequest& request = scene.bodies[static_cast<std::size_t>(part->body)];
+    const auto body = static_cast<std::size_t>(part->body);
+    const BodyRequest& request = scene.bodies[body];
     const auto begin = static_cast<std::size_t>(part->begin),
                count = static_cast<std::size_t>((next - 1)->end) - begin;
     const std::span<const Triangle> triangles = model.surfels.triangles_of(*part);
-    if (count > 0) check_touches(request, triangles);
+    if (count == 0 || !touches_anything(scene, body)) {
+      part = next;
+      continue;
+    }
+    check_touches(request, triangles);
     const std::vector<double> spacing = tabulated(count, [&](std::size_t k) {
       return local_spacing(request.neighbourhood, model.neighbourhood.support[begin + k]);
     });
@@ -244,7 +272,7 @@ void add_contact(Model& model, const Scene& scene) {
         triangles, part->surfel_begin);
     LayerCounts counts;
     for (std::size_t k = 0; k < count; ++k) counts.add(distance[k], spacing[k]);
-    if (count > 0) check_layer(request, counts);
+    check_layer(request, counts);
     for (std::size_t k = 0; k < count; ++k) {
       offset[begin + k] = contact_offset(distance[k], spacing[k], counts.has_layer());
     }
@@ -252,8 +280,12 @@ void add_contact(Model& model, const Scene& scene) {
   }
   add_contact_layer(model, offset);
   set_fields(model);
-  if (const std::string problem = overlap_at_start(model, scene); !problem.empty()) {
-    throw InputError(problem);
+  const std::vector<LayerSupports> supports = add_body_layer(model, scene, offset);
+  add_body_surfaces(model, scene, supports,
+                    [&](std::size_t body) { return surface_of_body(model, body); });
+  for (const std::string& problem :
+       {overlap_at_start(model, scene), bodies_overlap_at_start(model, scene)}) {
+    if (!problem.empty()) throw InputError(problem);
   }
 }
 

@@ -74,6 +74,15 @@ void add_contact_layer(Model& model, std::span<const double> offset);
 /// Of a share: collective.
 void set_fields(Model& model);
 
+/// True if a phyxel of this rank is inside something at the start, and deepest of all ranks'. Of a
+/// share: collective.
+/// @param depth [m], 0 if none of this rank is inside
+/// @param tolerance of the depth, as a share of a support
+bool is_deepest_overlap(const Model& model, double depth, Index phyxel, double tolerance);
+
+/// True if a body of a scene touches an obstacle or a body.
+bool touches_anything(const Scene& scene, std::size_t body);
+
 /// The error of a model whose bodies are inside an obstacle at the start: what overlaps would be
 /// pushed out in one step, and fly away. Empty if none is. Of a share: collective, and empty on all
 /// ranks but one.

@@ -44,4 +44,7 @@ std::vector<std::string> obstacle_names();
 /// The keys of obstacles, but for those of their paths.
 std::vector<SceneKey> obstacle_keys();
 
+/// The keys of the contact of bodies with each other.
+std::vector<SceneKey> contact_keys();
+
 }  // namespace phyxel

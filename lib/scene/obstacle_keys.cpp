@@ -1,4 +1,5 @@
-/// The keys of obstacles, and of the paths of obstacles and of parts of bodies.
+/// The keys of contact: obstacles, the paths of obstacles and of parts of bodies, and how bodies
+/// touch each other.
 #include <fmt/format.h>
 
 #include "phyxel/physics/obstacles.hpp"
@@ -84,6 +85,33 @@ std::vector<SceneKey> obstacle_keys() {
            "comes from its elasticity: 0 is right for most, and 1 returns no more than 0, as what is behind the layer hits it again."},
       {.section = "obstacle", .name = "motion", .type = KeyType::table, .otherwise = "at rest",
        .meaning = "How the obstacle moves."},
+  };
+}
+
+std::vector<SceneKey> contact_keys() {
+  return {
+      {.section = "contact", .name = "friction", .fallback = "0", .range = between(0, 1e6),
+       .meaning = "Coulomb's coefficient: largest tangential over normal force of a point that sticks."},
+      {.section = "contact", .name = "kinetic_friction", .otherwise = "`friction`", .range = between(0, 1e6),
+       .meaning = "The same of a point that slides; at most `friction`."},
+      {.section = "contact", .name = "restitution", .fallback = "0", .range = between(0, 1),
+       .meaning = "Speed of a point of a surface after an impact over that before, as of an obstacle."},
+      {.section = "contact", .name = "self", .type = KeyType::boolean, .fallback = "false",
+       .meaning = "Whether parts of one body touch each other, too: those that are two supports and more apart at rest."},
+      {.section = "contact", .name = "sweeps", .type = KeyType::integer, .fallback = "1", .range = between(1, 1000),
+       .meaning = "How often contact is resolved in each step: more for high stacks, which sink into each other by less then."},
+      {.section = "contact", .name = "all", .type = KeyType::boolean, .otherwise = "true without pairs",
+       .meaning = "Whether all bodies touch each other, not only those of `pair`."},
+      {.section = "contact", .name = "pair", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Bodies that touch, or whose contact differs from that of the others."},
+      {.section = "contact.pair", .name = "first", .type = KeyType::text, .required = true, .meaning = "The name of a body."},
+      {.section = "contact.pair", .name = "second", .type = KeyType::text, .required = true, .meaning = "The name of another body."},
+      {.section = "contact.pair", .name = "friction", .otherwise = "that of [contact]", .range = between(0, 1e6),
+       .meaning = "As in [contact]."},
+      {.section = "contact.pair", .name = "kinetic_friction", .otherwise = "`friction`", .range = between(0, 1e6),
+       .meaning = "As in [contact]."},
+      {.section = "contact.pair", .name = "restitution", .otherwise = "that of [contact]", .range = between(0, 1),
+       .meaning = "As in [contact]."},
   };
 }
 

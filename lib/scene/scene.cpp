@@ -12,6 +12,7 @@
 #include "phyxel/error.hpp"
 #include "scene/parse_obstacles.hpp"
 #include "scene/scene_body.hpp"
+#include "scene/scene_contact.hpp"
 #include "scene/scene_error.hpp"
 #include "scene/scene_obstacles.hpp"
 #include "scene/scene_probes.hpp"
@@ -181,6 +182,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   scene.render = render_of(root, scene.gravity);
   scene.bodies = naming(scene, [&] { return read_bodies(root); });
   scene.obstacles = read_obstacles(root, FilesOf::run);
+  if (root.has("contact")) scene.contact = read_contact(root.table("contact"), scene.bodies);
   naming(scene, [&] { read_probes(root, scene.bodies); });
   return scene;
 }

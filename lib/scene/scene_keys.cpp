@@ -92,6 +92,8 @@ std::vector<SceneKey> top_keys() {
        .meaning = "The bodies; at most 10000, copies included."},
       {.name = "obstacle", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Rigid bodies that others cannot enter; at most 1000."},
+      {.name = "contact", .type = KeyType::table, .otherwise = "bodies pass through each other",
+       .meaning = "How bodies touch each other."},
       {.name = "probe", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Places whose values are logged."},
   };
@@ -447,7 +449,7 @@ std::span<const SceneKey> scene_keys() {
     for (const auto& part :
          {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
           law_keys("body.inclusion"), grading_keys(), path_keys("body.motion"), boundary_keys(),
-          path_keys("obstacle.motion"), obstacle_keys(), place_keys()}) {
+          path_keys("obstacle.motion"), obstacle_keys(), contact_keys(), place_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

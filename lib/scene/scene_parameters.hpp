@@ -254,6 +254,25 @@ void visit_run(const Scene& scene, Visit&& visit) {
   visit("output", "checkpoint_every", scene.output.checkpoint_every);
 }
 
+template <class Visit>
+void visit_contact(const ContactRequest& contact, Visit&& visit) {
+  visit("contact", "friction", contact.friction);
+  if (contact.kinetic_friction) visit("contact", "kinetic_friction", *contact.kinetic_friction);
+  visit("contact", "restitution", contact.restitution);
+  visit("contact", "self", contact.self);
+  visit("contact", "sweeps", contact.sweeps);
+  if (contact.all) visit("contact", "all", *contact.all);
+}
+
+template <class Visit>
+void visit_pair(const ContactPairRequest& pair, Visit&& visit) {
+  visit("contact.pair", "first", pair.first);
+  visit("contact.pair", "second", pair.second);
+  if (pair.friction) visit("contact.pair", "friction", *pair.friction);
+  if (pair.kinetic_friction) visit("contact.pair", "kinetic_friction", *pair.kinetic_friction);
+  if (pair.restitution) visit("contact.pair", "restitution", *pair.restitution);
+}
+
 }  // namespace detail
 
 /// Calls `visit(owner, section, key, value)` for every value of a scene that is set. Values are
@@ -269,6 +288,14 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
   for (std::size_t k = 0; k < scene.obstacles.size(); ++k) {
     const ObstacleRequest& obstacle = scene.obstacles[k];
     detail::visit_obstacle(obstacle, of({nullptr, 0, "obstacle", k + 1, &obstacle.where}));
+  }
+  if (scene.contact) {
+    const ContactRequest& contact = *scene.contact;
+    detail::visit_contact(contact, of({nullptr, 0, "", 0, &contact.where}));
+    for (std::size_t k = 0; k < contact.pairs.size(); ++k) {
+      const ContactPairRequest& pair = contact.pairs[k];
+      detail::visit_pair(pair, of({nullptr, 0, "pair", k + 1, &pair.where}));
+    }
   }
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyRequest& body = scene.bodies[b];

@@ -57,6 +57,14 @@ std::vector<SceneSection> boundary_sections() {
       {"obstacle.motion", "[obstacle.motion]", "",
        "The path of the obstacle above, as that of a `[[body.motion]]`. At least one of `displacement`, `rotation`, `velocity` and "
        "`amplitude` is needed."},
+      {"contact", "[contact]", "",
+       "Contact of bodies with each other: with this section, which may be empty, no body enters another one. The phyxels on the surface of each "
+       "body, or those beside it, are kept out of the other bodies as out of obstacles, by forces that act where a step would lead them, and "
+       "back on the phyxels of the other surface near them, so that both momenta are kept. Bodies need closed surfaces, and may touch at the "
+       "start but not overlap. Each frame adds a line for each body to `contacts.csv`, with force, torque, impulse, angular impulse and work of all other bodies on "
+       "it; heat and losses of a body are its share, which may be negative: their sums over the bodies are what contact has taken from the motion."},
+      {"contact.pair", "[[contact.pair]]", "",
+       "Two bodies that touch. Without `all = true`, bodies that are in no pair touch nothing but obstacles."},
       {"probe", "[[probe]]", "selection",
        "A place whose values are logged at each frame in `probes.csv`: exactly one of `point`, a line by `from` "
        "and `to`, and a selection, whose phyxels' values are averaged by volume. Each line of the file has the step, the "

@@ -7,6 +7,7 @@
 
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
+#include "scene/scene_contact.hpp"
 #include "scene/scene_obstacles.hpp"
 #include "scene/scene_parameters.hpp"
 #include "scene/scene_schema.hpp"
@@ -118,6 +119,7 @@ void validate(const Scene& scene) {
     }
   });
   for (const ObstacleRequest& obstacle : scene.obstacles) check_obstacle(obstacle);
+  if (scene.contact) check_contact(*scene.contact, scene.bodies);
   for (const BodyRequest& body : scene.bodies) {
     check_law(body, body.material, body.where);
     for (const InclusionRequest& inclusion : body.inclusions) {

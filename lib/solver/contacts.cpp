@@ -9,6 +9,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
+#include "solver/body_contacts.hpp"
 #include "solver/contact_penalty.hpp"
 #include "solver/present_forces.hpp"
 #include "solver/step_contacts.hpp"
@@ -16,28 +17,61 @@
 namespace phyxel {
 namespace {
 
-/// The sums of each obstacle over the step from an instant, on this rank, as `StepContacts` would
-/// add them.
-StepSums sums_of_next_step(const Model& model, const SupportInstant& now, const State& state) {
-  StepContacts contacts(model, 1);
-  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
+constexpr const char* body_shape = "body";  // where readings of obstacles have a shape
+
+/// The state of some phyxels after a step in which nothing touches them.
+State next_state(const Model& model, const SupportInstant& now, const State& state,
+                 std::span<const Index> phyxels) {
   const std::vector<Vec3d> free = free_axes(model);
   State next{.displacement = state.displacement, .velocity = state.velocity};
-  for (const Index i : model.contact.phyxels) {
+  for (const Index i : phyxels) {
     const DampedFlow flow = damped_flow(part_of(model, i).material.damping, now.dt);
     Vec3d& v = next.velocity[i];
     v = flow.keep * v + (flow.gain / model.mass[i]) * now.other_force[i];
     if (!free.empty()) v = by_components(free[i], v);
     next.displacement[i] += now.dt * v;
   }
+  if (free.empty()) return next;
   std::vector<Vec3d> prescribed = next.displacement;
   prescribe_displacements(model, now.time + now.dt, prescribed);
-  if (!free.empty()) {
-    for (const Index i : model.contact.phyxels) {
-      const Vec3d way = prescribed[i] - state.displacement[i];
-      next.velocity[i] += (1 / now.dt) * (way - by_components(free[i], way));
-      next.displacement[i] = prescribed[i];
+  for (const Index i : phyxels) {
+    const Vec3d way = prescribed[i] - state.displacement[i];
+    next.velocity[i] += (1 / now.dt) * (way - by_components(free[i], way));
+    next.displacement[i] = prescribed[i];
+  }
+  return next;
+}
+
+/// What bodies and obstacles do over the step from an instant, on this rank.
+struct NextStep {
+  StepSums sums;               ///< As `StepContacts` and `BodyContacts` would add them.
+  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
+};
+
+NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
+                   const State& state) {
+  StepContacts contacts(model, 1);
+  BodyContacts bodies(model, 1);
+  const std::vector<Index>& layer =
+      bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
+  State next = next_state(model, now, state, layer);
+  NextStep made;
+  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
+  if (bodies.acts()) {
+    const auto of = [](const State& s) {
+      return [&s](Index i) { return SurfaceState{s.displacement[i], s.velocity[i]}; };
+    };
+    std::vector<Mat3d> gradient;
+    backend.displacement_gradients(gradient);
+    bodies.begin_step(now.dt, of(state));
+    for (std::size_t p = 0; p < bodies.count(); ++p) {
+      bodies.set_gradient(p, gradient[bodies.phyxel(p)]);
     }
+    made.depths = bodies.depths(of(state));
+    bodies.keep_apart(of(next), [&](Index i, const SurfaceState& to) {
+      next.displacement[i] = to.displacement;
+      next.velocity[i] = to.velocity;
+    });
   }
   contacts.keep_out([](Index) { return true; },
                     [&](Index i) {
@@ -47,17 +81,20 @@ StepSums sums_of_next_step(const Model& model, const SupportInstant& now, const 
                       next.displacement[i] = to.displacement;
                       next.velocity[i] = to.velocity;
                     });
-  return contacts.sums();
+  made.sums = contacts.sums();
+  made.sums.insert(made.sums.end(), bodies.sums().begin(), bodies.sums().end());
+  return made;
 }
 
 Vec3d vector_of(std::span<const ExactSum> sums) {
   return {sums[0].value(), sums[1].value(), sums[2].value()};
 }
 
-/// What obstacles do over a time, as sums of each (`ContactTerms`) on this rank.
+/// What obstacles and bodies do over a time, as sums of each (`ContactTerms`) on this rank.
 struct ContactRates {
   StepSums sums;
-  double span = 1;  ///< [s]
+  double span = 1;             ///< [s]
+  std::vector<double> depths;  ///< As of `NextStep`.
 };
 
 /// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by
@@ -68,7 +105,8 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
     const PresentForces present(model, backend, solver);
     const SupportInstant now = present.instant();
     state = present.state();
-    return {sums_of_next_step(model, now, state), now.dt};
+    NextStep next = next_step(model, backend, now, state);
+    return {std::move(next.sums), now.dt, std::move(next.depths)};
   }
   backend.download(state);
   const std::span<const ExactSum> known = solver.end_contact();
@@ -77,7 +115,7 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   const PlacedObstacles at = solver.method() == Method::equilibrium
                                  ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
                                  : obstacles_over(model, solver.time(), solver.dt());
-  ContactRates rates{StepSums(ContactTerms::count * model.obstacles.size())};
+  ContactRates rates{StepSums(ContactTerms::count * touching_count(model))};
   penalty.add_to(at, state.displacement, rates.span, rates.sums);
   return rates;
 }
@@ -96,11 +134,20 @@ double depth_in(const Model& model, std::size_t o, const Solver& solver, const S
   return model.share ? model.share->communicator->largest(deepest) : deepest;
 }
 
-/// The smallest support of the phyxels that touch obstacles [m]. Of a share: collective.
+/// The first part of a body of the scene.
+const Part& first_part(const Model& model, std::size_t body) {
+  return *std::find_if(model.parts.begin(), model.parts.end(), [&](const Part& part) {
+    return static_cast<std::size_t>(part.body) == body;
+  });
+}
+
+/// The smallest support of the phyxels that touch obstacles or bodies [m]. Of a share: collective.
 double smallest_support(const Model& model) {
   double smallest = HUGE_VAL;
-  for (const Index i : model.contact.phyxels) {
-    smallest = std::min(smallest, model.neighbourhood.support[i]);
+  for (const ContactLayer* layer : {&model.contact, &model.body_contact.layer}) {
+    for (const Index i : layer->phyxels) {
+      smallest = std::min(smallest, model.neighbourhood.support[i]);
+    }
   }
   return model.share ? model.share->communicator->smallest(smallest) : smallest;
 }
@@ -118,19 +165,30 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
   const double support = smallest_support(model);
   for (const ContactReading& reading : readings) {
     if (!(reading.depth > deepest * support)) continue;
-    say_wrong(model,
-              fmt::format("phyxels are {:.3g} m deep in obstacle \"{}\", a quarter of a support of "
-                          "{:.3g} m is allowed: another obstacle presses them into it, or they are "
-                          "too fast for the step",
-                          reading.depth, reading.obstacle, support));
+    say_wrong(
+        model,
+        fmt::format("phyxels are {:.3g} m deep in {} \"{}\", a quarter of a support of {:.3g} m "
+                    "is allowed: something presses them into it, or they are too fast for the "
+                    "step",
+                    reading.depth, reading.shape == body_shape ? "other bodies: body" : "obstacle",
+                    reading.obstacle, support));
   }
 }
 
 }  // namespace
 
 void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed) {
-  if (model.obstacles.empty() || solver.method() == Method::equilibrium) return;
+  if (touching_count(model) == 0 || solver.method() == Method::equilibrium) return;
   const double dt = solver.dt(), support = smallest_support(model);
+  if (const double way = 2 * largest_speed * dt; model.body_contact.acts() && way > 0.5 * support) {
+    say_wrong(
+        model,
+        fmt::format("phyxels move at up to {:.3g} m/s, so that two bodies may move by {:.3g} m "
+                    "against each other in a step of {:.3g} s: they might pass through each "
+                    "other unseen; allowed: {:.3g} m, half of a support, by a step of at most "
+                    "{:.3g} s (time.step, time.safety), or lower speeds",
+                    largest_speed, way, dt, 0.5 * support, 0.25 * support / largest_speed));
+  }
   for (const Obstacle& obstacle : model.obstacles) {
     const double of_obstacle = obstacle.largest_speed(obstacle.step_from(solver.time(), dt));
     const double speed = largest_speed + of_obstacle;
@@ -157,30 +215,42 @@ const char* shape_name(const Obstacle& obstacle) {
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver) {
   check_fits(model, backend);
-  if (model.obstacles.empty()) return {};
+  if (touching_count(model) == 0) return {};
   State state;
   ContactRates rates = rates_now(model, backend, solver, state);
   add_over_ranks(model, rates.sums);
   StepSums all = no_step_sums(model);
   add_words(all, solver.step_sums());
   std::vector<ContactReading> readings;
-  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+  const auto add = [&](ContactReading reading) {
     constexpr std::size_t count = ContactTerms::count;
-    const std::span<const ExactSum> step = std::span(rates.sums).subspan(o * count, count);
+    const std::size_t first = readings.size() * count;
+    const std::span<const ExactSum> step = std::span(rates.sums).subspan(first, count);
     const std::span<const ExactSum> sums =
-        std::span(all).subspan(sums_of_motions(model) + o * count, count);
+        std::span(all).subspan(sums_of_motions(model) + first, count);
+    reading.force = vector_of(step.subspan(ContactTerms::impulse, 3)) / rates.span;
+    reading.torque = vector_of(step.subspan(ContactTerms::moment, 3)) / rates.span;
+    reading.impulse = vector_of(sums.subspan(ContactTerms::impulse, 3));
+    reading.angular_impulse = vector_of(sums.subspan(ContactTerms::moment, 3));
+    reading.work = sums[ContactTerms::work].value();
+    reading.friction_heat = sums[ContactTerms::friction_heat].value();
+    reading.impact_loss = sums[ContactTerms::impact_loss].value();
+    readings.push_back(std::move(reading));
+  };
+  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
-    readings.push_back({.obstacle = obstacle.name,
-                        .shape = shape_name(obstacle),
-                        .force = vector_of(step.subspan(ContactTerms::impulse, 3)) / rates.span,
-                        .torque = vector_of(step.subspan(ContactTerms::moment, 3)) / rates.span,
-                        .impulse = vector_of(sums.subspan(ContactTerms::impulse, 3)),
-                        .angular_impulse = vector_of(sums.subspan(ContactTerms::moment, 3)),
-                        .work = sums[ContactTerms::work].value(),
-                        .friction_heat = sums[ContactTerms::friction_heat].value(),
-                        .impact_loss = sums[ContactTerms::impact_loss].value(),
-                        .depth = depth_in(model, o, solver, state),
-                        .place = obstacle.place});
+    add({.obstacle = obstacle.name,
+         .shape = shape_name(obstacle),
+         .depth = depth_in(model, o, solver, state),
+         .place = obstacle.place});
+  }
+  for (std::size_t b = 0; b < model.body_contact.distances.size(); ++b) {
+    const Part& part = first_part(model, b);
+    const double depth = b < rates.depths.size() ? rates.depths[b] : 0;
+    add({.obstacle = part.name,
+         .shape = body_shape,
+         .depth = model.share ? model.share->communicator->largest(depth) : depth,
+         .place = part.centre});
   }
   check_depths(model, readings);
   return readings;

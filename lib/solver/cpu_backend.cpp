@@ -8,6 +8,7 @@
 
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
+#include "solver/body_contacts.hpp"
 #include "solver/cpu_passes.hpp"
 #include "solver/cpu_surfels.hpp"
 #include "solver/following_loads.hpp"
@@ -85,6 +86,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   std::vector<std::int64_t> step_sums() const override {
     StepSums sums = support_work_.sums();
     sums.insert(sums.end(), contacts_.sums().begin(), contacts_.sums().end());
+    sums.insert(sums.end(), body_contacts_.sums().begin(), body_contacts_.sums().end());
     return words_of(std::move(sums));
   }
 
@@ -187,7 +189,9 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
       list.push_back({"loads that follow the surface", followed_force_.size() * sizeof(Vec3d)});
     }
     if (support_work_.bytes() > 0) list.push_back({"work of supports", support_work_.bytes()});
-    if (contacts_.bytes() > 0) list.push_back({"contact", contacts_.bytes()});
+    if (const std::size_t bytes = contacts_.bytes() + body_contacts_.bytes(); bytes > 0) {
+      list.push_back({"contact", bytes});
+    }
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -222,6 +226,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     const Phase phase("forces, motion");
     apply_loads(time);
     contacts_.begin_step(time, dt, [&](Index i) { return velocity_of(i); });
+    if (body_contacts_.acts()) return advance_apart(time, dt);
     this->pass(this->displacement_records(), [&](const std::vector<Run>& runs) {
       for (const Run& run : runs) this->advance_run(run, dt);
       if (&runs == &boundary_runs_) end_step(time, dt, true);  // before they are sent
@@ -229,16 +234,68 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     end_step(time, dt, false);
     this->clear_padding();
   }
+  /// The same where bodies touch each other: phyxels of all ranks are led to the end of the step
+  /// before any of them is moved out of another body.
+  void advance_apart(double time, double dt) {
+    const auto state_of = [&](Index i) {
+      return SurfaceState{this->get3(displacement_, layout_.slot(i)), velocity_of(i)};
+    };
+    body_contacts_.begin_step(dt, state_of);
+    set_contact_gradients();
+    const auto advance_all = [&](const std::vector<Run>& runs) {
+      for (const Run& run : runs) this->advance_run(run, dt);
+    };
+    advance_all(boundary_runs_);
+    advance_all(interior_runs_);
+    for (const bool of_boundary : {true, false}) this->follow_motions(time, dt, of_boundary);
+    body_contacts_.keep_apart(state_of, [&](Index i, const SurfaceState& to) {
+      this->set_state(i, to.displacement, to.velocity);
+    });
+    contacts_.keep_out([](Index) { return true; }, touched(), touch());
+    if (model_.share) this->refresh(this->displacement_records());
+    this->clear_padding();
+  }
+  /// Finds the gradients of displacement of phyxels that may touch other bodies.
+  void set_contact_gradients() {
+    if (contact_generation_ != body_contacts_.generation()) {
+      contact_generation_ = body_contacts_.generation();
+      contact_packs_.clear();
+      for (std::size_t p = 0; p < body_contacts_.count(); ++p) {
+        contact_packs_.emplace_back(layout_.slot(body_contacts_.phyxel(p)) / W, p);
+      }
+      std::sort(contact_packs_.begin(), contact_packs_.end());
+    }
+    const int threads = std::clamp(static_cast<int>(contact_packs_.size() / 400), 1, threads_);
+#pragma omp parallel num_threads(threads)
+    {
+      Index pack = -1;  // whose gradients are known
+      Mat3<P> gradient;
+#pragma omp for schedule(static)
+      for (std::size_t k = 0; k < contact_packs_.size(); ++k) {
+        const auto [of_point, p] = contact_packs_[k];
+        if (of_point != pack) gradient = this->whole_gradient_of(pack = of_point);
+        const Index lane = layout_.slot(body_contacts_.phyxel(p)) % W;
+        Mat3d of_lane;
+        for (int e = 0; e < 9; ++e) of_lane(e / 3, e % 3) = gradient(e / 3, e % 3)[lane];
+        body_contacts_.set_gradient(p, of_lane);
+      }
+    }
+  }
   /// Moves phyxels along prescribed paths and out of obstacles, either those of the boundary or the
   /// others.
   void end_step(double time, double dt, bool of_boundary) {
     this->follow_motions(time, dt, of_boundary);
-    contacts_.keep_out(
-        [&](Index i) { return (!boundary_.empty() && boundary_[i]) == of_boundary; },
-        [&](Index i) {
-          return Touched{this->get3(displacement_, layout_.slot(i)), velocity_of(i)};
-        },
-        [&](Index i, const Touched& to) { this->set_state(i, to.displacement, to.velocity); });
+    contacts_.keep_out([&](Index i) { return (!boundary_.empty() && boundary_[i]) == of_boundary; },
+                       touched(), touch());
+  }
+  /// Functions that return and replace the state of a phyxel at the end of a step.
+  auto touched() const {
+    return [this](Index i) {
+      return Touched{this->get3(displacement_, layout_.slot(i)), velocity_of(i)};
+    };
+  }
+  auto touch() {
+    return [this](Index i, const Touched& to) { this->set_state(i, to.displacement, to.velocity); };
   }
   Vec3d velocity_of(Index i) const { return this->get3(velocity_, layout_.slot(i)); }
   /// Sums the forces that are applied at `time` [s]. Repeated calls sum again only while a load
@@ -267,6 +324,10 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
 
   StepContacts contacts_{model_, threads_};
+  BodyContacts body_contacts_{model_, threads_};
+  // The packs of the phyxels that may touch other bodies, and the numbers of these among them.
+  std::vector<std::pair<Index, std::size_t>> contact_packs_;
+  std::int64_t contact_generation_ = 0;
   std::vector<Vec3d> external_force_;
   FollowingLoads following_{model_};
   // Forces of loads that follow the surface [N], shape [n], zero but while they are summed; empty

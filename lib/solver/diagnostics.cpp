@@ -135,11 +135,11 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver) {
   Diagnostics d = diagnose(model, backend, solver.now());
-  if (model.obstacles.empty()) return d;
+  if (touching_count(model) == 0) return d;
   StepSums all = no_step_sums(model);
   add_words(all, solver.step_sums());
   ExactSum loss;
-  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+  for (std::size_t o = 0; o < touching_count(model); ++o) {
     const std::size_t first = sums_of_motions(model) + o * ContactTerms::count;
     loss.add(all[first + ContactTerms::friction_heat].value());
     loss.add(all[first + ContactTerms::impact_loss].value());

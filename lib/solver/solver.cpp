@@ -66,8 +66,17 @@ void check_times(const State& state) {
   }
 }
 
-/// Refuses friction and restitution of obstacles to methods that know neither.
-void refuse_friction(const Model& model, Method method) {
+/// Refuses friction and restitution of obstacles, and contact of bodies, to methods that know
+/// neither.
+void refuse_contact(const Model& model, Method method) {
+  if (model.body_contact.acts()) {
+    const std::string why = fmt::format(
+        "[contact] found with solver.method = \"{}\"; allowed with this method: no "
+        "contact of bodies with each other; \"verlet\" has it",
+        method_name(method));
+    if (model.share) throw AgreedError(ExitCode::bad_input, why);
+    throw InputError(why);
+  }
   for (const Obstacle& obstacle : model.obstacles) {
     const bool rubs = obstacle.law.static_friction > 0;
     const double found = rubs ? obstacle.law.static_friction : obstacle.law.restitution;
@@ -100,7 +109,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
-  if (method != Method::verlet) refuse_friction(model, method);
+  if (method != Method::verlet) refuse_contact(model, method);
   const std::size_t words = words_of(no_step_sums(model)).size();
   if (!start.step_sums.empty() && start.step_sums.size() != words) {
     throw InputError(

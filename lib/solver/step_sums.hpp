@@ -1,5 +1,5 @@
 /// Sums over steps and phyxels, without rounding: the work of supports that move, and what
-/// obstacles have done.
+/// obstacles and bodies have done to bodies.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,8 @@ inline bool has_moving_supports(const Model& model) {
                      [](const Motion& motion) { return !motion.stands_still(); });
 }
 
-/// Exact sums of the work of each motion [J], none if no support moves; then those of each obstacle
-/// (`ContactTerms`).
+/// Exact sums of the work of each motion [J], none if no support moves; then those of each
+/// obstacle, and those of each body of the scene if bodies touch each other (`ContactTerms`).
 using StepSums = std::vector<ExactSum>;
 
 /// Returns the number of sums of motions, after which those of obstacles begin.
@@ -29,9 +29,14 @@ inline std::size_t sums_of_motions(const Model& model) {
   return has_moving_supports(model) ? model.motions.size() : 0;
 }
 
+/// Returns the number of what touches: obstacles, and bodies that touch each other.
+inline std::size_t touching_count(const Model& model) {
+  return model.obstacles.size() + model.body_contact.distances.size();
+}
+
 /// Returns sums of zero.
 inline StepSums no_step_sums(const Model& model) {
-  return StepSums(sums_of_motions(model) + ContactTerms::count * model.obstacles.size());
+  return StepSums(sums_of_motions(model) + ContactTerms::count * touching_count(model));
 }
 
 /// Returns the words of exact sums, as backends and checkpoints hold them.

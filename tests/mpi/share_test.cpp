@@ -108,15 +108,35 @@ Model touching() {
   return model;
 }
 
+/// Two bodies that fly into each other, one of which is held at an end.
+Model colliding() {
+  Scene scene;
+  for (const char* shape : {"beam", "block"}) {
+    const bool is_first = scene.bodies.empty();
+    BodyRequest body;
+    body.name = shape;
+    body.where = "test";
+    body.source.shape = {.name = shape, .size = {0.6, 0.4, 0.4}, .spacing = 0.05};
+    body.translation = {is_first ? 0.0 : 0.9005, is_first ? 0.0 : 0.11, is_first ? 0.0 : 0.07};
+    body.material = testing::rubber();
+    body.velocity = {is_first ? 0.0 : -2.0, 0, 0};
+    if (is_first) body.fixed.push_back({.select = {.region = "x-"}});
+    scene.bodies.push_back(body);
+  }
+  scene.contact = ContactRequest{.friction = 0.4, .sweeps = 2};
+  return build_model(scene);
+}
+
 struct ShareCase {
   const char* name;
   Model (*make)();
 };
 const std::vector<ShareCase>& share_cases() {
-  static const std::vector<ShareCase> cases{
-      {"Cube", testing::cube},    {"Coil", testing::coil}, {"Thread", testing::thread},
-      {"Apart", testing::apart},  {"Tiny", testing::tiny}, {"Everything", everything},
-      {"Controlled", controlled}, {"Custom", custom},      {"Touching", touching}};
+  static const std::vector<ShareCase> cases{{"Cube", testing::cube},     {"Coil", testing::coil},
+                                            {"Thread", testing::thread}, {"Apart", testing::apart},
+                                            {"Tiny", testing::tiny},     {"Everything", everything},
+                                            {"Controlled", controlled},  {"Custom", custom},
+                                            {"Touching", touching},      {"Colliding", colliding}};
   return cases;
 }
 

@@ -201,11 +201,20 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
         "conserves energy: do not trust the result; a smaller time.safety may help",
         100 * energy_drift(now)));
   }
-  for (const ContactReading& contact : readings_.contacts) {
+  std::vector<ContactReading> touching = readings_.contacts;
+  const std::size_t obstacles = model().obstacles.size();
+  if (touching.size() > obstacles) {  // of bodies, the sum counts
+    for (std::size_t k = obstacles + 1; k < touching.size(); ++k) {
+      touching[obstacles].impact_loss += touching[k].impact_loss;
+    }
+    touching[obstacles].obstacle = "other bodies";
+    touching.resize(obstacles + 1);
+  }
+  for (const ContactReading& contact : touching) {
     if (contact.impact_loss < -0.01 * peak_energy_ &&
         -contact.impact_loss > rounding_energy(model())) {
       warnings.push_back(fmt::format(
-          "contact with obstacle \"{}\" has made {:.3g} J, {:.2g}% of the largest kinetic + "
+          "contact with \"{}\" has made {:.3g} J, {:.2g}% of the largest kinetic + "
           "elastic "
           "energy: do not trust the result; a smaller time.safety may help",
           contact.obstacle, -contact.impact_loss, -100 * contact.impact_loss / peak_energy_));

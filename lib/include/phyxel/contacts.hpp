@@ -1,4 +1,4 @@
-/// Forces and work of obstacles.
+/// Forces and work of obstacles, and of bodies on each other.
 #pragma once
 
 #include <span>
@@ -11,9 +11,9 @@
 
 namespace phyxel {
 
-/// What an obstacle does to the bodies, now and since t = 0.
+/// What an obstacle does to the bodies, or all other bodies to one, now and since t = 0.
 struct ContactReading {
-  std::string obstacle;      ///< Its name.
+  std::string obstacle;      ///< Its name, or that of the body.
   std::string shape;         ///< The name of its shape, e.g. "plane".
   Vec3d force, torque;       ///< On the bodies [N], and about `place` [N m], over the next step.
   Vec3d impulse;             ///< On the bodies since t = 0 [N s].

@@ -158,6 +158,29 @@ struct ContactLayer {
   std::vector<double> offset;  ///< Distance of each from its body's surface [m]; 0: it lies on it.
 };
 
+/// How the bodies of a scene touch each other.
+struct BodyContact {
+  /// Two bodies of the scene with a law of their own.
+  struct Pair {
+    Index first = 0, second = 0;  ///< Numbers of bodies, the smaller one first.
+    ContactLaw law;
+  };
+  ContactLaw law;           ///< Of other pairs.
+  std::vector<Pair> pairs;  ///< Ascending.
+  bool all = true;          ///< True if other pairs touch, too.
+  bool self = false;        ///< True if parts of one body touch each other, too.
+  int sweeps = 1;           ///< How often contact is resolved in each step.
+  /// Distances from the surface of each body at rest, by the number of the body; null for bodies
+  /// that touch no other. Empty in scenes without such contact.
+  std::vector<std::shared_ptr<const DistanceArrays>> distances;
+  /// The phyxels by which bodies touch each other, held and moved ones, too.
+  ContactLayer layer;
+
+  bool acts() const { return !distances.empty(); }
+  /// The law of two bodies, which may be the same one; null if they do not touch.
+  const ContactLaw* law_of(Index a, Index b) const;
+};
+
 /// Forces on some phyxels, times the factor of a curve. Their directions are constant, unless they
 /// follow the surface.
 struct Load {
@@ -229,6 +252,7 @@ struct Model {
   std::vector<Load> loads;
   std::vector<Obstacle> obstacles;
   ContactLayer contact;
+  BodyContact body_contact;
   std::vector<Following> following;  ///< Of loads that follow the surface, in their order.
   std::vector<Probe> probes;
   std::vector<Walls> walls;  ///< Of each body.

@@ -222,6 +222,27 @@ struct ObstacleRequest {
   std::string where;  ///< "scene.toml:30:1", for errors.
 };
 
+/// Two bodies that touch each other in a way of their own.
+struct ContactPairRequest {
+  std::string first, second;  ///< Names of bodies.
+  /// As of `ContactRequest`; unset: as there.
+  std::optional<double> friction, kinetic_friction, restitution;
+  std::string where;  ///< "scene.toml:30:1", for errors.
+};
+
+/// How the bodies of a scene touch each other.
+struct ContactRequest {
+  double friction = 0;                     ///< Coulomb's coefficient of points that stick.
+  std::optional<double> kinetic_friction;  ///< The same of sliding points; unset: `friction`.
+  double restitution = 0;  ///< Speed of a surface point after an impact over that before.
+  bool self = false;       ///< True if parts of one body touch each other, too.
+  int sweeps = 1;          ///< How often contact is resolved in each step.
+  std::vector<ContactPairRequest> pairs;
+  /// Whether all bodies touch each other, not only those of `pairs`; unset: if there are no pairs.
+  std::optional<bool> all;
+  std::string where;  ///< "scene.toml:30:1", for errors.
+};
+
 /// Simulated time and step size.
 struct TimeRequest {
   double end = 0;  ///< Simulated time [s].
@@ -274,6 +295,7 @@ struct Scene {
   RenderRequest render;
   std::vector<BodyRequest> bodies;
   std::vector<ObstacleRequest> obstacles;
+  std::optional<ContactRequest> contact;  ///< Unset: bodies pass through each other.
 };
 
 /// Default strength of hourglass control: 0.1, the most accurate value (docs/accuracy.md); 0 for

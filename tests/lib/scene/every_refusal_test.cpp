@@ -239,6 +239,24 @@ std::vector<Late> refused_obstacles() {
        {":5:1", "body \"beam\" has no surface"}}};
 }
 
+/// Contact of bodies that are not there, or of keys that do not go together.
+std::vector<Late> refused_contacts() {
+  const std::string contact = "[contact]\n", pair = contact + "[[contact.pair]]\n";
+  return {{with_bar(contact + "friction = -0.1\n"), {":14:", "contact.friction", "-0.1 found"}},
+          {with_bar(contact + "restitution = 2\n"), {":14:", "contact.restitution", "2 found"}},
+          {with_bar(contact + "sweeps = 0\n"), {":14:", "contact.sweeps", "0 found"}},
+          {with_bar(contact + "kinetic_friction = 0.1\n"),
+           {":13:", "contact.kinetic_friction", "0.1 found, above a friction of 0"}},
+          {with_bar(contact + "all = false\n"), {":13:", "contact.all", "nothing touches"}},
+          {with_bar(pair + "first = 'beam'\n"), {":14:", "contact.pair.second", "missing"}},
+          {with_bar(pair + "first = 'beam'\nsecond = 'bar'\n"),
+           {":14:", "contact.pair.second", "\"bar\" found", "allowed: \"beam\""}},
+          {with_bar(pair + "first = 'beam'\nsecond = 'beam'\n"),
+           {":14:", "contact.pair.second", "\"beam\" found, the first body, too"}},
+          {still + bar + "surfels = false\n" + material + contact + "self = true\n",
+           {":5:1", "body \"beam\" has no surface"}}};
+}
+
 /// Gradings of bodies that cannot have them, and finer regions.
 std::vector<Late> refused_gradings() {
   return {
@@ -368,7 +386,7 @@ TEST_F(EveryRefusal, BeyondTheParserNamesFileBodyAndValue) {
   ASSERT_EQ(refusal_of(with_bar("")), "accepted");
   for (const std::vector<Late>& refusals :
        {late_refusals(), refused_bodies(), refused_gradings(), refused_loads(), refused_planes(),
-        refused_probes(), refused_obstacles()}) {
+        refused_probes(), refused_obstacles(), refused_contacts()}) {
     for (const Late& late : refusals) expect_named(late.text, late.names);
   }
   EXPECT_GT(refused_, 30);

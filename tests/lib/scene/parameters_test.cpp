@@ -272,6 +272,19 @@ size = [1, 2, 3] # obstacle.size => size = [1, 2, 4]
 [[obstacle]]
 shape = 'plane'
 normal = [0, 0, 1] # obstacle.normal => normal = [0, 1, 1]
+[contact]
+friction = 0.5 # contact.friction => friction = 0.6
+kinetic_friction = 0.4 # contact.kinetic_friction => kinetic_friction = 0.3
+restitution = 0.1 # contact.restitution => restitution = 0.2
+self = true # contact.self => self = false
+sweeps = 2 # contact.sweeps => sweeps = 3
+all = true # contact.all => all = false
+[[contact.pair]]
+first = 'third' # contact.pair.first => first = 'fourth'
+second = 'seventh' # contact.pair.second => second = 'fifth'
+friction = 0.2 # contact.pair.friction => friction = 0.3
+kinetic_friction = 0.1 # contact.pair.kinetic_friction => kinetic_friction = 0
+restitution = 0.3 # contact.pair.restitution => restitution = 0.4
 [[obstacle]]
 shape = 'mesh'
 mesh = 'a.obj' # obstacle.mesh => mesh = 'b.obj'

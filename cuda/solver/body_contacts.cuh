@@ -1,0 +1,329 @@
+/// Contact of bodies with each other on the GPU.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "model/parts.hpp"
+#include "solver/body_contacts.hpp"
+#include "solver/device_distances.cuh"
+#include "solver/device_model.cuh"
+#include "solver/device_sums.cuh"
+#include "solver/passes.cuh"
+
+namespace phyxel::cuda {
+
+/// The phyxels of this device that may touch other bodies, in device memory, shape [count] each;
+/// they are the first of the points of `ContactPasses`.
+template <class Real>
+struct SurfacePlaces {
+  const Index* place = nullptr;            ///< Tile slots.
+  const Vec3<double>* position = nullptr;  ///< At rest [m].
+  const Vec3<double>* inward = nullptr;    ///< As of `SurfaceSite` [m].
+  const Vec3<double>* centre = nullptr;    ///< Centre of mass of their bodies, at rest [m].
+  const Index* body = nullptr;             ///< Numbers of their bodies.
+  const Index* entry = nullptr;            ///< Where their gradients are.
+  const Real* gradients = nullptr;         ///< Of displacement, shape [9, stride].
+  std::size_t stride = 0;
+  SurfaceMotion* motion = nullptr;
+  PointForces* forces = nullptr;  ///< Of all sweeps of the step.
+  int count = 0;
+};
+
+/// The displacement of a place, as precisely as the state has it [m].
+template <class Real, class StateReal>
+__device__ Vec3<double> displacement_at(const Fields<Real, StateReal>& f, Index place) {
+  if constexpr (std::is_same_v<Real, StateReal>) {
+    return to<double>(f.points.get(place).u);
+  } else {
+    return to<double>(column3(f.displacement, f.places, place));
+  }
+}
+
+/// Copies the state of phyxels of the layer. One thread per phyxel.
+template <class Real, class StateReal>
+__global__ void copy_states(Fields<Real, StateReal> f, const Index* place, SurfaceState* state,
+                            int count) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  state[k] = {displacement_at(f, place[k]), to<double>(column3(f.velocity, f.places, place[k]))};
+}
+
+/// Sets what is known of points at the start of a step. One thread per point.
+template <class Real, class StateReal>
+__global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p >= s.count) return;
+  SurfaceMotion& motion = s.motion[p];
+  motion.before = s.position[p] + displacement_at(f, s.place[p]);
+  motion.earlier = to<double>(column3(f.velocity, f.places, s.place[p]));
+  Mat3<double> gradient;
+  for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + s.entry[p]];
+  motion.probe = s.inward[p] + gradient * s.inward[p];
+  motion.back = inverse_deformation(gradient);
+  s.forces[p] = {};
+}
+
+/// Sets where points are at the end of a step. One thread per point.
+template <class Real, class StateReal>
+__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p >= s.count) return;
+  s.motion[p].after = s.position[p] + displacement_at(f, s.place[p]);
+  s.motion[p].velocity = to<double>(column3(f.velocity, f.places, s.place[p]));
+}
+
+// One thread per row or point.
+template <class Real>
+__global__ void find_touches(ContactPasses passes, int rows) {
+  const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (r < rows) passes.find_touch(r);
+}
+template <class Real>
+__global__ void find_shares(ContactPasses passes, int points) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p < points) passes.find_share(p);
+}
+template <class Real>
+__global__ void find_row_forces(ContactPasses passes, int rows) {
+  const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (r < rows) passes.find_force(r);
+}
+
+/// Moves points by the forces on them. One thread per point.
+/// @param sums of each body; they receive the forces of all sweeps after the last one
+template <class Real, class StateReal>
+__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                           SumWords sums, bool is_last) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p >= s.count) return;
+  const PointForces forces = passes.forces_on(p);
+  const Vec3<double> change = passes.change_by(forces, p);
+  PointForces& all = s.forces[p];
+  all.normal += forces.normal;
+  all.tangential += forces.tangential;
+  const Index at = s.place[p];
+  Vec3<double> v = to<double>(column3(f.velocity, f.places, at));
+  if (!(change == Vec3<double>{})) {
+    v += change;
+    set_column3(f.velocity, f.places, at, to<StateReal>(v));
+    const Vec3<StateReal> u = to<StateReal>(displacement_at(f, at) + passes.dt * change);
+    if constexpr (!std::is_same_v<Real, StateReal>) set_column3(f.displacement, f.places, at, u);
+    auto record = f.points.get(at);
+    record.u = to<Real>(u);
+    f.points.set(at, record);
+    v = to<double>(to<StateReal>(v));
+  }
+  if (!is_last || all.normal == Vec3<double>{}) return;
+  const Vec3<double> mean = 0.5 * (s.motion[p].earlier + v);
+  ContactTerms terms;
+  terms.set(passes.dt * all.normal, passes.dt * all.tangential, s.motion[p].before - s.centre[p],
+            mean, mean);
+  for (int t = 0; t < ContactTerms::count; ++t) {
+    sums.add(s.body[p] * ContactTerms::count + t, p, terms.value[t]);
+  }
+}
+
+/// Keeps the bodies of a model out of each other.
+template <class Real, class StateReal>
+class DeviceBodyContacts {
+ public:
+  explicit DeviceBodyContacts(DeviceModel<Real, StateReal>& model)
+      : m_(model), points_(model.model()) {
+    if (!acts()) return;
+    const BodyContact& contact = m_.model().body_contact;
+    std::vector<DistanceField> fields;
+    for (const auto& distances : contact.distances) {
+      distances_.push_back(distances ? DeviceDistances(*distances, name) : DeviceDistances());
+      fields.push_back(distances_.back().view());
+    }
+    fields_ = sent(fields, name);
+    layer_place_ = sent(places_of(contact.layer.phyxels), name);
+    layer_states_ = {contact.layer.phyxels.size(), name};
+    const std::size_t bodies = contact.distances.size();
+    const auto accumulators = static_cast<unsigned>(std::clamp<std::size_t>(256 / bodies, 2, 128));
+    sums_ = DeviceSums(static_cast<int>(bodies) * ContactTerms::count, accumulators, name);
+  }
+
+  /// True if bodies touch each other.
+  bool acts() const { return m_.model().body_contact.acts(); }
+
+  /// Prepares for a step of `dt` [s]. Of a share: collective.
+  void begin_step(double dt, const Passes<Real, StateReal>& passes) {
+    if (!acts()) return;
+    if (watch_.is_due(dt)) look(dt);
+    dt_ = dt;
+    if (!points_.any()) return;
+    sums_.prepare(place_.size(), 1, [&] { m_.wait(); });
+    passes.put_gradients({gradients_.data(), stride(), tiles_.data()},
+                         static_cast<Index>(tiles_.size()));
+    m_.launch_each("begin_motion", begin_motion<Real, StateReal>, count(), m_.fields(), places());
+  }
+  /// Moves phyxels that the step has led into bodies out of them. Of a share: collective.
+  void keep_apart() {
+    if (!acts() || !points_.any()) return;
+    const ContactPasses passes = this->passes();
+    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
+    const int sweeps = m_.model().body_contact.sweeps;
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
+      if (m_.share()) refresh();
+      m_.launch_each("find_touches", find_touches<Real>, rows, passes, rows);
+      m_.launch_each("find_shares", find_shares<Real>, points, passes, points);
+      m_.launch_each("find_row_forces", find_row_forces<Real>, rows, passes, rows);
+      m_.launch_each("move_apart", move_apart<Real, StateReal>, count(), m_.fields(), passes,
+                     places(), sums_.pointer(), sweep + 1 == sweeps);
+    }
+  }
+  /// The sums of each body so far (`ContactTerms`). Waits for the steps in progress.
+  std::vector<ExactSum> sums() const {
+    if (!acts()) return {};
+    m_.wait();
+    return sums_.sums();
+  }
+  std::size_t bytes() const {
+    if (!acts()) return 0;
+    std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_states_.bytes() +
+                        sums_.bytes() + site_.bytes() + motion_.bytes() + rows_.bytes() +
+                        near_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
+                        forces_.bytes() + gradients_.bytes();
+    for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
+    return bytes;
+  }
+
+ private:
+  static constexpr const char* name = "contact";
+
+  int count() const { return static_cast<int>(place_.size()); }
+  std::size_t stride() const { return tiles_.size() * tile_size; }
+  std::vector<Index> places_of(const std::vector<Index>& phyxels) const {
+    std::vector<Index> places;
+    for (const Index i : phyxels) places.push_back(m_.tiling().place[i]);
+    return places;
+  }
+
+  /// Finds the points that may touch anew if phyxels have moved far enough.
+  void look(double dt) {
+    const int count = static_cast<int>(layer_place_.size());
+    m_.launch_each("copy_states", copy_states<Real, StateReal>, count, m_.fields(),
+                   layer_place_.data(), layer_states_.data(), count);
+    m_.wait();
+    if (!watch_.look(m_.model(), fetched(layer_states_), points_.skin(), dt)) return;
+    points_.find(watch_.positions(), dt);
+    send_points();
+  }
+  void send_points() {
+    const Model& model = m_.model();
+    std::vector<Index> phyxels, bodies;
+    std::vector<Vec3<double>> positions, centres, inward;
+    for (std::size_t p = 0; p < points_.own().size(); ++p) {
+      inward.push_back(points_.sites()[p].inward);
+    }
+    for (const Index k : points_.own()) {
+      const Index i = model.body_contact.layer.phyxels[k];
+      const Part& part = part_of(model, i);
+      phyxels.push_back(i);
+      positions.push_back(model.position[i]);
+      centres.push_back(part.centre);
+      bodies.push_back(part.body);
+    }
+    const std::vector<Index> places = places_of(phyxels);
+    std::vector<Index> tiles;
+    for (const Index place : places) tiles.push_back(place / tile_size);
+    std::sort(tiles.begin(), tiles.end());
+    tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+    std::vector<Index> entries;
+    for (const Index place : places) {
+      const auto tile = std::lower_bound(tiles.begin(), tiles.end(), place / tile_size);
+      entries.push_back(static_cast<Index>(tile - tiles.begin()) * tile_size + place % tile_size);
+    }
+    place_ = sent(places, name);
+    position_ = sent(positions, name);
+    inward_ = sent(inward, name);
+    centre_ = sent(centres, name);
+    body_ = sent(bodies, name);
+    entry_ = sent(entries, name);
+    tiles_ = sent(tiles, name);
+    gradients_ = {9 * stride(), name};
+    site_ = sent_span(points_.sites());
+    motion_ = sent(std::vector<SurfaceMotion>(points_.sites().size()), name);
+    rows_ = sent_span(points_.rows());
+    near_ = sent_span(points_.near());
+    rows_of_start_ = sent(points_.rows_of().offsets, name);
+    rows_of_ = sent(points_.rows_of().indices, name);
+    rows_from_start_ = sent(points_.rows_from().offsets, name);
+    rows_from_ = sent(points_.rows_from().indices, name);
+    touch_ = {points_.rows().size(), name};
+    force_ = {points_.rows().size(), name};
+    share_ = {points_.sites().size(), name};
+    forces_ = {places.size(), name};
+  }
+  template <class T>
+  DeviceArray<T> sent_span(std::span<const T> values) const {
+    return sent(std::vector<T>(values.begin(), values.end()), name);
+  }
+
+  /// Gives points of other ranks the values that their owners have, through the host.
+  void refresh() {
+    m_.wait();
+    std::vector<SurfaceMotion> motion = fetched(motion_);
+    points_.refresh(motion);
+    motion_.upload(motion.data());
+  }
+
+  SurfacePlaces<Real> places() const {
+    return {.place = place_.data(),
+            .position = position_.data(),
+            .inward = inward_.data(),
+            .centre = centre_.data(),
+            .body = body_.data(),
+            .entry = entry_.data(),
+            .gradients = gradients_.data(),
+            .stride = stride(),
+            .motion = motion_.data(),
+            .forces = forces_.data(),
+            .count = count()};
+  }
+  ContactPasses passes() const {
+    return {.site = site_.data(),
+            .motion = motion_.data(),
+            .row = rows_.data(),
+            .near = near_.data(),
+            .rows_of_start = rows_of_start_.data(),
+            .rows_of = rows_of_.data(),
+            .rows_from_start = rows_from_start_.data(),
+            .rows_from = rows_from_.data(),
+            .field = fields_.data(),
+            .touch = touch_.data(),
+            .force = force_.data(),
+            .share = share_.data(),
+            .dt = dt_};
+  }
+
+  DeviceModel<Real, StateReal>& m_;
+  TouchingPoints points_;
+  ContactWatch watch_;
+  double dt_ = 0;  // [s]
+  DeviceSums sums_;
+  std::vector<DeviceDistances> distances_;  // of each body
+  DeviceArray<DistanceField> fields_;
+  DeviceArray<Index> layer_place_;
+  DeviceArray<SurfaceState> layer_states_;
+  // Of this device's points.
+  DeviceArray<Index> place_, body_, entry_, tiles_;
+  DeviceArray<Vec3<double>> position_, inward_, centre_;
+  DeviceArray<Real> gradients_;
+  DeviceArray<PointForces> forces_;
+  // As of `ContactPasses`.
+  DeviceArray<SurfaceSite> site_;
+  DeviceArray<SurfaceMotion> motion_;
+  DeviceArray<ContactRow> rows_;
+  DeviceArray<Index> near_, rows_of_, rows_from_;
+  DeviceArray<Offset> rows_of_start_, rows_from_start_;
+  DeviceArray<SurfaceTouch> touch_;
+  DeviceArray<SurfaceForce> force_;
+  DeviceArray<double> share_;
+};
+
+}  // namespace phyxel::cuda

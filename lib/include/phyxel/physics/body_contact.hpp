@@ -1,0 +1,283 @@
+/// Contact of points of one surface with the deformed surface of a body: the gap, the impulse that
+/// closes it, and who takes the reaction.
+///
+/// The body's signed distance φ is known at rest. A place q beside its deformed surface is led back
+/// to where it would be at rest by the deformation gradients F_k of the phyxels k of that surface
+/// near it, so that edges, thin parts and corners act as they are:
+///
+///   X(q) = Σ ω_k (X_k + ½ (G_k + Ḡ)(q - y_k)),   G_k = F_k⁻¹,   Ḡ = Σ ω_k G_k,
+///   m = Ḡᵀ ∇φ(X(q)),   n̄ = m/|m|,   g = φ(X(q))/|m| + n̄ · (x - q),
+///
+/// where y_k are the places of these phyxels, ω_k smooth weights, and x the point. q lies inside
+/// the point's own body, half a spacing from x: it is outside the other body even where x has
+/// entered it, so that the nearest face is the one through which x has come, on edges and at
+/// corners, too. The force that closes the gap is shared among them by weights r_k that reproduce
+/// linear functions along the surface, so that both momenta of the bodies are kept to rounding,
+/// with friction, too.
+#pragma once
+
+#include <cmath>
+
+#include "phyxel/physics/contact.hpp"
+#include "phyxel/physics/distance_field.hpp"
+#include "phyxel/types.hpp"
+
+namespace phyxel {
+
+/// What does not change of a phyxel by which a body touches others.
+struct SurfaceSite {
+  Vec3<double> rest;  ///< X [m]
+  /// Change of velocity by a force over a step, along each axis; 0 along prescribed ones [m/s/N].
+  Vec3<double> mobility;
+  Vec3<double> inward;  ///< From X to the place at rest whose distance is looked up [m].
+  /// φ(X) of its own body, where its surface is smooth: distances are taken from there [m].
+  double level = 0;
+  double area = 0;    ///< A measure of the area of its part of the surface [m²].
+  double offset = 0;  ///< Its distance from its body's surface [m].
+  double range = 0;   ///< Distance up to which it knows of other surfaces [m].
+};
+
+/// The same phyxel in a step, before contact.
+struct SurfaceMotion {
+  Vec3<double> before;    ///< Where it is at the start of the step [m].
+  Vec3<double> after;     ///< Where it would be at the end [m].
+  Vec3<double> velocity;  ///< Over the step [m/s].
+  Vec3<double> earlier;   ///< Velocity at the start of the step [m/s].
+  Vec3<double> probe;     ///< q - x: F times `inward` [m].
+  Mat3<double> back;      ///< G: the inverse of its deformation gradient at the start.
+};
+
+/// The inverse of a deformation gradient. That of a phyxel without volume is the identity, as it
+/// says nothing of where a point would be at rest.
+/// @param gradient of displacement
+PHYXEL_HD Mat3<double> inverse_deformation(const Mat3<double>& gradient) {
+  const auto column = [&](int c) {
+    return Vec3<double>{gradient(0, c) + (c == 0), gradient(1, c) + (c == 1),
+                        gradient(2, c) + (c == 2)};
+  };
+  const Vec3<double> a = column(0), b = column(1), c = column(2);
+  const double volume = dot(a, cross(b, c));
+  constexpr double least = 1e-3;
+  Mat3<double> inverse{};
+  if (!(volume > least)) {
+    for (int k = 0; k < 3; ++k) inverse(k, k) = 1;
+    return inverse;
+  }
+  const Vec3<double> rows[] = {cross(b, c), cross(c, a), cross(a, b)};
+  for (int r = 0; r < 3; ++r) {
+    inverse(r, 0) = rows[r].x / volume;
+    inverse(r, 1) = rows[r].y / volume;
+    inverse(r, 2) = rows[r].z / volume;
+  }
+  return inverse;
+}
+
+/// The weight of a phyxel of a surface at a distance from a point, zero from `range` on.
+/// @param square of the distance [m²]
+PHYXEL_HD double surface_weight(double square, double range) {
+  const double left = 1 - square / (range * range);
+  return left > 0 ? left * left * left : 0;
+}
+
+/// The larger of two ranges, up to which phyxels of two surfaces know of each other [m].
+PHYXEL_HD double common_range(double a, double b) { return a > b ? a : b; }
+
+/// The weight with which a phyxel of a surface carries the force on a point: that of its distance
+/// times its area, as far as it faces the point, so that a uniform pressure is passed on uniformly,
+/// and faces beside the one that is touched carry nothing.
+/// @param normal n̄, away from the body. @param square of the distance from the point [m²]
+PHYXEL_HD double carrying_weight(Vec3<double> normal, double square, double range,
+                                 const SurfaceSite& site, const SurfaceMotion& motion) {
+  const double weight = surface_weight(square, range);
+  if (!(weight > 0)) return 0;
+  const Vec3<double> out = -(transpose(motion.back) * site.inward);  // along its own normal
+  const double length = std::sqrt(dot(out, out));
+  constexpr double from = 0.2, to = 0.5, least = 1e-6;  // cosines; edges have 0.71, corners 0.58
+  double facing = length > 0 ? (dot(normal, out) / length - from) / (to - from) : 1;
+  facing = facing > 1 ? 1 : facing > least ? facing : least;
+  return weight * site.area * facing;
+}
+
+/// A point that is inside a body at the end of a step, and how the body's surface carries it.
+struct SurfaceTouch {
+  bool is_inside = false;
+  double gap = 0;       ///< g - offset, negative [m].
+  Vec3<double> normal;  ///< n̄, away from the body.
+  double weights = 0;   ///< Sum of the weights of those that carry it (`carrying_weight`).
+  Vec3<double> centre;  ///< Their mean place at the start of the step [m].
+  /// T⁺ d [1/m]: with weights ω_k whose sum is 1, r_k = ω_k (1 + tilt · (y_k - centre)).
+  Vec3<double> tilt;
+  double height = 0;            ///< n̄ · (x - Σ r_k y_k) at the start of the step [m].
+  Sym3<double> inverse_spread;  ///< T⁺ [1/m²], where T = Σ ω_k z_k z_kᵀ, z_k along the surface.
+
+  /// r_k of a phyxel. @param weight with which it carries the point
+  PHYXEL_HD double share(double weight, Vec3<double> y) const {
+    return weight / weights * (1 + dot(tilt, y - centre));
+  }
+};
+
+/// The part of a vector along a surface.
+PHYXEL_HD Vec3<double> along(Vec3<double> normal, Vec3<double> v) {
+  return v - dot(normal, v) * normal;
+}
+
+/// The pseudo-inverse of a symmetric tensor that has n as a null vector.
+PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
+  // Two unit vectors across n, one of them across the axis that is farthest from n.
+  const Vec3<double> axis = std::fabs(n.x) < 0.6   ? Vec3<double>{1, 0, 0}
+                            : std::fabs(n.y) < 0.6 ? Vec3<double>{0, 1, 0}
+                                                   : Vec3<double>{0, 0, 1};
+  Vec3<double> a = cross(n, axis);
+  a = (1 / std::sqrt(dot(a, a))) * a;
+  const Vec3<double> b = cross(n, a);
+  const double aa = dot(a, t * a), ab = dot(a, t * b), bb = dot(b, t * b);
+  // Eigenvalues m ± q, and the eigenvector of the larger one.
+  const double middle = 0.5 * (aa + bb), half = 0.5 * (aa - bb);
+  const double q = std::sqrt(half * half + ab * ab);
+  const double large = middle + q, small = middle - q;
+  if (!(large > 0)) return {};
+  Vec3<double> u = half > 0 ? (half + q) * a + ab * b : ab * a + (q - half) * b;
+  const double length = std::sqrt(dot(u, u));
+  u = length > 0 ? (1 / length) * u : a;
+  const Vec3<double> v = cross(n, u);
+  constexpr double cut_off = 1e-3;  // phyxels on one line do not spread along the other
+  const double p = 1 / large, s = small > cut_off * large ? 1 / small : 0.0;
+  return {p * u.x * u.x + s * v.x * v.x, p * u.x * u.y + s * v.x * v.y,
+          p * u.x * u.z + s * v.x * v.z, p * u.y * u.y + s * v.y * v.y,
+          p * u.y * u.z + s * v.y * v.z, p * u.z * u.z + s * v.z * v.z};
+}
+
+/// Finds whether a point is inside a body, from the phyxels of the body's surface near it.
+/// @param count number of these phyxels
+/// @param site_of,motion_of return those of the k-th
+/// @param field distances from the body's surface at rest
+template <class SiteOf, class MotionOf>
+PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotion& point, int count,
+                                     SiteOf&& site_of, MotionOf&& motion_of,
+                                     const DistanceField& field) {
+  SurfaceTouch touch;
+  const auto square_of = [&](int k) {
+    const Vec3<double> apart = motion_of(k).after - point.after;
+    return dot(apart, apart);
+  };
+  const auto range_of = [&](int k) { return common_range(site.range, site_of(k).range); };
+  Mat3<double> back{};                  // Σ w G
+  Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
+  double level = 0, weights = 0;        // Σ w φ(X), Σ w
+  const Vec3<double> place = point.after + point.probe;
+  for (int k = 0; k < count; ++k) {
+    const double w = surface_weight(square_of(k), range_of(k));
+    if (!(w > 0)) continue;
+    const SurfaceMotion& other = motion_of(k);
+    const Vec3<double> way = place - other.after;
+    weights += w;
+    back += w * other.back;
+    rest += w * site_of(k).rest;
+    led += w * (other.back * way);
+    apart += w * way;
+    level += w * site_of(k).level;
+  }
+  if (!(weights > 0)) return touch;
+  const double scale = 1 / weights;
+  back = scale * back;
+  const Vec3<double> x = scale * (rest + 0.5 * (led + back * apart));
+  const Gap gap = field.gap(x);
+  const Vec3<double> m = transpose(back) * gap.normal;
+  const double length = std::sqrt(dot(m, m));
+  if (!(length > 0)) return touch;
+  touch.normal = (1 / length) * m;
+  touch.gap =
+      (gap.distance - scale * level) / length - dot(touch.normal, point.probe) - site.offset;
+  if (!(touch.gap < 0)) return touch;
+  touch.is_inside = true;
+  const Vec3<double> n = touch.normal;
+  const auto carries = [&](int k) {
+    return carrying_weight(n, square_of(k), range_of(k), site_of(k), motion_of(k));
+  };
+  for (int k = 0; k < count; ++k) {
+    const double w = carries(k);
+    touch.weights += w;
+    touch.centre += w * (motion_of(k).before - point.before);
+  }
+  touch.centre = (1 / touch.weights) * touch.centre;  // from the point
+  Sym3<double> spread{};
+  for (int k = 0; k < count; ++k) {
+    const Vec3<double> z = along(n, motion_of(k).before - point.before - touch.centre);
+    const double share = carries(k) / touch.weights;
+    spread.xx += share * z.x * z.x;
+    spread.xy += share * z.x * z.y;
+    spread.xz += share * z.x * z.z;
+    spread.yy += share * z.y * z.y;
+    spread.yz += share * z.y * z.z;
+    spread.zz += share * z.z * z.z;
+  }
+  touch.inverse_spread = inverse_along(n, spread);
+  touch.tilt = touch.inverse_spread * along(n, -touch.centre);
+  touch.centre += point.before;
+  Vec3<double> carried{};  // Σ r (y - x)
+  for (int k = 0; k < count; ++k) {
+    const Vec3<double> y = motion_of(k).before;
+    carried += touch.share(carries(k), y) * (y - point.before);
+  }
+  touch.height = -dot(n, carried);
+  return touch;
+}
+
+/// The force of a body on a point in a step [N], and how it acts back.
+struct SurfaceForce {
+  Vec3<double> normal, tangential;  ///< On the point.
+  Vec3<double> twist;               ///< Couples of friction: b = height T⁺ tangential [N/m].
+
+  /// The normal part of the reaction on a phyxel of the body's surface, and its tangential part.
+  /// @param weight with which it carries the point. @param y its place at the start of the step [m]
+  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch, double weight,
+                                         Vec3<double> y) const {
+    const double turning = weight / touch.weights * dot(twist, y - touch.centre);
+    return turning * touch.normal - touch.share(weight, y) * normal;
+  }
+  PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceTouch& touch, double weight,
+                                             Vec3<double> y) const {
+    return -touch.share(weight, y) * tangential;
+  }
+};
+
+/// The force that closes a gap over a step, and Coulomb's friction,
+///
+///   f = max(-g/Δt, -(1 + e) n̄ · v⁻)/D_n,   f_t = -v_t/|v_t| min(μ f, |v_t|/D_t),
+///   D = Σ_i |r_i| c_i d · M_i d / a  along a direction d,
+///
+/// where v is the velocity of the point relative to the surface, v⁻ that before the step, M_i the
+/// mobility of a phyxel, a the area of the point, and c_i = Σ a |r_i| over all contacts that the
+/// phyxel takes part in: masses are split by areas, so that no gap is closed twice over.
+/// @param mobility returns D along a direction [m/s/N]
+template <class Mobility>
+PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, Vec3<double> velocity,
+                                     Vec3<double> earlier, const ContactLaw& law, double dt,
+                                     Mobility&& mobility) {
+  SurfaceForce force{};
+  const Vec3<double> n = touch.normal;
+  const double across = mobility(n);
+  if (!(across > 0)) return force;  // nothing is free to move
+  double rate = -touch.gap / dt;
+  const double approach = -dot(n, earlier);
+  if (law.restitution > 0 && approach > 0) {
+    const double rebound = (1 + law.restitution) * approach;
+    rate = rate < rebound ? rebound : rate;
+  }
+  const double push = rate / across;
+  force.normal = push * n;
+  if (!(law.static_friction > 0)) return force;
+  const Vec3<double> slip = along(n, velocity);
+  const double speed = std::sqrt(dot(slip, slip));
+  if (!(speed > 0)) return force;
+  const Vec3<double> way = (1 / speed) * slip;
+  const double sideways = mobility(way);
+  if (!(sideways > 0)) return force;
+  const double stop = speed / sideways, hold = law.kinetic_friction * push;
+  const double size = stop <= law.static_friction * push || stop < hold ? stop : hold;
+  force.tangential = -size * way;
+  force.twist = touch.height * (touch.inverse_spread * force.tangential);
+  return force;
+}
+
+}  // namespace phyxel

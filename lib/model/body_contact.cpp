@@ -1,0 +1,206 @@
+#include "model/body_contact.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/distance_field.hpp"
+#include "mesh/surface_topology.hpp"
+#include "model/box_overlaps.hpp"
+#include "model/contact.hpp"
+#include "model/parts.hpp"
+#include "phyxel/error.hpp"
+#include "phyxel/mesh.hpp"
+#include "scene/scene_error.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+Index body_named(const Scene& scene, const std::string& name) {
+  const auto found = std::find_if(scene.bodies.begin(), scene.bodies.end(),
+                                  [&](const BodyRequest& body) { return body.name == name; });
+  return static_cast<Index>(found - scene.bodies.begin());
+}
+
+bool touches_all(const ContactRequest& request) {
+  return request.all.value_or(request.pairs.empty());
+}
+
+/// The laws of contact of a scene, without surfaces.
+BodyContact laws_of(const Scene& scene) {
+  const ContactRequest& request = *scene.contact;
+  BodyContact contact{.law = {request.friction, request.kinetic_friction.value_or(request.friction),
+                              request.restitution},
+                      .all = touches_all(request),
+                      .self = request.self,
+                      .sweeps = request.sweeps};
+  for (const ContactPairRequest& pair : request.pairs) {
+    const Index a = body_named(scene, pair.first), b = body_named(scene, pair.second);
+    const double friction = pair.friction.value_or(request.friction);
+    const double kinetic = pair.kinetic_friction ? *pair.kinetic_friction
+                           : pair.friction       ? friction
+                                                 : contact.law.kinetic_friction;
+    contact.pairs.push_back({std::min(a, b),
+                             std::max(a, b),
+                             {friction, kinetic, pair.restitution.value_or(request.restitution)}});
+  }
+  std::sort(contact.pairs.begin(), contact.pairs.end(),
+            [](const BodyContact::Pair& p, const BodyContact::Pair& q) {
+              return std::pair(p.first, p.second) < std::pair(q.first, q.second);
+            });
+  return contact;
+}
+
+LayerSupports supports_of_layer(const Model& model, Index body) {
+  LayerSupports found;
+  const std::vector<Index>& layer = model.body_contact.layer.phyxels;
+  for (const Part& part : model.parts) {
+    if (part.body != body) continue;
+    const auto first = std::lower_bound(layer.begin(), layer.end(), part.begin);
+    const auto last = std::lower_bound(first, layer.end(), part.end);
+    for (auto i = first; i != last; ++i) {
+      const double h = model.neighbourhood.support[*i];
+      found = {std::min(found.least, h), std::max(found.most, h)};
+    }
+  }
+  if (!model.share) return found;
+  const Communicator& ranks = *model.share->communicator;
+  return {ranks.smallest(found.least), ranks.largest(found.most)};
+}
+
+/// The distances from a body's surface, as finely as its phyxels are spaced.
+std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, Surface surface,
+                                                   const LayerSupports& supports) {
+  const SurfaceDefects defects = inspect_surface(surface);
+  if (!connect(surface).closed) {
+    throw InputError(named(
+        request, fmt::format("body \"{}\" cannot touch other bodies: its surface is not closed "
+                             "({}); allowed: a closed one, or pairs that leave it out",
+                             request.name, defects.describe())));
+  }
+  orient(surface);
+  constexpr double share_of_support = 0.25;  // about half a spacing
+  return std::make_shared<const DistanceArrays>(
+      distances_from(surface, share_of_support * supports.least, supports.most));
+}
+
+/// The box of the phyxels of a body's surface at rest, with a margin.
+Box box_of(const DistanceArrays& distances) {
+  const DistanceField& field = distances.shape;
+  const double cell = DistanceField::edge * field.spacing;
+  const Vec3d size{cell * field.count.x, cell * field.count.y, cell * field.count.z};
+  return {field.low, field.low + size};
+}
+
+/// A phyxel that is inside another body.
+struct Overlap {
+  double depth = 0;  ///< [m]
+  Index phyxel = 0, body = 0;
+};
+
+/// The phyxel of this rank that is deepest inside another body at rest.
+Overlap deepest_overlap(const Model& model) {
+  const BodyContact& contact = model.body_contact;
+  const std::size_t bodies = contact.distances.size();
+  std::vector<Box> boxes;
+  std::vector<Index> number;
+  for (std::size_t b = 0; b < bodies; ++b) {
+    if (!contact.distances[b]) continue;
+    boxes.push_back(box_of(*contact.distances[b]));
+    number.push_back(static_cast<Index>(b));
+  }
+  std::vector<std::vector<Index>> partners(bodies);
+  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
+    if (!contact.law_of(number[a], number[b])) return;
+    partners[number[a]].push_back(number[b]);
+    partners[number[b]].push_back(number[a]);
+  });
+  Overlap found;
+  for (std::size_t k = 0; k < contact.layer.phyxels.size(); ++k) {
+    const Index i = contact.layer.phyxels[k];
+    for (const Index other : partners[part_of(model, i).body]) {
+      const DistanceArrays& distances = *contact.distances[other];
+      if (!contains(box_of(distances), model.position[i])) continue;
+      const double depth =
+          contact.layer.offset[k] - distances.view().gap(model.position[i]).distance;
+      if (depth > found.depth) found = {depth, i, other};
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+const ContactLaw* BodyContact::law_of(Index a, Index b) const {
+  if (a == b && !self) return nullptr;
+  const std::pair wanted(std::min(a, b), std::max(a, b));
+  const auto found = std::lower_bound(pairs.begin(), pairs.end(), wanted,
+                                      [](const Pair& pair, const std::pair<Index, Index>& other) {
+                                        return std::pair(pair.first, pair.second) < other;
+                                      });
+  if (found != pairs.end() && std::pair(found->first, found->second) == wanted) return &found->law;
+  return all || a == b ? &law : nullptr;
+}
+
+bool touches_bodies(const Scene& scene, std::size_t body) {
+  if (!scene.contact) return false;
+  if (scene.contact->self) return true;
+  if (touches_all(*scene.contact)) return scene.bodies.size() > 1;
+  const std::string& name = scene.bodies[body].name;
+  return std::any_of(
+      scene.contact->pairs.begin(), scene.contact->pairs.end(),
+      [&](const ContactPairRequest& pair) { return pair.first == name || pair.second == name; });
+}
+
+std::vector<LayerSupports> add_body_layer(Model& model, const Scene& scene,
+                                          std::span<const double> offset) {
+  if (!scene.contact) return {};
+  model.body_contact = laws_of(scene);
+  BodyContact& contact = model.body_contact;
+  const auto touches = tabulated(scene.bodies.size(), [&](std::size_t b) {
+    return static_cast<char>(touches_bodies(scene, b));
+  });
+  if (std::none_of(touches.begin(), touches.end(), [](char t) { return t != 0; })) return {};
+  for (const Part& part : model.parts) {
+    if (!touches[part.body]) continue;
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      if (offset[i] < 0) continue;
+      contact.layer.phyxels.push_back(i);
+      contact.layer.offset.push_back(offset[i]);
+    }
+  }
+  std::vector<LayerSupports> supports(scene.bodies.size());
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    if (touches[b]) supports[b] = supports_of_layer(model, static_cast<Index>(b));
+  }
+  return supports;
+}
+
+void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSupports> supports,
+                       const std::function<Surface(std::size_t body)>& surface_of) {
+  model.body_contact.distances.resize(supports.size());
+  for (std::size_t b = 0; b < supports.size(); ++b) {
+    if (!(supports[b].most > 0)) continue;  // it touches nothing
+    model.body_contact.distances[b] = distances_of(scene.bodies[b], surface_of(b), supports[b]);
+  }
+}
+
+std::string bodies_overlap_at_start(const Model& model, const Scene& scene) {
+  if (!model.body_contact.acts()) return {};
+  const Overlap found = deepest_overlap(model);
+  // Distances are interpolated, and from bent surfaces off by a hundredth of a spacing.
+  constexpr double tolerance = 0.01;
+  if (!is_deepest_overlap(model, found.depth, found.phyxel, tolerance)) return {};
+  const Vec3d x = model.position[found.phyxel];
+  const std::string& where = scene.contact->where;
+  return fmt::format(
+      "{}{}body \"{}\" is {:.3g} m deep in body \"{}\" at the start, at ({:.6g}, {:.6g}, {:.6g}) "
+      "m; "
+      "allowed: bodies that do not overlap, or pairs that do not touch",
+      where, where.empty() ? "" : ": ", part_of(model, found.phyxel).name, found.depth,
+      scene.bodies[static_cast<std::size_t>(found.body)].name, x.x, x.y, x.z);
+}
+
+}  // namespace phyxel

@@ -1,0 +1,140 @@
+#include "solver/body_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mesh/distance_field.hpp"
+#include "model/parts.hpp"
+
+namespace phyxel {
+BodyContacts::BodyContacts(const Model& model, int threads)
+    : model_(model), threads_(threads), points_(model) {
+  if (!acts()) return;
+  sums_.resize(ContactTerms::count * model.body_contact.distances.size());
+  for (const auto& distances : model.body_contact.distances) {
+    fields_.push_back(distances ? distances->view() : DistanceField{});
+  }
+}
+
+bool ContactWatch::look(const Model& model, std::span<const SurfaceState> states, double skin,
+                        double dt) {
+  const std::vector<Index>& layer = model.body_contact.layer.phyxels;
+  std::vector<Vec3d> now(layer.size());
+  double moved = 0, fastest = 0;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    now[k] = model.position[layer[k]] + states[k].displacement;
+    fastest = std::max(fastest, norm(states[k].velocity));
+    if (generation_ > 0) moved = std::max(moved, norm(now[k] - positions_[k]));
+  }
+  if (model.share) {
+    moved = model.share->communicator->largest(moved);
+    fastest = model.share->communicator->largest(fastest);
+  }
+  // Speeds may double until the next look.
+  const double way = 2 * fastest * dt, most = 0.5 * skin;
+  const bool is_late = generation_ == 0 || dt != dt_ || moved + way > most;
+  if (is_late) {
+    positions_ = std::move(now);
+    moved = 0;
+    ++generation_;
+  }
+  dt_ = dt;
+  constexpr double rarest = 64;
+  left_ = static_cast<int>(std::clamp((most - moved) / std::max(way, 1e-300), 1.0, rarest));
+  return is_late;
+}
+
+void BodyContacts::look(std::span<const SurfaceState> states, double dt) {
+  if (!watch_.look(model_, states, points_.skin(), dt)) return;
+  points_.find(watch_.positions(), dt);
+  motion_.assign(points_.sites().size(), {});
+}
+
+void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {
+  const Vec3d inward = points_.sites()[p].inward;
+  motion_[p].probe = inward + gradient * inward;
+  motion_[p].back = inverse_deformation(gradient);
+}
+
+int BodyContacts::threads_here() const {
+  return std::clamp(static_cast<int>(points_.rows().size() / 200), 1, threads_);
+}
+
+ContactPasses BodyContacts::passes() {
+  const std::size_t rows = points_.rows().size();
+  touches_.resize(rows);
+  row_forces_.resize(rows);
+  shares_.resize(points_.sites().size());
+  return {.site = points_.sites().data(),
+          .motion = motion_.data(),
+          .row = points_.rows().data(),
+          .near = points_.near().data(),
+          .rows_of_start = points_.rows_of().offsets.data(),
+          .rows_of = points_.rows_of().indices.data(),
+          .rows_from_start = points_.rows_from().offsets.data(),
+          .rows_from = points_.rows_from().indices.data(),
+          .field = fields_.data(),
+          .touch = touches_.data(),
+          .force = row_forces_.data(),
+          .share = shares_.data(),
+          .dt = dt_};
+}
+
+void BodyContacts::find_touches() {
+  const ContactPasses passes = this->passes();
+  const auto rows = static_cast<Index>(touches_.size());
+#pragma omp parallel for schedule(static) num_threads(threads_here())
+  for (Index r = 0; r < rows; ++r) passes.find_touch(r);
+}
+
+void BodyContacts::add_depths(std::vector<double>& deepest) const {
+  for (std::size_t r = 0; r < touches_.size(); ++r) {
+    const Index point = points_.rows()[r].point;
+    if (!touches_[r].is_inside || point >= static_cast<Index>(count())) continue;
+    double& depth = deepest[part_of(model_, phyxel(point)).body];
+    depth = std::max(depth, -touches_[r].gap);
+  }
+}
+
+void BodyContacts::find_forces() {
+  find_touches();
+  const ContactPasses passes = this->passes();
+  const auto rows = static_cast<Index>(touches_.size()),
+             points = static_cast<Index>(shares_.size());
+  forces_.resize(count());
+#pragma omp parallel num_threads(threads_here())
+  {
+#pragma omp for schedule(static)
+    for (Index p = 0; p < points; ++p) passes.find_share(p);
+#pragma omp for schedule(static)
+    for (Index r = 0; r < rows; ++r) passes.find_force(r);
+#pragma omp for schedule(static)
+    for (std::size_t p = 0; p < forces_.size(); ++p) {
+      forces_[p] = passes.forces_on(static_cast<Index>(p));
+    }
+  }
+}
+
+void BodyContacts::add_to_sums(std::size_t p, const PointForces& forces, Vec3d velocity) {
+  const Index i = phyxel(p);
+  const Part& part = part_of(model_, i);
+  const Vec3d mean = 0.5 * (motion_[p].earlier + velocity);
+  ContactTerms terms;
+  terms.set(dt_ * forces.normal, dt_ * forces.tangential, motion_[p].before - part.centre, mean,
+            mean);
+  for (int t = 0; t < ContactTerms::count; ++t) {
+    sums_[static_cast<std::size_t>(part.body) * ContactTerms::count + t].add(terms.value[t]);
+  }
+}
+
+std::size_t BodyContacts::bytes() const {
+  if (!acts()) return 0;
+  return points_.bytes() + sums_.size() * sizeof(ExactSum) +
+         watch_.positions().size() * sizeof(Vec3d) +
+         motion_.size() * (sizeof(SurfaceMotion) + sizeof(double)) +
+         touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceForce)) +
+         forces_.size() * sizeof(PointForces);
+}
+
+}  // namespace phyxel

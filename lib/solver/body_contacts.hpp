@@ -1,0 +1,196 @@
+/// Contact of bodies with each other in the steps of Verlet's method, on the host.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "phyxel/model.hpp"
+#include "phyxel/neighbourhood.hpp"
+#include "solver/contact_search.hpp"
+#include "solver/step_sums.hpp"
+
+namespace phyxel {
+
+/// A phyxel of a surface at the start of a step.
+struct SurfaceState {
+  Vec3d displacement;  ///< [m]
+  Vec3d velocity;      ///< [m/s]
+};
+
+/// The points of surfaces that may touch other bodies soon, and which of them need to know of each
+/// other; those of this rank first, then those of other ranks.
+class TouchingPoints {
+ public:
+  /// @param model must outlive this
+  explicit TouchingPoints(const Model& model);
+
+  /// Finds them anew from places. Of a share: collective. @param dt size of the step [s]
+  void find(std::span<const Vec3d> position, double dt);
+
+  /// Of the layer of this rank, shape [layer]: range [m].
+  std::span<const double> ranges() const { return range_; }
+  /// Twice the distance by which phyxels may move before they have to be found anew [m].
+  double skin() const { return skin_; }
+
+  /// Numbers, in the layer, of this rank's points.
+  std::span<const Index> own() const { return own_; }
+  std::span<const SurfaceSite> sites() const { return site_; }
+  std::span<const ContactRow> rows() const { return rows_.rows; }
+  std::span<const Index> near() const { return rows_.near; }
+  /// For each point, the rows that it is near to, and those of which it is the point, ascending.
+  const Csr& rows_of() const { return rows_of_; }
+  const Csr& rows_from() const { return rows_from_; }
+  /// True if there are rows on any rank.
+  bool any() const { return any_; }
+  /// Gives the points of other ranks the values that their owners have. Of a share: collective.
+  void refresh(std::vector<SurfaceMotion>& motion) const;
+
+  std::size_t bytes() const;
+
+ private:
+  std::vector<ContactCandidate> candidates(std::span<const Vec3d> position, double dt) const;
+  void keep_what_counts(const std::vector<ContactCandidate>& all, ContactRows found);
+  void invert();
+
+  const Model& model_;
+  std::vector<double> range_;
+  std::vector<SurfaceSite> layer_;  // with 1 along free axes and 0 along others as mobility
+  double skin_ = 0;
+  std::vector<Index> own_;
+  std::vector<SurfaceSite> site_;
+  ContactRows rows_;
+  Csr rows_of_, rows_from_;
+  bool any_ = false;
+  std::vector<std::vector<Index>> send_;     // points of this rank, by rank
+  std::vector<std::vector<Index>> receive_;  // points of other ranks, by rank
+};
+
+/// When points that may touch have to be found anew: before phyxels have moved by half a skin.
+class ContactWatch {
+ public:
+  /// True if it is time to look where phyxels are, before a step of `dt` [s].
+  bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
+  /// Looks at the phyxels of the layer, and returns true if points have to be found anew, at
+  /// `positions`. Of a share: collective.
+  bool look(const Model& model, std::span<const SurfaceState> states, double skin, double dt);
+  /// Where the phyxels of the layer were when points had to be found anew [m].
+  const std::vector<Vec3d>& positions() const { return positions_; }
+  /// How often that was.
+  std::int64_t generation() const { return generation_; }
+
+ private:
+  std::vector<Vec3d> positions_;
+  std::int64_t generation_ = 0;
+  double dt_ = 0;  // [s]
+  int left_ = 0;   // steps until the next look
+};
+
+/// Keeps the bodies of a model out of each other, step by step, and adds up what they do.
+class BodyContacts {
+ public:
+  /// @param model must outlive this. @param threads most threads that share the work
+  BodyContacts(const Model& model, int threads);
+
+  /// True if bodies touch each other.
+  bool acts() const { return model_.body_contact.acts(); }
+
+  /// Prepares for a step. Of a share: collective.
+  /// @param state_of returns the state of a phyxel
+  template <class StateOf>
+  void begin_step(double dt, StateOf&& state_of) {
+    if (!acts()) return;
+    const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
+    if (watch_.is_due(dt)) {
+      std::vector<SurfaceState> states(layer.size());
+      for (std::size_t k = 0; k < layer.size(); ++k) states[k] = state_of(layer[k]);
+      look(states, dt);
+    }
+    dt_ = dt;
+    for (std::size_t p = 0; p < points_.own().size(); ++p) {
+      const Index i = layer[points_.own()[p]];
+      const SurfaceState state = state_of(i);
+      motion_[p].before = model_.position[i] + state.displacement;
+      motion_[p].earlier = state.velocity;
+    }
+  }
+  /// The phyxels of this rank whose gradients of displacement `set_gradient` needs in each step.
+  std::size_t count() const { return points_.own().size(); }
+  Index phyxel(std::size_t p) const { return model_.body_contact.layer.phyxels[points_.own()[p]]; }
+  void set_gradient(std::size_t p, const Mat3d& gradient);
+  /// A number that changes when these phyxels do.
+  std::int64_t generation() const { return watch_.generation(); }
+
+  /// Moves phyxels that the step has led into bodies out of them. Of a share: collective.
+  /// @param get,set return and replace the state of a phyxel at the end of the step
+  template <class Get, class Set>
+  void keep_apart(Get&& get, Set&& set) {
+    if (!acts() || !points_.any()) return;
+    std::vector<PointForces> all(count());  // of all sweeps
+    for (int sweep = 0; sweep < model_.body_contact.sweeps; ++sweep) {
+      place(get);
+      find_forces();
+      for (std::size_t p = 0; p < count(); ++p) {
+        const Vec3d change = passes().change_by(forces_[p], static_cast<Index>(p));
+        if (change != Vec3d{}) {
+          const SurfaceState state = get(phyxel(p));
+          set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
+        }
+        all[p].normal += forces_[p].normal;
+        all[p].tangential += forces_[p].tangential;
+      }
+    }
+    for (std::size_t p = 0; p < count(); ++p) {
+      if (all[p].normal != Vec3d{}) add_to_sums(p, all[p], get(phyxel(p)).velocity);
+    }
+  }
+  /// The depth of the deepest phyxel of each body in other bodies [m]. Of a share: that of this
+  /// rank's phyxels; collective. @param get returns the state of a phyxel
+  template <class Get>
+  std::vector<double> depths(Get&& get) {
+    std::vector<double> deepest(model_.body_contact.distances.size());
+    if (!acts() || !points_.any()) return deepest;
+    place(get);
+    find_touches();
+    add_depths(deepest);
+    return deepest;
+  }
+
+  /// The sums of each body of the scene so far (`ContactTerms`).
+  const StepSums& sums() const { return sums_; }
+  std::size_t bytes() const;
+
+ private:
+  void look(std::span<const SurfaceState> states, double dt);
+  /// Sets where points are at the end of the step.
+  template <class Get>
+  void place(Get&& get) {
+    for (std::size_t p = 0; p < count(); ++p) {
+      const SurfaceState state = get(phyxel(p));
+      motion_[p].after = model_.position[phyxel(p)] + state.displacement;
+      motion_[p].velocity = state.velocity;
+    }
+    points_.refresh(motion_);
+  }
+  void find_touches();
+  void find_forces();
+  void add_depths(std::vector<double>& deepest) const;
+  int threads_here() const;
+  ContactPasses passes();
+  void add_to_sums(std::size_t p, const PointForces& forces, Vec3d velocity);
+
+  const Model& model_;
+  int threads_;
+  TouchingPoints points_;
+  std::vector<DistanceField> fields_;  // of each body of the scene
+  StepSums sums_;
+  std::vector<SurfaceMotion> motion_;     // shape [points]
+  std::vector<SurfaceTouch> touches_;     // shape [rows]
+  std::vector<SurfaceForce> row_forces_;  // shape [rows]
+  std::vector<double> shares_;            // c of each point
+  std::vector<PointForces> forces_;       // on this rank's points
+  ContactWatch watch_;
+  double dt_ = 0;  // [s]
+};
+
+}  // namespace phyxel

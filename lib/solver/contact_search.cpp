@@ -1,0 +1,131 @@
+#include "solver/contact_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "model/box_overlaps.hpp"
+#include "model/parts.hpp"
+#include "model/spatial_hash.hpp"
+#include "rank_exchange.hpp"
+#include "tabulated.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr Box nowhere{{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
+
+Box together(const Box& a, const Box& b) {
+  return {
+      {std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)},
+      {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
+}
+
+/// The phyxels near a point, of bodies that it may touch.
+class Neighbours {
+ public:
+  Neighbours(const BodyContact& contact, std::span<const ContactCandidate> points, double skin)
+      : contact_(contact),
+        points_(points),
+        skin_(skin),
+        position_(tabulated(points.size(), [&](std::size_t k) { return points[k].now; })),
+        hash_(position_, reach(points, skin)),
+        reach_(reach(points, skin)) {}
+
+  /// The numbers of the phyxels near a point, ascending within each body, and the bodies ascending.
+  std::vector<Index> of(std::size_t p) const {
+    const ContactCandidate& point = points_[p];
+    std::vector<Index> found;
+    hash_.visit_ball(point.now, reach_, [&](const SpatialHash::Entry& entry) {
+      const ContactCandidate& other = points_[static_cast<std::size_t>(entry.index)];
+      const double range = common_range(point.site.range, other.site.range);
+      if (norm(other.now - point.now) > range + skin_) return;
+      if (!contact_.law_of(point.body, other.body)) return;
+      // Parts of one body that are near each other at rest do not touch.
+      const bool are_apart =
+          point.body != other.body || norm(other.site.rest - point.site.rest) > 2 * range;
+      if (are_apart) found.push_back(entry.index);
+    });
+    std::sort(found.begin(), found.end(), [&](Index a, Index b) {
+      return std::pair(points_[a].body, a) < std::pair(points_[b].body, b);
+    });
+    return found;
+  }
+
+ private:
+  static double reach(std::span<const ContactCandidate> points, double skin) {
+    double range = 0;
+    for (const ContactCandidate& point : points) range = std::max(range, point.site.range);
+    return range + skin;
+  }
+
+  const BodyContact& contact_;
+  std::span<const ContactCandidate> points_;
+  double skin_;
+  std::vector<Vec3d> position_;
+  SpatialHash hash_;
+  double reach_;
+};
+
+}  // namespace
+
+std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
+                                 std::span<const double> range, double skin) {
+  const BodyContact& contact = model.body_contact;
+  std::vector<Box> boxes(contact.distances.size(), nowhere);
+  for (std::size_t k = 0; k < position.size(); ++k) {
+    Box& box = boxes[part_of(model, contact.layer.phyxels[k]).body];
+    box = together(box, grown({position[k], position[k]}, range[k] + 0.5 * skin));
+  }
+  if (!model.share) return boxes;
+  const Communicator& ranks = *model.share->communicator;
+  const std::vector<std::vector<Box>> all =
+      exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), boxes));
+  for (const std::vector<Box>& some : all) {
+    for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = together(boxes[b], some[b]);
+  }
+  return boxes;
+}
+
+std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
+                                                   std::span<const Box> boxes) {
+  std::vector<std::vector<Index>> partners(boxes.size());
+  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
+    const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
+    if (!contact.distances[a] || !contact.distances[b] || !contact.law_of(first, second)) return;
+    partners[a].push_back(second);
+    partners[b].push_back(first);
+  });
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    const auto itself = static_cast<Index>(b);
+    if (contact.distances[b] && contact.law_of(itself, itself)) partners[b].push_back(itself);
+    std::sort(partners[b].begin(), partners[b].end());
+  }
+  return partners;
+}
+
+ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,
+                      double skin) {
+  ContactRows found;
+  if (points.empty()) return found;
+  const Neighbours neighbours(contact, points, skin);
+  const std::vector<std::vector<Index>> near =
+      tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
+  for (std::size_t p = 0; p < points.size(); ++p) {
+    for (const Index k : near[p]) {
+      const Index body = points[k].body;
+      const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
+                          found.rows.back().body != body;
+      const auto at = static_cast<Index>(found.near.size());
+      if (is_new) {
+        found.rows.push_back(
+            {static_cast<Index>(p), body, *contact.law_of(points[p].body, body), at, at});
+      }
+      found.near.push_back(k);
+      found.rows.back().end = at + 1;
+    }
+  }
+  return found;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,212 @@
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/distance_field.hpp"
+#include "model/box_overlaps.hpp"
+#include "model/parts.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "rank_exchange.hpp"
+#include "solver/body_contacts.hpp"
+#include "solver/boundary_conditions.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr double share_of_range = 0.25;  // of the skin
+
+/// Lists of numbers, as rows of a table. @param list of each entry
+Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries) {
+  Csr csr;
+  csr.offsets.assign(lists + 1, 0);
+  for (const auto& [list, value] : entries) ++csr.offsets[static_cast<std::size_t>(list) + 1];
+  for (std::size_t k = 0; k < lists; ++k) csr.offsets[k + 1] += csr.offsets[k];
+  csr.indices.resize(entries.size());
+  std::vector<Offset> next(csr.offsets.begin(), csr.offsets.end() - 1);
+  for (const auto& [list, value] : entries) csr.indices[next[list]++] = value;
+  return csr;
+}
+
+/// Adds the points of rows that have a chosen one to those. @returns which rows these are
+std::vector<char> spread(const ContactRows& rows, std::vector<char>& chosen) {
+  std::vector<char> touched(rows.rows.size());
+  const std::vector<char> before = chosen;
+  for (std::size_t r = 0; r < rows.rows.size(); ++r) {
+    const ContactRow& row = rows.rows[r];
+    const auto first = rows.near.begin() + row.begin, last = rows.near.begin() + row.end;
+    touched[r] =
+        before[row.point] || std::any_of(first, last, [&](Index k) { return before[k] != 0; });
+    if (!touched[r]) continue;
+    chosen[row.point] = 1;
+    for (auto k = first; k != last; ++k) chosen[*k] = 1;
+  }
+  return touched;
+}
+
+/// Sets where a phyxel's distance from other bodies is looked up, and the level of its surface,
+/// from the distances of places around it from its own body's surface.
+void look_around(SurfaceSite& site, const DistanceField& own) {
+  const double spacing = 0.45 * site.range;
+  const auto slope = [&](Vec3d way) {
+    return (own.gap(site.rest + spacing * way).distance -
+            own.gap(site.rest - spacing * way).distance) /
+           (2 * spacing);
+  };
+  const Vec3d normal{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})};
+  const double size = norm(normal);
+  if (!(size > 0.1)) return;                             // a body so thin that it has no inside
+  constexpr double share_of_spacing = 0.5, flat = 0.95;  // at an edge of a box, the size is 0.71
+  site.inward = (-share_of_spacing * spacing / size) * normal;
+  if (site.offset == 0 && size > flat) site.level = own.gap(site.rest).distance;
+}
+
+}  // namespace
+
+TouchingPoints::TouchingPoints(const Model& model) : model_(model) {
+  const ContactLayer& layer = model.body_contact.layer;
+  if (!model.body_contact.acts()) return;
+  double least = HUGE_VAL;
+  for (const Index i : layer.phyxels) {
+    range_.push_back(model.neighbourhood.support[i]);
+    least = std::min(least, range_.back());
+  }
+  const std::vector<Vec3d> free = free_axes(model);
+  for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
+    const Index i = layer.phyxels[k];
+    SurfaceSite site{.rest = model.position[i],
+                     .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
+                     .area = model.volume[i] / range_[k],
+                     .offset = layer.offset[k],
+                     .range = range_[k]};
+    look_around(site, model.body_contact.distances[part_of(model, i).body]->view());
+    layer_.push_back(site);
+  }
+  if (model.share) least = model.share->communicator->smallest(least);
+  skin_ = share_of_range * least;
+}
+
+std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> position,
+                                                         double dt) const {
+  const BodyContact& contact = model_.body_contact;
+  const std::vector<Box> boxes = boxes_of_bodies(model_, position, range_, skin_);
+  const std::vector<std::vector<Index>> partners = partners_of_bodies(contact, boxes);
+  const int rank = model_.share ? model_.share->communicator->rank() : 0;
+  std::vector<ContactCandidate> some;
+  for (std::size_t k = 0; k < position.size(); ++k) {
+    const Index i = contact.layer.phyxels[k];
+    const Part& part = part_of(model_, i);
+    const Box around = grown({position[k], position[k]}, range_[k] + 0.5 * skin_);
+    const std::vector<Index>& others = partners[part.body];
+    if (std::none_of(others.begin(), others.end(),
+                     [&](Index b) { return overlap(around, boxes[b]); })) {
+      continue;
+    }
+    SurfaceSite site = layer_[k];
+    site.mobility = damped_flow(part.material.damping, dt).gain / model_.mass[i] * site.mobility;
+    some.push_back(
+        {position[k], site, model_.global_id(i), part.body, rank, static_cast<Index>(k)});
+  }
+  if (!model_.share) return some;
+  const Communicator& ranks = *model_.share->communicator;
+  std::vector<ContactCandidate> all;
+  for (const auto& of_rank :
+       exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), some))) {
+    all.insert(all.end(), of_rank.begin(), of_rank.end());
+  }
+  std::sort(all.begin(), all.end(),
+            [](const ContactCandidate& a, const ContactCandidate& b) { return a.id < b.id; });
+  return all;
+}
+
+void TouchingPoints::find(std::span<const Vec3d> position, double dt) {
+  const std::vector<ContactCandidate> all = candidates(position, dt);
+  ContactRows found = find_rows(model_.body_contact, all, skin_);
+  any_ = !found.rows.empty();
+  keep_what_counts(all, std::move(found));
+  invert();
+}
+
+// The force on a point of this rank needs the forces of all rows that it is in, these the shares of
+// all points of these rows, and these all rows that those are in.
+void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, ContactRows found) {
+  const Communicator* ranks = model_.share ? model_.share->communicator : nullptr;
+  const int rank = ranks ? ranks->rank() : 0;
+  std::vector<char> in_rows(all.size()), chosen(all.size());
+  for (const ContactRow& row : found.rows) {
+    in_rows[row.point] = 1;
+    for (Index k = row.begin; k < row.end; ++k) in_rows[found.near[k]] = 1;
+  }
+  for (std::size_t k = 0; k < all.size(); ++k) chosen[k] = in_rows[k] && all[k].rank == rank;
+  spread(found, chosen);
+  const std::vector<char> kept = spread(found, chosen);
+
+  own_.clear();
+  site_.clear();
+  std::vector<Index> number(all.size(), -1);
+  std::vector<std::vector<Index>> wanted(ranks ? static_cast<std::size_t>(ranks->size()) : 0);
+  receive_.assign(wanted.size(), {});
+  for (const bool of_this_rank : {true, false}) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (!chosen[k] || (all[k].rank == rank) != of_this_rank) continue;
+      number[k] = static_cast<Index>(site_.size());
+      site_.push_back(all[k].site);
+      if (of_this_rank) {
+        own_.push_back(all[k].place);
+      } else {
+        wanted[all[k].rank].push_back(all[k].place);
+        receive_[all[k].rank].push_back(number[k]);
+      }
+    }
+  }
+  rows_ = {};
+  for (std::size_t r = 0; r < found.rows.size(); ++r) {
+    if (!kept[r]) continue;
+    ContactRow row = found.rows[r];
+    const auto begin = static_cast<Index>(rows_.near.size());
+    for (Index k = row.begin; k < row.end; ++k) rows_.near.push_back(number[found.near[k]]);
+    row.point = number[row.point];
+    row.begin = begin;
+    row.end = static_cast<Index>(rows_.near.size());
+    rows_.rows.push_back(row);
+  }
+  if (!ranks) return;
+  std::vector<Index> own_number(range_.size(), -1);
+  for (std::size_t p = 0; p < own_.size(); ++p) own_number[own_[p]] = static_cast<Index>(p);
+  send_ = exchanged(*ranks, wanted);
+  for (std::vector<Index>& places : send_) {
+    for (Index& place : places) place = own_number[place];
+  }
+}
+
+void TouchingPoints::invert() {
+  std::vector<std::pair<Index, Index>> of, from;
+  for (std::size_t r = 0; r < rows_.rows.size(); ++r) {
+    const ContactRow& row = rows_.rows[r];
+    from.emplace_back(row.point, static_cast<Index>(r));
+    for (Index k = row.begin; k < row.end; ++k) {
+      of.emplace_back(rows_.near[k], static_cast<Index>(r));
+    }
+  }
+  rows_of_ = grouped(site_.size(), of);
+  rows_from_ = grouped(site_.size(), from);
+}
+
+void TouchingPoints::refresh(std::vector<SurfaceMotion>& motion) const {
+  if (!model_.share) return;
+  std::vector<std::vector<SurfaceMotion>> sent(send_.size());
+  for (std::size_t r = 0; r < send_.size(); ++r) {
+    for (const Index p : send_[r]) sent[r].push_back(motion[p]);
+  }
+  const auto received = exchanged(*model_.share->communicator, sent);
+  for (std::size_t r = 0; r < receive_.size(); ++r) {
+    for (std::size_t k = 0; k < receive_[r].size(); ++k) motion[receive_[r][k]] = received[r][k];
+  }
+}
+
+std::size_t TouchingPoints::bytes() const {
+  return range_.size() * sizeof(double) + (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
+         rows_.rows.size() * sizeof(ContactRow) +
+         (own_.size() + 2 * rows_.near.size() + rows_.rows.size()) * sizeof(Index) +
+         (rows_of_.offsets.size() + rows_from_.offsets.size()) * sizeof(Offset);
+}
+
+}  // namespace phyxel

@@ -1,0 +1,340 @@
+/// Bodies that touch each other, against mechanics: momenta, energies, impacts of bars and balls,
+/// pressure between lattices that do not match, friction, stacks, and what must not touch.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "support/contact_scene.hpp"
+
+namespace phyxel {
+namespace {
+
+const std::string touching = "[contact]\n";
+
+std::string body(const std::string& name, const std::string& shape, const std::string& more,
+                 double young = 1e5, double poisson = 0.3) {
+  return fmt::format(
+      "[[body]]\nname = '{}'\n{}{}[body.material]\nyoung = {}\npoisson = {}\ndensity = 1000\n",
+      name, shape, more, young, poisson);
+}
+
+const std::string ball_shape = "shape = 'sphere'\nradius = 0.1\nspacing = 0.03\n";
+
+/// Two balls that meet off their line of centres, spinning.
+std::string meeting_balls(const std::string& contact) {
+  return end + contact +
+         body("left", ball_shape,
+              "translation = [-0.105, 0, 0]\nvelocity = [1, 0, 0]\n"
+              "spin = [0, 3, 5]\n") +
+         body("right", ball_shape,
+              "translation = [0.105, 0.05, 0.01]\nvelocity = [-1, 0, 0]\n"
+              "spin = [2, 0, 4]\n");
+}
+
+double energy_lost(const std::vector<ContactReading>& contacts) {
+  double lost = 0;
+  for (const ContactReading& c : contacts) lost += c.friction_heat + c.impact_loss;
+  return lost;
+}
+
+TEST(BodyContacts, KeepBothMomentaToRounding) {
+  for (const Precision precision : {Precision::double_, Precision::mixed, Precision::single}) {
+    for (const std::string more : {"", "restitution = 0.5\n", "sweeps = 3\n"}) {
+      Way way(meeting_balls("[contact]\nfriction = 0.4\n" + more), dt, precision);
+      const double scale = way.mass() * 1;  // of momenta; speeds are 1 m/s
+      const Vec3d momentum = way.momentum();
+      // Velocities belong to half steps: about places before a step it is kept exactly.
+      const auto turning = [&] {
+        const State s = way.solver.state();
+        Vec3d all;
+        for (Index i = 0; i < way.model.size(); ++i) {
+          const Vec3d x = way.model.position[i] + s.displacement[i] - dt * s.velocity[i];
+          all += way.model.mass[i] * cross(x, s.velocity[i]);
+        }
+        return all;
+      };
+      way.solver.step();
+      const Vec3d before = turning();
+      double pushed = 0;
+      for (int k = 0; k < 300; ++k) {
+        way.solver.step();
+        pushed = std::max(pushed, norm(way.contacts()[0].force));
+      }
+      const std::vector<ContactReading> contacts = way.contacts();
+      EXPECT_GT(pushed, 10);
+      EXPECT_GT(norm(contacts[0].impulse), 0.3 * scale);
+      const double rounding = precision == Precision::double_ ? 1e-13 : 2e-5;
+      EXPECT_LE(norm(way.momentum() - momentum), rounding * scale) << precision_name(precision);
+      EXPECT_LE(norm(turning() - before), rounding * scale * 0.1) << precision_name(precision);
+      EXPECT_LE(norm(contacts[0].impulse + contacts[1].impulse), 1e-13 * scale);
+    }
+  }
+}
+
+TEST(BodyContacts, CloseTheLedgerOfEnergies) {
+  const auto error_of = [](double step) {
+    Way way(meeting_balls("[contact]\nfriction = 0.4\n"), step);
+    const double start = way.energy();
+    way.solver.step(std::llround(0.15 / step));
+    EXPECT_GT(energy_lost(way.contacts()), 0.005 * start);
+    const Diagnostics d = diagnose(way.model, *way.backend, way.solver);
+    EXPECT_NEAR(d.contact_loss, energy_lost(way.contacts()), 1e-12 * start);
+    return std::abs(way.energy() - start) / start;
+  };
+  const double coarse = error_of(dt), fine = error_of(dt / 4);
+  EXPECT_LE(coarse, 5e-3);
+  EXPECT_LE(fine, 0.3 * coarse);
+}
+
+/// Two bars along x, 4 phyxels across, without Poisson's effect, that meet end to end.
+std::string bars(double length, double other) {
+  const auto bar = [](double l) {
+    return fmt::format(
+        "shape = 'beam'\nsize = [{}, 0.2, 0.2]\nspacing = 0.05\n"
+        "lattice = 'nodes'\n",
+        l);
+  };
+  return end + touching +
+         body("first", bar(length),
+              fmt::format("translation = [{}, 0, 0]\nvelocity = [0.1, 0, 0]\n", -length - 1e-4),
+              1e5, 0) +
+         body("second", bar(other), "", 1e5, 0);
+}
+
+/// The momentum of a body over its mass [m/s].
+Vec3d velocity_of(Way& way, std::size_t part) {
+  const State state = way.solver.state();
+  Vec3d sum;
+  double mass = 0;
+  for (Index i = way.model.parts[part].begin; i < way.model.parts[part].end; ++i) {
+    sum += way.model.mass[i] * state.velocity[i];
+    mass += way.model.mass[i];
+  }
+  return sum / mass;
+}
+
+TEST(BodyContacts, LetEqualBarsExchangeTheirVelocities) {
+  Way way(bars(2, 2), 5e-4);
+  const double start = way.energy(), speed_of_sound = 10;
+  double begin = 0, ended = 0;
+  while (ended == 0 && way.solver.time() < 1) {
+    way.solver.step();
+    const bool touches = way.contacts()[1].force.x > 0;
+    if (touches && begin == 0) begin = way.solver.time();
+    if (begin > 0 && !touches && velocity_of(way, 1).x > 0.09) ended = way.solver.time();
+  }
+  // Goldsmith 1960: 2 L/c. 4 across, the outermost half layer is a part of the length.
+  EXPECT_NEAR((ended - begin) / (2 * 2 / speed_of_sound), 1, 0.03);
+  EXPECT_NEAR(velocity_of(way, 0).x, 0, 0.003);
+  EXPECT_NEAR(velocity_of(way, 1).x, 0.1, 0.003);
+  // The layers that meet lose what an inelastic impact of half a layer does.
+  EXPECT_NEAR(energy_lost(way.contacts()) / start, 0, 0.02);
+}
+
+TEST(BodyContacts, LetAShortBarStopAtALongOne) {
+  Way way(bars(1, 2), 5e-4);
+  way.solver.step(std::llround(0.5 / 5e-4));
+  // Saint-Venant: the short one stops, the long one has half its speed on average.
+  EXPECT_NEAR(velocity_of(way, 0).x, 0, 0.004);
+  EXPECT_NEAR(velocity_of(way, 1).x, 0.05, 0.002);
+}
+
+/// The time that two balls of 0.2 m touch each other over Hertz's, and the part of their speed with
+/// which they part.
+std::pair<double, double> impact_of_balls(double spacing) {
+  constexpr double radius = 0.1, speed = 1.5, young = 3e5;
+  const std::string shape = fmt::format("shape = 'sphere'\nradius = 0.1\nspacing = {}\n", spacing);
+  Way way(
+      end + touching +
+          body("left", shape, "translation = [-0.1001, 0, 0]\nvelocity = [0.75, 0, 0]\n", young) +
+          body("right", shape, "translation = [0.1001, 0, 0]\nvelocity = [-0.75, 0, 0]\n", young),
+      2e-4);
+  double begin = 0, ended = 0;
+  while (ended == 0 && way.solver.time() < 0.5) {
+    way.solver.step();
+    const bool touches = way.contacts()[1].force.x > 0;
+    if (touches && begin == 0) begin = way.solver.time();
+    if (begin > 0 && !touches && velocity_of(way, 1).x > 0) ended = way.solver.time();
+  }
+  // Hertz 1882: 2.868 (m*² / (R* E*² V))^(1/5).
+  const double stiffness = young / (1 - 0.3 * 0.3) / 2, mass = way.mass() / 4;
+  const double duration =
+      2.868 * std::pow(mass * mass / (radius / 2 * stiffness * stiffness * speed), 0.2);
+  return {(ended - begin) / duration, (velocity_of(way, 1).x - velocity_of(way, 0).x) / speed};
+}
+
+TEST(BodyContacts, OfBallsConvergeToHertz) {
+  const auto [coarse, coarse_rebound] = impact_of_balls(0.034);
+  const auto [fine, fine_rebound] = impact_of_balls(0.02);
+  // The circle of contact has a radius of one and of two spacings. Each row of phyxels begins to
+  // carry when it touches, so that the balls are too stiff by a part of a row.
+  EXPECT_NEAR(fine, 1, 0.09);
+  EXPECT_LT(std::abs(fine - 1), 0.9 * std::abs(coarse - 1));
+  EXPECT_GT(fine_rebound, 0.9);
+  EXPECT_GT(fine_rebound, coarse_rebound);
+}
+
+/// Two blocks, one on the other, that a plate presses by 1%. Their lattices do not match.
+std::string patch(const std::string& more, double turn) {
+  const auto block_of = [&](double spacing) {
+    return fmt::format("shape = 'block'\nsize = [0.4, 0.4, 0.2]\nspacing = {}\nlattice = 'nodes'\n",
+                       spacing);
+  };
+  const std::string damped = "damping = 20\n";
+  return end + touching + more + obstacle("shape = 'plane'\ntranslation = [0, 0, -0.2]\n") +
+         obstacle(
+             "shape = 'plane'\nnormal = [0, 0, -1]\ntranslation = [0, 0, 0.2]\n"
+             "[obstacle.motion]\ndisplacement = [0, 0, -0.004]\nduration = 0.2\n") +
+         body("lower", block_of(0.05), "translation = [0, 0, -0.1]\n", 1e5, 0) + damped +
+         body("upper", block_of(0.04),
+              fmt::format("translation = [0, 0, 0.1]\nrotation = [0, 0, {}]\n", turn), 1e5, 0) +
+         damped;
+}
+
+TEST(BodyContacts, PassPressureOnBetweenLatticesThatDoNotMatch) {
+  Way way(patch("sweeps = 2\n", 0), 5e-4);
+  way.solver.step(4000);
+  std::vector<Mat3d> gradient;
+  way.backend->displacement_gradients(gradient);
+  // Poisson's ratio is 0: the stress is E times the strain, 1% of the height less what the blocks
+  // sink into each other.
+  double sum = 0, squares = 0, volume = 0;
+  for (Index i = 0; i < way.model.size(); ++i) {
+    const double v = way.model.volume[i], strain = gradient[i](2, 2);
+    sum += v * strain;
+    squares += v * strain * strain;
+    volume += v;
+  }
+  const double mean = sum / volume;
+  EXPECT_NEAR(mean, -0.01, 5e-5);
+  // At the corners, which lie on each other, it is a quarter off.
+  EXPECT_LE(std::sqrt(squares / volume - mean * mean), 0.03 * std::abs(mean));
+  EXPECT_NEAR(way.contacts()[1].force.z / (1e5 * 0.16 * mean), 1, 0.01);
+}
+
+TEST(BodyContacts, HoldABlockOnAnotherOneByFriction) {
+  // An inclined plane, which gravity turned by that angle stands for; the lower block is held.
+  const auto slid = [](double friction) {
+    const double angle = 21.8 * std::numbers::pi / 180;  // tan 21.8° = 0.4
+    Way way(fmt::format("gravity = [{}, 0, {}]\n{}[contact]\nfriction = {}\n",
+                        9.81 * std::sin(angle), -9.81 * std::cos(angle), end, friction) +
+                body("slope",
+                     "shape = 'block'\nsize = [1.2, 0.3, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n",
+                     "translation = [0.3, 0, -0.1]\n[[body.fixed]]\nall = true\n") +
+                body("block",
+                     "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n",
+                     "translation = [0, 0.012, 0.1]\n") +
+                "viscosity = 0.004\n",
+            dt);
+    way.solver.step(1200);
+    const double before = velocity_of(way, 1).x;
+    way.solver.step(400);
+    return (velocity_of(way, 1).x - before) / (400 * dt);
+  };
+  const double angle = 21.8 * std::numbers::pi / 180;
+  // It still swings by a hundredth of g sin 21.8°.
+  EXPECT_NEAR(slid(0.5), 0, 0.04);
+  const double expected = 9.81 * (std::sin(angle) - 0.2 * std::cos(angle));
+  EXPECT_NEAR(slid(0.2), expected, 0.02 * expected);
+}
+
+TEST(BodyContacts, DoNotActBesideFaces) {
+  // A block slides down beside another one, half a spacing away, past its edge.
+  const std::string shape =
+      "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n";
+  Way way(
+      end + touching + body("still", shape, "") +
+          body("passing", shape, "translation = [0.225, 0.013, 0.22]\nvelocity = [0, 0, -0.5]\n"),
+      dt);
+  way.solver.step(1700);  // 0.42 m
+  EXPECT_EQ(way.contacts()[0].impulse, Vec3d{});
+  EXPECT_NEAR(velocity_of(way, 1).z, -0.5, 1e-9);
+}
+
+TEST(BodyContacts, AreOfSomePairsAloneIfAsked) {
+  const std::string shape =
+      "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n";
+  const auto pushed = [&](const std::string& contact) {
+    Way way(end + contact + body("a", shape, "velocity = [1, 0, 0]\n") +
+                body("b", shape, "translation = [0.23, 0, 0]\n") +
+                body("c", shape, "translation = [-0.23, 0, 0]\nvelocity = [2, 0, 0]\n"),
+            dt);
+    way.solver.step(150);
+    std::vector<char> touched;
+    for (const ContactReading& c : way.contacts()) touched.push_back(c.impulse != Vec3d{});
+    return touched;
+  };
+  EXPECT_EQ(pushed(touching), (std::vector<char>{1, 1, 1}));
+  EXPECT_EQ(pushed("[contact]\n[[contact.pair]]\nfirst = 'b'\nsecond = 'a'\n"),
+            (std::vector<char>{1, 1, 0}));
+}
+
+TEST(BodyContacts, HoldAStack) {
+  std::string text = "gravity = [0, 0, -9.81]\n" + end + "[contact]\nfriction = 0.5\nsweeps = 4\n" +
+                     obstacle("shape = 'plane'\nfriction = 0.5\ntranslation = [0, 0, -0.1]\n");
+  constexpr int blocks = 4;
+  for (int k = 0; k < blocks; ++k) {
+    text += body(fmt::format("block {}", k),
+                 "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n",
+                 fmt::format("translation = [{}, {}, {}]\nrotation = [0, 0, {}]\n", 0.003 * k,
+                             -0.002 * k, 0.2 * k, 7 * k),
+                 1e6) +  // softer ones buckle under their weight
+            "damping = 12\n";
+  }
+  Way way(text, 2e-4);
+  way.solver.step(7000);
+  const Vec3d before = way.centre();
+  double force = 0;
+  for (int k = 0; k < 1000; ++k) {
+    way.solver.step();
+    if (k % 10 == 0) force += way.contacts()[0].force.z / 100;
+  }
+  EXPECT_NEAR(force / (9.81 * way.mass()), 1, 1e-3);
+  EXPECT_LE(norm(way.centre() - before), 1e-3 * 0.05);
+  double deepest = 0;
+  for (const ContactReading& c : way.contacts()) deepest = std::max(deepest, c.depth);
+  EXPECT_LE(deepest, 0.2 * 0.05);
+}
+
+TEST(BodyContacts, HaveTheSameBitsOnAnyThreadsAndAfterARestart) {
+  const std::string text = meeting_balls("[contact]\nfriction = 0.4\n");
+  Way one(text, dt, Precision::single, 1), three(text, dt, Precision::single, 3);
+  one.solver.step(220);
+  three.solver.step(120);
+  EXPECT_GT(norm(three.contacts()[0].impulse), 0.1);
+  Way resumed(text, dt, Precision::single, 2);
+  Solver next(resumed.model, *resumed.backend, three.solver.state(), Method::verlet);
+  next.step(100);
+  const State expected = one.solver.state(), found = next.state();
+  EXPECT_EQ(expected.displacement, found.displacement);
+  EXPECT_EQ(expected.velocity, found.velocity);
+  EXPECT_EQ(expected.step_sums, found.step_sums);
+}
+
+TEST(BodyContacts, AreRefusedToBodiesThatOverlapAtTheStart) {
+  const auto refusal = [](const std::string& text) {
+    try {
+      build_model(parse_scene(text, "scene.toml"));
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string shape =
+      "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n";
+  const std::string message = refusal(end + touching + body("a", shape, "") +
+                                      body("b", shape, "translation = [0.17, 0.01, 0]\n"));
+  EXPECT_THAT(message, ::testing::HasSubstr("scene.toml:3:1: body \""));
+  EXPECT_THAT(message, ::testing::HasSubstr("is 0.03 m deep in body \""));
+  // Bodies that touch may.
+  EXPECT_EQ(refusal(end + touching + body("a", shape, "") +
+                    body("b", shape, "translation = [0.2, 0.01, 0]\n")),
+            "accepted");
+}
+
+}  // namespace
+}  // namespace phyxel
