@@ -99,6 +99,16 @@ State deformed(const Model& model) {
   return state;
 }
 
+/// Puts equal bodies on each other.
+void pile_up(std::vector<Cloud>& clouds) {
+  const Box box = box_around(clouds[0].surface.position);
+  for (std::size_t b = 0; b < clouds.size(); ++b) {
+    const Vec3d up{0, 0, static_cast<double>(b) * (box.high.z - box.low.z)};
+    for (Vec3d& x : clouds[b].position) x += up;
+    for (Vec3d& x : clouds[b].surface.position) x += up;
+  }
+}
+
 std::vector<Vec3d> forces_of(Backend& backend, const State& state) {
   std::vector<Vec3d> force;
   backend.upload(state);
@@ -181,12 +191,14 @@ void bench_step(const BenchOptions& options) {
     std::vector<Cloud> clouds;
     const bool surfels = terms == "surfels";
     // Closed gradients and contact need a surface, which then is not moved.
-    const bool has_surface = surfels || terms == "closure" || terms == "obstacle";
+    const bool has_surface =
+        surfels || terms == "closure" || terms == "obstacle" || terms == "contact";
     clouds.push_back(bench_cloud(options.shape, size, has_surface));
     for (ObstacleRequest& floor : scene.obstacles) {
       floor.translation.z = box_around(clouds[0].surface.position).low.z;
     }
     clouds.resize(scene.bodies.size(), clouds[0]);
+    if (terms == "contact") pile_up(clouds);
     const Model model = build_model(scene, clouds, device);
     const std::vector<Vec3d> exact = exact_forces(model, device);
     const double pairs = static_cast<double>(model.pairs());

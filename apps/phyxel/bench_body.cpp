@@ -22,8 +22,8 @@ std::string term_of(const LawEntry& law) {
 std::vector<std::string> bench_terms() {
   std::vector<std::string> terms;
   for (const LawEntry& law : law_table()) terms.push_back(term_of(law));
-  for (const char* term :
-       {"volume", "hourglass", "closure", "damping", "load", "adaptive", "obstacle", "surfels"}) {
+  for (const char* term : {"volume", "hourglass", "closure", "damping", "load", "adaptive",
+                           "obstacle", "contact", "surfels"}) {
     terms.emplace_back(term);
   }
   return terms;
@@ -66,6 +66,14 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
   if (terms == "obstacle") scene.obstacles.push_back({.name = "floor", .shape = "plane"});
   body.neighbourhood.factor = factor;
   scene.bodies.assign(static_cast<std::size_t>(bodies), body);
+  if (terms == "contact") {
+    scene.contact = ContactRequest{.friction = 0.3};
+    for (int b = 0; b < bodies; ++b) {
+      BodyRequest& one = scene.bodies[static_cast<std::size_t>(b)];
+      one.name += std::to_string(b);
+      one.velocity.z = 0.1 * (bodies - 1 - 2 * b);  // they press each other
+    }
+  }
   return scene;
 }
 

@@ -128,6 +128,7 @@ BoundarySize boundary_size(const Model& model) {
   for (const Motion& motion : model.motions) size.moved += own(motion.phyxels);
   for (const Load& load : model.loads) size.loaded += own(load.phyxels);
   size.touching = std::ssize(model.contact.phyxels);
+  size.touching_bodies = std::ssize(model.body_contact.layer.phyxels);
   return size;
 }
 
@@ -150,8 +151,9 @@ std::vector<SupportRange> support_ranges(const Model& model) {
 
 namespace {
 
-/// Lines about obstacles, and how many phyxels touch them.
-std::string describe_obstacles(const Model& model, std::int64_t touching) {
+/// Lines about obstacles and about contact of bodies, and how many phyxels may touch them.
+std::string describe_contact(const Model& model, std::int64_t touching,
+                             std::int64_t touching_bodies) {
   std::string text;
   constexpr std::size_t most = 8;
   for (std::size_t k = 0; k < std::min(model.obstacles.size(), most); ++k) {
@@ -171,6 +173,20 @@ std::string describe_obstacles(const Model& model, std::int64_t touching) {
   if (!model.obstacles.empty()) {
     text += fmt::format("              {} phyxels of surfaces may touch {}\n", touching,
                         model.obstacles.size() > 1 ? "them" : "it");
+  }
+  if (model.body_contact.acts()) {
+    const BodyContact& contact = model.body_contact;
+    std::string which = contact.all ? "all bodies"
+                                    : fmt::format("{} pair{} of bodies", contact.pairs.size(),
+                                                  contact.pairs.size() == 1 ? "" : "s");
+    if (contact.self) which += ", and each body itself";
+    text += fmt::format("  contact     {}; friction {:g}{}{}; {} phyxels of surfaces may touch\n",
+                        which, contact.law.static_friction,
+                        contact.law.restitution > 0
+                            ? fmt::format(", restitution {:g}", contact.law.restitution)
+                            : "",
+                        contact.sweeps > 1 ? fmt::format("; {} sweeps a step", contact.sweeps) : "",
+                        touching_bodies);
   }
   return text;
 }
@@ -217,7 +233,7 @@ std::string describe_model(const Scene& scene, const Model& model, const Boundar
   if (model.loads.size() > most_loads) {
     text += fmt::format("              and {} more loads\n", model.loads.size() - most_loads);
   }
-  text += describe_obstacles(model, boundary.touching);
+  text += describe_contact(model, boundary.touching, boundary.touching_bodies);
   for (const std::string& warning : model.warnings)
     text += fmt::format("  warning     {}\n", warning);
   return text;

@@ -28,7 +28,8 @@ Scene scene_with(const Overrides& overrides);
 /// Number of phyxels with prescribed displacements, and with loads.
 struct BoundarySize {
   std::int64_t moved = 0, loaded = 0;
-  std::int64_t touching = 0;  ///< Those of contact layers.
+  std::int64_t touching = 0;         ///< Those that may touch obstacles.
+  std::int64_t touching_bodies = 0;  ///< Those that may touch bodies.
 };
 /// Counts the boundary phyxels of a model, without ghosts.
 BoundarySize boundary_size(const Model& model);

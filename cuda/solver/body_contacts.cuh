@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -20,11 +22,11 @@ template <class Real>
 struct SurfacePlaces {
   const Index* place = nullptr;            ///< Tile slots.
   const Vec3<double>* position = nullptr;  ///< At rest [m].
-  const Vec3<double>* inward = nullptr;    ///< As of `SurfaceSite` [m].
-  const Vec3<double>* centre = nullptr;    ///< Centre of mass of their bodies, at rest [m].
-  const Index* body = nullptr;             ///< Numbers of their bodies.
-  const Index* entry = nullptr;            ///< Where their gradients are.
-  const Real* gradients = nullptr;         ///< Of displacement, shape [9, stride].
+  const SurfaceSite* site = nullptr;
+  const Vec3<double>* centre = nullptr;  ///< Centre of mass of their bodies, at rest [m].
+  const Index* body = nullptr;           ///< Numbers of their bodies.
+  const Index* entry = nullptr;          ///< Where their gradients are.
+  const Real* gradients = nullptr;       ///< Of displacement, shape [9, stride].
   std::size_t stride = 0;
   SurfaceMotion* motion = nullptr;
   PointForces* forces = nullptr;  ///< Of all sweeps of the step.
@@ -41,13 +43,35 @@ __device__ Vec3<double> displacement_at(const Fields<Real, StateReal>& f, Index 
   }
 }
 
-/// Copies the state of phyxels of the layer. One thread per phyxel.
+/// Copies the places of phyxels of the layer [m]. One thread per phyxel.
 template <class Real, class StateReal>
-__global__ void copy_states(Fields<Real, StateReal> f, const Index* place, SurfaceState* state,
-                            int count) {
+__global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
+                            const Vec3<double>* position, Vec3<double>* now, int count) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (k >= count) return;
-  state[k] = {displacement_at(f, place[k]), to<double>(column3(f.velocity, f.places, place[k]))};
+  if (k < count) now[k] = position[k] + displacement_at(f, place[k]);
+}
+
+/// Finds how far the phyxels of the layer have moved, and how fast they are: the bits of the
+/// largest squares [m², m²/s²], which are in the order of the numbers. One thread per phyxel.
+template <class Real, class StateReal>
+__global__ void find_farthest(Fields<Real, StateReal> f, const Index* place,
+                              const Vec3<double>* position, const Vec3<double>* found,
+                              unsigned long long* squares, int count) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  double of_way = 0, of_speed = 0;
+  if (k < count) {
+    const Vec3<double> way = position[k] + displacement_at(f, place[k]) - found[k];
+    const Vec3<double> velocity = to<double>(column3(f.velocity, f.places, place[k]));
+    of_way = dot(way, way);
+    of_speed = dot(velocity, velocity);
+  }
+  for (int lanes = 16; lanes > 0; lanes /= 2) {
+    of_way = fmax(of_way, __shfl_down_sync(0xffffffff, of_way, lanes));
+    of_speed = fmax(of_speed, __shfl_down_sync(0xffffffff, of_speed, lanes));
+  }
+  if (threadIdx.x % 32 != 0) return;
+  atomicMax(squares, static_cast<unsigned long long>(__double_as_longlong(of_way)));
+  atomicMax(squares + 1, static_cast<unsigned long long>(__double_as_longlong(of_speed)));
 }
 
 /// Sets what is known of points at the start of a step. One thread per point.
@@ -60,8 +84,7 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
   motion.earlier = to<double>(column3(f.velocity, f.places, s.place[p]));
   Mat3<double> gradient;
   for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + s.entry[p]];
-  motion.probe = s.inward[p] + gradient * s.inward[p];
-  motion.back = inverse_deformation(gradient);
+  set_gradient(motion, s.site[p], gradient);
   s.forces[p] = {};
 }
 
@@ -140,7 +163,11 @@ class DeviceBodyContacts {
     }
     fields_ = sent(fields, name);
     layer_place_ = sent(places_of(contact.layer.phyxels), name);
-    layer_states_ = {contact.layer.phyxels.size(), name};
+    std::vector<Vec3<double>> positions;
+    for (const Index i : contact.layer.phyxels) positions.push_back(m_.model().position[i]);
+    layer_position_ = sent(positions, name);
+    layer_found_ = {positions.size(), name};
+    squares_ = sent(std::vector<unsigned long long>(2), name);
     const std::size_t bodies = contact.distances.size();
     const auto accumulators = static_cast<unsigned>(std::clamp<std::size_t>(256 / bodies, 2, 128));
     sums_ = DeviceSums(static_cast<int>(bodies) * ContactTerms::count, accumulators, name);
@@ -169,9 +196,9 @@ class DeviceBodyContacts {
     for (int sweep = 0; sweep < sweeps; ++sweep) {
       m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
       if (m_.share()) refresh();
-      m_.launch_each("find_touches", find_touches<Real>, rows, passes, rows);
-      m_.launch_each("find_shares", find_shares<Real>, points, passes, points);
-      m_.launch_each("find_row_forces", find_row_forces<Real>, rows, passes, rows);
+      launch_few("find_touches", find_touches<Real>, rows, passes);
+      launch_few("find_shares", find_shares<Real>, points, passes);
+      launch_few("find_row_forces", find_row_forces<Real>, rows, passes);
       m_.launch_each("move_apart", move_apart<Real, StateReal>, count(), m_.fields(), passes,
                      places(), sums_.pointer(), sweep + 1 == sweeps);
     }
@@ -184,10 +211,10 @@ class DeviceBodyContacts {
   }
   std::size_t bytes() const {
     if (!acts()) return 0;
-    std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_states_.bytes() +
-                        sums_.bytes() + site_.bytes() + motion_.bytes() + rows_.bytes() +
-                        near_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
-                        forces_.bytes() + gradients_.bytes();
+    std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
+                        layer_found_.bytes() + sums_.bytes() + site_.bytes() + motion_.bytes() +
+                        rows_.bytes() + near_.bytes() + carries_.bytes() + touch_.bytes() +
+                        force_.bytes() + share_.bytes() + forces_.bytes() + gradients_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -206,20 +233,29 @@ class DeviceBodyContacts {
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
     const int count = static_cast<int>(layer_place_.size());
-    m_.launch_each("copy_states", copy_states<Real, StateReal>, count, m_.fields(),
-                   layer_place_.data(), layer_states_.data(), count);
+    double moved = 0, fastest = 0;
+    if (watch_.generation() > 0) {
+      PHYXEL_CUDA(cudaMemsetAsync(squares_.data(), 0, squares_.bytes(), m_.stream()));
+      m_.launch_each("find_farthest", find_farthest<Real, StateReal>, count, m_.fields(),
+                     layer_place_.data(), layer_position_.data(), layer_found_.data(),
+                     squares_.data(), count);
+      m_.wait();
+      const std::vector<unsigned long long> bits = fetched(squares_);
+      moved = std::sqrt(std::bit_cast<double>(bits[0]));
+      fastest = std::sqrt(std::bit_cast<double>(bits[1]));
+    }
+    if (!watch_.look(m_.model(), moved, fastest, points_.skin(), dt)) return;
+    m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
+                   layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
     m_.wait();
-    if (!watch_.look(m_.model(), fetched(layer_states_), points_.skin(), dt)) return;
+    watch_.found(fetched(layer_found_));
     points_.find(watch_.positions(), dt);
     send_points();
   }
   void send_points() {
     const Model& model = m_.model();
     std::vector<Index> phyxels, bodies;
-    std::vector<Vec3<double>> positions, centres, inward;
-    for (std::size_t p = 0; p < points_.own().size(); ++p) {
-      inward.push_back(points_.sites()[p].inward);
-    }
+    std::vector<Vec3<double>> positions, centres;
     for (const Index k : points_.own()) {
       const Index i = model.body_contact.layer.phyxels[k];
       const Part& part = part_of(model, i);
@@ -240,7 +276,6 @@ class DeviceBodyContacts {
     }
     place_ = sent(places, name);
     position_ = sent(positions, name);
-    inward_ = sent(inward, name);
     centre_ = sent(centres, name);
     body_ = sent(bodies, name);
     entry_ = sent(entries, name);
@@ -250,12 +285,14 @@ class DeviceBodyContacts {
     motion_ = sent(std::vector<SurfaceMotion>(points_.sites().size()), name);
     rows_ = sent_span(points_.rows());
     near_ = sent_span(points_.near());
-    rows_of_start_ = sent(points_.rows_of().offsets, name);
-    rows_of_ = sent(points_.rows_of().indices, name);
+    row_of_entry_ = sent_span(points_.row_of_entry());
+    entries_of_start_ = sent(points_.entries_of().offsets, name);
+    entries_of_ = sent(points_.entries_of().indices, name);
     rows_from_start_ = sent(points_.rows_from().offsets, name);
     rows_from_ = sent(points_.rows_from().indices, name);
     touch_ = {points_.rows().size(), name};
     force_ = {points_.rows().size(), name};
+    carries_ = {points_.near().size(), name};
     share_ = {points_.sites().size(), name};
     forces_ = {places.size(), name};
   }
@@ -264,6 +301,16 @@ class DeviceBodyContacts {
     return sent(std::vector<T>(values.begin(), values.end()), name);
   }
 
+  /// Launches a thread for each of `count` rows or points, a few in each block: there are too few
+  /// to fill a device with large ones, and each takes long.
+  void launch_few(const char* kernel_name, void (*kernel)(ContactPasses, int), int count,
+                  const ContactPasses& passes) const {
+    constexpr unsigned threads = 32;
+    const unsigned blocks = (static_cast<unsigned>(count) + threads - 1) / threads;
+    if (blocks == 0) return;
+    kernel<<<blocks, threads, 0, m_.stream()>>>(passes, count);
+    m_.launched(kernel_name, blocks, threads);
+  }
   /// Gives points of other ranks the values that their owners have, through the host.
   void refresh() {
     m_.wait();
@@ -275,7 +322,7 @@ class DeviceBodyContacts {
   SurfacePlaces<Real> places() const {
     return {.place = place_.data(),
             .position = position_.data(),
-            .inward = inward_.data(),
+            .site = site_.data(),
             .centre = centre_.data(),
             .body = body_.data(),
             .entry = entry_.data(),
@@ -290,37 +337,41 @@ class DeviceBodyContacts {
             .motion = motion_.data(),
             .row = rows_.data(),
             .near = near_.data(),
-            .rows_of_start = rows_of_start_.data(),
-            .rows_of = rows_of_.data(),
+            .row_of_entry = row_of_entry_.data(),
+            .entries_of_start = entries_of_start_.data(),
+            .entries_of = entries_of_.data(),
             .rows_from_start = rows_from_start_.data(),
             .rows_from = rows_from_.data(),
             .field = fields_.data(),
             .touch = touch_.data(),
             .force = force_.data(),
+            .carries = carries_.data(),
             .share = share_.data(),
             .dt = dt_};
   }
 
   DeviceModel<Real, StateReal>& m_;
   TouchingPoints points_;
-  ContactWatch watch_;
+  ContactWatch watch_{4};
   double dt_ = 0;  // [s]
   DeviceSums sums_;
   std::vector<DeviceDistances> distances_;  // of each body
   DeviceArray<DistanceField> fields_;
   DeviceArray<Index> layer_place_;
-  DeviceArray<SurfaceState> layer_states_;
+  DeviceArray<Vec3<double>> layer_position_, layer_found_;
+  DeviceArray<unsigned long long> squares_;
   // Of this device's points.
   DeviceArray<Index> place_, body_, entry_, tiles_;
-  DeviceArray<Vec3<double>> position_, inward_, centre_;
+  DeviceArray<Vec3<double>> position_, centre_;
   DeviceArray<Real> gradients_;
   DeviceArray<PointForces> forces_;
   // As of `ContactPasses`.
   DeviceArray<SurfaceSite> site_;
   DeviceArray<SurfaceMotion> motion_;
   DeviceArray<ContactRow> rows_;
-  DeviceArray<Index> near_, rows_of_, rows_from_;
-  DeviceArray<Offset> rows_of_start_, rows_from_start_;
+  DeviceArray<Index> near_, row_of_entry_, entries_of_, rows_from_;
+  DeviceArray<Offset> entries_of_start_, rows_from_start_;
+  DeviceArray<SurfaceShare> carries_;
   DeviceArray<SurfaceTouch> touch_;
   DeviceArray<SurfaceForce> force_;
   DeviceArray<double> share_;

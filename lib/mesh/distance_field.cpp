@@ -17,7 +17,9 @@ constexpr double everywhere = HUGE_VAL;
 double node_count(Vec3d extent, double area, double spacing, double band) {
   const double cell = edge * spacing;
   const double corners = (extent.x / cell + 2) * (extent.y / cell + 2) * (extent.z / cell + 2);
-  const double bricks = area * (2 * band + 2 * cell) / (cell * cell * cell);
+  // Near a surface smaller than the band, all cells are bricks.
+  const double bricks =
+      area < 4 * band * band ? corners : area * (2 * band + 2 * cell) / (cell * cell * cell);
   return corners + DistanceField::nodes * bricks;
 }
 

@@ -118,6 +118,15 @@ Overlap deepest_overlap(const Model& model) {
     partners[number[b]].push_back(number[a]);
   });
   Overlap found;
+  // A body whose deepest place is inside another one, as that of a body twice at the same place.
+  for (const Part& part : model.parts) {
+    if (part.begin == part.owned_end() || !contact.distances[part.body]) continue;
+    const Vec3d middle = contact.distances[part.body]->deepest;
+    for (const Index other : partners[part.body]) {
+      const double depth = -contact.distances[other]->view().gap(middle).distance;
+      if (depth > found.depth) found = {depth, part.begin, other};
+    }
+  }
   for (std::size_t k = 0; k < contact.layer.phyxels.size(); ++k) {
     const Index i = contact.layer.phyxels[k];
     for (const Index other : partners[part_of(model, i).body]) {

@@ -94,7 +94,8 @@ Deepest deepest_of(const Model& model) {
 void set_field_for(Obstacle& obstacle, double support, std::vector<std::string>& warnings) {
   constexpr double share_of_support = 0.25;  // about half a spacing
   const double extent = box_around(obstacle.surface->position).extent();
-  const double wanted = std::min(share_of_support * support, extent / 32);
+  const double wanted = std::min(share_of_support * support,
+                                 (support < HUGE_VAL ? std::max(extent, support) : extent) / 32);
   const double made = obstacle.set_field(wanted, support < HUGE_VAL ? support : 0);
   if (made <= 1.01 * wanted) return;
   warnings.push_back(fmt::format(

@@ -17,16 +17,7 @@ BodyContacts::BodyContacts(const Model& model, int threads)
   }
 }
 
-bool ContactWatch::look(const Model& model, std::span<const SurfaceState> states, double skin,
-                        double dt) {
-  const std::vector<Index>& layer = model.body_contact.layer.phyxels;
-  std::vector<Vec3d> now(layer.size());
-  double moved = 0, fastest = 0;
-  for (std::size_t k = 0; k < layer.size(); ++k) {
-    now[k] = model.position[layer[k]] + states[k].displacement;
-    fastest = std::max(fastest, norm(states[k].velocity));
-    if (generation_ > 0) moved = std::max(moved, norm(now[k] - positions_[k]));
-  }
+bool ContactWatch::look(const Model& model, double moved, double fastest, double skin, double dt) {
   if (model.share) {
     moved = model.share->communicator->largest(moved);
     fastest = model.share->communicator->largest(fastest);
@@ -35,26 +26,32 @@ bool ContactWatch::look(const Model& model, std::span<const SurfaceState> states
   const double way = 2 * fastest * dt, most = 0.5 * skin;
   const bool is_late = generation_ == 0 || dt != dt_ || moved + way > most;
   if (is_late) {
-    positions_ = std::move(now);
     moved = 0;
     ++generation_;
   }
   dt_ = dt;
-  constexpr double rarest = 64;
-  left_ = static_cast<int>(std::clamp((most - moved) / std::max(way, 1e-300), 1.0, rarest));
+  const double steps = (most - moved) / std::max(way, 1e-300);
+  left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
   return is_late;
 }
 
 void BodyContacts::look(std::span<const SurfaceState> states, double dt) {
-  if (!watch_.look(model_, states, points_.skin(), dt)) return;
+  const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
+  std::vector<Vec3d> now(layer.size());
+  double moved = 0, fastest = 0;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    now[k] = model_.position[layer[k]] + states[k].displacement;
+    fastest = std::max(fastest, norm(states[k].velocity));
+    if (!watch_.positions().empty()) moved = std::max(moved, norm(now[k] - watch_.positions()[k]));
+  }
+  if (!watch_.look(model_, moved, fastest, points_.skin(), dt)) return;
+  watch_.found(std::move(now));
   points_.find(watch_.positions(), dt);
   motion_.assign(points_.sites().size(), {});
 }
 
 void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {
-  const Vec3d inward = points_.sites()[p].inward;
-  motion_[p].probe = inward + gradient * inward;
-  motion_[p].back = inverse_deformation(gradient);
+  phyxel::set_gradient(motion_[p], points_.sites()[p], gradient);
 }
 
 int BodyContacts::threads_here() const {
@@ -65,18 +62,21 @@ ContactPasses BodyContacts::passes() {
   const std::size_t rows = points_.rows().size();
   touches_.resize(rows);
   row_forces_.resize(rows);
+  carries_.resize(points_.near().size());
   shares_.resize(points_.sites().size());
   return {.site = points_.sites().data(),
           .motion = motion_.data(),
           .row = points_.rows().data(),
           .near = points_.near().data(),
-          .rows_of_start = points_.rows_of().offsets.data(),
-          .rows_of = points_.rows_of().indices.data(),
+          .row_of_entry = points_.row_of_entry().data(),
+          .entries_of_start = points_.entries_of().offsets.data(),
+          .entries_of = points_.entries_of().indices.data(),
           .rows_from_start = points_.rows_from().offsets.data(),
           .rows_from = points_.rows_from().indices.data(),
           .field = fields_.data(),
           .touch = touches_.data(),
           .force = row_forces_.data(),
+          .carries = carries_.data(),
           .share = shares_.data(),
           .dt = dt_};
 }
@@ -134,7 +134,7 @@ std::size_t BodyContacts::bytes() const {
          watch_.positions().size() * sizeof(Vec3d) +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceForce)) +
-         forces_.size() * sizeof(PointForces);
+         carries_.size() * sizeof(SurfaceShare) + forces_.size() * sizeof(PointForces);
 }
 
 }  // namespace phyxel

@@ -38,8 +38,9 @@ class TouchingPoints {
   std::span<const SurfaceSite> sites() const { return site_; }
   std::span<const ContactRow> rows() const { return rows_.rows; }
   std::span<const Index> near() const { return rows_.near; }
-  /// For each point, the rows that it is near to, and those of which it is the point, ascending.
-  const Csr& rows_of() const { return rows_of_; }
+  std::span<const Index> row_of_entry() const { return row_of_entry_; }
+  /// For each point, the entries that are it, and the rows of which it is the point, ascending.
+  const Csr& entries_of() const { return entries_of_; }
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
@@ -60,7 +61,8 @@ class TouchingPoints {
   std::vector<Index> own_;
   std::vector<SurfaceSite> site_;
   ContactRows rows_;
-  Csr rows_of_, rows_from_;
+  std::vector<Index> row_of_entry_;
+  Csr entries_of_, rows_from_;
   bool any_ = false;
   std::vector<std::vector<Index>> send_;     // points of this rank, by rank
   std::vector<std::vector<Index>> receive_;  // points of other ranks, by rank
@@ -69,17 +71,23 @@ class TouchingPoints {
 /// When points that may touch have to be found anew: before phyxels have moved by half a skin.
 class ContactWatch {
  public:
+  /// @param rarest most steps between two looks: what an impact sets in motion must not go far
+  ///   before the next one
+  explicit ContactWatch(int rarest) : rarest_(rarest) {}
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
-  /// Looks at the phyxels of the layer, and returns true if points have to be found anew, at
-  /// `positions`. Of a share: collective.
-  bool look(const Model& model, std::span<const SurfaceState> states, double skin, double dt);
-  /// Where the phyxels of the layer were when points had to be found anew [m].
+  /// Returns true if points have to be found anew, at places that `found` then tells. Of a share:
+  /// collective. @param moved how far the phyxels of the layer are from those places [m]
+  /// @param fastest their largest speed [m/s]
+  bool look(const Model& model, double moved, double fastest, double skin, double dt);
+  void found(std::vector<Vec3d> positions) { positions_ = std::move(positions); }
+  /// Where the phyxels of the layer were then [m]; none before.
   const std::vector<Vec3d>& positions() const { return positions_; }
   /// How often that was.
   std::int64_t generation() const { return generation_; }
 
  private:
+  int rarest_;
   std::vector<Vec3d> positions_;
   std::int64_t generation_ = 0;
   double dt_ = 0;  // [s]
@@ -186,10 +194,11 @@ class BodyContacts {
   StepSums sums_;
   std::vector<SurfaceMotion> motion_;     // shape [points]
   std::vector<SurfaceTouch> touches_;     // shape [rows]
+  std::vector<SurfaceShare> carries_;     // shape [entries]
   std::vector<SurfaceForce> row_forces_;  // shape [rows]
   std::vector<double> shares_;            // c of each point
   std::vector<PointForces> forces_;       // on this rank's points
-  ContactWatch watch_;
+  ContactWatch watch_{1};
   double dt_ = 0;  // [s]
 };
 

@@ -25,17 +25,19 @@ struct PointForces {
 struct ContactPasses {
   const SurfaceSite* site = nullptr;  ///< Shape [points], as all others of points.
   const SurfaceMotion* motion = nullptr;
-  const ContactRow* row = nullptr;  ///< Shape [rows], as all others of rows.
-  const Index* near = nullptr;      ///< Points of each row, in its range.
-  /// Rows that each point is near to: those from rows_of_start[p] to rows_of_start[p + 1].
-  const Offset* rows_of_start = nullptr;
-  const Index* rows_of = nullptr;
+  const ContactRow* row = nullptr;      ///< Shape [rows], as all others of rows.
+  const Index* near = nullptr;          ///< Points of each row, in its range: its entries.
+  const Index* row_of_entry = nullptr;  ///< Row of each entry.
+  /// Entries that are each point: those from entries_of_start[p] to entries_of_start[p + 1].
+  const Offset* entries_of_start = nullptr;
+  const Index* entries_of = nullptr;
   /// Rows of which it is the point.
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
   const DistanceField* field = nullptr;  ///< Of each body of the scene.
   SurfaceTouch* touch = nullptr;         ///< Of each row.
   SurfaceForce* force = nullptr;         ///< Of each row.
+  SurfaceShare* carries = nullptr;       ///< Of each entry.
   double* share = nullptr;               ///< c of each point [m²].
   double dt = 0;                         ///< [s]
 
@@ -45,34 +47,41 @@ struct ContactPasses {
         site[here.point], motion[here.point], here.end - here.begin,
         [&](int k) -> const SurfaceSite& { return site[near[here.begin + k]]; },
         [&](int k) -> const SurfaceMotion& { return motion[near[here.begin + k]]; },
-        field[here.body]);
+        field[here.body], carries + here.begin);
   }
   PHYXEL_HD void find_share(Index p) const {
     double sum = 0;
     for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
       if (touch[rows_from[k]].is_inside) sum += site[p].area;
     }
-    for_each_row_of(p, [&](Index r, double w) {
-      sum += site[row[r].point].area * std::fabs(touch[r].share(w, motion[p].before));
-    });
+    for (Offset k = entries_of_start[p]; k < entries_of_start[p + 1]; ++k) {
+      const Index e = entries_of[k];
+      const double part = carries[e].part;
+      if (part != 0) sum += site[row[row_of_entry[e]].point].area * std::fabs(part);
+    }
     share[p] = sum;
   }
   PHYXEL_HD void find_force(Index r) const {
     force[r] = {};
     if (!touch[r].is_inside) return;
-    const SurfaceMotion& point = motion[row[r].point];
+    const ContactRow& here = row[r];
+    const SurfaceMotion& point = motion[here.point];
     Vec3<double> velocity = point.velocity, earlier = point.earlier;
-    for_each_near(r, [&](Index k, double of_k) {
-      velocity += -of_k * motion[k].velocity;
-      earlier += -of_k * motion[k].earlier;
-    });
+    for (Index e = here.begin; e < here.end; ++e) {
+      const double part = carries[e].part;
+      if (part == 0) continue;
+      velocity += -part * motion[near[e]].velocity;
+      earlier += -part * motion[near[e]].earlier;
+    }
     const auto mobility_along = [&](Vec3<double> d) {
-      double sum = split_mobility(row[r].point, d);
-      for_each_near(r,
-                    [&](Index k, double of_k) { sum += std::fabs(of_k) * split_mobility(k, d); });
-      return sum / site[row[r].point].area;
+      double sum = split_mobility(here.point, d);
+      for (Index e = here.begin; e < here.end; ++e) {
+        const double part = carries[e].part;
+        if (part != 0) sum += std::fabs(part) * split_mobility(near[e], d);
+      }
+      return sum / site[here.point].area;
     };
-    force[r] = surface_force(touch[r], velocity, earlier, row[r].law, dt, mobility_along);
+    force[r] = surface_force(touch[r], velocity, earlier, here.law, dt, mobility_along);
   }
   PHYXEL_HD PointForces forces_on(Index p) const {
     PointForces sum;
@@ -80,10 +89,13 @@ struct ContactPasses {
       sum.normal += force[rows_from[k]].normal;
       sum.tangential += force[rows_from[k]].tangential;
     }
-    for_each_row_of(p, [&](Index r, double w) {
-      sum.normal += force[r].normal_reaction(touch[r], w, motion[p].before);
-      sum.tangential += force[r].tangential_reaction(touch[r], w, motion[p].before);
-    });
+    for (Offset k = entries_of_start[p]; k < entries_of_start[p + 1]; ++k) {
+      const Index e = entries_of[k];
+      if (!(carries[e].weight > 0)) continue;
+      const Index r = row_of_entry[e];
+      sum.normal += force[r].normal_reaction(touch[r], carries[e], motion[p].before);
+      sum.tangential += force[r].tangential_reaction(carries[e]);
+    }
     return sum;
   }
   /// The change of velocity by forces [m/s].
@@ -93,31 +105,6 @@ struct ContactPasses {
   }
 
  private:
-  /// The weight with which a phyxel carries the point of a row.
-  PHYXEL_HD double weight(Index r, Index k) const {
-    const Index p = row[r].point;
-    const Vec3<double> apart = motion[k].after - motion[p].after;
-    return carrying_weight(touch[r].normal, dot(apart, apart),
-                           common_range(site[p].range, site[k].range), site[k], motion[k]);
-  }
-  /// Calls each(k, r_k) for the points near the point of a row.
-  template <class Each>
-  PHYXEL_HD void for_each_near(Index r, Each&& each) const {
-    for (Index k = row[r].begin; k < row[r].end; ++k) {
-      const double w = weight(r, near[k]);
-      if (w > 0) each(near[k], touch[r].share(w, motion[near[k]].before));
-    }
-  }
-  /// Calls each(r, w) for the rows that a point is near to and whose own point is inside.
-  template <class Each>
-  PHYXEL_HD void for_each_row_of(Index p, Each&& each) const {
-    for (Offset k = rows_of_start[p]; k < rows_of_start[p + 1]; ++k) {
-      const Index r = rows_of[k];
-      if (!touch[r].is_inside) continue;
-      const double w = weight(r, p);
-      if (w > 0) each(r, w);
-    }
-  }
   /// c d · M d of a point along a direction d.
   PHYXEL_HD double split_mobility(Index p, Vec3<double> d) const {
     const Vec3<double> m = site[p].mobility;

@@ -113,6 +113,9 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
       tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
   for (std::size_t p = 0; p < points.size(); ++p) {
     for (const Index k : near[p]) {
+      // Points far apart would press on a fine surface like nails; it has points of its own.
+      constexpr double coarser = 1.5;
+      if (points[p].site.range > coarser * points[k].site.range) continue;
       const Index body = points[k].body;
       const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
                           found.rows.back().body != body;

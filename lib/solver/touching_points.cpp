@@ -8,6 +8,7 @@
 #include "rank_exchange.hpp"
 #include "solver/body_contacts.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -118,6 +119,7 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
 }
 
 void TouchingPoints::find(std::span<const Vec3d> position, double dt) {
+  const Phase phase("points that may touch");
   const std::vector<ContactCandidate> all = candidates(position, dt);
   ContactRows found = find_rows(model_.body_contact, all, skin_);
   any_ = !found.rows.empty();
@@ -179,14 +181,16 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
 
 void TouchingPoints::invert() {
   std::vector<std::pair<Index, Index>> of, from;
+  row_of_entry_.resize(rows_.near.size());
   for (std::size_t r = 0; r < rows_.rows.size(); ++r) {
     const ContactRow& row = rows_.rows[r];
     from.emplace_back(row.point, static_cast<Index>(r));
-    for (Index k = row.begin; k < row.end; ++k) {
-      of.emplace_back(rows_.near[k], static_cast<Index>(r));
+    for (Index e = row.begin; e < row.end; ++e) {
+      row_of_entry_[e] = static_cast<Index>(r);
+      of.emplace_back(rows_.near[e], e);
     }
   }
-  rows_of_ = grouped(site_.size(), of);
+  entries_of_ = grouped(site_.size(), of);
   rows_from_ = grouped(site_.size(), from);
 }
 
@@ -205,8 +209,8 @@ void TouchingPoints::refresh(std::vector<SurfaceMotion>& motion) const {
 std::size_t TouchingPoints::bytes() const {
   return range_.size() * sizeof(double) + (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
          rows_.rows.size() * sizeof(ContactRow) +
-         (own_.size() + 2 * rows_.near.size() + rows_.rows.size()) * sizeof(Index) +
-         (rows_of_.offsets.size() + rows_from_.offsets.size()) * sizeof(Offset);
+         (own_.size() + 3 * rows_.near.size() + rows_.rows.size()) * sizeof(Index) +
+         (entries_of_.offsets.size() + rows_from_.offsets.size()) * sizeof(Offset);
 }
 
 }  // namespace phyxel

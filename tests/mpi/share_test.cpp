@@ -100,7 +100,7 @@ Model touching() {
   scene.obstacles.push_back({.name = "spike",
                              .shape = "mesh",
                              .mesh = file,
-                             .translation = {0, 0, 0.71},
+                             .translation = {0, 0, 0.2005},
                              .friction = 0.2,
                              .motion = {.velocity = {0, 0, -1}}});
   Model model = build_model(scene);

@@ -55,7 +55,7 @@ Run::Run(const RunOptions& options)
   supports_ = support_ranges(model());
   const BoundarySize boundary = boundary_size(model());
   boundary_ = {ranks().sum(boundary.moved), ranks().sum(boundary.loaded),
-               ranks().sum(boundary.touching)};
+               ranks().sum(boundary.touching), ranks().sum(boundary.touching_bodies)};
   setup_seconds_ = seconds_since(start_);
 }
 

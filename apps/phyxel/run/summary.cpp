@@ -300,6 +300,14 @@ void Run::say_contacts() const {
   const std::size_t printed = std::min(readings_.contacts.size(), most_printed);
   for (std::size_t k = 0; k < printed; ++k) {
     const ContactReading& c = readings_.contacts[k];
+    if (k >= model().obstacles.size()) {
+      fmt::print(
+          "  contact     {}: force of other bodies ({:.4g}, {:.4g}, {:.4g}) N; since t = 0 impulse "
+          "({:.4g}, {:.4g}, {:.4g}) N s, work {:.4g} J; deepest {:.2g} m\n",
+          c.obstacle, c.force.x, c.force.y, c.force.z, c.impulse.x, c.impulse.y, c.impulse.z,
+          c.work, deepest_[k]);
+      continue;
+    }
     fmt::print(
         "  contact     {}: force on the bodies ({:.4g}, {:.4g}, {:.4g}) N; since t = 0 impulse "
         "({:.4g}, {:.4g}, {:.4g}) N s, work {:.4g} J, heat of friction {:.4g} J, loss in impacts "
@@ -308,6 +316,16 @@ void Run::say_contacts() const {
         c.friction_heat, c.impact_loss, deepest_[k]);
   }
   say_left_out(readings_.contacts.size(), "more: contacts.csv");
+  if (readings_.contacts.size() == model().obstacles.size()) return;
+  double heat = 0, loss = 0;
+  for (std::size_t k = model().obstacles.size(); k < readings_.contacts.size(); ++k) {
+    heat += readings_.contacts[k].friction_heat;
+    loss += readings_.contacts[k].impact_loss;
+  }
+  fmt::print(
+      "              of bodies with each other, since t = 0: heat of friction {:.4g} J, loss in "
+      "impacts {:.4g} J\n",
+      heat, loss);
 }
 
 void Run::say_reactions() const {

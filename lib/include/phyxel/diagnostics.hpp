@@ -72,6 +72,7 @@ class StabilityWatch {
   double wave_speed_ = 0;     ///< Pressure wave speed of the fastest part [m/s].
   double driving_speed_ = 0;  ///< Largest speeds of the start and of all motions, summed [m/s].
   double acceleration_ = 0;   ///< Largest accelerations by gravity and all loads, summed [m/s²].
+  double contact_noise_ = 0;  ///< Energy of overlaps that bodies may have at the start [J].
   bool conservative_;
   std::optional<Diagnostics> good_;  // the last one found good
 };

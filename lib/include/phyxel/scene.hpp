@@ -236,7 +236,7 @@ struct ContactRequest {
   std::optional<double> kinetic_friction;  ///< The same of sliding points; unset: `friction`.
   double restitution = 0;  ///< Speed of a surface point after an impact over that before.
   bool self = false;       ///< True if parts of one body touch each other, too.
-  int sweeps = 1;          ///< How often contact is resolved in each step.
+  int sweeps = 4;          ///< How often contact is resolved in each step.
   std::vector<ContactPairRequest> pairs;
   /// Whether all bodies touch each other, not only those of `pairs`; unset: if there are no pairs.
   std::optional<bool> all;

@@ -8,12 +8,12 @@
 ///   X(q) = Σ ω_k (X_k + ½ (G_k + Ḡ)(q - y_k)),   G_k = F_k⁻¹,   Ḡ = Σ ω_k G_k,
 ///   m = Ḡᵀ ∇φ(X(q)),   n̄ = m/|m|,   g = φ(X(q))/|m| + n̄ · (x - q),
 ///
-/// where y_k are the places of these phyxels, ω_k smooth weights, and x the point. q lies inside
-/// the point's own body, half a spacing from x: it is outside the other body even where x has
-/// entered it, so that the nearest face is the one through which x has come, on edges and at
-/// corners, too. The force that closes the gap is shared among them by weights r_k that reproduce
-/// linear functions along the surface, so that both momenta of the bodies are kept to rounding,
-/// with friction, too.
+/// where y_k are the places of these phyxels, ω_k smooth weights, zero for those that face away,
+/// and x the point. q lies inside the point's own body, half a spacing from x: it is outside the
+/// other body even where x has entered it, so that the nearest face is the one through which x has
+/// come, on edges and at corners, too. The force that closes the gap is shared among the phyxels of
+/// the surface by weights r_k that reproduce linear functions along it, so that both momenta of the
+/// bodies are kept to rounding, with friction, too.
 #pragma once
 
 #include <cmath>
@@ -45,6 +45,7 @@ struct SurfaceMotion {
   Vec3<double> earlier;   ///< Velocity at the start of the step [m/s].
   Vec3<double> probe;     ///< q - x: F times `inward` [m].
   Mat3<double> back;      ///< G: the inverse of its deformation gradient at the start.
+  Vec3<double> out;       ///< Unit normal of its surface; zero if that is unknown.
 };
 
 /// The inverse of a deformation gradient. That of a phyxel without volume is the identity, as it
@@ -82,6 +83,23 @@ PHYXEL_HD double surface_weight(double square, double range) {
 /// The larger of two ranges, up to which phyxels of two surfaces know of each other [m].
 PHYXEL_HD double common_range(double a, double b) { return a > b ? a : b; }
 
+/// How much of a phyxel of a surface counts for a point: all of one whose surface faces the
+/// point's, so that the other side of a thin part, of a slit, or of the point's own body does not.
+PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) {
+  const double t = 2.5 * (0.1 - dot(point.out, other.out));
+  return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
+}
+
+/// Sets what follows from a phyxel's gradient of displacement.
+PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
+                            const Mat3<double>& gradient) {
+  motion.probe = site.inward + gradient * site.inward;
+  motion.back = inverse_deformation(gradient);
+  const Vec3<double> out = -(transpose(motion.back) * site.inward);
+  const double length = std::sqrt(dot(out, out));
+  motion.out = length > 0 ? (1 / length) * out : out;
+}
+
 /// The weight with which a phyxel of a surface carries the force on a point: that of its distance
 /// times its area, as far as it faces the point, so that a uniform pressure is passed on uniformly,
 /// and faces beside the one that is touched carry nothing.
@@ -90,30 +108,27 @@ PHYXEL_HD double carrying_weight(Vec3<double> normal, double square, double rang
                                  const SurfaceSite& site, const SurfaceMotion& motion) {
   const double weight = surface_weight(square, range);
   if (!(weight > 0)) return 0;
-  const Vec3<double> out = -(transpose(motion.back) * site.inward);  // along its own normal
-  const double length = std::sqrt(dot(out, out));
   constexpr double from = 0.2, to = 0.5, least = 1e-6;  // cosines; edges have 0.71, corners 0.58
-  double facing = length > 0 ? (dot(normal, out) / length - from) / (to - from) : 1;
-  facing = facing > 1 ? 1 : facing > least ? facing : least;
-  return weight * site.area * facing;
+  const double part = (dot(normal, motion.out) - from) / (to - from);
+  const bool is_known = dot(motion.out, motion.out) > 0;
+  return weight * site.area * (!is_known || part > 1 ? 1 : part > least ? part : least);
 }
 
-/// A point that is inside a body at the end of a step, and how the body's surface carries it.
+/// A point that is inside a body at the end of a step.
 struct SurfaceTouch {
   bool is_inside = false;
-  double gap = 0;       ///< g - offset, negative [m].
-  Vec3<double> normal;  ///< n̄, away from the body.
-  double weights = 0;   ///< Sum of the weights of those that carry it (`carrying_weight`).
-  Vec3<double> centre;  ///< Their mean place at the start of the step [m].
-  /// T⁺ d [1/m]: with weights ω_k whose sum is 1, r_k = ω_k (1 + tilt · (y_k - centre)).
-  Vec3<double> tilt;
+  double gap = 0;               ///< g - offset, negative [m].
+  Vec3<double> normal;          ///< n̄, away from the body.
+  Vec3<double> centre;          ///< Mean place of those that carry it, as the step starts [m].
   double height = 0;            ///< n̄ · (x - Σ r_k y_k) at the start of the step [m].
   Sym3<double> inverse_spread;  ///< T⁺ [1/m²], where T = Σ ω_k z_k z_kᵀ, z_k along the surface.
+};
 
-  /// r_k of a phyxel. @param weight with which it carries the point
-  PHYXEL_HD double share(double weight, Vec3<double> y) const {
-    return weight / weights * (1 + dot(tilt, y - centre));
-  }
+/// How a phyxel of a surface carries a point: by its part of all weights, and its part of the
+/// force.
+struct SurfaceShare {
+  double weight = 0;  ///< ω_k, whose sum is 1.
+  double part = 0;    ///< r_k = ω_k (1 + T⁺ d · z_k), whose sum is 1, too.
 };
 
 /// The part of a vector along a surface.
@@ -147,15 +162,18 @@ PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
           p * u.y * u.z + s * v.y * v.z, p * u.z * u.z + s * v.z * v.z};
 }
 
-/// Finds whether a point is inside a body, from the phyxels of the body's surface near it.
+/// Finds whether a point is inside a body, from the phyxels of the body's surface near it, and how
+/// these carry it.
 /// @param count number of these phyxels
 /// @param site_of,motion_of return those of the k-th
 /// @param field distances from the body's surface at rest
+/// @param shares receive those of the phyxels, shape [count]; all zero if the point is outside
 template <class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotion& point, int count,
                                      SiteOf&& site_of, MotionOf&& motion_of,
-                                     const DistanceField& field) {
+                                     const DistanceField& field, SurfaceShare* shares) {
   SurfaceTouch touch;
+  for (int k = 0; k < count; ++k) shares[k] = {};
   const auto square_of = [&](int k) {
     const Vec3<double> apart = motion_of(k).after - point.after;
     return dot(apart, apart);
@@ -166,9 +184,9 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
   double level = 0, weights = 0;        // Σ w φ(X), Σ w
   const Vec3<double> place = point.after + point.probe;
   for (int k = 0; k < count; ++k) {
-    const double w = surface_weight(square_of(k), range_of(k));
-    if (!(w > 0)) continue;
     const SurfaceMotion& other = motion_of(k);
+    const double w = facing(point, other) * surface_weight(square_of(k), range_of(k));
+    if (!(w > 0)) continue;
     const Vec3<double> way = place - other.after;
     weights += w;
     back += w * other.back;
@@ -188,22 +206,27 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
   touch.normal = (1 / length) * m;
   touch.gap =
       (gap.distance - scale * level) / length - dot(touch.normal, point.probe) - site.offset;
-  if (!(touch.gap < 0)) return touch;
+  // A surface is touched from outside, and by more than rounding.
+  constexpr double rounding = 1e-9;
+  if (!(touch.gap < -rounding * site.range) ||
+      dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
+    return touch;
+  }
   touch.is_inside = true;
   const Vec3<double> n = touch.normal;
-  const auto carries = [&](int k) {
-    return carrying_weight(n, square_of(k), range_of(k), site_of(k), motion_of(k));
-  };
+  double carried = 0;
   for (int k = 0; k < count; ++k) {
-    const double w = carries(k);
-    touch.weights += w;
+    const double w = carrying_weight(n, square_of(k), range_of(k), site_of(k), motion_of(k));
+    shares[k].weight = w;
+    carried += w;
     touch.centre += w * (motion_of(k).before - point.before);
   }
-  touch.centre = (1 / touch.weights) * touch.centre;  // from the point
+  touch.centre = (1 / carried) * touch.centre;  // from the point
   Sym3<double> spread{};
   for (int k = 0; k < count; ++k) {
+    const double share = shares[k].weight = shares[k].weight / carried;
+    if (!(share > 0)) continue;
     const Vec3<double> z = along(n, motion_of(k).before - point.before - touch.centre);
-    const double share = carries(k) / touch.weights;
     spread.xx += share * z.x * z.x;
     spread.xy += share * z.x * z.y;
     spread.xz += share * z.x * z.z;
@@ -212,14 +235,16 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
     spread.zz += share * z.z * z.z;
   }
   touch.inverse_spread = inverse_along(n, spread);
-  touch.tilt = touch.inverse_spread * along(n, -touch.centre);
-  touch.centre += point.before;
-  Vec3<double> carried{};  // Σ r (y - x)
+  const Vec3<double> tilt = touch.inverse_spread * along(n, -touch.centre);
+  Vec3<double> reached{};  // Σ r (y - x)
   for (int k = 0; k < count; ++k) {
-    const Vec3<double> y = motion_of(k).before;
-    carried += touch.share(carries(k), y) * (y - point.before);
+    if (!(shares[k].weight > 0)) continue;
+    const Vec3<double> y = motion_of(k).before - point.before;
+    shares[k].part = shares[k].weight * (1 + dot(tilt, y - touch.centre));
+    reached += shares[k].part * y;
   }
-  touch.height = -dot(n, carried);
+  touch.height = -dot(n, reached);
+  touch.centre += point.before;
   return touch;
 }
 
@@ -229,15 +254,14 @@ struct SurfaceForce {
   Vec3<double> twist;               ///< Couples of friction: b = height T⁺ tangential [N/m].
 
   /// The normal part of the reaction on a phyxel of the body's surface, and its tangential part.
-  /// @param weight with which it carries the point. @param y its place at the start of the step [m]
-  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch, double weight,
+  /// @param y its place at the start of the step [m]
+  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch, const SurfaceShare& share,
                                          Vec3<double> y) const {
-    const double turning = weight / touch.weights * dot(twist, y - touch.centre);
-    return turning * touch.normal - touch.share(weight, y) * normal;
+    const double turning = share.weight * dot(twist, y - touch.centre);
+    return turning * touch.normal - share.part * normal;
   }
-  PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceTouch& touch, double weight,
-                                             Vec3<double> y) const {
-    return -touch.share(weight, y) * tangential;
+  PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceShare& share) const {
+    return -share.part * tangential;
   }
 };
 
@@ -249,6 +273,7 @@ struct SurfaceForce {
 /// where v is the velocity of the point relative to the surface, v⁻ that before the step, M_i the
 /// mobility of a phyxel, a the area of the point, and c_i = Σ a |r_i| over all contacts that the
 /// phyxel takes part in: masses are split by areas, so that no gap is closed twice over.
+/// Where the point was inside by g₀ < 0 as the step started, -g₀/(5 Δt) - n̄ · v stands for -g/Δt.
 /// @param mobility returns D along a direction [m/s/N]
 template <class Mobility>
 PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, Vec3<double> velocity,
@@ -258,7 +283,11 @@ PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, Vec3<double> vel
   const Vec3<double> n = touch.normal;
   const double across = mobility(n);
   if (!(across > 0)) return force;  // nothing is free to move
-  double rate = -touch.gap / dt;
+  // Points that come upon each other deep inside, as at corners, are not flung apart.
+  const double before = touch.gap / dt - dot(n, velocity);  // gap as the step starts, over Δt
+  constexpr double recovery = 0.2;
+  double rate = before < 0 ? -recovery * before - dot(n, velocity) : -touch.gap / dt;
+  if (!(rate > 0)) return force;
   const double approach = -dot(n, earlier);
   if (law.restitution > 0 && approach > 0) {
     const double rebound = (1 + law.restitution) * approach;
