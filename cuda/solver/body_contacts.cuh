@@ -54,7 +54,7 @@ __global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
 /// Finds how far the phyxels of the layer have moved, and how fast they are: the bits of the
 /// largest squares [m², m²/s²], which are in the order of the numbers. One thread per phyxel.
 template <class Real, class StateReal>
-__global__ void find_farthest(Fields<Real, StateReal> f, const Index* place,
+__global__ void find_moved(Fields<Real, StateReal> f, const Index* place,
                               const Vec3<double>* position, const Vec3<double>* found,
                               unsigned long long* squares, int count) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
@@ -236,7 +236,7 @@ class DeviceBodyContacts {
     double moved = 0, fastest = 0;
     if (watch_.generation() > 0) {
       PHYXEL_CUDA(cudaMemsetAsync(squares_.data(), 0, squares_.bytes(), m_.stream()));
-      m_.launch_each("find_farthest", find_farthest<Real, StateReal>, count, m_.fields(),
+      m_.launch_each("find_moved", find_moved<Real, StateReal>, count, m_.fields(),
                      layer_place_.data(), layer_position_.data(), layer_found_.data(),
                      squares_.data(), count);
       m_.wait();
