@@ -55,8 +55,8 @@ __global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
 /// largest squares [m², m²/s²], which are in the order of the numbers. One thread per phyxel.
 template <class Real, class StateReal>
 __global__ void find_moved(Fields<Real, StateReal> f, const Index* place,
-                              const Vec3<double>* position, const Vec3<double>* found,
-                              unsigned long long* squares, int count) {
+                           const Vec3<double>* position, const Vec3<double>* found,
+                           unsigned long long* squares, int count) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   double of_way = 0, of_speed = 0;
   if (k < count) {

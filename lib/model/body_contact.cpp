@@ -171,7 +171,12 @@ std::vector<LayerSupports> add_body_layer(Model& model, const Scene& scene,
   const auto touches = tabulated(scene.bodies.size(), [&](std::size_t b) {
     return static_cast<char>(touches_bodies(scene, b));
   });
-  if (std::none_of(touches.begin(), touches.end(), [](char t) { return t != 0; })) return {};
+  if (std::none_of(touches.begin(), touches.end(), [](char t) { return t != 0; })) {
+    model.warnings.push_back(
+        "[contact] has nothing to act on: the scene has one body, which self = true lets touch "
+        "itself");
+    return {};
+  }
   for (const Part& part : model.parts) {
     if (!touches[part.body]) continue;
     for (Index i = part.begin; i < part.owned_end(); ++i) {

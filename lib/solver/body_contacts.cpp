@@ -130,7 +130,11 @@ void BodyContacts::add_to_sums(std::size_t p, const PointForces& forces, Vec3d v
 
 std::size_t BodyContacts::bytes() const {
   if (!acts()) return 0;
-  return points_.bytes() + sums_.size() * sizeof(ExactSum) +
+  std::size_t distances = 0;
+  for (const auto& of_body : model_.body_contact.distances) {
+    if (of_body) distances += of_body->bytes();
+  }
+  return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) +
          watch_.positions().size() * sizeof(Vec3d) +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceForce)) +

@@ -93,8 +93,8 @@ struct ContactPasses {
       const Index e = entries_of[k];
       if (!(carries[e].weight > 0)) continue;
       const Index r = row_of_entry[e];
-      sum.normal += force[r].normal_reaction(touch[r], carries[e], motion[p].before);
-      sum.tangential += force[r].tangential_reaction(carries[e]);
+      sum.normal += force[r].normal_reaction(carries[e]);
+      sum.tangential += force[r].tangential_reaction(touch[r], carries[e], motion[p].before);
     }
     return sum;
   }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "mesh/distance_field.hpp"
 #include "model/parts.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/obstacles.hpp"
@@ -98,8 +99,12 @@ class StepContacts {
   const StepSums& sums() const { return sums_; }
   /// Bytes of its arrays.
   std::size_t bytes() const {
-    return sums_.size() * sizeof(ExactSum) + (free_.size() + before_.size()) * sizeof(Vec3d) +
-           inertia_.size() * sizeof(double);
+    std::size_t distances = 0;
+    for (const Obstacle& obstacle : model_.obstacles) {
+      if (obstacle.distances) distances += obstacle.distances->bytes();
+    }
+    return distances + sums_.size() * sizeof(ExactSum) +
+           (free_.size() + before_.size()) * sizeof(Vec3d) + inertia_.size() * sizeof(double);
   }
 
  private:

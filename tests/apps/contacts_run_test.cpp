@@ -120,5 +120,18 @@ TEST_F(ContactsOfRuns, OfFrictionAreRefusedToImplicitSteps) {
                                  "solver.method = \"implicit\"; allowed with this method: 0"));
 }
 
+TEST_F(ContactsOfRuns, AStackStandsOnAFloor) {
+  const json summary = summary_of("stack");
+  const double weight = 4 * 8 * g;
+  ASSERT_EQ(summary["contacts"].size(), 5u);
+  EXPECT_NEAR(summary["contacts"][0]["force_n"][2].get<double>(), weight, 1e-3 * weight);
+  // Each block carries those above it.
+  EXPECT_NEAR(summary["contacts"][1]["force_n"][2].get<double>(), -0.75 * weight, 2e-3 * weight);
+  EXPECT_NEAR(summary["contacts"][4]["force_n"][2].get<double>(), 0.25 * weight, 1e-3 * weight);
+  for (const json& contact : summary["contacts"]) {
+    EXPECT_LT(contact["deepest_m"].get<double>(), 0.2 * 0.05);  // spacings
+  }
+}
+
 }  // namespace
 }  // namespace phyxel

@@ -391,10 +391,10 @@ TEST_F(Trajectory, ARunDrawsItsFolderAndRemovesStalePictures) {
   for (const char* name : {"frame_000007.png", "notes.txt", "frame_a.png"}) {
     std::ofstream(run_ / "pictures" / name) << "old";
   }
-  RenderRequest request;
-  request.count = 2;
-  request.width = request.height = 64;
-  EXPECT_EQ(render_directory(run_, request, true).size(), 2u);
+  Scene scene;
+  scene.render.count = 2;
+  scene.render.width = scene.render.height = 64;
+  EXPECT_EQ(render_directory(run_, scene, true).size(), 2u);
   EXPECT_THAT(names_in(run_ / "pictures"),
               ElementsAre("frame_000000.png", "frame_000002.png", "frame_a.png", "notes.txt"));
 }

@@ -201,25 +201,24 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
         "conserves energy: do not trust the result; a smaller time.safety may help",
         100 * energy_drift(now)));
   }
-  std::vector<ContactReading> touching = readings_.contacts;
-  const std::size_t obstacles = model().obstacles.size();
-  if (touching.size() > obstacles) {  // of bodies, the sum counts
-    for (std::size_t k = obstacles + 1; k < touching.size(); ++k) {
-      touching[obstacles].impact_loss += touching[k].impact_loss;
-    }
-    touching[obstacles].obstacle = "other bodies";
-    touching.resize(obstacles + 1);
-  }
-  for (const ContactReading& contact : touching) {
-    if (contact.impact_loss < -0.01 * peak_energy_ &&
-        -contact.impact_loss > rounding_energy(model())) {
-      warnings.push_back(fmt::format(
-          "contact with \"{}\" has made {:.3g} J, {:.2g}% of the largest kinetic + "
-          "elastic "
-          "energy: do not trust the result; a smaller time.safety may help",
-          contact.obstacle, -contact.impact_loss, -100 * contact.impact_loss / peak_energy_));
+  const auto warn_of_energy = [&](const std::string& what, double made) {
+    if (!(made > 0.01 * peak_energy_) || !(made > rounding_energy(model()))) return;
+    warnings.push_back(fmt::format(
+        "{} has made {:.3g} J, {:.2g}% of the largest kinetic + elastic energy: do not trust the "
+        "result; a smaller time.safety may help",
+        what, made, 100 * made / peak_energy_));
+  };
+  double of_bodies = 0;  // each has a share, which may be negative
+  for (std::size_t k = 0; k < readings_.contacts.size(); ++k) {
+    const ContactReading& contact = readings_.contacts[k];
+    if (k >= model().obstacles.size()) {
+      of_bodies -= contact.impact_loss;
+    } else {
+      warn_of_energy(fmt::format("contact with obstacle \"{}\"", contact.obstacle),
+                     -contact.impact_loss);
     }
   }
+  warn_of_energy("contact of bodies with each other", of_bodies);
   return warnings;
 }
 

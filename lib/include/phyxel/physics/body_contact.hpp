@@ -253,15 +253,15 @@ struct SurfaceForce {
   Vec3<double> normal, tangential;  ///< On the point.
   Vec3<double> twist;               ///< Couples of friction: b = height T⁺ tangential [N/m].
 
-  /// The normal part of the reaction on a phyxel of the body's surface, and its tangential part.
-  /// @param y its place at the start of the step [m]
-  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch, const SurfaceShare& share,
-                                         Vec3<double> y) const {
-    const double turning = share.weight * dot(twist, y - touch.centre);
-    return turning * touch.normal - share.part * normal;
+  /// The reaction on a phyxel of the body's surface to the normal part.
+  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceShare& share) const {
+    return -share.part * normal;
   }
-  PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceShare& share) const {
-    return -share.part * tangential;
+  /// The reaction to friction, and to its couple. @param y its place as the step starts [m]
+  PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceTouch& touch, const SurfaceShare& share,
+                                             Vec3<double> y) const {
+    const double turning = share.weight * dot(twist, y - touch.centre);
+    return turning * touch.normal - share.part * tangential;
   }
 };
 
