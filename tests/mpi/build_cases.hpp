@@ -252,7 +252,8 @@ inline BuildCase graded_clouds() {
   return c;
 }
 
-/// Lattices with layers on the faces of boxes that hold and move parts of them, on a floor.
+/// Lattices with layers on the faces of boxes that hold and move parts of them, on a floor; they
+/// touch each other.
 inline BuildCase supported() {
   BuildCase c{"Supported", {.bodies = {shape("beam", 0.12), shape("cylinder", 0.17)}}, {}};
   BodyRequest &beam = c.scene.bodies[0], &column = c.scene.bodies[1];
@@ -264,7 +265,9 @@ inline BuildCase supported() {
   beam.motions.push_back(
       {.select = {.box = Selection::Box{{-9, 3.6, -9}, {9, 9, 0.11}}}, .velocity = {0.1, 0, 0}});
   column.source.shape.length = 2;
+  column.translation = {5, 0, 0};
   column.fixed.push_back({.select = {.box = Selection::Box{{-9, -9, -9}, {9, 9, -0.37}}}});
+  c.scene.contact = ContactRequest{.friction = 0.3};
   c.scene.obstacles = {
       {.name = "floor", .shape = "plane", .translation = {0, 0, -3}, .friction = 0.2},
       {.name = "post", .shape = "sphere", .radius = 1, .translation = {9, 9, 9}}};

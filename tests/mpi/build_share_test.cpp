@@ -13,6 +13,7 @@
 #include "build_cases.hpp"
 #include "device.hpp"
 #include "host_surveyor.hpp"
+#include "mesh/distance_field.hpp"
 #include "model/closing_areas.hpp"
 #include "model/host_memory.hpp"
 #include "partition/share.hpp"
@@ -98,6 +99,13 @@ void expect_same_contact(const Model& here, const Model& expected) {
   EXPECT_EQ(here.obstacles.size(), expected.obstacles.size());
   EXPECT_EQ(here.contact.phyxels, expected.contact.phyxels);
   EXPECT_EQ(here.contact.offset, expected.contact.offset);
+  const BodyContact &found = here.body_contact, &wanted = expected.body_contact;
+  EXPECT_EQ(found.layer.phyxels, wanted.layer.phyxels);
+  EXPECT_EQ(found.layer.offset, wanted.layer.offset);
+  ASSERT_EQ(found.distances.size(), wanted.distances.size());
+  for (std::size_t b = 0; b < wanted.distances.size(); ++b) {
+    EXPECT_TRUE(same_bits(found.distances[b]->fine, wanted.distances[b]->fine));
+  }
 }
 
 TEST_P(BuiltShares, AreWhatWouldBeTakenOutOfTheWhole) {
