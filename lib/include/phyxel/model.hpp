@@ -176,6 +176,7 @@ struct BodyContact {
   /// The phyxels by which bodies touch each other, held and moved ones, too.
   ContactLayer layer;
 
+  /// True if bodies touch each other.
   bool acts() const { return !distances.empty(); }
   /// The law of two bodies, which may be the same one; null if they do not touch.
   const ContactLaw* law_of(Index a, Index b) const;
