@@ -248,8 +248,7 @@ class DeviceBodyContacts {
     m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
                    layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
     m_.wait();
-    watch_.found(fetched(layer_found_));
-    points_.find(watch_.positions(), dt);
+    points_.find(fetched(layer_found_), dt);
     send_points();
   }
   void send_points() {

@@ -22,6 +22,10 @@ struct DistanceArrays {
   std::size_t bytes() const;
 };
 
+/// The distance between the nodes of a field over the smallest support of the phyxels beside it:
+/// about half a spacing of these.
+inline constexpr double nodes_over_support = 0.25;
+
 /// The largest number of nodes of a field: 400 MB.
 inline constexpr double most_field_nodes = 1e8;
 

@@ -81,9 +81,8 @@ std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, S
                              request.name, defects.describe())));
   }
   orient(surface);
-  constexpr double share_of_support = 0.25;  // about half a spacing
   return std::make_shared<const DistanceArrays>(
-      distances_from(surface, share_of_support * supports.least, supports.most));
+      distances_from(surface, nodes_over_support * supports.least, supports.most));
 }
 
 /// The box of the phyxels of a body's surface at rest, with a margin.
@@ -103,35 +102,27 @@ struct Overlap {
 /// The phyxel of this rank that is deepest inside another body at rest.
 Overlap deepest_overlap(const Model& model) {
   const BodyContact& contact = model.body_contact;
-  const std::size_t bodies = contact.distances.size();
-  std::vector<Box> boxes;
-  std::vector<Index> number;
-  for (std::size_t b = 0; b < bodies; ++b) {
-    if (!contact.distances[b]) continue;
-    boxes.push_back(box_of(*contact.distances[b]));
-    number.push_back(static_cast<Index>(b));
-  }
-  std::vector<std::vector<Index>> partners(bodies);
-  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
-    if (!contact.law_of(number[a], number[b])) return;
-    partners[number[a]].push_back(number[b]);
-    partners[number[b]].push_back(number[a]);
+  const std::vector<Box> boxes = tabulated(contact.distances.size(), [&](std::size_t b) {
+    return contact.distances[b] ? box_of(*contact.distances[b]) : Box{};
   });
+  const std::vector<std::vector<Index>> partners = partners_of_bodies(contact, boxes);
   Overlap found;
   // A body whose deepest place is inside another one, as that of a body twice at the same place.
   for (const Part& part : model.parts) {
     if (part.begin == part.owned_end() || !contact.distances[part.body]) continue;
     const Vec3d middle = contact.distances[part.body]->deepest;
     for (const Index other : partners[part.body]) {
+      if (other == part.body) continue;
       const double depth = -contact.distances[other]->view().gap(middle).distance;
       if (depth > found.depth) found = {depth, part.begin, other};
     }
   }
   for (std::size_t k = 0; k < contact.layer.phyxels.size(); ++k) {
     const Index i = contact.layer.phyxels[k];
-    for (const Index other : partners[part_of(model, i).body]) {
+    const Index body = part_of(model, i).body;
+    for (const Index other : partners[body]) {
+      if (other == body || !contains(boxes[other], model.position[i])) continue;
       const DistanceArrays& distances = *contact.distances[other];
-      if (!contains(box_of(distances), model.position[i])) continue;
       const double depth =
           contact.layer.offset[k] - distances.view().gap(model.position[i]).distance;
       if (depth > found.depth) found = {depth, i, other};
@@ -199,6 +190,23 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
     if (!(supports[b].most > 0)) continue;  // it touches nothing
     model.body_contact.distances[b] = distances_of(scene.bodies[b], surface_of(b), supports[b]);
   }
+}
+
+std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
+                                                   std::span<const Box> boxes) {
+  std::vector<std::vector<Index>> partners(boxes.size());
+  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
+    const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
+    if (!contact.distances[a] || !contact.distances[b] || !contact.law_of(first, second)) return;
+    partners[a].push_back(second);
+    partners[b].push_back(first);
+  });
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    const auto itself = static_cast<Index>(b);
+    if (contact.distances[b] && contact.law_of(itself, itself)) partners[b].push_back(itself);
+    std::sort(partners[b].begin(), partners[b].end());
+  }
+  return partners;
 }
 
 std::string bodies_overlap_at_start(const Model& model, const Scene& scene) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "model/box.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
@@ -33,6 +34,11 @@ std::vector<LayerSupports> add_body_layer(Model& model, const Scene& scene,
 /// @throws InputError for a surface that is open
 void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSupports> supports,
                        const std::function<Surface(std::size_t body)>& surface_of);
+
+/// The bodies that each body touches if it meets them, by their boxes: ascending, and with the body
+/// itself if its parts touch each other.
+std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
+                                                   std::span<const Box> boxes);
 
 /// The error of a model whose bodies are to touch but overlap at the start. Empty if none do. Of a
 /// share: collective, and empty on all ranks but one.

@@ -10,7 +10,7 @@
 #include "mesh/face_relaxation.hpp"
 #include "model/assembly.hpp"
 #include "model/body_contact.hpp"
-#include "model/box.hpp"
+#include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
 #include "model/symmetry.hpp"
@@ -53,11 +53,7 @@ std::pair<Index, double> nearest_in(const Model& model, const Part& part, Vec3d 
   const auto count = static_cast<std::size_t>(part.owned_end()) - first;
   if (count == 0) return {0, HUGE_VAL};
   const Box box = box_around(std::span(model.position).subspan(first, count));
-  const auto is_between = [](double low, double x, double high) { return low <= x && x <= high; };
-  if (!is_between(box.low.x, point.x, box.high.x) || !is_between(box.low.y, point.y, box.high.y) ||
-      !is_between(box.low.z, point.z, box.high.z)) {
-    return {0, HUGE_VAL};
-  }
+  if (!contains(box, point)) return {0, HUGE_VAL};
   std::pair<Index, double> nearest{0, HUGE_VAL};
   for (Index i = part.begin; i < part.owned_end(); ++i) {
     const double distance = norm(model.position[i] - point);
@@ -92,9 +88,8 @@ Deepest deepest_of(const Model& model) {
 /// Finds the distances from the surface of a mesh, as finely as phyxels are spaced.
 /// @param support the smallest one of phyxels that touch [m]
 void set_field_for(Obstacle& obstacle, double support, std::vector<std::string>& warnings) {
-  constexpr double share_of_support = 0.25;  // about half a spacing
   const double extent = box_around(obstacle.surface->position).extent();
-  const double wanted = std::min(share_of_support * support,
+  const double wanted = std::min(nodes_over_support * support,
                                  (support < HUGE_VAL ? std::max(extent, support) : extent) / 32);
   const double made = obstacle.set_field(wanted, support < HUGE_VAL ? support : 0);
   if (made <= 1.01 * wanted) return;

@@ -42,11 +42,11 @@ void BodyContacts::look(std::span<const SurfaceState> states, double dt) {
   for (std::size_t k = 0; k < layer.size(); ++k) {
     now[k] = model_.position[layer[k]] + states[k].displacement;
     fastest = std::max(fastest, norm(states[k].velocity));
-    if (!watch_.positions().empty()) moved = std::max(moved, norm(now[k] - watch_.positions()[k]));
+    if (!found_at_.empty()) moved = std::max(moved, norm(now[k] - found_at_[k]));
   }
   if (!watch_.look(model_, moved, fastest, points_.skin(), dt)) return;
-  watch_.found(std::move(now));
-  points_.find(watch_.positions(), dt);
+  found_at_ = std::move(now);
+  points_.find(found_at_, dt);
   motion_.assign(points_.sites().size(), {});
 }
 
@@ -135,7 +135,7 @@ std::size_t BodyContacts::bytes() const {
     if (of_body) distances += of_body->bytes();
   }
   return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) +
-         watch_.positions().size() * sizeof(Vec3d) +
+         found_at_.size() * sizeof(Vec3d) +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceForce)) +
          carries_.size() * sizeof(SurfaceShare) + forces_.size() * sizeof(PointForces);

@@ -28,8 +28,6 @@ class TouchingPoints {
   /// Finds them anew from places. Of a share: collective. @param dt size of the step [s]
   void find(std::span<const Vec3d> position, double dt);
 
-  /// Of the layer of this rank, shape [layer]: range [m].
-  std::span<const double> ranges() const { return range_; }
   /// Twice the distance by which phyxels may move before they have to be found anew [m].
   double skin() const { return skin_; }
 
@@ -55,7 +53,6 @@ class TouchingPoints {
   void invert();
 
   const Model& model_;
-  std::vector<double> range_;
   std::vector<SurfaceSite> layer_;  // with 1 along free axes and 0 along others as mobility
   double skin_ = 0;
   std::vector<Index> own_;
@@ -76,19 +73,15 @@ class ContactWatch {
   explicit ContactWatch(int rarest) : rarest_(rarest) {}
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
-  /// Returns true if points have to be found anew, at places that `found` then tells. Of a share:
-  /// collective. @param moved how far the phyxels of the layer are from those places [m]
+  /// Returns true if points have to be found anew. Of a share: collective.
+  /// @param moved how far the phyxels of the layer have moved since the last time [m]
   /// @param fastest their largest speed [m/s]
   bool look(const Model& model, double moved, double fastest, double skin, double dt);
-  void found(std::vector<Vec3d> positions) { positions_ = std::move(positions); }
-  /// Where the phyxels of the layer were then [m]; none before.
-  const std::vector<Vec3d>& positions() const { return positions_; }
-  /// How often that was.
+  /// How often they had to be.
   std::int64_t generation() const { return generation_; }
 
  private:
   int rarest_;
-  std::vector<Vec3d> positions_;
   std::int64_t generation_ = 0;
   double dt_ = 0;  // [s]
   int left_ = 0;   // steps until the next look
@@ -102,6 +95,8 @@ class BodyContacts {
 
   /// True if bodies touch each other.
   bool acts() const { return model_.body_contact.acts(); }
+  /// True if points of any rank may touch in this step.
+  bool any() const { return points_.any(); }
 
   /// Prepares for a step. Of a share: collective.
   /// @param state_of returns the state of a phyxel
@@ -138,8 +133,9 @@ class BodyContacts {
     for (int sweep = 0; sweep < model_.body_contact.sweeps; ++sweep) {
       place(get);
       find_forces();
+      const ContactPasses passes = this->passes();
       for (std::size_t p = 0; p < count(); ++p) {
-        const Vec3d change = passes().change_by(forces_[p], static_cast<Index>(p));
+        const Vec3d change = passes.change_by(forces_[p], static_cast<Index>(p));
         if (change != Vec3d{}) {
           const SurfaceState state = get(phyxel(p));
           set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
@@ -199,7 +195,8 @@ class BodyContacts {
   std::vector<double> shares_;            // c of each point
   std::vector<PointForces> forces_;       // on this rank's points
   ContactWatch watch_{1};
-  double dt_ = 0;  // [s]
+  std::vector<Vec3d> found_at_;  // places of the layer when points were found [m]
+  double dt_ = 0;                // [s]
 };
 
 }  // namespace phyxel

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
@@ -70,12 +71,12 @@ class Neighbours {
 }  // namespace
 
 std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
-                                 std::span<const double> range, double skin) {
+                                 std::span<const SurfaceSite> sites, double skin) {
   const BodyContact& contact = model.body_contact;
   std::vector<Box> boxes(contact.distances.size(), nowhere);
   for (std::size_t k = 0; k < position.size(); ++k) {
     Box& box = boxes[part_of(model, contact.layer.phyxels[k]).body];
-    box = together(box, grown({position[k], position[k]}, range[k] + 0.5 * skin));
+    box = together(box, grown({position[k], position[k]}, sites[k].range + 0.5 * skin));
   }
   if (!model.share) return boxes;
   const Communicator& ranks = *model.share->communicator;
@@ -85,23 +86,6 @@ std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> posi
     for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = together(boxes[b], some[b]);
   }
   return boxes;
-}
-
-std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
-                                                   std::span<const Box> boxes) {
-  std::vector<std::vector<Index>> partners(boxes.size());
-  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
-    const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
-    if (!contact.distances[a] || !contact.distances[b] || !contact.law_of(first, second)) return;
-    partners[a].push_back(second);
-    partners[b].push_back(first);
-  });
-  for (std::size_t b = 0; b < boxes.size(); ++b) {
-    const auto itself = static_cast<Index>(b);
-    if (contact.distances[b] && contact.law_of(itself, itself)) partners[b].push_back(itself);
-    std::sort(partners[b].begin(), partners[b].end());
-  }
-  return partners;
 }
 
 ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,

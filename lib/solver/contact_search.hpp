@@ -29,13 +29,9 @@ struct ContactRows {
 /// The boxes of the layer's phyxels of each body, grown by their ranges and half a
 /// skin: bodies whose boxes do not overlap are out of each other's range. Of a share: collective.
 /// @param position of each phyxel of the layer [m]
-/// @param range of each [m]
+/// @param sites of each
 std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
-                                 std::span<const double> range, double skin);
-
-/// The bodies that each body may touch soon, ascending.
-std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
-                                                   std::span<const Box> boxes);
+                                 std::span<const SurfaceSite> sites, double skin);
 
 /// Finds the rows of points with phyxels of other bodies' surfaces within the common range and a
 /// skin. @param points ascending by their ids

@@ -61,9 +61,9 @@ NextStep next_step(const Model& model, Backend& backend, const SupportInstant& n
     const auto of = [](const State& s) {
       return [&s](Index i) { return SurfaceState{s.displacement[i], s.velocity[i]}; };
     };
-    std::vector<Mat3d> gradient;
-    backend.displacement_gradients(gradient);
     bodies.begin_step(now.dt, of(state));
+    std::vector<Mat3d> gradient;
+    if (bodies.any()) backend.displacement_gradients(gradient);
     for (std::size_t p = 0; p < bodies.count(); ++p) {
       bodies.set_gradient(p, gradient[bodies.phyxel(p)]);
     }

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "mesh/distance_field.hpp"
+#include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
 #include "phyxel/physics/verlet.hpp"
@@ -67,17 +68,17 @@ TouchingPoints::TouchingPoints(const Model& model) : model_(model) {
   if (!model.body_contact.acts()) return;
   double least = HUGE_VAL;
   for (const Index i : layer.phyxels) {
-    range_.push_back(model.neighbourhood.support[i]);
-    least = std::min(least, range_.back());
+    least = std::min(least, model.neighbourhood.support[i]);
   }
   const std::vector<Vec3d> free = free_axes(model);
   for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
     const Index i = layer.phyxels[k];
+    const double range = model.neighbourhood.support[i];
     SurfaceSite site{.rest = model.position[i],
                      .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
-                     .area = model.volume[i] / range_[k],
+                     .area = model.volume[i] / range,
                      .offset = layer.offset[k],
-                     .range = range_[k]};
+                     .range = range};
     look_around(site, model.body_contact.distances[part_of(model, i).body]->view());
     layer_.push_back(site);
   }
@@ -88,14 +89,14 @@ TouchingPoints::TouchingPoints(const Model& model) : model_(model) {
 std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> position,
                                                          double dt) const {
   const BodyContact& contact = model_.body_contact;
-  const std::vector<Box> boxes = boxes_of_bodies(model_, position, range_, skin_);
+  const std::vector<Box> boxes = boxes_of_bodies(model_, position, layer_, skin_);
   const std::vector<std::vector<Index>> partners = partners_of_bodies(contact, boxes);
   const int rank = model_.share ? model_.share->communicator->rank() : 0;
   std::vector<ContactCandidate> some;
   for (std::size_t k = 0; k < position.size(); ++k) {
     const Index i = contact.layer.phyxels[k];
     const Part& part = part_of(model_, i);
-    const Box around = grown({position[k], position[k]}, range_[k] + 0.5 * skin_);
+    const Box around = grown({position[k], position[k]}, layer_[k].range + 0.5 * skin_);
     const std::vector<Index>& others = partners[part.body];
     if (std::none_of(others.begin(), others.end(),
                      [&](Index b) { return overlap(around, boxes[b]); })) {
@@ -171,7 +172,7 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
     rows_.rows.push_back(row);
   }
   if (!ranks) return;
-  std::vector<Index> own_number(range_.size(), -1);
+  std::vector<Index> own_number(layer_.size(), -1);
   for (std::size_t p = 0; p < own_.size(); ++p) own_number[own_[p]] = static_cast<Index>(p);
   send_ = exchanged(*ranks, wanted);
   for (std::vector<Index>& places : send_) {
@@ -207,7 +208,7 @@ void TouchingPoints::refresh(std::vector<SurfaceMotion>& motion) const {
 }
 
 std::size_t TouchingPoints::bytes() const {
-  return range_.size() * sizeof(double) + (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
+  return (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
          rows_.rows.size() * sizeof(ContactRow) +
          (own_.size() + 3 * rows_.near.size() + rows_.rows.size()) * sizeof(Index) +
          (entries_of_.offsets.size() + rows_from_.offsets.size()) * sizeof(Offset);

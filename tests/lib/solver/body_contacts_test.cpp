@@ -117,18 +117,25 @@ Vec3d velocity_of(Way& way, std::size_t part) {
   return sum / mass;
 }
 
-TEST(BodyContacts, LetEqualBarsExchangeTheirVelocities) {
-  Way way(bars(2, 2), 5e-4);
-  const double start = way.energy(), speed_of_sound = 10;
+/// How long the second body is pushed along x, until it is faster than `speed` [m/s]; steps end
+/// `most` [s] after the start.
+double time_of_contact(Way& way, double most, double speed) {
   double begin = 0, ended = 0;
-  while (ended == 0 && way.solver.time() < 1) {
+  while (ended == 0 && way.solver.time() < most) {
     way.solver.step();
     const bool touches = way.contacts()[1].force.x > 0;
     if (touches && begin == 0) begin = way.solver.time();
-    if (begin > 0 && !touches && velocity_of(way, 1).x > 0.09) ended = way.solver.time();
+    if (begin > 0 && !touches && velocity_of(way, 1).x > speed) ended = way.solver.time();
   }
+  return ended - begin;
+}
+
+TEST(BodyContacts, LetEqualBarsExchangeTheirVelocities) {
+  Way way(bars(2, 2), 5e-4);
+  const double start = way.energy(), speed_of_sound = 10;
+  const double duration = time_of_contact(way, 1, 0.09);
   // Goldsmith 1960: 2 L/c. 4 across, the outermost half layer is a part of the length.
-  EXPECT_NEAR((ended - begin) / (2 * 2 / speed_of_sound), 1, 0.03);
+  EXPECT_NEAR(duration / (2 * 2 / speed_of_sound), 1, 0.03);
   EXPECT_NEAR(velocity_of(way, 0).x, 0, 0.003);
   EXPECT_NEAR(velocity_of(way, 1).x, 0.1, 0.003);
   // The layers that meet lose what an inelastic impact of half a layer does.
@@ -153,18 +160,12 @@ std::pair<double, double> impact_of_balls(double spacing) {
           body("left", shape, "translation = [-0.1001, 0, 0]\nvelocity = [0.75, 0, 0]\n", young) +
           body("right", shape, "translation = [0.1001, 0, 0]\nvelocity = [-0.75, 0, 0]\n", young),
       2e-4);
-  double begin = 0, ended = 0;
-  while (ended == 0 && way.solver.time() < 0.5) {
-    way.solver.step();
-    const bool touches = way.contacts()[1].force.x > 0;
-    if (touches && begin == 0) begin = way.solver.time();
-    if (begin > 0 && !touches && velocity_of(way, 1).x > 0) ended = way.solver.time();
-  }
+  const double found = time_of_contact(way, 0.5, 0);
   // Hertz 1882: 2.868 (m*² / (R* E*² V))^(1/5).
   const double stiffness = young / (1 - 0.3 * 0.3) / 2, mass = way.mass() / 4;
   const double duration =
       2.868 * std::pow(mass * mass / (radius / 2 * stiffness * stiffness * speed), 0.2);
-  return {(ended - begin) / duration, (velocity_of(way, 1).x - velocity_of(way, 0).x) / speed};
+  return {found / duration, (velocity_of(way, 1).x - velocity_of(way, 0).x) / speed};
 }
 
 TEST(BodyContacts, OfBallsConvergeToHertz) {

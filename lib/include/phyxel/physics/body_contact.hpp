@@ -20,6 +20,7 @@
 
 #include "phyxel/physics/contact.hpp"
 #include "phyxel/physics/distance_field.hpp"
+#include "phyxel/physics/weight.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -52,32 +53,16 @@ struct SurfaceMotion {
 /// says nothing of where a point would be at rest.
 /// @param gradient of displacement
 PHYXEL_HD Mat3<double> inverse_deformation(const Mat3<double>& gradient) {
-  const auto column = [&](int c) {
-    return Vec3<double>{gradient(0, c) + (c == 0), gradient(1, c) + (c == 1),
-                        gradient(2, c) + (c == 2)};
-  };
-  const Vec3<double> a = column(0), b = column(1), c = column(2);
-  const double volume = dot(a, cross(b, c));
+  const Mat3<double> f = identity<double>() + gradient;
+  const double volume = determinant(f);
   constexpr double least = 1e-3;
-  Mat3<double> inverse{};
-  if (!(volume > least)) {
-    for (int k = 0; k < 3; ++k) inverse(k, k) = 1;
-    return inverse;
-  }
-  const Vec3<double> rows[] = {cross(b, c), cross(c, a), cross(a, b)};
-  for (int r = 0; r < 3; ++r) {
-    inverse(r, 0) = rows[r].x / volume;
-    inverse(r, 1) = rows[r].y / volume;
-    inverse(r, 2) = rows[r].z / volume;
-  }
-  return inverse;
+  return volume > least ? (1 / volume) * transpose(cofactor(f)) : identity<double>();
 }
 
-/// The weight of a phyxel of a surface at a distance from a point, zero from `range` on.
-/// @param square of the distance [m²]
+/// The weight of a phyxel of a surface for a point, zero from `range` on.
+/// @param square of their distance [m²]
 PHYXEL_HD double surface_weight(double square, double range) {
-  const double left = 1 - square / (range * range);
-  return left > 0 ? left * left * left : 0;
+  return weight_shape_anywhere(square, 1 / (range * range));
 }
 
 /// The larger of two ranges, up to which phyxels of two surfaces know of each other [m].
