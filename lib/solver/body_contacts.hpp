@@ -18,8 +18,8 @@ struct SurfaceState {
   Vec3d velocity;      ///< [m/s]
 };
 
-/// The points of surfaces that may touch other bodies soon, and which of them need to know of each
-/// other; those of this rank first, then those of other ranks.
+/// The points of surfaces that may touch other bodies soon, and the lists of neighbours among them.
+/// The points of this rank come first, then the points of other ranks.
 class TouchingPoints {
  public:
   /// @param model must outlive this
@@ -37,7 +37,7 @@ class TouchingPoints {
   std::span<const ContactRow> rows() const { return rows_.rows; }
   std::span<const Index> near() const { return rows_.near; }
   std::span<const Index> row_of_entry() const { return row_of_entry_; }
-  /// For each point, the entries that are it, and the rows of which it is the point, ascending.
+  /// For each point, the entries that name it, and the rows that belong to it, ascending.
   const Csr& entries_of() const { return entries_of_; }
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.

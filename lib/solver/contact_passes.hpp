@@ -28,10 +28,10 @@ struct ContactPasses {
   const ContactRow* row = nullptr;      ///< Shape [rows], as all others of rows.
   const Index* near = nullptr;          ///< Points of each row, in its range: its entries.
   const Index* row_of_entry = nullptr;  ///< Row of each entry.
-  /// Entries that are each point: those from entries_of_start[p] to entries_of_start[p + 1].
+  /// Entries that name each point p: from entries_of_start[p] to entries_of_start[p + 1].
   const Offset* entries_of_start = nullptr;
   const Index* entries_of = nullptr;
-  /// Rows of which it is the point.
+  /// Rows that belong to each point.
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
   const DistanceField* field = nullptr;  ///< Of each body of the scene.

@@ -25,7 +25,7 @@
 
 namespace phyxel {
 
-/// What does not change of a phyxel by which a body touches others.
+/// The constants of a phyxel of a contact layer, between two searches for points that may touch.
 struct SurfaceSite {
   Vec3<double> rest;  ///< X [m]
   /// Change of velocity by a force over a step, along each axis; 0 along prescribed ones [m/s/N].
@@ -38,10 +38,10 @@ struct SurfaceSite {
   double range = 0;   ///< Distance up to which it knows of other surfaces [m].
 };
 
-/// The same phyxel in a step, before contact.
+/// The motion of a phyxel of a contact layer over a step, before contact.
 struct SurfaceMotion {
-  Vec3<double> before;    ///< Where it is at the start of the step [m].
-  Vec3<double> after;     ///< Where it would be at the end [m].
+  Vec3<double> before;    ///< Place at the start of the step [m].
+  Vec3<double> after;     ///< Predicted place at the end of the step [m].
   Vec3<double> velocity;  ///< Over the step [m/s].
   Vec3<double> earlier;   ///< Velocity at the start of the step [m/s].
   Vec3<double> probe;     ///< q - x: F times `inward` [m].
@@ -75,7 +75,8 @@ PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) 
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
 }
 
-/// Sets what follows from a phyxel's gradient of displacement.
+/// Sets the probe, the inverse deformation gradient and the normal of a phyxel.
+/// @param gradient of displacement
 PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
                             const Mat3<double>& gradient) {
   motion.probe = site.inward + gradient * site.inward;

@@ -15,7 +15,7 @@ struct Gap {
   Vec3<double> normal{};  ///< Unit vector outwards, the gradient of the distance.
 };
 
-/// What a kernel knows of a field of distances; whoever made it keeps the arrays. The cells of a
+/// A field of distances, as kernels read it; whoever made it keeps the arrays. The cells of a
 /// coarse grid near the surface are bricks of smaller cells. Within a cell, coarse or fine, the
 /// distance is interpolated along each axis, so that it is exact beside flat faces.
 struct DistanceField {
