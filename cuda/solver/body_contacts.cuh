@@ -13,6 +13,7 @@
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
 #include "solver/passes.cuh"
+#include "solver/thread_group.cuh"
 
 namespace phyxel::cuda {
 
@@ -29,7 +30,8 @@ struct SurfacePlaces {
   const Real* gradients = nullptr;       ///< Of displacement, shape [9, stride].
   std::size_t stride = 0;
   SurfaceMotion* motion = nullptr;
-  PointForces* forces = nullptr;  ///< Of all sweeps of the step.
+  Vec3<double>* velocity = nullptr;  ///< Over the step, so far [m/s].
+  PointForces* forces = nullptr;     ///< Of all sweeps of the step.
   int count = 0;
 };
 
@@ -88,64 +90,71 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
   s.forces[p] = {};
 }
 
-/// Sets where points are at the end of a step. One thread per point.
+/// Sets where points are at the end of a step, before contact. One thread per point.
 template <class Real, class StateReal>
 __global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (p >= s.count) return;
   s.motion[p].after = s.position[p] + displacement_at(f, s.place[p]);
-  s.motion[p].velocity = to<double>(column3(f.velocity, f.places, s.place[p]));
+  s.velocity[p] = to<double>(column3(f.velocity, f.places, s.place[p]));
 }
 
-// One thread per row or point.
-template <class Real>
-__global__ void find_touches(ContactPasses passes, int rows) {
-  const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (r < rows) passes.find_touch(r);
+// One group of threads per row or point.
+static __global__ void find_touches(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_touch(threads, threads.number());
 }
-template <class Real>
-__global__ void find_shares(ContactPasses passes, int points) {
-  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (p < points) passes.find_share(p);
+static __global__ void find_shares(ContactPasses passes, int points) {
+  const ThreadGroup threads;
+  if (threads.number() < points) passes.find_share(threads, threads.number());
 }
-template <class Real>
-__global__ void find_row_forces(ContactPasses passes, int rows) {
-  const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (r < rows) passes.find_force(r);
+static __global__ void find_responses(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_response(threads, threads.number());
+}
+static __global__ void find_row_forces(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_force(threads, threads.number());
 }
 
-/// Moves points by the forces on them. One thread per point.
-/// @param sums of each body; they receive the forces of all sweeps after the last one
+/// Moves points by the forces on them. One group of threads per point.
 template <class Real, class StateReal>
-__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
-                           SumWords sums, bool is_last) {
-  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
+  const ThreadGroup threads;
+  const int p = threads.number();
   if (p >= s.count) return;
-  const PointForces forces = passes.forces_on(p);
-  const Vec3<double> change = passes.change_by(forces, p);
+  const PointForces forces = passes.forces_on(threads, p);
+  if (!threads.is_first()) return;
   PointForces& all = s.forces[p];
   all.normal += forces.normal;
   all.tangential += forces.tangential;
+  const Vec3<double> change = passes.change_by(forces, p);
+  if (change == Vec3<double>{}) return;
   const Index at = s.place[p];
-  Vec3<double> v = to<double>(column3(f.velocity, f.places, at));
-  if (!(change == Vec3<double>{})) {
-    v += change;
-    set_column3(f.velocity, f.places, at, to<StateReal>(v));
-    const Vec3<StateReal> u = to<StateReal>(displacement_at(f, at) + passes.dt * change);
-    if constexpr (!std::is_same_v<Real, StateReal>) set_column3(f.displacement, f.places, at, u);
-    auto record = f.points.get(at);
-    record.u = to<Real>(u);
-    f.points.set(at, record);
-    v = to<double>(to<StateReal>(v));
-  }
-  if (!is_last || all.normal == Vec3<double>{}) return;
-  const Vec3<double> mean = 0.5 * (s.motion[p].earlier + v);
+  const Vec3<StateReal> v = to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change);
+  set_column3(f.velocity, f.places, at, v);
+  const Vec3<StateReal> u = to<StateReal>(displacement_at(f, at) + passes.dt * change);
+  if constexpr (!std::is_same_v<Real, StateReal>) set_column3(f.displacement, f.places, at, u);
+  auto record = f.points.get(at);
+  record.u = to<Real>(u);
+  f.points.set(at, record);
+  s.velocity[p] = to<double>(v);
+}
+
+/// Adds what the forces of all sweeps do to the sums of the bodies. One thread per point.
+template <class Real>
+__global__ void add_contact_terms(SurfacePlaces<Real> s, double dt, SumWords sums) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   ContactTerms terms;
-  terms.set(passes.dt * all.normal, passes.dt * all.tangential, s.motion[p].before - s.centre[p],
-            mean, mean);
-  for (int t = 0; t < ContactTerms::count; ++t) {
-    sums.add(s.body[p] * ContactTerms::count + t, p, terms.value[t]);
+  int first = 0;
+  if (p < s.count) {
+    const PointForces all = s.forces[p];
+    const SurfaceMotion& motion = s.motion[p];
+    const Vec3<double> mean = 0.5 * (motion.earlier + s.velocity[p]);
+    terms.set(dt * all.normal, dt * all.tangential, motion.before - s.centre[p], mean, mean);
+    first = s.body[p] * ContactTerms::count;
   }
+  for (int t = 0; t < ContactTerms::count; ++t) sums.add_of_warp(first + t, p, terms.value[t]);
 }
 
 /// Keeps the bodies of a model out of each other.
@@ -192,16 +201,22 @@ class DeviceBodyContacts {
     if (!acts() || !points_.any()) return;
     const ContactPasses passes = this->passes();
     const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
-    const int sweeps = m_.model().body_contact.sweeps;
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
-      m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
-      if (m_.share()) refresh();
-      launch_few("find_touches", find_touches<Real>, rows, passes);
-      launch_few("find_shares", find_shares<Real>, points, passes);
-      launch_few("find_row_forces", find_row_forces<Real>, rows, passes);
-      m_.launch_each("move_apart", move_apart<Real, StateReal>, count(), m_.fields(), passes,
-                     places(), sums_.pointer(), sweep + 1 == sweeps);
+    m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
+    if (m_.share()) {
+      refresh(motion_);
+      refresh(velocity_);
     }
+    launch_groups("find_touches", find_touches, rows, passes, rows);
+    launch_groups("find_shares", find_shares, points, passes, points);
+    launch_groups("find_responses", find_responses, rows, passes, rows);
+    for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
+      if (sweep > 0 && m_.share()) refresh(velocity_);
+      launch_groups("find_row_forces", find_row_forces, rows, passes, rows);
+      launch_groups("move_apart", move_apart<Real, StateReal>, count(), m_.fields(), passes,
+                    places());
+    }
+    m_.launch_each("add_contact_terms", add_contact_terms<Real>, count(), places(), dt_,
+                   sums_.pointer());
   }
   /// The sums of each body so far (`ContactTerms`). Waits for the steps in progress.
   std::vector<ExactSum> sums() const {
@@ -213,8 +228,9 @@ class DeviceBodyContacts {
     if (!acts()) return 0;
     std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
                         layer_found_.bytes() + sums_.bytes() + site_.bytes() + motion_.bytes() +
-                        rows_.bytes() + near_.bytes() + carries_.bytes() + touch_.bytes() +
-                        force_.bytes() + share_.bytes() + forces_.bytes() + gradients_.bytes();
+                        velocity_.bytes() + response_.bytes() + rows_.bytes() + near_.bytes() +
+                        carries_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
+                        forces_.bytes() + gradients_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -282,16 +298,19 @@ class DeviceBodyContacts {
     gradients_ = {9 * stride(), name};
     site_ = sent_span(points_.sites());
     motion_ = sent(std::vector<SurfaceMotion>(points_.sites().size()), name);
+    velocity_ = sent(std::vector<Vec3<double>>(points_.sites().size()), name);
     rows_ = sent_span(points_.rows());
-    near_ = sent_span(points_.near());
+    near_start_ = sent(points_.near().offsets, name);
+    near_ = sent(points_.near().indices, name);
     row_of_entry_ = sent_span(points_.row_of_entry());
     entries_of_start_ = sent(points_.entries_of().offsets, name);
     entries_of_ = sent(points_.entries_of().indices, name);
     rows_from_start_ = sent(points_.rows_from().offsets, name);
     rows_from_ = sent(points_.rows_from().indices, name);
     touch_ = {points_.rows().size(), name};
+    response_ = {points_.rows().size(), name};
     force_ = {points_.rows().size(), name};
-    carries_ = {points_.near().size(), name};
+    carries_ = {points_.row_of_entry().size(), name};
     share_ = {points_.sites().size(), name};
     forces_ = {places.size(), name};
   }
@@ -300,22 +319,23 @@ class DeviceBodyContacts {
     return sent(std::vector<T>(values.begin(), values.end()), name);
   }
 
-  /// Launches a thread for each of `count` rows or points, a few in each block: there are too few
-  /// to fill a device with large ones, and each takes long.
-  void launch_few(const char* kernel_name, void (*kernel)(ContactPasses, int), int count,
-                  const ContactPasses& passes) const {
-    constexpr unsigned threads = 32;
-    const unsigned blocks = (static_cast<unsigned>(count) + threads - 1) / threads;
+  /// Launches a group of threads for each of `count` rows or points.
+  template <class... Parameters, class... Arguments>
+  void launch_groups(const char* kernel_name, void (*kernel)(Parameters...), int count,
+                     Arguments... arguments) const {
+    constexpr unsigned groups = ThreadGroup::in_block, threads = ThreadGroup::block;
+    const unsigned blocks = (static_cast<unsigned>(count) + groups - 1) / groups;
     if (blocks == 0) return;
-    kernel<<<blocks, threads, 0, m_.stream()>>>(passes, count);
+    kernel<<<blocks, threads, 0, m_.stream()>>>(arguments...);
     m_.launched(kernel_name, blocks, threads);
   }
   /// Gives points of other ranks the values that their owners have, through the host.
-  void refresh() {
+  template <class T>
+  void refresh(DeviceArray<T>& of_points) {
     m_.wait();
-    std::vector<SurfaceMotion> motion = fetched(motion_);
-    points_.refresh(motion);
-    motion_.upload(motion.data());
+    std::vector<T> values = fetched(of_points);
+    points_.refresh(values);
+    of_points.upload(values.data());
   }
 
   SurfacePlaces<Real> places() const {
@@ -328,13 +348,16 @@ class DeviceBodyContacts {
             .gradients = gradients_.data(),
             .stride = stride(),
             .motion = motion_.data(),
+            .velocity = velocity_.data(),
             .forces = forces_.data(),
             .count = count()};
   }
   ContactPasses passes() const {
     return {.site = site_.data(),
             .motion = motion_.data(),
+            .velocity = velocity_.data(),
             .row = rows_.data(),
+            .near_start = near_start_.data(),
             .near = near_.data(),
             .row_of_entry = row_of_entry_.data(),
             .entries_of_start = entries_of_start_.data(),
@@ -343,6 +366,7 @@ class DeviceBodyContacts {
             .rows_from = rows_from_.data(),
             .field = fields_.data(),
             .touch = touch_.data(),
+            .response = response_.data(),
             .force = force_.data(),
             .carries = carries_.data(),
             .share = share_.data(),
@@ -367,11 +391,13 @@ class DeviceBodyContacts {
   // As of `ContactPasses`.
   DeviceArray<SurfaceSite> site_;
   DeviceArray<SurfaceMotion> motion_;
+  DeviceArray<Vec3<double>> velocity_;
   DeviceArray<ContactRow> rows_;
   DeviceArray<Index> near_, row_of_entry_, entries_of_, rows_from_;
-  DeviceArray<Offset> entries_of_start_, rows_from_start_;
+  DeviceArray<Offset> near_start_, entries_of_start_, rows_from_start_;
   DeviceArray<SurfaceShare> carries_;
   DeviceArray<SurfaceTouch> touch_;
+  DeviceArray<SurfaceResponse> response_;
   DeviceArray<SurfaceForce> force_;
   DeviceArray<double> share_;
 };

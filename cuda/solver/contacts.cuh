@@ -31,14 +31,13 @@ __global__ void keep_velocities(Fields<Real, StateReal> f, LayerArrays<StateReal
   if (k < layer.count) layer.before[k] = column3(f.velocity, f.places, layer.place[k]);
 }
 
-/// Moves phyxels that a step has led into an obstacle out of it, and adds to the obstacle's sums.
-/// One thread per phyxel of the layer. @param is_last true of the last obstacle, which leaves the
-/// velocities behind with which the next step starts
+/// Moves a phyxel of the layer out of an obstacle if the step has led it into it.
+/// @param terms receives what is added to the obstacle's sums. @param is_last as of `keep_out`
 template <class Shape, class Real, class StateReal>
-__global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer, Shape shape,
-                         ObstacleStep obstacle, SumWords sums, bool is_last) {
-  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (k >= layer.count) return;
+__device__ void keep_phyxel_out(const Fields<Real, StateReal>& f,
+                                const LayerArrays<StateReal>& layer, const Shape& shape,
+                                const ObstacleStep& obstacle, int k, bool is_last,
+                                ContactTerms& terms) {
   const Index at = layer.place[k];
   auto record = f.points.get(at);
   Vec3<StateReal> displacement;
@@ -55,7 +54,6 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
   TouchingPoint point{layer.position[k] + u, v,
                       to<double>(before),    {free(0), free(1), free(2)},
                       layer.offset[k],       layer.inertia[k]};
-  ContactTerms terms;
   if (!touch(shape, obstacle, point, terms)) return;
   displacement = to<StateReal>(u + obstacle.dt * (point.velocity - v));
   const Vec3<StateReal> changed = to<StateReal>(point.velocity);
@@ -66,7 +64,18 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
   }
   record.u = to<Real>(displacement);
   f.points.set(at, record);
-  for (int s = 0; s < ContactTerms::count; ++s) sums.add(s, k, terms.value[s]);
+}
+
+/// Moves phyxels that a step has led into an obstacle out of it, and adds to the obstacle's sums.
+/// One thread per phyxel of the layer. @param is_last true of the last obstacle, which leaves the
+/// velocities behind with which the next step starts
+template <class Shape, class Real, class StateReal>
+__global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer, Shape shape,
+                         ObstacleStep obstacle, SumWords sums, bool is_last) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  ContactTerms terms;
+  if (k < layer.count) keep_phyxel_out(f, layer, shape, obstacle, k, is_last, terms);
+  for (int s = 0; s < ContactTerms::count; ++s) sums.add_of_warp(s, k, terms.value[s]);
 }
 
 /// The shape of an obstacle, with what it reads in device memory.

@@ -48,6 +48,7 @@ void BodyContacts::look(std::span<const SurfaceState> states, double dt) {
   found_at_ = std::move(now);
   points_.find(found_at_, dt);
   motion_.assign(points_.sites().size(), {});
+  velocity_.assign(points_.sites().size(), {});
 }
 
 void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {
@@ -61,13 +62,16 @@ int BodyContacts::threads_here() const {
 ContactPasses BodyContacts::passes() {
   const std::size_t rows = points_.rows().size();
   touches_.resize(rows);
+  responses_.resize(rows);
   row_forces_.resize(rows);
-  carries_.resize(points_.near().size());
+  carries_.resize(points_.row_of_entry().size());
   shares_.resize(points_.sites().size());
   return {.site = points_.sites().data(),
           .motion = motion_.data(),
+          .velocity = velocity_.data(),
           .row = points_.rows().data(),
-          .near = points_.near().data(),
+          .near_start = points_.near().offsets.data(),
+          .near = points_.near().indices.data(),
           .row_of_entry = points_.row_of_entry().data(),
           .entries_of_start = points_.entries_of().offsets.data(),
           .entries_of = points_.entries_of().indices.data(),
@@ -75,6 +79,7 @@ ContactPasses BodyContacts::passes() {
           .rows_from = points_.rows_from().indices.data(),
           .field = fields_.data(),
           .touch = touches_.data(),
+          .response = responses_.data(),
           .force = row_forces_.data(),
           .carries = carries_.data(),
           .share = shares_.data(),
@@ -85,7 +90,7 @@ void BodyContacts::find_touches() {
   const ContactPasses passes = this->passes();
   const auto rows = static_cast<Index>(touches_.size());
 #pragma omp parallel for schedule(static) num_threads(threads_here())
-  for (Index r = 0; r < rows; ++r) passes.find_touch(r);
+  for (Index r = 0; r < rows; ++r) passes.find_touch(OneThread{}, r);
 }
 
 void BodyContacts::add_depths(std::vector<double>& deepest) const {
@@ -97,29 +102,38 @@ void BodyContacts::add_depths(std::vector<double>& deepest) const {
   }
 }
 
-void BodyContacts::find_forces() {
-  find_touches();
+void BodyContacts::find_responses() {
   const ContactPasses passes = this->passes();
   const auto rows = static_cast<Index>(touches_.size()),
              points = static_cast<Index>(shares_.size());
+#pragma omp parallel num_threads(threads_here())
+  {
+#pragma omp for schedule(static)
+    for (Index p = 0; p < points; ++p) passes.find_share(OneThread{}, p);
+#pragma omp for schedule(static)
+    for (Index r = 0; r < rows; ++r) passes.find_response(OneThread{}, r);
+  }
+}
+
+void BodyContacts::find_forces() {
+  const ContactPasses passes = this->passes();
+  const auto rows = static_cast<Index>(touches_.size());
   forces_.resize(count());
 #pragma omp parallel num_threads(threads_here())
   {
 #pragma omp for schedule(static)
-    for (Index p = 0; p < points; ++p) passes.find_share(p);
-#pragma omp for schedule(static)
-    for (Index r = 0; r < rows; ++r) passes.find_force(r);
+    for (Index r = 0; r < rows; ++r) passes.find_force(OneThread{}, r);
 #pragma omp for schedule(static)
     for (std::size_t p = 0; p < forces_.size(); ++p) {
-      forces_[p] = passes.forces_on(static_cast<Index>(p));
+      forces_[p] = passes.forces_on(OneThread{}, static_cast<Index>(p));
     }
   }
 }
 
-void BodyContacts::add_to_sums(std::size_t p, const PointForces& forces, Vec3d velocity) {
+void BodyContacts::add_to_sums(std::size_t p, const PointForces& forces) {
   const Index i = phyxel(p);
   const Part& part = part_of(model_, i);
-  const Vec3d mean = 0.5 * (motion_[p].earlier + velocity);
+  const Vec3d mean = 0.5 * (motion_[p].earlier + velocity_[p]);
   ContactTerms terms;
   terms.set(dt_ * forces.normal, dt_ * forces.tangential, motion_[p].before - part.centre, mean,
             mean);
@@ -136,8 +150,8 @@ std::size_t BodyContacts::bytes() const {
   }
   return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) +
          found_at_.size() * sizeof(Vec3d) +
-         motion_.size() * (sizeof(SurfaceMotion) + sizeof(double)) +
-         touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceForce)) +
+         motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
+         touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
          carries_.size() * sizeof(SurfaceShare) + forces_.size() * sizeof(PointForces);
 }
 

@@ -35,15 +35,18 @@ class TouchingPoints {
   std::span<const Index> own() const { return own_; }
   std::span<const SurfaceSite> sites() const { return site_; }
   std::span<const ContactRow> rows() const { return rows_.rows; }
-  std::span<const Index> near() const { return rows_.near; }
+  const Csr& near() const { return rows_.near; }
   std::span<const Index> row_of_entry() const { return row_of_entry_; }
-  /// For each point, the entries that name it, and the rows that belong to it, ascending.
+  /// For each point, the entries that name it, in `contact_threads` lists, and the rows that belong
+  /// to it, ascending.
   const Csr& entries_of() const { return entries_of_; }
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
-  /// Gives the points of other ranks the values that their owners have. Of a share: collective.
-  void refresh(std::vector<SurfaceMotion>& motion) const;
+  /// Gives the points of other ranks the values that their owners have: motions, or vectors. Of a
+  /// share: collective. @param of_points shape [points]
+  template <class T>
+  void refresh(std::vector<T>& of_points) const;
 
   std::size_t bytes() const;
 
@@ -57,6 +60,7 @@ class TouchingPoints {
   double skin_ = 0;
   std::vector<Index> own_;
   std::vector<SurfaceSite> site_;
+  std::vector<Index> id_;  // of each point, in the whole model
   ContactRows rows_;
   std::vector<Index> row_of_entry_;
   Csr entries_of_, rows_from_;
@@ -129,9 +133,12 @@ class BodyContacts {
   template <class Get, class Set>
   void keep_apart(Get&& get, Set&& set) {
     if (!acts() || !points_.any()) return;
+    place(get);
+    find_touches();
+    find_responses();
     std::vector<PointForces> all(count());  // of all sweeps
     for (int sweep = 0; sweep < model_.body_contact.sweeps; ++sweep) {
-      place(get);
+      if (sweep > 0) points_.refresh(velocity_);
       find_forces();
       const ContactPasses passes = this->passes();
       for (std::size_t p = 0; p < count(); ++p) {
@@ -139,13 +146,14 @@ class BodyContacts {
         if (change != Vec3d{}) {
           const SurfaceState state = get(phyxel(p));
           set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
+          velocity_[p] = get(phyxel(p)).velocity;
         }
         all[p].normal += forces_[p].normal;
         all[p].tangential += forces_[p].tangential;
       }
     }
     for (std::size_t p = 0; p < count(); ++p) {
-      if (all[p].normal != Vec3d{}) add_to_sums(p, all[p], get(phyxel(p)).velocity);
+      if (all[p].normal != Vec3d{}) add_to_sums(p, all[p]);
     }
   }
   /// The depth of the deepest phyxel of each body in other bodies [m]. Of a share: that of this
@@ -172,28 +180,32 @@ class BodyContacts {
     for (std::size_t p = 0; p < count(); ++p) {
       const SurfaceState state = get(phyxel(p));
       motion_[p].after = model_.position[phyxel(p)] + state.displacement;
-      motion_[p].velocity = state.velocity;
+      velocity_[p] = state.velocity;
     }
     points_.refresh(motion_);
+    points_.refresh(velocity_);
   }
   void find_touches();
+  void find_responses();
   void find_forces();
   void add_depths(std::vector<double>& deepest) const;
   int threads_here() const;
   ContactPasses passes();
-  void add_to_sums(std::size_t p, const PointForces& forces, Vec3d velocity);
+  void add_to_sums(std::size_t p, const PointForces& forces);
 
   const Model& model_;
   int threads_;
   TouchingPoints points_;
   std::vector<DistanceField> fields_;  // of each body of the scene
   StepSums sums_;
-  std::vector<SurfaceMotion> motion_;     // shape [points]
-  std::vector<SurfaceTouch> touches_;     // shape [rows]
-  std::vector<SurfaceShare> carries_;     // shape [entries]
-  std::vector<SurfaceForce> row_forces_;  // shape [rows]
-  std::vector<double> shares_;            // c of each point
-  std::vector<PointForces> forces_;       // on this rank's points
+  std::vector<SurfaceMotion> motion_;       // shape [points]
+  std::vector<Vec3d> velocity_;             // shape [points]
+  std::vector<SurfaceTouch> touches_;       // shape [rows]
+  std::vector<SurfaceResponse> responses_;  // shape [rows]
+  std::vector<SurfaceShare> carries_;       // shape [entries]
+  std::vector<SurfaceForce> row_forces_;    // shape [rows]
+  std::vector<double> shares_;              // c of each point
+  std::vector<PointForces> forces_;         // on this rank's points
   ContactWatch watch_{1};
   std::vector<Vec3d> found_at_;  // places of the layer when points were found [m]
   double dt_ = 0;                // [s]

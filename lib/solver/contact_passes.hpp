@@ -11,7 +11,6 @@ struct ContactRow {
   Index point = 0;  ///< Number of the point.
   Index body = 0;   ///< The body that it may enter.
   ContactLaw law;
-  Index begin = 0, end = 0;  ///< Range of the phyxels of that body's surface near it.
 };
 
 /// The forces of other bodies on a phyxel in a step [N], along normals and along surfaces.
@@ -21,80 +20,97 @@ struct PointForces {
 };
 
 /// The arrays of the passes. Whoever fills them runs `find_touch` for all rows, `find_share` for
-/// all points, `find_force` for all rows, then `forces_on` for its own points.
+/// all points, and `find_response` for all rows; then, in each sweep, `find_force` for all rows and
+/// `forces_on` for its own points, whose velocities it changes. Each is run by one thread
+/// (`OneThread`) or by a group that shares the work.
 struct ContactPasses {
   const SurfaceSite* site = nullptr;  ///< Shape [points], as all others of points.
   const SurfaceMotion* motion = nullptr;
-  const ContactRow* row = nullptr;      ///< Shape [rows], as all others of rows.
-  const Index* near = nullptr;          ///< Points of each row, in its range: its entries.
-  const Index* row_of_entry = nullptr;  ///< Row of each entry.
-  /// Entries that name each point p: from entries_of_start[p] to entries_of_start[p + 1].
+  const Vec3<double>* velocity = nullptr;  ///< Over the step, so far [m/s].
+  const ContactRow* row = nullptr;         ///< Shape [rows], as all others of rows.
+  /// Entries of each row, the points near it: the parts of its list (`contact_threads`) start at
+  /// near_start.
+  const Offset* near_start = nullptr;
+  const Index* near = nullptr;          ///< Of each entry: its point.
+  const Index* row_of_entry = nullptr;  ///< Of each entry: its row.
+  /// Entries that name each point, in parts, too.
   const Offset* entries_of_start = nullptr;
   const Index* entries_of = nullptr;
-  /// Rows that belong to each point.
+  /// Rows that belong to each point, not in parts.
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
   const DistanceField* field = nullptr;  ///< Of each body of the scene.
   SurfaceTouch* touch = nullptr;         ///< Of each row.
+  SurfaceResponse* response = nullptr;   ///< Of each row.
   SurfaceForce* force = nullptr;         ///< Of each row.
   SurfaceShare* carries = nullptr;       ///< Of each entry.
   double* share = nullptr;               ///< c of each point [m²].
   double dt = 0;                         ///< [s]
 
-  PHYXEL_HD void find_touch(Index r) const {
+  template <class Threads>
+  PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
     const ContactRow& here = row[r];
-    touch[r] = surface_touch(
-        site[here.point], motion[here.point], here.end - here.begin,
-        [&](int k) -> const SurfaceSite& { return site[near[here.begin + k]]; },
-        [&](int k) -> const SurfaceMotion& { return motion[near[here.begin + k]]; },
-        field[here.body], carries + here.begin);
+    const SurfaceTouch found = surface_touch(
+        threads, site[here.point], motion[here.point], entries_of_row(r),
+        [&](Offset e) -> const SurfaceSite& { return site[near[e]]; },
+        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body],
+        carries);
+    if (threads.is_first()) touch[r] = found;
   }
-  PHYXEL_HD void find_share(Index p) const {
-    double sum = 0;
+  template <class Threads>
+  PHYXEL_HD void find_share(const Threads& threads, Index p) const {
+    double area = 0;
+    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p),
+                 [&](Offset k) { area += carries[entries_of[k]].area; });
+    area = threads.sum(area);
+    if (!threads.is_first()) return;
     for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
-      if (touch[rows_from[k]].is_inside) sum += site[p].area;
+      if (touch[rows_from[k]].is_inside) area += site[p].area;
     }
-    for (Offset k = entries_of_start[p]; k < entries_of_start[p + 1]; ++k) {
-      const Index e = entries_of[k];
-      const double part = carries[e].part;
-      if (part != 0) sum += site[row[row_of_entry[e]].point].area * std::fabs(part);
-    }
-    share[p] = sum;
+    share[p] = area;
   }
-  PHYXEL_HD void find_force(Index r) const {
-    force[r] = {};
+  template <class Threads>
+  PHYXEL_HD void find_response(const Threads& threads, Index r) const {
     if (!touch[r].is_inside) return;
     const ContactRow& here = row[r];
-    const SurfaceMotion& point = motion[here.point];
-    Vec3<double> velocity = point.velocity, earlier = point.earlier;
-    for (Index e = here.begin; e < here.end; ++e) {
+    Vec3<double> mobility{}, earlier{};
+    threads.each(entries_of_row(r), [&](Offset e) {
       const double part = carries[e].part;
-      if (part == 0) continue;
-      velocity += -part * motion[near[e]].velocity;
-      earlier += -part * motion[near[e]].earlier;
-    }
-    const auto mobility_along = [&](Vec3<double> d) {
-      double sum = split_mobility(here.point, d);
-      for (Index e = here.begin; e < here.end; ++e) {
-        const double part = carries[e].part;
-        if (part != 0) sum += std::fabs(part) * split_mobility(near[e], d);
-      }
-      return sum / site[here.point].area;
-    };
-    force[r] = surface_force(touch[r], velocity, earlier, here.law, dt, mobility_along);
+      if (part == 0) return;
+      mobility += std::fabs(part) * share[near[e]] * site[near[e]].mobility;
+      earlier += part * motion[near[e]].earlier;
+    });
+    SurfaceResponse found;
+    found.mobility = (1 / site[here.point].area) *
+                     (threads.sum(mobility) + share[here.point] * site[here.point].mobility);
+    found.target = target_velocity(touch[r], relative_velocity(threads, r),
+                                   motion[here.point].earlier - threads.sum(earlier), here.law, dt);
+    if (threads.is_first()) response[r] = found;
   }
-  PHYXEL_HD PointForces forces_on(Index p) const {
-    PointForces sum;
-    for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
-      sum.normal += force[rows_from[k]].normal;
-      sum.tangential += force[rows_from[k]].tangential;
+  template <class Threads>
+  PHYXEL_HD void find_force(const Threads& threads, Index r) const {
+    SurfaceForce found{};
+    if (touch[r].is_inside) {
+      found = surface_force(touch[r], response[r], relative_velocity(threads, r), row[r].law);
     }
-    for (Offset k = entries_of_start[p]; k < entries_of_start[p + 1]; ++k) {
+    if (threads.is_first()) force[r] = found;
+  }
+  template <class Threads>
+  PHYXEL_HD PointForces forces_on(const Threads& threads, Index p) const {
+    PointForces sum;
+    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p), [&](Offset k) {
       const Index e = entries_of[k];
-      if (!(carries[e].weight > 0)) continue;
+      if (!(carries[e].weight > 0)) return;
       const Index r = row_of_entry[e];
-      sum.normal += force[r].normal_reaction(carries[e]);
+      sum.normal += force[r].normal_reaction(touch[r], carries[e]);
       sum.tangential += force[r].tangential_reaction(touch[r], carries[e], motion[p].before);
+    });
+    sum = {threads.sum(sum.normal), threads.sum(sum.tangential)};
+    for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
+      const Index r = rows_from[k];
+      if (!touch[r].is_inside) continue;
+      sum.normal += force[r].push * touch[r].normal;
+      sum.tangential += force[r].tangential;
     }
     return sum;
   }
@@ -105,10 +121,18 @@ struct ContactPasses {
   }
 
  private:
-  /// c d · M d of a point along a direction d.
-  PHYXEL_HD double split_mobility(Index p, Vec3<double> d) const {
-    const Vec3<double> m = site[p].mobility;
-    return share[p] * (d.x * d.x * m.x + d.y * d.y * m.y + d.z * d.z * m.z);
+  PHYXEL_HD const Offset* entries_of_row(Index r) const {
+    return near_start + contact_threads * static_cast<Offset>(r);
+  }
+  /// The velocity of a row's point relative to those that carry it.
+  template <class Threads>
+  PHYXEL_HD Vec3<double> relative_velocity(const Threads& threads, Index r) const {
+    Vec3<double> surface{};
+    threads.each(entries_of_row(r), [&](Offset e) {
+      const double part = carries[e].part;
+      if (part != 0) surface += part * velocity[near[e]];
+    });
+    return velocity[row[r].point] - threads.sum(surface);
   }
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <tuple>
 
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
@@ -22,6 +23,9 @@ Box together(const Box& a, const Box& b) {
       {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
 }
 
+/// The part of a list that a phyxel is in.
+int part_of_list(const ContactCandidate& point) { return point.id % contact_threads; }
+
 /// The phyxels near a point, of bodies that it may touch.
 class Neighbours {
  public:
@@ -33,7 +37,7 @@ class Neighbours {
         hash_(position_, reach(points, skin)),
         reach_(reach(points, skin)) {}
 
-  /// The numbers of the phyxels near a point, ascending within each body, and the bodies ascending.
+  /// The numbers of the phyxels near a point, by bodies, then by their part of a list, ascending.
   std::vector<Index> of(std::size_t p) const {
     const ContactCandidate& point = points_[p];
     std::vector<Index> found;
@@ -48,7 +52,8 @@ class Neighbours {
       if (are_apart) found.push_back(entry.index);
     });
     std::sort(found.begin(), found.end(), [&](Index a, Index b) {
-      return std::pair(points_[a].body, a) < std::pair(points_[b].body, b);
+      return std::tuple(points_[a].body, part_of_list(points_[a]), a) <
+             std::tuple(points_[b].body, part_of_list(points_[b]), b);
     });
     return found;
   }
@@ -69,6 +74,17 @@ class Neighbours {
 };
 
 }  // namespace
+
+Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries) {
+  Csr csr;
+  csr.offsets.assign(lists + 1, 0);
+  for (const auto& [list, value] : entries) ++csr.offsets[static_cast<std::size_t>(list) + 1];
+  for (std::size_t k = 0; k < lists; ++k) csr.offsets[k + 1] += csr.offsets[k];
+  csr.indices.resize(entries.size());
+  std::vector<Offset> next(csr.offsets.begin(), csr.offsets.end() - 1);
+  for (const auto& [list, value] : entries) csr.indices[next[list]++] = value;
+  return csr;
+}
 
 std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
                                  std::span<const SurfaceSite> sites, double skin) {
@@ -91,6 +107,7 @@ std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> posi
 ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,
                       double skin) {
   ContactRows found;
+  std::vector<std::pair<Index, Index>> entries;
   if (points.empty()) return found;
   const Neighbours neighbours(contact, points, skin);
   const std::vector<std::vector<Index>> near =
@@ -103,15 +120,14 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
       const Index body = points[k].body;
       const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
                           found.rows.back().body != body;
-      const auto at = static_cast<Index>(found.near.size());
       if (is_new) {
-        found.rows.push_back(
-            {static_cast<Index>(p), body, *contact.law_of(points[p].body, body), at, at});
+        found.rows.push_back({static_cast<Index>(p), body, *contact.law_of(points[p].body, body)});
       }
-      found.near.push_back(k);
-      found.rows.back().end = at + 1;
+      entries.emplace_back(
+          contact_threads * static_cast<Index>(found.rows.size() - 1) + part_of_list(points[k]), k);
     }
   }
+  found.near = grouped(contact_threads * found.rows.size(), entries);
   return found;
 }
 

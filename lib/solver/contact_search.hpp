@@ -2,10 +2,12 @@
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "model/box.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/neighbourhood.hpp"
 #include "solver/contact_passes.hpp"
 
 namespace phyxel {
@@ -23,8 +25,19 @@ struct ContactCandidate {
 /// Points beside bodies, and the phyxels of surfaces near them.
 struct ContactRows {
   std::vector<ContactRow> rows;  ///< By point, then by body.
-  std::vector<Index> near;       ///< Numbers of points, ascending in each row.
+  /// Numbers of points: for each row, `contact_threads` lists, in each of which they ascend.
+  Csr near;
+
+  /// The points near that of a row.
+  std::span<const Index> near_row(std::size_t r) const {
+    const Offset* start = near.offsets.data() + contact_threads * r;
+    return {near.indices.data() + start[0], near.indices.data() + start[contact_threads]};
+  }
 };
+
+/// Returns lists of numbers, each in the order of the entries. @param entries list and number of
+/// each
+Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries);
 
 /// The boxes of the layer's phyxels of each body, grown by their ranges and half a
 /// skin: bodies whose boxes do not overlap are out of each other's range. Of a share: collective.

@@ -16,30 +16,18 @@ namespace {
 
 constexpr double share_of_range = 0.25;  // of the skin
 
-/// Lists of numbers, as rows of a table. @param list of each entry
-Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries) {
-  Csr csr;
-  csr.offsets.assign(lists + 1, 0);
-  for (const auto& [list, value] : entries) ++csr.offsets[static_cast<std::size_t>(list) + 1];
-  for (std::size_t k = 0; k < lists; ++k) csr.offsets[k + 1] += csr.offsets[k];
-  csr.indices.resize(entries.size());
-  std::vector<Offset> next(csr.offsets.begin(), csr.offsets.end() - 1);
-  for (const auto& [list, value] : entries) csr.indices[next[list]++] = value;
-  return csr;
-}
-
 /// Adds the points of rows that have a chosen one to those. @returns which rows these are
 std::vector<char> spread(const ContactRows& rows, std::vector<char>& chosen) {
   std::vector<char> touched(rows.rows.size());
   const std::vector<char> before = chosen;
   for (std::size_t r = 0; r < rows.rows.size(); ++r) {
-    const ContactRow& row = rows.rows[r];
-    const auto first = rows.near.begin() + row.begin, last = rows.near.begin() + row.end;
-    touched[r] =
-        before[row.point] || std::any_of(first, last, [&](Index k) { return before[k] != 0; });
+    const std::span<const Index> near = rows.near_row(r);
+    const Index point = rows.rows[r].point;
+    touched[r] = before[point] ||
+                 std::any_of(near.begin(), near.end(), [&](Index k) { return before[k] != 0; });
     if (!touched[r]) continue;
-    chosen[row.point] = 1;
-    for (auto k = first; k != last; ++k) chosen[*k] = 1;
+    chosen[point] = 1;
+    for (const Index k : near) chosen[k] = 1;
   }
   return touched;
 }
@@ -134,16 +122,15 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
   const Communicator* ranks = model_.share ? model_.share->communicator : nullptr;
   const int rank = ranks ? ranks->rank() : 0;
   std::vector<char> in_rows(all.size()), chosen(all.size());
-  for (const ContactRow& row : found.rows) {
-    in_rows[row.point] = 1;
-    for (Index k = row.begin; k < row.end; ++k) in_rows[found.near[k]] = 1;
-  }
+  for (const ContactRow& row : found.rows) in_rows[row.point] = 1;
+  for (const Index k : found.near.indices) in_rows[k] = 1;
   for (std::size_t k = 0; k < all.size(); ++k) chosen[k] = in_rows[k] && all[k].rank == rank;
   spread(found, chosen);
   const std::vector<char> kept = spread(found, chosen);
 
   own_.clear();
   site_.clear();
+  id_.clear();
   std::vector<Index> number(all.size(), -1);
   std::vector<std::vector<Index>> wanted(ranks ? static_cast<std::size_t>(ranks->size()) : 0);
   receive_.assign(wanted.size(), {});
@@ -152,6 +139,7 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
       if (!chosen[k] || (all[k].rank == rank) != of_this_rank) continue;
       number[k] = static_cast<Index>(site_.size());
       site_.push_back(all[k].site);
+      id_.push_back(all[k].id);
       if (of_this_rank) {
         own_.push_back(all[k].place);
       } else {
@@ -164,12 +152,13 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
   for (std::size_t r = 0; r < found.rows.size(); ++r) {
     if (!kept[r]) continue;
     ContactRow row = found.rows[r];
-    const auto begin = static_cast<Index>(rows_.near.size());
-    for (Index k = row.begin; k < row.end; ++k) rows_.near.push_back(number[found.near[k]]);
     row.point = number[row.point];
-    row.begin = begin;
-    row.end = static_cast<Index>(rows_.near.size());
     rows_.rows.push_back(row);
+    for (const Index k : found.near_row(r)) rows_.near.indices.push_back(number[k]);
+    const Offset* start = found.near.offsets.data() + contact_threads * r;
+    for (int part = 0; part < contact_threads; ++part) {
+      rows_.near.offsets.push_back(rows_.near.offsets.back() + start[part + 1] - start[part]);
+    }
   }
   if (!ranks) return;
   std::vector<Index> own_number(layer_.size(), -1);
@@ -182,36 +171,43 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
 
 void TouchingPoints::invert() {
   std::vector<std::pair<Index, Index>> of, from;
-  row_of_entry_.resize(rows_.near.size());
+  row_of_entry_.clear();
   for (std::size_t r = 0; r < rows_.rows.size(); ++r) {
-    const ContactRow& row = rows_.rows[r];
-    from.emplace_back(row.point, static_cast<Index>(r));
-    for (Index e = row.begin; e < row.end; ++e) {
-      row_of_entry_[e] = static_cast<Index>(r);
-      of.emplace_back(rows_.near[e], e);
+    const Index point = rows_.rows[r].point;
+    from.emplace_back(point, static_cast<Index>(r));
+    for (const Index k : rows_.near_row(r)) {
+      of.emplace_back(contact_threads * k + id_[point] % contact_threads,
+                      static_cast<Index>(row_of_entry_.size()));
+      row_of_entry_.push_back(static_cast<Index>(r));
     }
   }
-  entries_of_ = grouped(site_.size(), of);
+  entries_of_ = grouped(contact_threads * site_.size(), of);
   rows_from_ = grouped(site_.size(), from);
 }
 
-void TouchingPoints::refresh(std::vector<SurfaceMotion>& motion) const {
+template <class T>
+void TouchingPoints::refresh(std::vector<T>& of_points) const {
   if (!model_.share) return;
-  std::vector<std::vector<SurfaceMotion>> sent(send_.size());
+  std::vector<std::vector<T>> sent(send_.size());
   for (std::size_t r = 0; r < send_.size(); ++r) {
-    for (const Index p : send_[r]) sent[r].push_back(motion[p]);
+    for (const Index p : send_[r]) sent[r].push_back(of_points[p]);
   }
   const auto received = exchanged(*model_.share->communicator, sent);
   for (std::size_t r = 0; r < receive_.size(); ++r) {
-    for (std::size_t k = 0; k < receive_[r].size(); ++k) motion[receive_[r][k]] = received[r][k];
+    for (std::size_t k = 0; k < receive_[r].size(); ++k) {
+      of_points[receive_[r][k]] = received[r][k];
+    }
   }
 }
+template void TouchingPoints::refresh(std::vector<SurfaceMotion>&) const;
+template void TouchingPoints::refresh(std::vector<Vec3d>&) const;
 
 std::size_t TouchingPoints::bytes() const {
   return (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
          rows_.rows.size() * sizeof(ContactRow) +
-         (own_.size() + 3 * rows_.near.size() + rows_.rows.size()) * sizeof(Index) +
-         (entries_of_.offsets.size() + rows_from_.offsets.size()) * sizeof(Offset);
+         (own_.size() + id_.size() + 3 * row_of_entry_.size() + rows_.rows.size()) * sizeof(Index) +
+         (rows_.near.offsets.size() + entries_of_.offsets.size() + rows_from_.offsets.size()) *
+             sizeof(Offset);
 }
 
 }  // namespace phyxel

@@ -302,18 +302,21 @@ TEST(BodyContacts, HoldAStack) {
 }
 
 TEST(BodyContacts, HaveTheSameBitsOnAnyThreadsAndAfterARestart) {
-  const std::string text = meeting_balls("[contact]\nfriction = 0.4\n");
-  Way one(text, dt, Precision::single, 1), three(text, dt, Precision::single, 3);
-  one.solver.step(220);
-  three.solver.step(120);
-  EXPECT_GT(norm(three.contacts()[0].impulse), 0.1);
-  Way resumed(text, dt, Precision::single, 2);
-  Solver next(resumed.model, *resumed.backend, three.solver.state(), Method::verlet);
-  next.step(100);
-  const State expected = one.solver.state(), found = next.state();
-  EXPECT_EQ(expected.displacement, found.displacement);
-  EXPECT_EQ(expected.velocity, found.velocity);
-  EXPECT_EQ(expected.step_sums, found.step_sums);
+  // In double, sums are seen to depend on what else is in lists, which a restart finds anew.
+  for (const Precision precision : {Precision::single, Precision::double_}) {
+    const std::string text = meeting_balls("[contact]\nfriction = 0.4\n");
+    Way one(text, dt, precision, 1), three(text, dt, precision, 3);
+    one.solver.step(220);
+    three.solver.step(120);
+    EXPECT_GT(norm(three.contacts()[0].impulse), 0.1);
+    Way resumed(text, dt, precision, 2);
+    Solver next(resumed.model, *resumed.backend, three.solver.state(), Method::verlet);
+    next.step(100);
+    const State expected = one.solver.state(), found = next.state();
+    EXPECT_EQ(expected.displacement, found.displacement);
+    EXPECT_EQ(expected.velocity, found.velocity);
+    EXPECT_EQ(expected.step_sums, found.step_sums);
+  }
 }
 
 /// A cube of 0.1 m, 4 phyxels across, on its faces.

@@ -40,13 +40,12 @@ struct SurfaceSite {
 
 /// The motion of a phyxel of a contact layer over a step, before contact.
 struct SurfaceMotion {
-  Vec3<double> before;    ///< Place at the start of the step [m].
-  Vec3<double> after;     ///< Predicted place at the end of the step [m].
-  Vec3<double> velocity;  ///< Over the step [m/s].
-  Vec3<double> earlier;   ///< Velocity at the start of the step [m/s].
-  Vec3<double> probe;     ///< q - x: F times `inward` [m].
-  Mat3<double> back;      ///< G: the inverse of its deformation gradient at the start.
-  Vec3<double> out;       ///< Unit normal of its surface; zero if that is unknown.
+  Vec3<double> before;   ///< Place at the start of the step [m].
+  Vec3<double> after;    ///< Predicted place at the end of the step [m].
+  Vec3<double> earlier;  ///< Velocity at the start of the step [m/s].
+  Vec3<double> probe;    ///< q - x: F times `inward` [m].
+  Mat3<double> back;     ///< G: the inverse of its deformation gradient at the start.
+  Vec3<double> out;      ///< Unit normal of its surface; zero if that is unknown.
 };
 
 /// The inverse of a deformation gradient. That of a phyxel without volume is the identity, as it
@@ -86,6 +85,28 @@ PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
   motion.out = length > 0 ? (1 / length) * out : out;
 }
 
+/// Lists of the passes of contact are dealt out among so many threads of a device, by the numbers
+/// that phyxels have in the whole model: sums then do not depend on what else is in a list.
+inline constexpr int contact_threads = 4;
+
+/// The work on a list by one thread. A group of threads of a device may share it instead, each with
+/// one part of the list, all with the same sums.
+struct OneThread {
+  /// Calls each(k) for the entries of this thread's parts of a list.
+  /// @param start of the list's parts, and the end of the last one; shape [contact_threads + 1]
+  template <class Each>
+  PHYXEL_HD void each(const Offset* start, Each&& each) const {
+    for (Offset k = start[0]; k < start[contact_threads]; ++k) each(k);
+  }
+  /// The sum of what the threads have.
+  template <class T>
+  PHYXEL_HD T sum(const T& part) const {
+    return part;
+  }
+  /// True of the thread that writes what all have found.
+  PHYXEL_HD bool is_first() const { return true; }
+};
+
 /// The weight with which a phyxel of a surface carries the force on a point: that of its distance
 /// times its area, as far as it faces the point, so that a uniform pressure is passed on uniformly,
 /// and faces beside the one that is touched carry nothing.
@@ -115,6 +136,7 @@ struct SurfaceTouch {
 struct SurfaceShare {
   double weight = 0;  ///< ω_k, whose sum is 1.
   double part = 0;    ///< r_k = ω_k (1 + T⁺ d · z_k), whose sum is 1, too.
+  double area = 0;    ///< |r_k| times the area of the point [m²].
 };
 
 /// The part of a vector along a surface.
@@ -150,29 +172,31 @@ PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
 
 /// Finds whether a point is inside a body, from the phyxels of the body's surface near it, and how
 /// these carry it.
-/// @param count number of these phyxels
-/// @param site_of,motion_of return those of the k-th
+/// @param threads share the phyxels among them (`OneThread`); all return the same
+/// @param list of these phyxels, as of `OneThread::each`
+/// @param site_of,motion_of return those of an entry of the list
 /// @param field distances from the body's surface at rest
-/// @param shares receive those of the phyxels, shape [count]; all zero if the point is outside
-template <class SiteOf, class MotionOf>
-PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotion& point, int count,
+/// @param shares receive those of the entries; all zero if the point is outside
+template <class Threads, class SiteOf, class MotionOf>
+PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
+                                     const SurfaceMotion& point, const Offset* list,
                                      SiteOf&& site_of, MotionOf&& motion_of,
                                      const DistanceField& field, SurfaceShare* shares) {
   SurfaceTouch touch;
-  for (int k = 0; k < count; ++k) shares[k] = {};
-  const auto square_of = [&](int k) {
+  threads.each(list, [&](Offset k) { shares[k] = {}; });
+  const auto square_of = [&](Offset k) {
     const Vec3<double> apart = motion_of(k).after - point.after;
     return dot(apart, apart);
   };
-  const auto range_of = [&](int k) { return common_range(site.range, site_of(k).range); };
+  const auto range_of = [&](Offset k) { return common_range(site.range, site_of(k).range); };
   Mat3<double> back{};                  // Σ w G
   Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
   double level = 0, weights = 0;        // Σ w φ(X), Σ w
   const Vec3<double> place = point.after + point.probe;
-  for (int k = 0; k < count; ++k) {
+  threads.each(list, [&](Offset k) {
     const SurfaceMotion& other = motion_of(k);
     const double w = facing(point, other) * surface_weight(square_of(k), range_of(k));
-    if (!(w > 0)) continue;
+    if (!(w > 0)) return;
     const Vec3<double> way = place - other.after;
     weights += w;
     back += w * other.back;
@@ -180,18 +204,20 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
     led += w * (other.back * way);
     apart += w * way;
     level += w * site_of(k).level;
-  }
+  });
+  weights = threads.sum(weights);
   if (!(weights > 0)) return touch;
   const double scale = 1 / weights;
-  back = scale * back;
-  const Vec3<double> x = scale * (rest + 0.5 * (led + back * apart));
+  back = scale * threads.sum(back);
+  const Vec3<double> x =
+      scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
   const Gap gap = field.gap(x);
   const Vec3<double> m = transpose(back) * gap.normal;
   const double length = std::sqrt(dot(m, m));
   if (!(length > 0)) return touch;
   touch.normal = (1 / length) * m;
-  touch.gap =
-      (gap.distance - scale * level) / length - dot(touch.normal, point.probe) - site.offset;
+  touch.gap = (gap.distance - scale * threads.sum(level)) / length -
+              dot(touch.normal, point.probe) - site.offset;
   // A surface is touched from outside, and by more than rounding.
   constexpr double rounding = 1e-9;
   if (!(touch.gap < -rounding * site.range) ||
@@ -201,17 +227,18 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
   touch.is_inside = true;
   const Vec3<double> n = touch.normal;
   double carried = 0;
-  for (int k = 0; k < count; ++k) {
+  threads.each(list, [&](Offset k) {
     const double w = carrying_weight(n, square_of(k), range_of(k), site_of(k), motion_of(k));
     shares[k].weight = w;
     carried += w;
     touch.centre += w * (motion_of(k).before - point.before);
-  }
-  touch.centre = (1 / carried) * touch.centre;  // from the point
+  });
+  carried = threads.sum(carried);
+  touch.centre = (1 / carried) * threads.sum(touch.centre);  // from the point
   Sym3<double> spread{};
-  for (int k = 0; k < count; ++k) {
+  threads.each(list, [&](Offset k) {
     const double share = shares[k].weight = shares[k].weight / carried;
-    if (!(share > 0)) continue;
+    if (!(share > 0)) return;
     const Vec3<double> z = along(n, motion_of(k).before - point.before - touch.centre);
     spread.xx += share * z.x * z.x;
     spread.xy += share * z.x * z.y;
@@ -219,29 +246,64 @@ PHYXEL_HD SurfaceTouch surface_touch(const SurfaceSite& site, const SurfaceMotio
     spread.yy += share * z.y * z.y;
     spread.yz += share * z.y * z.z;
     spread.zz += share * z.z * z.z;
-  }
-  touch.inverse_spread = inverse_along(n, spread);
+  });
+  touch.inverse_spread = inverse_along(n, threads.sum(spread));
   const Vec3<double> tilt = touch.inverse_spread * along(n, -touch.centre);
   Vec3<double> reached{};  // Σ r (y - x)
-  for (int k = 0; k < count; ++k) {
-    if (!(shares[k].weight > 0)) continue;
+  threads.each(list, [&](Offset k) {
+    if (!(shares[k].weight > 0)) return;
     const Vec3<double> y = motion_of(k).before - point.before;
     shares[k].part = shares[k].weight * (1 + dot(tilt, y - touch.centre));
+    shares[k].area = std::fabs(shares[k].part) * site.area;
     reached += shares[k].part * y;
-  }
-  touch.height = -dot(n, reached);
+  });
+  touch.height = -dot(n, threads.sum(reached));
   touch.centre += point.before;
   return touch;
 }
 
+/// How a point that is inside a body moves, relative to the surface, by a force on it.
+struct SurfaceResponse {
+  /// Change of the relative velocity by a force over a step, along each axis [m/s/N].
+  Vec3<double> mobility;
+  double target = 0;  ///< Velocity along n̄ that the step shall end with at least [m/s].
+};
+
+/// The change of a velocity along a unit vector by a force along it. @param mobility of each axis
+PHYXEL_HD double mobility_along(Vec3<double> mobility, Vec3<double> way) {
+  return way.x * way.x * mobility.x + way.y * way.y * mobility.y + way.z * way.z * mobility.z;
+}
+
+/// The least velocity along n̄ with which a step shall end, so that it closes the gap and throws
+/// back what has come,
+///
+///   w = max(-g⁻/Δt, n̄ · (v - (1 + e) v⁻)),   g⁻ = g - Δt n̄ · v,
+///
+/// where v is the velocity of the point relative to the surface before contact, v⁻ that at the
+/// start of the step, and e the restitution, which counts for points that approach. Where the point
+/// was inside as the step started, g⁻ < 0, a fifth of it is made good, so that points that come
+/// upon each other deep inside, as at corners, are not flung apart.
+PHYXEL_HD double target_velocity(const SurfaceTouch& touch, Vec3<double> velocity,
+                                 Vec3<double> earlier, const ContactLaw& law, double dt) {
+  const double ahead = dot(touch.normal, velocity), before = touch.gap / dt - ahead;
+  constexpr double recovery = 0.2;
+  const double closing = before < 0 ? -recovery * before : -before;
+  const double approach = -dot(touch.normal, earlier);
+  if (!(law.restitution > 0 && approach > 0)) return closing;
+  const double rebound = ahead + (1 + law.restitution) * approach;
+  return closing < rebound ? rebound : closing;
+}
+
 /// The force of a body on a point in a step [N], and how it acts back.
 struct SurfaceForce {
-  Vec3<double> normal, tangential;  ///< On the point.
-  Vec3<double> twist;               ///< Couples of friction: b = height T⁺ tangential [N/m].
+  double push = 0;          ///< On the point, along n̄ [N].
+  Vec3<double> tangential;  ///< On the point.
+  Vec3<double> twist;       ///< Couples of friction: b = height T⁺ tangential [N/m].
 
   /// The reaction on a phyxel of the body's surface to the normal part.
-  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceShare& share) const {
-    return -share.part * normal;
+  PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch,
+                                         const SurfaceShare& share) const {
+    return -share.part * push * touch.normal;
   }
   /// The reaction to friction, and to its couple. @param y its place as the step starts [m]
   PHYXEL_HD Vec3<double> tangential_reaction(const SurfaceTouch& touch, const SurfaceShare& share,
@@ -251,45 +313,31 @@ struct SurfaceForce {
   }
 };
 
-/// The force that closes a gap over a step, and Coulomb's friction,
+/// The force that gives a point its target velocity w, and Coulomb's friction,
 ///
-///   f = max(-g/Δt, -(1 + e) n̄ · v⁻)/D_n,   f_t = -v_t/|v_t| min(μ f, |v_t|/D_t),
+///   f = (w - n̄ · v)/D_n > 0,   f_t = -v_t/|v_t| min(μ f, |v_t|/D_t),
 ///   D = Σ_i |r_i| c_i d · M_i d / a  along a direction d,
 ///
-/// where v is the velocity of the point relative to the surface, v⁻ that before the step, M_i the
-/// mobility of a phyxel, a the area of the point, and c_i = Σ a |r_i| over all contacts that the
-/// phyxel takes part in: masses are split by areas, so that no gap is closed twice over.
-/// Where the point was inside by g₀ < 0 as the step started, -g₀/(5 Δt) - n̄ · v stands for -g/Δt.
-/// @param mobility returns D along a direction [m/s/N]
-template <class Mobility>
-PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, Vec3<double> velocity,
-                                     Vec3<double> earlier, const ContactLaw& law, double dt,
-                                     Mobility&& mobility) {
+/// where v is the velocity of the point relative to the surface, M_i the mobility of a phyxel, a
+/// the area of the point, and c_i = Σ a |r_i| over all contacts that the phyxel takes part in:
+/// masses are split by areas, so that no gap is closed twice over.
+PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, const SurfaceResponse& response,
+                                     Vec3<double> velocity, const ContactLaw& law) {
   SurfaceForce force{};
   const Vec3<double> n = touch.normal;
-  const double across = mobility(n);
-  if (!(across > 0)) return force;  // nothing is free to move
-  // Points that come upon each other deep inside, as at corners, are not flung apart.
-  const double before = touch.gap / dt - dot(n, velocity);  // gap as the step starts, over Δt
-  constexpr double recovery = 0.2;
-  double rate = before < 0 ? -recovery * before - dot(n, velocity) : -touch.gap / dt;
-  if (!(rate > 0)) return force;
-  const double approach = -dot(n, earlier);
-  if (law.restitution > 0 && approach > 0) {
-    const double rebound = (1 + law.restitution) * approach;
-    rate = rate < rebound ? rebound : rate;
-  }
-  const double push = rate / across;
-  force.normal = push * n;
+  const double across = mobility_along(response.mobility, n);
+  const double rate = response.target - dot(n, velocity);
+  if (!(across > 0 && rate > 0)) return force;  // nothing is free to move, or nothing has to
+  force.push = rate / across;
   if (!(law.static_friction > 0)) return force;
   const Vec3<double> slip = along(n, velocity);
   const double speed = std::sqrt(dot(slip, slip));
   if (!(speed > 0)) return force;
   const Vec3<double> way = (1 / speed) * slip;
-  const double sideways = mobility(way);
+  const double sideways = mobility_along(response.mobility, way);
   if (!(sideways > 0)) return force;
-  const double stop = speed / sideways, hold = law.kinetic_friction * push;
-  const double size = stop <= law.static_friction * push || stop < hold ? stop : hold;
+  const double stop = speed / sideways, hold = law.kinetic_friction * force.push;
+  const double size = stop <= law.static_friction * force.push || stop < hold ? stop : hold;
   force.tangential = -size * way;
   force.twist = touch.height * (touch.inverse_spread * force.tangential);
   return force;
