@@ -34,6 +34,8 @@ class TouchingPoints {
   /// Numbers, in the layer, of this rank's points.
   std::span<const Index> own() const { return own_; }
   std::span<const SurfaceSite> sites() const { return site_; }
+  /// The body that each point belongs to.
+  std::span<const Index> bodies() const { return body_; }
   std::span<const ContactRow> rows() const { return rows_.rows; }
   const Csr& near() const { return rows_.near; }
   std::span<const Index> row_of_entry() const { return row_of_entry_; }
@@ -61,6 +63,7 @@ class TouchingPoints {
   std::vector<Index> own_;
   std::vector<SurfaceSite> site_;
   std::vector<Index> id_;  // of each point, in the whole model
+  std::vector<Index> body_;
   ContactRows rows_;
   std::vector<Index> row_of_entry_;
   Csr entries_of_, rows_from_;

@@ -46,6 +46,8 @@ struct ContactPasses {
   SurfaceShare* carries = nullptr;       ///< Of each entry.
   double* share = nullptr;               ///< c of each point [m²].
   double dt = 0;                         ///< [s]
+  /// As of `surface_touch`. By default a point has to be inside by more than rounding.
+  double reach = -1e-9;
 
   template <class Threads>
   PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
@@ -53,7 +55,7 @@ struct ContactPasses {
     const SurfaceTouch found = surface_touch(
         threads, site[here.point], motion[here.point], entries_of_row(r),
         [&](Offset e) -> const SurfaceSite& { return site[near[e]]; },
-        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body],
+        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body], reach,
         carries);
     if (threads.is_first()) touch[r] = found;
   }

@@ -10,14 +10,6 @@
 #include "solver/boundary_conditions.hpp"
 
 namespace phyxel {
-namespace {
-
-// Times the stiffness of a phyxel against its neighbours. A layer of phyxels on a face, s apart,
-// then is as stiff as a fifth of s of the body.
-constexpr double share_of_stiffness = 40;
-
-}  // namespace
-
 PlacedObstacles obstacles_after(const Model& model, double share) {
   PlacedObstacles placed;
   for (const Obstacle& obstacle : model.obstacles) {
@@ -35,7 +27,7 @@ PlacedObstacles obstacles_over(const Model& model, double time, double span) {
 }
 
 ContactPenalty::ContactPenalty(const Model& model)
-    : model_(model), blocks_(model.contact.phyxels.size()) {
+    : model_(model), blocks_(model.contact.phyxels.size()), bodies_(model) {
   for (const Index i : model.contact.phyxels) {
     const double c = pressure_wave_speed(part_of(model, i).material);
     const double crossings = c / model.neighbourhood.support[i];
@@ -54,19 +46,28 @@ void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, 
   }
 }
 
-void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u) {
+void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u,
+                               const std::function<std::vector<Mat3d>()>& gradient_of_u) {
   std::fill(blocks_.begin(), blocks_.end(), Mat3d{});
   normal_forces_ = 0;
   for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
     blocks_[k] += f.stiffness;
     normal_forces_ += dot(f.force, f.force);
   });
+  if (!bodies_.empty()) bodies_.linearise(u, gradient_of_u());
+  held_.clear();
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    const Mat3d& block = blocks_[k];
+    if (block(0, 0) + block(1, 1) + block(2, 2) > 0) held_[model_.contact.phyxels[k]] = block;
+  }
+  bodies_.for_each_block([&](Index i, const Mat3d& block) { held_[i] += block; });
 }
 
 void ContactPenalty::add(const PlacedObstacles& at, const Vector& u, Vector& force) const {
   for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
     force[model_.contact.phyxels[k]] += f.force;
   });
+  bodies_.add(u, force);
 }
 
 double ContactPenalty::energy(const PlacedObstacles& at, const Vector& u) const {
@@ -74,6 +75,7 @@ double ContactPenalty::energy(const PlacedObstacles& at, const Vector& u) const 
   ExactSum sum;
   for_each_force(
       at, u, [&](std::size_t, std::size_t, const PenaltyForce& f, Vec3d) { sum.add(f.energy); });
+  bodies_.add_energy(u, sum);
   if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
   return sum.value();
 }
@@ -82,6 +84,7 @@ double ContactPenalty::squared_size() const {
   if (empty()) return 0;
   ExactSum sum;
   sum.add(normal_forces_);
+  bodies_.add_squares(sum);
   if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
   return sum.value();
 }
@@ -91,17 +94,16 @@ void ContactPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
     const Index i = model_.contact.phyxels[k];
     out[i] += blocks_[k] * v[i];
   }
+  bodies_.add_stiffness_times(v, out);
 }
 
 void ContactPenalty::precondition(std::span<const double> s, const Vector& free, const Vector& a,
                                   Vector& x) const {
-  for (std::size_t k = 0; k < blocks_.size(); ++k) {
-    if (!(blocks_[k](0, 0) + blocks_[k](1, 1) + blocks_[k](2, 2) > 0)) continue;
-    const Index i = model_.contact.phyxels[k];
+  for (const auto& [i, block] : held_) {
     const double of_axis[] = {free[i].x, free[i].y, free[i].z};
     Eigen::Matrix3d all = s[i] * Eigen::Matrix3d::Identity();
     for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) all(r, c) += of_axis[r] * of_axis[c] * blocks_[k](r, c);
+      for (int c = 0; c < 3; ++c) all(r, c) += of_axis[r] * of_axis[c] * block(r, c);
     }
     const Eigen::Vector3d solved = all.llt().solve(Eigen::Vector3d(a[i].x, a[i].y, a[i].z));
     x[i] = {solved[0], solved[1], solved[2]};
@@ -114,11 +116,12 @@ double ContactPenalty::largest_depth(const PlacedObstacles& at, const Vector& u)
     const double support = model_.neighbourhood.support[model_.contact.phyxels[k]];
     deepest = std::max(deepest, norm(f.force) / (stiffness_[k] * support));
   });
+  deepest = std::max(deepest, bodies_.depths().share);
   return model_.share ? model_.share->communicator->largest(deepest) : deepest;
 }
 
-void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, double time,
-                            std::span<ExactSum> sums) const {
+void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity,
+                            double time, std::span<ExactSum> sums) const {
   for_each_force(at, u, [&](std::size_t, std::size_t o, const PenaltyForce& f, Vec3d x) {
     const ObstacleStep& step = at[o];
     ContactTerms terms;  // an energy loses nothing
@@ -127,6 +130,7 @@ void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, double t
       sums[o * ContactTerms::count + t].add(terms.value[t]);
     }
   });
+  bodies_.add_to(velocity, time, sums.subspan(model_.obstacles.size() * ContactTerms::count));
 }
 
 }  // namespace phyxel

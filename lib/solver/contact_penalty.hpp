@@ -1,12 +1,15 @@
-/// Contact with obstacles in searches by Newton's method.
+/// Contact with obstacles and of bodies in searches by Newton's method.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <span>
 #include <vector>
 
 #include "model/owned_vectors.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/contact_penalty.hpp"
+#include "solver/body_penalty.hpp"
 #include "solver/step_sums.hpp"
 
 namespace phyxel {
@@ -21,7 +24,11 @@ PlacedObstacles obstacles_after(const Model& model, double share);
 /// Returns the obstacles at a time [s], with their velocities over the last `span` [s].
 PlacedObstacles obstacles_over(const Model& model, double time, double span);
 
-/// The contact layer of a model by penalties: forces, their stiffness, and their energy.
+/// Stiffness of penalties, times that of a phyxel against its neighbours. A layer of phyxels on a
+/// face, s apart, then is as stiff as a fifth of s of the body.
+inline constexpr double share_of_stiffness = 40;
+
+/// The contact layers of a model by penalties: forces, their stiffness, and their energy.
 class ContactPenalty {
  public:
   using Vector = OwnedVectors::Vector;
@@ -29,14 +36,22 @@ class ContactPenalty {
   /// @param model must outlive this
   explicit ContactPenalty(const Model& model);
 
-  bool empty() const { return model_.obstacles.empty(); }
-  /// Finds the stiffness at displacements u.
-  void linearise(const PlacedObstacles& at, const Vector& u);
-  /// Adds the forces at displacements u [N].
+  bool empty() const { return model_.obstacles.empty() && bodies_.empty(); }
+  /// Finds the stiffness at displacements u, and how bodies touch there; it stays so until the next
+  /// call. Collective on a share.
+  /// @param gradient_of_u returns the gradients of displacement, for bodies that touch each other
+  void linearise(const PlacedObstacles& at, const Vector& u,
+                 const std::function<std::vector<Mat3d>()>& gradient_of_u);
+  /// Forgets all that depends on earlier searches.
+  void forget() { bodies_.forget(); }
+  /// Replaces the gaps between bodies at u, the displacements of the last `linearise`, by better
+  /// ones to start a step of Newton's method from. @returns true if that changes forces
+  bool mix(const Vector& u) { return bodies_.mix(u); }
+  /// Adds the forces at displacements u [N]. Collective on a share, as all that follow.
   void add(const PlacedObstacles& at, const Vector& u, Vector& force) const;
-  /// The energy at displacements u [J]. Collective on a share.
+  /// The energy at displacements u [J].
   double energy(const PlacedObstacles& at, const Vector& u) const;
-  /// The sum of the squared normal forces of the last `linearise` [N²]. Collective on a share.
+  /// The sum of the squared normal forces of the last `linearise` [N²].
   double squared_size() const;
   /// Adds the stiffness of the last `linearise` times v [N].
   void add_stiffness_times(const Vector& v, Vector& out) const;
@@ -44,13 +59,16 @@ class ContactPenalty {
   /// @param s stiffness of each phyxel [N/m]. @param free 1 along free axes, 0 along others
   void precondition(std::span<const double> s, const Vector& free, const Vector& a,
                     Vector& x) const;
-  /// The depth of the deepest phyxel at displacements u, as a share of its support. Collective on a
-  /// share.
+  /// The depth of the deepest phyxel at displacements u, those of the last `linearise`, as a share
+  /// of its support.
   double largest_depth(const PlacedObstacles& at, const Vector& u) const;
-  /// Adds to the sums of each obstacle what its forces at u do over a time [s] (`ContactTerms`).
-  /// @param sums of the obstacles, one after the other
-  void add_to(const PlacedObstacles& at, const Vector& u, double time,
+  /// Adds to the sums of each obstacle and body what the forces at u, the displacements of the last
+  /// `linearise`, do over a time [s] (`ContactTerms`).
+  /// @param velocity of each phyxel in that time [m/s]
+  /// @param sums of the obstacles, one after the other, and of the bodies
+  void add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity, double time,
               std::span<ExactSum> sums) const;
+  const BodyPenalty& bodies() const { return bodies_; }
 
  private:
   /// Calls each(k, o, force, x) for the phyxels of the layer that are inside an obstacle at u; k
@@ -62,6 +80,8 @@ class ContactPenalty {
   std::vector<double> stiffness_;  // [N/m], shape [layer]
   std::vector<Mat3d> blocks_;      // [N/m], shape [layer]
   double normal_forces_ = 0;       // squared [N²], of this rank
+  BodyPenalty bodies_;
+  std::map<Index, Mat3d> held_;  // stiffness of phyxels in contact against themselves [N/m]
 };
 
 }  // namespace phyxel

@@ -110,13 +110,21 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   }
   backend.download(state);
   const std::span<const ExactSum> known = solver.end_contact();
-  if (!known.empty()) return {StepSums(known.begin(), known.end())};
-  const ContactPenalty penalty(model);
+  ContactRates rates{StepSums(known.begin(), known.end())};
+  if (!known.empty() && !model.body_contact.acts()) return rates;
+  ContactPenalty penalty(model);
   const PlacedObstacles at = solver.method() == Method::equilibrium
                                  ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
                                  : obstacles_over(model, solver.time(), solver.dt());
-  ContactRates rates{StepSums(ContactTerms::count * touching_count(model))};
-  penalty.add_to(at, state.displacement, rates.span, rates.sums);
+  penalty.linearise(at, state.displacement, [&] {
+    std::vector<Mat3d> gradient;
+    backend.displacement_gradients(gradient);
+    return gradient;
+  });
+  rates.depths = penalty.bodies().depths().of_body;
+  if (!known.empty()) return rates;
+  rates.sums.resize(ContactTerms::count * touching_count(model));
+  penalty.add_to(at, state.displacement, state.velocity, rates.span, rates.sums);
   return rates;
 }
 

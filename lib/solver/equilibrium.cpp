@@ -10,6 +10,7 @@
 #include "solver/boundary_conditions.hpp"
 #include "solver/newton.hpp"
 #include "solver/rigid_support.hpp"
+#include "solver/step_sums.hpp"
 
 namespace phyxel {
 namespace {
@@ -74,16 +75,23 @@ int stages_of(const Model& model, const OwnedVectors& vectors) {
   return static_cast<int>(std::clamp(std::max(by_turns, by_way), 1.0, most));
 }
 
-/// Refuses a state in which an obstacle is deeper in a body than pressures push it.
+/// True if the bodies of a model may touch something that holds them.
+bool touches(const Model& model) { return touching_count(model) > 0; }
+
+/// Refuses a state in which an obstacle or a body is deeper in a body than pressures push it.
 void check_depth(const Model& model, const Newton& newton, const Balance& balance,
                  const Newton::Vector& u) {
   constexpr double deepest = 0.25;
   const double depth = newton.contact().largest_depth(balance.obstacles, u);
   if (!(depth > deepest)) return;
   const std::string why = fmt::format(
-      "no equilibrium was found: phyxels are up to {:.2g} supports deep in an obstacle, {:.2g} is "
+      "no equilibrium was found: phyxels are up to {:.2g} supports deep in {}, {:.2g} is "
       "allowed; what presses them is stronger than the body",
-      depth, deepest);
+      depth,
+      model.obstacles.empty()     ? "other bodies"
+      : model.body_contact.acts() ? "an obstacle or other bodies"
+                                  : "an obstacle",
+      deepest);
   if (model.share) throw AgreedError(ExitCode::diverged, why);
   throw DivergedError(why);
 }
@@ -133,7 +141,7 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
       "time "
       "with damping",
       found.steps, found.evaluations, report.why, report.residual, tolerance,
-      model.obstacles.empty() ? "" : ", or it does not touch the obstacle that is to hold it yet");
+      touches(model) ? ", or it does not touch yet what is to hold it" : "");
   if (model.share) throw AgreedError(ExitCode::diverged, why);
   throw DivergedError(why);
 }
@@ -148,7 +156,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   newton.observe(options.observer);
   const OwnedVectors& vectors = newton.vectors();
   Balance balance = whole_balance(model, newton);
-  if (model.obstacles.empty()) refuse_unsupported_bodies(model, balance);  // else they may hold
+  if (!touches(model)) refuse_unsupported_bodies(model, balance);  // else something may hold them
   Equilibrium found;
   backend.set_history_interval(0);
   backend.download(found.state);
@@ -168,7 +176,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     found.steps += report.steps;
     found.evaluations += report.evaluations;
     if (report.found) {
-      if (!model.obstacles.empty()) check_depth(model, newton, balance, found.state.displacement);
+      if (touches(model)) check_depth(model, newton, balance, found.state.displacement);
       continue;
     }
     vectors.refresh_ghosts(found.state.displacement);

@@ -94,8 +94,9 @@ void ImplicitStep::add_support_work(const SupportInstant& now) {
   }
 }
 
-void ImplicitStep::add_contact(const Vector& u, double time, StepSums& sums) const {
-  newton_.contact().add_to(balance_.obstacles, u, time,
+void ImplicitStep::add_contact(const Vector& u, const Vector& v, double time,
+                               StepSums& sums) const {
+  newton_.contact().add_to(balance_.obstacles, u, v, time,
                            std::span(sums).subspan(sums_of_motions(model_)));
 }
 
@@ -127,7 +128,7 @@ void ImplicitStep::take_both_stages(State& state) {
   }
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, u2, v2);
-  add_contact(u2, rest, support_work_);
+  add_contact(u2, v2, rest, support_work_);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
   // step.
   Vector from = vectors.make();
@@ -138,9 +139,9 @@ void ImplicitStep::take_both_stages(State& state) {
   });
   backend_.set_history_interval(dt);
   Vector force = take_stage(end, s, from, u2, v2);
-  add_contact(u2, s, support_work_);
+  add_contact(u2, v2, s, support_work_);
   end_contact_ = no_step_sums(model_);
-  add_contact(u2, 1, end_contact_);
+  add_contact(u2, v2, 1, end_contact_);
   Vector before = vectors.make(), after = vectors.make();
   prescribe_displacements(model_, begin, before);
   prescribe_displacements(model_, end, after);

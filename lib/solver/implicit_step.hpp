@@ -50,7 +50,7 @@ class ImplicitStep {
   /// Adds the work of supports at an instant.
   void add_support_work(const SupportInstant& now);
   /// Adds what contact does over a time [s] at the end of a stage.
-  void add_contact(const Vector& u, double time, StepSums& sums) const;
+  void add_contact(const Vector& u, const Vector& v, double time, StepSums& sums) const;
 
   const Model& model_;
   Backend& backend_;

@@ -69,13 +69,13 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
   double smallest = std::numeric_limits<double>::infinity();
   int without_gain = 0, exhausted = 0;
   find_stiffness(balance);
+  contact_.forget();
   // Forces and energies without contact, whose stiffness is known and needs no differences.
   Vector force = forces_without_contact(balance, u), step = vectors_.make(), next = vectors_.make();
   double plain_energy = potential(balance, u);
   for (;;) {
-    contact_.linearise(balance.obstacles, u);
-    const Vector all = with_contact(balance, u, force);
-    const double energy = plain_energy + contact_.energy(balance.obstacles, u);
+    linearise_contact(balance, u);
+    Vector all = with_contact(balance, u, force);
     report.residual = residual(balance, u, all);
     report.evaluations = evaluations_;
     const double to_move = vectors_.largest(
@@ -87,6 +87,8 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     without_gain = gained ? 0 : without_gain + 1;
     report.why = why_to_end(report, without_gain, exhausted);
     if (!report.why.empty()) return report;
+    if (contact_.mix(u)) all = with_contact(balance, u, force);
+    const double energy = plain_energy + contact_.energy(balance.obstacles, u);
     progress_.step = report.steps;
     progress_.residual = report.residual;
     progress_.energy = energy;
@@ -175,7 +177,20 @@ Newton::Vector Newton::with_contact(const Balance& balance, const Vector& u, Vec
 }
 
 Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
-  return with_contact(balance, u, acting_without_contact(balance, u));
+  Vector force = acting_without_contact(balance, u);
+  linearise_contact(balance, u);
+  return with_contact(balance, u, std::move(force));
+}
+
+/// Call it where the backend has the displacements u.
+void Newton::linearise_contact(const Balance& balance, const Vector& u) {
+  if (contact_.empty()) return;
+  contact_.linearise(balance.obstacles, u, [&] {
+    std::vector<Mat3d> gradient;
+    backend_.displacement_gradients(gradient);
+    ++evaluations_;
+    return gradient;
+  });
 }
 
 /// The sum of all forces at u but those of contact, those of inertia included [N].

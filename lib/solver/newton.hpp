@@ -73,7 +73,7 @@ class Newton {
   Vector inner_forces(const Vector& u);
   /// Returns the sum of internal, applied, following and contact forces [N] at u, without inertia.
   Vector acting_forces(const Balance& balance, const Vector& u);
-  /// Contact with obstacles, as it was when the last search ended.
+  /// Contact with obstacles and of bodies, as it was when the last search ended.
   const ContactPenalty& contact() const { return contact_; }
   const OwnedVectors& vectors() const { return vectors_; }
   /// Sets the forces of gravity, loads and the caller. @param time of loads that grow [s]
@@ -83,6 +83,8 @@ class Newton {
   std::string why_to_end(const NewtonReport& report, int without_gain, int exhausted) const;
   Vector acting_without_contact(const Balance& balance, const Vector& u);
   Vector forces_without_contact(const Balance& balance, const Vector& u);
+  /// Finds how bodies touch obstacles and each other at u.
+  void linearise_contact(const Balance& balance, const Vector& u);
   /// Adds the forces of contact at u to those without.
   Vector with_contact(const Balance& balance, const Vector& u, Vector force) const;
   void put(const Vector& u);

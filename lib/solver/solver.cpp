@@ -66,28 +66,26 @@ void check_times(const State& state) {
   }
 }
 
-/// Refuses friction and restitution of obstacles, and contact of bodies, to methods that know
-/// neither.
+/// Refuses friction and restitution to methods that do not know them.
 void refuse_contact(const Model& model, Method method) {
-  if (model.body_contact.acts()) {
+  const auto check = [&](const ContactLaw& law, const std::string& section,
+                         const std::string& of_what) {
+    const bool rubs = law.static_friction > 0;
+    const double found = rubs ? law.static_friction : law.restitution;
+    if (!(found > 0)) return;
     const std::string why = fmt::format(
-        "[contact] found with solver.method = \"{}\"; allowed with this method: no "
-        "contact of bodies with each other; \"verlet\" has it",
-        method_name(method));
+        "{}.{} = {:g}{} found with solver.method = \"{}\"; allowed with this method: 0", section,
+        rubs ? "friction" : "restitution", found, of_what, method_name(method));
     if (model.share) throw AgreedError(ExitCode::bad_input, why);
     throw InputError(why);
-  }
+  };
   for (const Obstacle& obstacle : model.obstacles) {
-    const bool rubs = obstacle.law.static_friction > 0;
-    const double found = rubs ? obstacle.law.static_friction : obstacle.law.restitution;
-    if (!(found > 0)) continue;
-    const std::string why = fmt::format(
-        "obstacle.{} = {:g} of obstacle \"{}\" found with solver.method = \"{}\"; allowed with "
-        "this "
-        "method: 0",
-        rubs ? "friction" : "restitution", found, obstacle.name, method_name(method));
-    if (model.share) throw AgreedError(ExitCode::bad_input, why);
-    throw InputError(why);
+    check(obstacle.law, "obstacle", fmt::format(" of obstacle \"{}\"", obstacle.name));
+  }
+  if (!model.body_contact.acts()) return;
+  check(model.body_contact.law, "contact", "");
+  for (const BodyContact::Pair& pair : model.body_contact.pairs) {
+    check(pair.law, "contact.pair", "");
   }
 }
 

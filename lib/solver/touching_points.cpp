@@ -131,6 +131,7 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
   own_.clear();
   site_.clear();
   id_.clear();
+  body_.clear();
   std::vector<Index> number(all.size(), -1);
   std::vector<std::vector<Index>> wanted(ranks ? static_cast<std::size_t>(ranks->size()) : 0);
   receive_.assign(wanted.size(), {});
@@ -140,6 +141,7 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
       number[k] = static_cast<Index>(site_.size());
       site_.push_back(all[k].site);
       id_.push_back(all[k].id);
+      body_.push_back(all[k].body);
       if (of_this_rank) {
         own_.push_back(all[k].place);
       } else {
@@ -205,7 +207,8 @@ template void TouchingPoints::refresh(std::vector<Vec3d>&) const;
 std::size_t TouchingPoints::bytes() const {
   return (layer_.size() + site_.size()) * sizeof(SurfaceSite) +
          rows_.rows.size() * sizeof(ContactRow) +
-         (own_.size() + id_.size() + 3 * row_of_entry_.size() + rows_.rows.size()) * sizeof(Index) +
+         (own_.size() + 2 * id_.size() + 3 * row_of_entry_.size() + rows_.rows.size()) *
+             sizeof(Index) +
          (rows_.near.offsets.size() + entries_of_.offsets.size() + rows_from_.offsets.size()) *
              sizeof(Offset);
 }

@@ -1,6 +1,8 @@
 /// Scenes of bodies that touch something, and what tests ask of them on their way.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,6 +55,14 @@ struct Way {
   std::unique_ptr<Backend> backend;
   Solver solver;
 };
+
+/// A body of a shape, with more keys.
+inline std::string body(const std::string& name, const std::string& shape, const std::string& more,
+                        double young = 1e5, double poisson = 0.3) {
+  return fmt::format(
+      "[[body]]\nname = '{}'\n{}{}[body.material]\nyoung = {}\npoisson = {}\ndensity = 1000\n",
+      name, shape, more, young, poisson);
+}
 
 /// A block of 5 x 5 x 5 phyxels on its faces, 0.2 m wide, 8 kg.
 inline std::string block(const std::string& more = "") {

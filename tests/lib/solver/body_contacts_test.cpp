@@ -15,13 +15,6 @@ namespace {
 
 const std::string touching = "[contact]\n";
 
-std::string body(const std::string& name, const std::string& shape, const std::string& more,
-                 double young = 1e5, double poisson = 0.3) {
-  return fmt::format(
-      "[[body]]\nname = '{}'\n{}{}[body.material]\nyoung = {}\npoisson = {}\ndensity = 1000\n",
-      name, shape, more, young, poisson);
-}
-
 const std::string ball_shape = "shape = 'sphere'\nradius = 0.1\nspacing = 0.03\n";
 
 /// Two balls that meet off their line of centres, spinning.

@@ -124,7 +124,7 @@ PHYXEL_HD double carrying_weight(Vec3<double> normal, double square, double rang
 /// A point that is inside a body at the end of a step.
 struct SurfaceTouch {
   bool is_inside = false;
-  double gap = 0;               ///< g - offset, negative [m].
+  double gap = 0;               ///< g - offset [m].
   Vec3<double> normal;          ///< n̄, away from the body.
   Vec3<double> centre;          ///< Mean place of those that carry it, as the step starts [m].
   double height = 0;            ///< n̄ · (x - Σ r_k y_k) at the start of the step [m].
@@ -176,12 +176,14 @@ PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
 /// @param list of these phyxels, as of `OneThread::each`
 /// @param site_of,motion_of return those of an entry of the list
 /// @param field distances from the body's surface at rest
+/// @param reach gap below which the point counts as inside, as a share of its range
 /// @param shares receive those of the entries; all zero if the point is outside
 template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
                                      const SurfaceMotion& point, const Offset* list,
                                      SiteOf&& site_of, MotionOf&& motion_of,
-                                     const DistanceField& field, SurfaceShare* shares) {
+                                     const DistanceField& field, double reach,
+                                     SurfaceShare* shares) {
   SurfaceTouch touch;
   threads.each(list, [&](Offset k) { shares[k] = {}; });
   const auto square_of = [&](Offset k) {
@@ -218,9 +220,8 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   touch.normal = (1 / length) * m;
   touch.gap = (gap.distance - scale * threads.sum(level)) / length -
               dot(touch.normal, point.probe) - site.offset;
-  // A surface is touched from outside, and by more than rounding.
-  constexpr double rounding = 1e-9;
-  if (!(touch.gap < -rounding * site.range) ||
+  // A surface is touched from outside.
+  if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
     return touch;
   }

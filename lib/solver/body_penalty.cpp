@@ -1,0 +1,278 @@
+#include "solver/body_penalty.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/distance_field.hpp"
+#include "model/parts.hpp"
+#include "phyxel/diagnostics.hpp"
+#include "rank_sums.hpp"
+#include "solver/contact_penalty.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr double reach = 0.25;           // gap of points that may touch before the next `linearise`
+constexpr double rounding_reach = 1e-6;  // gap up to which a point counts as held
+
+double harmonic_mean(double a, double b) { return 2 * a * b / (a + b); }
+
+}  // namespace
+
+BodyPenalty::BodyPenalty(const Model& model)
+    : model_(model), points_(model), modulus_(model.body_contact.distances.size()) {
+  if (empty()) return;
+  for (const auto& distances : model.body_contact.distances) {
+    fields_.push_back(distances ? distances->view() : DistanceField{});
+  }
+  for (const Part& part : model.parts) {
+    const double c = pressure_wave_speed(part.material);
+    modulus_[part.body] = part.material.density * c * c;
+  }
+}
+
+void BodyPenalty::find_points(const Vector& u) {
+  const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
+  std::vector<Vec3d> now(layer.size());
+  double moved = found_at_.empty() ? HUGE_VAL : 0;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    now[k] = model_.position[layer[k]] + u[layer[k]];
+    if (!found_at_.empty()) moved = std::max(moved, norm(now[k] - found_at_[k]));
+  }
+  if (model_.share) moved = model_.share->communicator->largest(moved);
+  if (moved <= 0.5 * points_.skin()) return;
+  found_at_ = std::move(now);
+  points_.find(found_at_, 1);
+  expected_.clear();
+  mixing_.forget();
+  shaped_at_.clear();
+}
+
+/// Finds gaps anew, and normals and shares if points have moved far enough. These jump where a
+/// point passes an edge, so that a search that asked for them at each step would not come to an
+/// end.
+void BodyPenalty::find_touches() {
+  std::vector<SurfaceTouch> touches(points_.rows().size());
+  std::vector<SurfaceShare> carries(points_.row_of_entry().size());
+  const ContactPasses passes{.site = points_.sites().data(),
+                             .motion = motion_.data(),
+                             .row = points_.rows().data(),
+                             .near_start = points_.near().offsets.data(),
+                             .near = points_.near().indices.data(),
+                             .field = fields_.data(),
+                             .touch = touches.data(),
+                             .carries = carries.data(),
+                             .reach = reach};
+  for (std::size_t r = 0; r < touches.size(); ++r) {
+    passes.find_touch(OneThread{}, static_cast<Index>(r));
+  }
+  double moved = shaped_at_.empty() ? HUGE_VAL : 0;  // as a share of ranges
+  for (std::size_t p = 0; p < shaped_at_.size(); ++p) {
+    moved = std::max(moved, norm(motion_[p].after - shaped_at_[p]) / points_.sites()[p].range);
+  }
+  if (model_.share) moved = model_.share->communicator->largest(moved);
+  constexpr double far = 0.01;
+  if (moved <= far) {
+    for (std::size_t r = 0; r < touches.size(); ++r) {
+      if (touches[r].normal != Vec3d{}) touches_[r].gap = touches[r].gap;
+    }
+    return;
+  }
+  touches_ = std::move(touches);
+  carries_ = std::move(carries);
+  shaped_at_.clear();
+  for (std::size_t p = 0; p < count(); ++p) shaped_at_.push_back(motion_[p].after);
+}
+
+void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient) {
+  if (empty()) return;
+  if (!found_at_.empty()) expected_ = gaps(u);
+  find_points(u);
+  const std::size_t points = points_.sites().size(), rows = points_.rows().size();
+  motion_.assign(points, {});
+  for (std::size_t p = 0; p < count(); ++p) {
+    const Index i = phyxel(p);
+    motion_[p].before = motion_[p].after = model_.position[i] + u[i];
+    set_gradient(motion_[p], points_.sites()[p], gradient[i]);
+  }
+  points_.refresh(motion_);
+  start_ = of_points(u);
+  find_touches();
+  stiffness_.resize(rows);
+  for (std::size_t r = 0; r < rows; ++r) {
+    const ContactRow& row = points_.rows()[r];
+    const SurfaceSite& site = points_.sites()[row.point];
+    const double modulus = harmonic_mean(modulus_[points_.bodies()[row.point]], modulus_[row.body]);
+    stiffness_[r] = share_of_stiffness * modulus * site.area / site.range;
+  }
+  gap_.resize(rows);
+  for (std::size_t r = 0; r < rows; ++r) gap_[r] = touches_[r].gap;
+  find_blocks();
+}
+
+bool BodyPenalty::mix(const Vector& u) {
+  if (empty() || expected_.size() != gap_.size()) return false;
+  // The unknowns are what the gaps would be without displacements.
+  const std::vector<Vec3d> moved = of_points(u);
+  std::vector<double> way(gap_.size()), x(gap_.size()), f(gap_.size());
+  for (std::size_t r = 0; r < gap_.size(); ++r) {
+    if (!touches_[r].is_inside) continue;
+    way[r] = along_normal(r, moved);
+    x[r] = expected_[r] - way[r];
+    f[r] = gap_[r] - expected_[r];
+  }
+  const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    ExactSum sum;
+    for (std::size_t r = 0; r < a.size(); ++r) {
+      if (points_.rows()[r].point < static_cast<Index>(count())) sum.add(a[r] * b[r]);
+    }
+    if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
+    return sum.value();
+  };
+  const std::vector<double> next = mixing_.next(x, f, product);
+  for (std::size_t r = 0; r < gap_.size(); ++r) {
+    if (touches_[r].is_inside) gap_[r] = next[r] + way[r];
+  }
+  find_blocks();
+  return true;
+}
+
+std::vector<Vec3d> BodyPenalty::of_points(const Vector& of_phyxels) const {
+  std::vector<Vec3d> all(points_.sites().size());
+  for (std::size_t p = 0; p < count(); ++p) all[p] = of_phyxels[phyxel(p)];
+  points_.refresh(all);
+  return all;
+}
+
+double BodyPenalty::along_normal(std::size_t r, const std::vector<Vec3d>& of_points) const {
+  const Offset* start = points_.near().offsets.data() + contact_threads * r;
+  Vec3d apart = of_points[points_.rows()[r].point];
+  for (Offset e = start[0]; e < start[contact_threads]; ++e) {
+    apart += -carries_[e].part * of_points[points_.near().indices[e]];
+  }
+  return dot(touches_[r].normal, apart);
+}
+
+std::vector<Vec3d> BodyPenalty::spread(const std::vector<double>& push) const {
+  std::vector<Vec3d> force(count());
+  const Csr &from = points_.rows_from(), &of = points_.entries_of();
+  for (std::size_t p = 0; p < count(); ++p) {
+    for (Offset k = from.offsets[p]; k < from.offsets[p + 1]; ++k) {
+      const Index r = from.indices[k];
+      force[p] += push[r] * touches_[r].normal;
+    }
+    const Offset* start = of.offsets.data() + contact_threads * p;
+    for (Offset k = start[0]; k < start[contact_threads]; ++k) {
+      const Index e = of.indices[k], r = points_.row_of_entry()[e];
+      force[p] += -carries_[e].part * push[r] * touches_[r].normal;
+    }
+  }
+  return force;
+}
+
+std::vector<double> BodyPenalty::gaps(const Vector& u) const {
+  std::vector<Vec3d> moved = of_points(u);
+  for (std::size_t p = 0; p < start_.size(); ++p) moved[p] = moved[p] - start_[p];
+  std::vector<double> gap = gap_;
+  for (std::size_t r = 0; r < gap.size(); ++r) {
+    if (touches_[r].is_inside) gap[r] += along_normal(r, moved);
+  }
+  return gap;
+}
+
+std::vector<double> BodyPenalty::pushes(const Vector& u) const {
+  std::vector<double> push = gaps(u);
+  for (std::size_t r = 0; r < push.size(); ++r) {
+    push[r] = touches_[r].is_inside ? std::max(0.0, -stiffness_[r] * push[r]) : 0;
+  }
+  return push;
+}
+
+void BodyPenalty::add(const Vector& u, Vector& force) const {
+  if (empty()) return;
+  const std::vector<Vec3d> forces = spread(pushes(u));
+  for (std::size_t p = 0; p < count(); ++p) force[phyxel(p)] += forces[p];
+}
+
+void BodyPenalty::add_energy(const Vector& u, ExactSum& sum) const {
+  if (empty()) return;
+  const std::vector<double> push = pushes(u);
+  for (std::size_t r = 0; r < push.size(); ++r) {
+    if (points_.rows()[r].point < static_cast<Index>(count()) && push[r] > 0) {
+      sum.add(0.5 * push[r] * push[r] / stiffness_[r]);
+    }
+  }
+}
+
+void BodyPenalty::add_squares(ExactSum& sum) const {
+  for (std::size_t r = 0; r < touches_.size(); ++r) {
+    const SurfaceTouch& touch = touches_[r];
+    const bool is_own = points_.rows()[r].point < static_cast<Index>(count());
+    if (!is_own || !touch.is_inside || touch.gap >= 0) continue;
+    sum.add(stiffness_[r] * touch.gap * stiffness_[r] * touch.gap);
+  }
+}
+
+void BodyPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
+  if (empty()) return;
+  const std::vector<Vec3d> moved = of_points(v);
+  std::vector<double> pull(touches_.size());
+  for (std::size_t r = 0; r < pull.size(); ++r) {
+    if (is_held(r)) pull[r] = stiffness_[r] * along_normal(r, moved);
+  }
+  const std::vector<Vec3d> forces = spread(pull);
+  for (std::size_t p = 0; p < count(); ++p) out[phyxel(p)] += forces[p];
+}
+
+bool BodyPenalty::is_held(std::size_t r) const {
+  const double range = points_.sites()[points_.rows()[r].point].range;
+  return touches_[r].is_inside && gap_[r] < rounding_reach * range;
+}
+
+void BodyPenalty::find_blocks() {
+  blocks_.assign(count(), {});
+  for (std::size_t r = 0; r < touches_.size(); ++r) {
+    if (!is_held(r)) continue;
+    const Mat3d whole = stiffness_[r] * outer(touches_[r].normal, touches_[r].normal);
+    const auto add_to = [&](Index p, double share) {
+      if (p < static_cast<Index>(count())) blocks_[p] += share * whole;
+    };
+    add_to(points_.rows()[r].point, 1);
+    const Offset* start = points_.near().offsets.data() + contact_threads * r;
+    for (Offset e = start[0]; e < start[contact_threads]; ++e) {
+      add_to(points_.near().indices[e], carries_[e].part * carries_[e].part);
+    }
+  }
+}
+
+BodyPenalty::Depths BodyPenalty::depths() const {
+  Depths found{std::vector<double>(fields_.size())};
+  for (std::size_t r = 0; r < touches_.size(); ++r) {
+    const Index p = points_.rows()[r].point;
+    if (!touches_[r].is_inside || p >= static_cast<Index>(count())) continue;
+    double& depth = found.of_body[points_.bodies()[p]];
+    depth = std::max(depth, -touches_[r].gap);
+    found.share = std::max(found.share, -touches_[r].gap / points_.sites()[p].range);
+  }
+  return found;
+}
+
+void BodyPenalty::add_to(const Vector& velocity, double time, std::span<ExactSum> sums) const {
+  if (empty()) return;
+  std::vector<double> push(touches_.size());
+  for (std::size_t r = 0; r < push.size(); ++r) {
+    if (touches_[r].is_inside) push[r] = std::max(0.0, -stiffness_[r] * touches_[r].gap);
+  }
+  const std::vector<Vec3d> forces = spread(push);
+  for (std::size_t p = 0; p < count(); ++p) {
+    if (forces[p] == Vec3d{}) continue;
+    const Part& part = part_of(model_, phyxel(p));
+    ContactTerms terms;  // an energy loses nothing
+    terms.set(time * forces[p], {}, motion_[p].after - part.centre, velocity[phyxel(p)], {});
+    for (int t = 0; t < ContactTerms::count; ++t) {
+      sums[static_cast<std::size_t>(part.body) * ContactTerms::count + t].add(terms.value[t]);
+    }
+  }
+}
+
+}  // namespace phyxel

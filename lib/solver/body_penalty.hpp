@@ -1,0 +1,106 @@
+/// Contact of bodies with each other in searches by Newton's method.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "exact_sum.hpp"
+#include "model/owned_vectors.hpp"
+#include "phyxel/model.hpp"
+#include "solver/anderson.hpp"
+#include "solver/body_contacts.hpp"
+
+namespace phyxel {
+
+/// The contact of bodies with each other by penalties. Between two calls of `linearise`, normals
+/// and shares stay what they were, so that forces are the derivative of an energy:
+///   E = Σ ½ k g²  over g < 0,   g = g₀ + n̄ · (d_p - Σ r_k d_k),
+/// with displacements d since then.
+class BodyPenalty {
+ public:
+  using Vector = OwnedVectors::Vector;
+
+  /// @param model must outlive this
+  explicit BodyPenalty(const Model& model);
+
+  /// True in scenes whose bodies do not touch each other.
+  bool empty() const { return !model_.body_contact.acts(); }
+  /// Finds which points are near other bodies, and how. Of a share: collective, as all that follow.
+  /// @param u displacements [m]. @param gradient of displacement, shape [n, 3, 3]
+  void linearise(const Vector& u, const std::vector<Mat3d>& gradient);
+  /// Forgets all that depends on earlier searches, so that a search that a restart begins anew is
+  /// the same.
+  void forget() {
+    found_at_.clear();
+    expected_.clear();
+  }
+  /// Replaces the gaps at u, the displacements of `linearise`, by those from which the next step of
+  /// Newton's method is most likely to lead to a place where gaps are what it takes them for: they
+  /// depend on deformation in ways that the stiffness does not know.
+  /// @returns true if that changes forces
+  bool mix(const Vector& u);
+  /// Adds the forces at displacements u [N].
+  void add(const Vector& u, Vector& force) const;
+  /// Adds the energies of this rank's points at displacements u [J].
+  void add_energy(const Vector& u, ExactSum& sum) const;
+  /// Adds the squared normal forces on this rank's points, as they were at `linearise` [N²].
+  void add_squares(ExactSum& sum) const;
+  /// Adds the stiffness at `linearise` times v [N].
+  void add_stiffness_times(const Vector& v, Vector& out) const;
+  /// Calls each(i, block) with the stiffness at `linearise` of this rank's phyxels i in contact
+  /// against themselves [N/m], ascending. Not collective.
+  template <class Each>
+  void for_each_block(Each&& each) const {
+    for (std::size_t p = 0; p < blocks_.size(); ++p) {
+      const Mat3d& block = blocks_[p];
+      if (block(0, 0) + block(1, 1) + block(2, 2) > 0) each(phyxel(p), block);
+    }
+  }
+  /// The depth of the deepest of this rank's points of each body in other bodies at `linearise`
+  /// [m], and as a share of its support.
+  struct Depths {
+    std::vector<double> of_body;
+    double share = 0;
+  };
+  Depths depths() const;
+  /// Adds to the sums of each body what the forces at `linearise` do over a time [s].
+  /// @param velocity of each phyxel in that time [m/s]. @param sums of the bodies (`ContactTerms`)
+  void add_to(const Vector& velocity, double time, std::span<ExactSum> sums) const;
+
+ private:
+  std::size_t count() const { return points_.own().size(); }
+  Index phyxel(std::size_t p) const { return model_.body_contact.layer.phyxels[points_.own()[p]]; }
+  void find_points(const Vector& u);
+  void find_touches();
+  /// True if a row pushes, or would at once.
+  bool is_held(std::size_t r) const;
+  void find_blocks();
+  /// Vectors of the points, from those of phyxels.
+  std::vector<Vec3d> of_points(const Vector& of_phyxels) const;
+  /// The part along a row's normal of the vector of its point relative to those that carry it.
+  double along_normal(std::size_t r, const std::vector<Vec3d>& of_points) const;
+  /// Forces along normals that rows exert, on this rank's points.
+  std::vector<Vec3d> spread(const std::vector<double>& push) const;
+  /// Gaps at displacements u [m]; of points that are not near other bodies, what they were.
+  std::vector<double> gaps(const Vector& u) const;
+  /// Forces along the normals at displacements u [N].
+  std::vector<double> pushes(const Vector& u) const;
+
+  const Model& model_;
+  TouchingPoints points_;
+  std::vector<DistanceField> fields_;  // of each body of the scene
+  std::vector<double> modulus_;        // of pressure waves, of each body [Pa]
+  std::vector<Vec3d> found_at_;        // places of the layer when points were found [m]
+  std::vector<Vec3d> shaped_at_;       // places of own points when normals were found [m]
+  std::vector<Vec3d> start_;           // displacements of the points at `linearise` [m]
+  std::vector<SurfaceMotion> motion_;  // shape [points]
+  std::vector<SurfaceTouch> touches_;  // shape [rows], as all others of rows
+  std::vector<SurfaceShare> carries_;  // shape [entries]
+  std::vector<double> gap_;            // g₀ of each row [m]
+  std::vector<double> expected_;       // gaps at `linearise` by the linear form before it [m]
+  std::vector<double> stiffness_;      // k of each row [N/m]
+  std::vector<Mat3d> blocks_;          // of this rank's points [N/m]
+  AndersonMixing mixing_;
+};
+
+}  // namespace phyxel
