@@ -34,18 +34,18 @@ BodyPenalty::BodyPenalty(const Model& model)
 void BodyPenalty::find_points(const Vector& u) {
   const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
   std::vector<Vec3d> now(layer.size());
-  double moved = found_at_.empty() ? HUGE_VAL : 0;
+  double moved = knows_points_ ? 0 : HUGE_VAL;
   for (std::size_t k = 0; k < layer.size(); ++k) {
     now[k] = model_.position[layer[k]] + u[layer[k]];
-    if (!found_at_.empty()) moved = std::max(moved, norm(now[k] - found_at_[k]));
+    if (knows_points_) moved = std::max(moved, norm(now[k] - found_at_[k]));
   }
   if (model_.share) moved = model_.share->communicator->largest(moved);
   if (moved <= 0.5 * points_.skin()) return;
   found_at_ = std::move(now);
   points_.find(found_at_, 1);
-  expected_.clear();
+  knows_points_ = true;
+  knows_shapes_ = knows_expected_ = false;
   mixing_.forget();
-  shaped_at_.clear();
 }
 
 /// Finds gaps anew, and normals and shares if points have moved far enough. These jump where a
@@ -66,8 +66,8 @@ void BodyPenalty::find_touches() {
   for (std::size_t r = 0; r < touches.size(); ++r) {
     passes.find_touch(OneThread{}, static_cast<Index>(r));
   }
-  double moved = shaped_at_.empty() ? HUGE_VAL : 0;  // as a share of ranges
-  for (std::size_t p = 0; p < shaped_at_.size(); ++p) {
+  double moved = knows_shapes_ ? 0 : HUGE_VAL;  // as a share of ranges
+  for (std::size_t p = 0; knows_shapes_ && p < count(); ++p) {
     moved = std::max(moved, norm(motion_[p].after - shaped_at_[p]) / points_.sites()[p].range);
   }
   if (model_.share) moved = model_.share->communicator->largest(moved);
@@ -80,13 +80,15 @@ void BodyPenalty::find_touches() {
   }
   touches_ = std::move(touches);
   carries_ = std::move(carries);
+  knows_shapes_ = true;
   shaped_at_.clear();
   for (std::size_t p = 0; p < count(); ++p) shaped_at_.push_back(motion_[p].after);
 }
 
 void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient) {
   if (empty()) return;
-  if (!found_at_.empty()) expected_ = gaps(u);
+  knows_expected_ = knows_points_;
+  if (knows_expected_) expected_ = gaps(u);
   find_points(u);
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
   motion_.assign(points, {});
@@ -111,7 +113,7 @@ void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient)
 }
 
 bool BodyPenalty::mix(const Vector& u) {
-  if (empty() || expected_.size() != gap_.size()) return false;
+  if (empty() || !knows_expected_) return false;
   // The unknowns are what the gaps would be without displacements.
   const std::vector<Vec3d> moved = of_points(u);
   std::vector<double> way(gap_.size()), x(gap_.size()), f(gap_.size());

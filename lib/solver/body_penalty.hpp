@@ -30,10 +30,7 @@ class BodyPenalty {
   void linearise(const Vector& u, const std::vector<Mat3d>& gradient);
   /// Forgets all that depends on earlier searches, so that a search that a restart begins anew is
   /// the same.
-  void forget() {
-    found_at_.clear();
-    expected_.clear();
-  }
+  void forget() { knows_points_ = false; }
   /// Replaces the gaps at u, the displacements of `linearise`, by those from which the next step of
   /// Newton's method is most likely to lead to a place where gaps are what it takes them for: they
   /// depend on deformation in ways that the stiffness does not know.
@@ -101,6 +98,8 @@ class BodyPenalty {
   std::vector<double> stiffness_;      // k of each row [N/m]
   std::vector<Mat3d> blocks_;          // of this rank's points [N/m]
   AndersonMixing mixing_;
+  // The same on all ranks: what of the above is of this search.
+  bool knows_points_ = false, knows_shapes_ = false, knows_expected_ = false;
 };
 
 }  // namespace phyxel
