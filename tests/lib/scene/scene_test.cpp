@@ -432,8 +432,9 @@ TEST(Scene, OutputGoesToAFolderNamedAfterTheSceneHere) {
 }
 
 TEST(Scene, EveryExampleIsRead) {
-  const std::map<std::string, std::size_t> bodies{
-      {"ten_dinos", 10}, {"bin_of_dinos", 6}, {"stack", 4}};
+  const std::map<std::string, std::size_t> bodies{{"ten_dinos", 10},   {"bin_of_dinos", 6},
+                                                  {"stack", 4},        {"cradle", 5},
+                                                  {"rubber_rings", 2}, {"skittles", 11}};
   std::size_t count = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(PHYXEL_SOURCE_DIR "/examples")) {
     const fs::path file = entry.path() / "scene.toml";
