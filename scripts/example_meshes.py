@@ -3,7 +3,7 @@
 
     scripts/example_meshes.py            writes them beside their scenes
 
-The ring is turned from a profile. Each other body is the set of points at which a function is negative, about the signed
+The skittle and the ring are turned from profiles. Each other body is the set of points at which a function is negative, about the signed
 distance from its surface: balls, ellipsoids and capsules, blended. The function is evaluated at the nodes of a cubic grid; a
 cell with corners of both signs gets a vertex, which is then moved onto the surface along the gradient; each edge of the grid
 with ends of both signs gets two triangles between the vertices of its four cells.
@@ -72,20 +72,6 @@ def horseshoe(p):
     return capsule((abs(x), y, z), (0.05, 0, 0), (0.05, 0.1, 0), 0.014)
 
 
-def skittle(p):
-    """A pin of bowling, 0.38 m high, about the z axis."""
-    r, z = math.hypot(p[0], p[1]), p[2]
-    profile = [(0.0, 0.026), (0.02, 0.0335), (0.06, 0.046), (0.114, 0.0605), (0.16, 0.0555), (0.2, 0.038), (0.25, 0.0235),
-               (0.29, 0.0275), (0.33, 0.0325), (0.345, 0.032)]
-    if z >= 0.345:
-        return math.hypot(r, z - 0.345) - 0.032
-    for (z0, r0), (z1, r1) in zip(profile, profile[1:]):
-        if z < z1:
-            t = max((z - z0) / (z1 - z0), 0.0)
-            return max(r - (r0 + t * t * (3 - 2 * t) * (r1 - r0)), -z)
-    return r
-
-
 def gradient(f, p, step):
     slope = []
     for k in range(3):
@@ -145,17 +131,46 @@ def surface_of(f, low, high, step):
 
 
 def turned(profile, count):
-    """Surface of revolution about z of a closed, counter-clockwise profile of points (r, z)."""
-    n = len(profile)
+    """Surface of revolution about z of a closed, counter-clockwise profile of points (r, z), of which some may be on the axis."""
     angles = [2 * math.pi * i / count for i in range(count)]
-    vertices = [(r * math.cos(a), r * math.sin(a), z) for a in angles for r, z in profile]
-    triangles = []
+    number, vertices, triangles = {}, [], []
+
+    def vertex(i, k):
+        r, z = profile[k % len(profile)]
+        key = (i % count if r > 0 else 0, k % len(profile))
+        if key not in number:
+            number[key] = len(vertices)
+            vertices.append((r * math.cos(angles[key[0]]), r * math.sin(angles[key[0]]), z))
+        return number[key]
+
     for i in range(count):
-        for k in range(n):
-            a, b = i * n + k, i * n + (k + 1) % n
-            c, d = (i + 1) % count * n + (k + 1) % n, (i + 1) % count * n + k
-            triangles += [(a, c, b), (a, d, c)]
+        for k in range(len(profile)):
+            a, b, c, d = vertex(i, k), vertex(i, k + 1), vertex(i + 1, k + 1), vertex(i + 1, k)
+            triangles += [t for t in ((a, c, b), (a, d, c)) if len(set(t)) == 3]
     return vertices, triangles
+
+
+#: Heights and radii of a skittle [m], which cubics join.
+SKITTLE = [(-0.03, 0.024), (0.0, 0.032), (0.045, 0.046), (0.114, 0.0605), (0.19, 0.044), (0.25, 0.0235), (0.30, 0.027), (0.345, 0.032),
+           (0.40, 0.032)]
+
+
+def skittle_radius(z):
+    """Radius of a skittle at a height from 0 to 0.345 m."""
+    k = max(j for j in range(1, len(SKITTLE) - 2) if SKITTLE[j][0] <= z)
+    (za, ra), (zb, rb), (zc, rc), (zd, rd) = SKITTLE[k - 1:k + 3]
+    t = (z - zb) / (zc - zb)
+    start, end = (rc - ra) / (zc - za) * (zc - zb), (rd - rb) / (zd - zb) * (zc - zb)
+    square, cube = t * t, t * t * t
+    return (2 * cube - 3 * square + 1) * rb + (cube - 2 * square + t) * start + (3 * square - 2 * cube) * rc + (cube - square) * end
+
+
+def skittle():
+    """A pin of bowling, 0.377 m high, on a flat base."""
+    side = [(skittle_radius(0.345 * k / 28), 0.345 * k / 28) for k in range(28)]
+    angles = [math.pi / 2 * k / 4 for k in range(4)]
+    return turned([(0, 0), (0.011, 0), (0.022, 0)] + side + [(0.032 * math.cos(a), 0.345 + 0.032 * math.sin(a)) for a in angles] +
+                  [(0, 0.377)], 24)
 
 
 def rubber_ring():
@@ -174,7 +189,7 @@ def bodies():
         surface_of(pendulum, (-0.06, -0.12, -0.31), (0.06, 0.12, 0.02), 0.0065)
     yield "clap/horseshoe.obj", "A horseshoe, 28 mm thick, with arms of 0.1 m", \
         surface_of(horseshoe, (-0.075, -0.075, -0.025), (0.075, 0.125, 0.025), 0.006)
-    yield "skittles/skittle.obj", "A pin of bowling, 0.38 m high", surface_of(skittle, (-0.08, -0.08, -0.02), (0.08, 0.08, 0.4), 0.012)
+    yield "skittles/skittle.obj", "A pin of bowling, 0.377 m high", skittle()
     yield "rubber_rings/ring.obj", "A ring of the radii 30 and 40 mm, 10 mm wide", rubber_ring()
 
 
